@@ -1,0 +1,1 @@
+"""UAVs: airframes, their state and their dynamics."""

@@ -1,0 +1,85 @@
+"""The last few poses of every UAV, so that a sensor can look back at where it was.
+
+A ring buffer: row `k % H` is the pose after physics step k, at time `k * dt_ns`; row 0 of a fresh
+history is the initial state. A LIDAR sweep of 18.75 ms reads about 20 rows.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.core.compiled import inline_kernel
+
+DEFAULT_LENGTH = 64
+"""Rows kept: 64 ms at 1 kHz, more than two turns of a 40 Hz LIDAR."""
+
+
+class PoseHistory(NamedTuple):
+    """Poses of N UAVs after the last H physics steps; plain arrays, so that kernels can take it."""
+
+    position: NDArray[np.float64]
+    """(H, N, 3) m, map."""
+    attitude: NDArray[np.float64]
+    """(H, N, 4) unit quaternions, map from body."""
+    dt_ns: int
+    """Length of a physics step."""
+
+
+def new_history(
+    position: ArrayLike, attitude: ArrayLike, dt_ns: int, length: int = DEFAULT_LENGTH
+) -> PoseHistory:
+    """History of a fleet that has stood still at `position` (N, 3), `attitude` (N, 4) so far."""
+    p = np.asarray(position, dtype=np.float64)
+    q = np.asarray(attitude, dtype=np.float64)
+    return PoseHistory(
+        np.ascontiguousarray(np.broadcast_to(p, (length, *p.shape))),
+        np.ascontiguousarray(np.broadcast_to(q, (length, *q.shape))),
+        int(dt_ns),
+    )
+
+
+@inline_kernel
+def record(
+    history: PoseHistory, step: int, position: NDArray[np.float64], attitude: NDArray[np.float64]
+) -> None:
+    """Store the poses (N, 3), (N, 4) after physics step `step`."""
+    row = step % history.position.shape[0]
+    for i in range(position.shape[0]):
+        for j in range(3):
+            history.position[row, i, j] = position[i, j]
+        for j in range(4):
+            history.attitude[row, i, j] = attitude[i, j]
+
+
+@inline_kernel
+def pose_at(
+    history: PoseHistory, uav: int, time_ns: int
+) -> tuple[float, float, float, float, float, float, float]:
+    """Pose (x, y, z, qx, qy, qz, qw) of one UAV at a time that the history covers.
+
+    Positions are interpolated linearly between two steps, attitudes by the normalized mean, whose
+    error against the great arc is below 1e-9 rad for the millisecond of a step.
+    """
+    length = history.position.shape[0]
+    step = max(time_ns, 0) // history.dt_ns
+    f = (max(time_ns, 0) - step * history.dt_ns) / history.dt_ns
+    a = step % length
+    b = a if f == 0.0 else (step + 1) % length
+    p, q = history.position, history.attitude
+    g = 1.0 - f
+    x = g * p[a, uav, 0] + f * p[b, uav, 0]
+    y = g * p[a, uav, 1] + f * p[b, uav, 1]
+    z = g * p[a, uav, 2] + f * p[b, uav, 2]
+    dot = 0.0
+    for j in range(4):
+        dot += q[a, uav, j] * q[b, uav, j]
+    h = -f if dot < 0.0 else f
+    qx = g * q[a, uav, 0] + h * q[b, uav, 0]
+    qy = g * q[a, uav, 1] + h * q[b, uav, 1]
+    qz = g * q[a, uav, 2] + h * q[b, uav, 2]
+    qw = g * q[a, uav, 3] + h * q[b, uav, 3]
+    n = 1.0 / np.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
+    return x, y, z, qx * n, qy * n, qz * n, qw * n
