@@ -1,0 +1,1 @@
+"""What stands in the map: terrain, trees, forests, and the rays cast at them."""

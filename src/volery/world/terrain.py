@@ -1,0 +1,242 @@
+"""The ground: heights on a square grid, and one surface through them for everyone.
+
+Each cell is split along its diagonal from lower left to upper right, and a height anywhere is that
+of the triangle there, so that rays (`Terrain.mesh`), ground contact (`terrain_height`,
+`terrain_normal`) and queries agree to rounding. Beyond the grid the height is that of the nearest
+edge point and the ground is level across the edge.
+
+A file of heights is a CSV matrix without a header: row i holds y = origin_y + i * spacing, column j
+holds x = origin_x + j * spacing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.core.compiled import inline_kernel, kernel
+from volery.core.errors import DataFileError
+from volery.world.mesh import Mesh
+
+_SHOWN_FAULTS = 20
+
+
+class TerrainGrid(NamedTuple):
+    """Heights for kernels: heights (rows along y, columns along x) m, corner and spacing in m."""
+
+    heights: NDArray[np.float64]
+    origin_x: float
+    origin_y: float
+    spacing: float
+
+
+@inline_kernel
+def terrain_height(grid: TerrainGrid, x: float, y: float) -> float:
+    """Height of the ground at map position (x, y), m."""
+    heights, origin_x, origin_y, spacing = grid
+    rows, columns = heights.shape
+    u = min(max((x - origin_x) / spacing, 0.0), columns - 1.0)
+    v = min(max((y - origin_y) / spacing, 0.0), rows - 1.0)
+    j = min(int(u), columns - 2)
+    i = min(int(v), rows - 2)
+    u -= j
+    v -= i
+    low: float = heights[i, j]
+    high: float = heights[i + 1, j + 1]
+    if u >= v:  # the triangle below the diagonal
+        right: float = heights[i, j + 1]
+        return low + u * (right - low) + v * (high - right)
+    left: float = heights[i + 1, j]
+    return low + v * (left - low) + u * (high - left)
+
+
+@inline_kernel
+def terrain_normal(grid: TerrainGrid, x: float, y: float) -> tuple[float, float, float]:
+    """Unit normal (nx, ny, nz), upward, of the ground at map position (x, y)."""
+    heights, origin_x, origin_y, spacing = grid
+    rows, columns = heights.shape
+    u = (x - origin_x) / spacing
+    v = (y - origin_y) / spacing
+    inside_x = 0.0 <= u <= columns - 1.0
+    inside_y = 0.0 <= v <= rows - 1.0
+    u = min(max(u, 0.0), columns - 1.0)
+    v = min(max(v, 0.0), rows - 1.0)
+    j = min(int(u), columns - 2)
+    i = min(int(v), rows - 2)
+    if u - j >= v - i:
+        slope_x = (heights[i, j + 1] - heights[i, j]) / spacing
+        slope_y = (heights[i + 1, j + 1] - heights[i, j + 1]) / spacing
+    else:
+        slope_x = (heights[i + 1, j + 1] - heights[i + 1, j]) / spacing
+        slope_y = (heights[i + 1, j] - heights[i, j]) / spacing
+    if not inside_x:
+        slope_x = 0.0
+    if not inside_y:
+        slope_y = 0.0
+    nz = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
+    return -slope_x * nz, -slope_y * nz, nz
+
+
+@kernel
+def _heights_kernel(
+    grid: TerrainGrid, x: NDArray[np.float64], y: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
+    for k in range(x.shape[0]):
+        out[k] = terrain_height(grid, x[k], y[k])
+
+
+@kernel
+def _normals_kernel(
+    grid: TerrainGrid, x: NDArray[np.float64], y: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
+    for k in range(x.shape[0]):
+        out[k, 0], out[k, 1], out[k, 2] = terrain_normal(grid, x[k], y[k])
+
+
+@dataclass(frozen=True, eq=False)
+class Terrain:
+    """Ground of a world, in the map frame.
+
+    grid: heights and their place; at least 2 x 2 finite heights, held read-only.
+    """
+
+    grid: TerrainGrid
+
+    def __post_init__(self) -> None:
+        heights = np.array(self.grid.heights, dtype=np.float64, order="C")
+        if heights.ndim != 2 or min(heights.shape) < 2:
+            raise ValueError(f"a terrain needs at least 2 x 2 heights, not {heights.shape}")
+        if not np.isfinite(heights).all():
+            raise ValueError("a terrain's heights must be finite numbers")
+        spacing = float(self.grid.spacing)
+        if not (spacing > 0.0 and math.isfinite(spacing)):
+            raise ValueError(f"a terrain's spacing must be positive, not {spacing}")
+        origin = float(self.grid.origin_x), float(self.grid.origin_y)
+        if not all(map(math.isfinite, origin)):
+            raise ValueError(f"a terrain's origin must be finite, not {origin}")
+        heights.flags.writeable = False
+        object.__setattr__(self, "grid", TerrainGrid(heights, *origin, spacing))
+
+    @classmethod
+    def from_heights(
+        cls, heights: ArrayLike, spacing_m: float, origin: tuple[float, float] = (0.0, 0.0)
+    ) -> Terrain:
+        """Terrain through `heights` (rows along y, columns along x), m; [0, 0] lies at `origin`."""
+        return cls(TerrainGrid(np.asarray(heights, dtype=np.float64), *origin, spacing_m))
+
+    @classmethod
+    def flat(
+        cls,
+        extent_m: float = 500.0,
+        height_m: float = 0.0,
+        origin: tuple[float, float] = (0.0, 0.0),
+    ) -> Terrain:
+        """Level square of side `extent_m` whose lower left corner is `origin`."""
+        return cls.from_heights(np.full((2, 2), height_m), extent_m, origin)
+
+    @classmethod
+    def from_csv(
+        cls,
+        path: str | Path,
+        spacing_m: float,
+        origin: tuple[float, float] = (0.0, 0.0),
+    ) -> Terrain:
+        """Terrain of a CSV matrix of heights in m (first row at the lowest y).
+
+        Raises DataFileError that names the file and every bad row.
+        """
+        path = Path(path)
+        return cls.from_heights(_read_heights(path), spacing_m, origin)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """The grid's rectangle x0, y0, x1, y1 in the map, m."""
+        heights, x0, y0, spacing = self.grid
+        rows, columns = heights.shape
+        return x0, y0, x0 + (columns - 1) * spacing, y0 + (rows - 1) * spacing
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
+        """Heights at map positions; x and y broadcast, the result has their shape, m."""
+        x, y = _broadcast(x, y)
+        out = np.empty(x.size)
+        _heights_kernel(self.grid, x.ravel(), y.ravel(), out)
+        return out.reshape(x.shape)
+
+    def normal(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
+        """Unit upward normals at map positions, shape (..., 3)."""
+        x, y = _broadcast(x, y)
+        out = np.empty((x.size, 3))
+        _normals_kernel(self.grid, x.ravel(), y.ravel(), out)
+        return out.reshape((*x.shape, 3))
+
+    def mesh(self) -> Mesh:
+        """The surface as triangles facing up, in the map frame: two a cell."""
+        heights, x0, y0, spacing = self.grid
+        rows, columns = heights.shape
+        x, y = np.meshgrid(x0 + spacing * np.arange(columns), y0 + spacing * np.arange(rows))
+        index = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
+        a, b = index[:-1, :-1], index[:-1, 1:]
+        d, c = index[1:, :-1], index[1:, 1:]
+        triangles = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], axis=2)
+        vertices = np.stack([x, y, heights], axis=-1).reshape(-1, 3)
+        return Mesh(vertices.astype(np.float32), triangles.reshape(-1, 3))
+
+
+def _broadcast(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    bx, by = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
+    return np.ascontiguousarray(bx).reshape(bx.shape), np.ascontiguousarray(by).reshape(by.shape)
+
+
+def _read_heights(path: Path) -> NDArray[np.float64]:
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except FileNotFoundError:
+        raise DataFileError(f"elevation grid {path} does not exist") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataFileError(f"elevation grid {path} cannot be read: {error}") from None
+    rows: list[list[float]] = []
+    faults: list[str] = []
+    columns = 0
+    for number, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        fields = line.split(",")
+        columns = columns or len(fields)
+        if len(fields) != columns:
+            faults.append(f"row {number} has {len(fields)} values, the first row {columns}")
+            continue
+        try:
+            row = [float(field) for field in fields]
+        except ValueError:
+            at = next(k for k, f in enumerate(fields, start=1) if not _is_number(f))
+            faults.append(f"row {number}, column {at}: {fields[at - 1].strip()!r} is not a number")
+            continue
+        wrong = next((k for k, value in enumerate(row, start=1) if not math.isfinite(value)), 0)
+        if wrong:
+            faults.append(
+                f"row {number}, column {wrong}: {fields[wrong - 1].strip()} is not finite"
+            )
+            continue
+        rows.append(row)
+    if faults:
+        more = len(faults) - _SHOWN_FAULTS
+        shown = "; ".join(faults[:_SHOWN_FAULTS]) + (f"; and {more} more" if more > 0 else "")
+        raise DataFileError(f"elevation grid {path}: {shown}")
+    if len(rows) < 2 or columns < 2:
+        raise DataFileError(
+            f"elevation grid {path} has {len(rows)} rows of {columns} values; at least 2 x 2 needed"
+        )
+    return np.array(rows)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
