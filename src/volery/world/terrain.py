@@ -40,8 +40,8 @@ def terrain_height(grid: TerrainGrid, x: float, y: float) -> float:
     """Height of the ground at map position (x, y), m."""
     heights, origin_x, origin_y, spacing = grid
     rows, columns = heights.shape
-    u = min(max((x - origin_x) / spacing, 0.0), columns - 1.0)
-    v = min(max((y - origin_y) / spacing, 0.0), rows - 1.0)
+    u: float = min(max((x - origin_x) / spacing, 0.0), columns - 1.0)
+    v: float = min(max((y - origin_y) / spacing, 0.0), rows - 1.0)
     j = min(int(u), columns - 2)
     i = min(int(v), rows - 2)
     u -= j
