@@ -1,0 +1,1 @@
+"""Volery: many UAVs with LIDARs in lock step."""

@@ -1,0 +1,1 @@
+"""Words everyone uses: errors, clock, frames, rotations, random streams, compiled kernels."""

@@ -1,0 +1,45 @@
+"""Simulated time: integer nanoseconds since the start of the run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+NS_PER_S = 1_000_000_000
+
+
+def ns_from_s(seconds: float) -> int:
+    """Nearest integer nanosecond to `seconds`."""
+    return round(seconds * NS_PER_S)
+
+
+def s_from_ns(time_ns: int) -> float:
+    """Seconds as a float; exact to a nanosecond below 100 days."""
+    return time_ns / NS_PER_S
+
+
+def stamp_from_ns(time_ns: int) -> tuple[int, int]:
+    """ROS stamp (sec, nanosec) of a time."""
+    return divmod(time_ns, NS_PER_S)
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """Instants `phase_ns + k / rate_hz`, k = 0, 1, ..., without accumulated rounding."""
+
+    rate_hz: Fraction
+    phase_ns: int = 0
+
+    @classmethod
+    def from_hz(cls, rate_hz: float, phase_ns: int = 0) -> Schedule:
+        """Schedule of a rate given as a float; 30.0 and 29.97 are taken as exact decimals."""
+        return cls(Fraction(str(rate_hz)), phase_ns)
+
+    @property
+    def period_ns(self) -> int:
+        """Nearest integer period."""
+        return round(NS_PER_S / self.rate_hz)
+
+    def instant_ns(self, k: int) -> int:
+        """Time of the k-th firing."""
+        return self.phase_ns + round(k * NS_PER_S / self.rate_hz)

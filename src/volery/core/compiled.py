@@ -1,0 +1,109 @@
+"""The one way to compile a kernel: numba, nogil, cached under a key that cannot go stale.
+
+numba notices an edit of the file that holds a kernel, but not of a callee in another file. The
+cache folder is therefore named by a hash of all of Volery's sources that hold kernels, the versions
+of numba and numpy, and the CPU. An edited kernel gets a fresh folder; old ones are swept away.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeVar
+
+# libgomp and other OpenMP runtimes spin on shared cores for milliseconds unless told not to.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+_KEEP_CACHES = 3
+
+
+def _kernel_sources() -> list[Path]:
+    return sorted(p for p in _PACKAGE.rglob("*.py") if b"kernel" in p.read_bytes())
+
+
+def _cpu_name() -> str:
+    import llvmlite.binding as llvm
+
+    features: str = llvm.get_host_cpu_features().flatten()
+    name: str = llvm.get_host_cpu_name()
+    return name + hashlib.sha256(features.encode()).hexdigest()[:8]
+
+
+def _cache_key() -> str:
+    digest = hashlib.sha256()
+    for source in _kernel_sources():
+        digest.update(source.relative_to(_PACKAGE).as_posix().encode())
+        digest.update(source.read_bytes())
+    for word in (version("numba"), version("numpy"), sys.version, _cpu_name()):
+        digest.update(word.encode())
+    return digest.hexdigest()[:20]
+
+
+def _cache_root() -> Path:
+    base = os.environ.get("VOLERY_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    root = Path(base) if base else Path.home() / ".cache"
+    return root / "volery" / "kernels"
+
+
+def _sweep(root: Path, keep: Path) -> None:
+    """Remove the compiled kernels of older versions, the newest few excepted."""
+    others = sorted(
+        (p for p in root.iterdir() if p.is_dir() and p != keep),
+        key=lambda p: p.stat().st_mtime,
+        reverse=True,
+    )
+    for old in others[_KEEP_CACHES - 1 :]:
+        if time.time() - old.stat().st_mtime > 3600:
+            shutil.rmtree(old, ignore_errors=True)
+
+
+@cache
+def cache_dir() -> Path:
+    """Folder of the compiled kernels; a temporary one where the user's cache is not writable."""
+    root = _cache_root()
+    folder = root / _cache_key()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+        _sweep(root, folder)
+    except OSError:
+        folder = Path(tempfile.gettempdir()) / f"volery-kernels-{os.getuid()}" / folder.name
+        folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def kernel(function: F) -> F:
+    """Compile `function` at its first call, without Python's lock, cached on disk.
+
+    Division follows numpy (no ZeroDivisionError): a kernel checks its denominators itself.
+    """
+    return _decorate(function, error_model="numpy", nogil=True)
+
+
+def inline_kernel(function: F) -> F:
+    """Compile a small helper that other kernels call; LLVM inlines it."""
+    return _decorate(function, error_model="numpy", nogil=True)
+
+
+def _decorate(function: F, **options: Any) -> F:
+    saved = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_dir())
+    try:
+        compiled: F = numba.njit(cache=True, **options)(function)
+    finally:
+        numba.config.CACHE_DIR = saved
+    return compiled

@@ -1,0 +1,29 @@
+"""The error tree. Whatever a user can cause is a `VoleryError` with one clear sentence."""
+
+
+class VoleryError(Exception):
+    """Base of all errors that Volery raises on purpose."""
+
+
+class ScenarioError(VoleryError):
+    """A scenario cannot be loaded or run; the message names file, key and what is allowed."""
+
+
+class DataFileError(VoleryError):
+    """A data file (inventory, elevation grid, airframe, sensor) is missing or broken."""
+
+
+class PlacementError(ScenarioError):
+    """A UAV was placed where it cannot be: inside a tree, under the ground, inside another."""
+
+
+class RecordingError(VoleryError):
+    """A log cannot be written (disk full, no permission) or read."""
+
+
+class GraphError(VoleryError):
+    """A topic, service or message does not fit: wrong type, unknown name, invalid rate."""
+
+
+class CommandError(VoleryError):
+    """A command is refused: not finite, out of range, or impossible in the present mode."""

@@ -1,0 +1,92 @@
+"""The only place where axes change hands (REP-103 inside: ENU world, FLU body).
+
+- NED world / FRD body: MAVLink's.
+- Optical: z forward, x right, y down; a camera's frames ending in `_optical`.
+- Unity: left-handed, x right, y up, z forward. ROS (x, y, z) = Unity (z, -x, y), so Unity
+  (x, y, z) = ROS (-y, z, x). (The 2025 ROS + Unity3D article prints this equation with its two
+  sides exchanged; this is the form of Unity's own ROS-TCP-Connector.)
+
+Vectors are (..., 3), quaternions (..., 4) in x y z w.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.core import rotations
+
+Array = NDArray[np.float64]
+
+Q_NED_ENU = np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0])
+"""Half a turn about the north-east diagonal; its own inverse."""
+Q_FRD_FLU = np.array([1.0, 0.0, 0.0, 0.0])
+"""Half a turn about the forward axis; its own inverse."""
+Q_BODY_OPTICAL = np.array([-0.5, 0.5, -0.5, 0.5])
+"""Rotates optical-frame vectors into a FLU body frame."""
+
+for _constant in (Q_NED_ENU, Q_FRD_FLU, Q_BODY_OPTICAL):
+    _constant.flags.writeable = False
+
+
+def ned_from_enu(v: ArrayLike) -> Array:
+    """East-north-up vectors to north-east-down."""
+    v = np.asarray(v, dtype=np.float64)
+    return np.stack([v[..., 1], v[..., 0], -v[..., 2]], axis=-1)
+
+
+enu_from_ned = ned_from_enu
+
+
+def frd_from_flu(v: ArrayLike) -> Array:
+    """Forward-left-up vectors to forward-right-down."""
+    return np.asarray(v, dtype=np.float64) * np.array([1.0, -1.0, -1.0])
+
+
+flu_from_frd = frd_from_flu
+
+
+def q_ned_frd_from_enu_flu(q_enu_flu: ArrayLike) -> Array:
+    """Attitude FLU-in-ENU to FRD-in-NED."""
+    return rotations.multiply(Q_NED_ENU, rotations.multiply(q_enu_flu, Q_FRD_FLU))
+
+
+def q_enu_flu_from_ned_frd(q_ned_frd: ArrayLike) -> Array:
+    """Attitude FRD-in-NED to FLU-in-ENU."""
+    return rotations.multiply(Q_NED_ENU, rotations.multiply(q_ned_frd, Q_FRD_FLU))
+
+
+def optical_from_flu(v: ArrayLike) -> Array:
+    """Forward-left-up vectors to an optical frame (x right, y down, z forward)."""
+    v = np.asarray(v, dtype=np.float64)
+    return np.stack([-v[..., 1], -v[..., 2], v[..., 0]], axis=-1)
+
+
+def flu_from_optical(v: ArrayLike) -> Array:
+    """Optical-frame vectors to forward-left-up."""
+    v = np.asarray(v, dtype=np.float64)
+    return np.stack([v[..., 2], -v[..., 0], -v[..., 1]], axis=-1)
+
+
+def unity_from_ros(v: ArrayLike) -> Array:
+    """ROS vectors (x, y, z) to Unity (-y, z, x)."""
+    v = np.asarray(v, dtype=np.float64)
+    return np.stack([-v[..., 1], v[..., 2], v[..., 0]], axis=-1)
+
+
+def ros_from_unity(v: ArrayLike) -> Array:
+    """Unity vectors (x, y, z) to ROS (z, -x, y)."""
+    v = np.asarray(v, dtype=np.float64)
+    return np.stack([v[..., 2], -v[..., 0], v[..., 1]], axis=-1)
+
+
+def q_unity_from_ros(q: ArrayLike) -> Array:
+    """ROS rotation to Unity's: the axis maps as a vector, the sense turns with handedness."""
+    q = np.asarray(q, dtype=np.float64)
+    return np.concatenate([-unity_from_ros(q[..., :3]), q[..., 3:]], axis=-1)
+
+
+def q_ros_from_unity(q: ArrayLike) -> Array:
+    """Unity rotation to ROS."""
+    q = np.asarray(q, dtype=np.float64)
+    return np.concatenate([-ros_from_unity(q[..., :3]), q[..., 3:]], axis=-1)

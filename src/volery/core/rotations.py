@@ -1,0 +1,147 @@
+"""Unit quaternions (x, y, z, w), active, Hamilton: `rotate(q_map_body, v_body)` is in the map.
+
+Functions take arrays whose last axis is the quaternion or vector and broadcast over the rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
+IDENTITY.flags.writeable = False
+
+
+def multiply(p: ArrayLike, q: ArrayLike) -> Array:
+    """Composition: `rotate(multiply(p, q), v) == rotate(p, rotate(q, v))`. Shapes (..., 4)."""
+    px, py, pz, pw = np.moveaxis(np.asarray(p, dtype=np.float64), -1, 0)
+    qx, qy, qz, qw = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
+    return np.stack(
+        [
+            pw * qx + px * qw + py * qz - pz * qy,
+            pw * qy - px * qz + py * qw + pz * qx,
+            pw * qz + px * qy - py * qx + pz * qw,
+            pw * qw - px * qx - py * qy - pz * qz,
+        ],
+        axis=-1,
+    )
+
+
+def conjugate(q: ArrayLike) -> Array:
+    """Inverse rotation. Shape (..., 4)."""
+    return np.asarray(q, dtype=np.float64) * np.array([-1.0, -1.0, -1.0, 1.0])
+
+
+def normalize(q: ArrayLike) -> Array:
+    """Unit quaternion of the same direction. Shape (..., 4)."""
+    q = np.asarray(q, dtype=np.float64)
+    return np.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True))
+
+
+def rotate(q: ArrayLike, v: ArrayLike) -> Array:
+    """Vectors `v` (..., 3) turned by `q` (..., 4)."""
+    q = np.asarray(q, dtype=np.float64)
+    v = np.asarray(v, dtype=np.float64)
+    u, w = q[..., :3], q[..., 3:]
+    t = 2.0 * np.cross(u, v)
+    return np.asarray(v + w * t + np.cross(u, t))
+
+
+def matrix(q: ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    x, y, z, w = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def from_matrix(rotation: ArrayLike) -> Array:
+    """Quaternion of one (3, 3) rotation matrix, with w >= 0."""
+    r = np.asarray(rotation, dtype=np.float64)
+    four_squares = np.array(
+        [
+            1.0 + r[0, 0] - r[1, 1] - r[2, 2],
+            1.0 - r[0, 0] + r[1, 1] - r[2, 2],
+            1.0 - r[0, 0] - r[1, 1] + r[2, 2],
+            1.0 + r[0, 0] + r[1, 1] + r[2, 2],
+        ]
+    )
+    largest = int(np.argmax(four_squares))
+    columns = np.array(
+        [
+            [four_squares[0], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[2, 1] - r[1, 2]],
+            [r[0, 1] + r[1, 0], four_squares[1], r[1, 2] + r[2, 1], r[0, 2] - r[2, 0]],
+            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], four_squares[2], r[1, 0] - r[0, 1]],
+            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], four_squares[3]],
+        ]
+    )
+    q = normalize(columns[largest])
+    return q if q[3] >= 0.0 else -q
+
+
+def from_rpy(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
+    """Quaternion of fixed-axis roll, pitch, yaw (REP-103), rad. Broadcasts to (..., 4)."""
+    roll, pitch, yaw = np.broadcast_arrays(
+        *(np.asarray(a, dtype=np.float64) / 2.0 for a in (roll, pitch, yaw))
+    )
+    cr, sr = np.cos(roll), np.sin(roll)
+    cp, sp = np.cos(pitch), np.sin(pitch)
+    cy, sy = np.cos(yaw), np.sin(yaw)
+    return np.stack(
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ],
+        axis=-1,
+    )
+
+
+def to_rpy(q: ArrayLike) -> Array:
+    """Roll, pitch, yaw (..., 3), rad; pitch in [-pi/2, pi/2]."""
+    x, y, z, w = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
+    return np.stack(
+        [
+            np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+            np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0)),
+            np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+        ],
+        axis=-1,
+    )
+
+
+def yaw_of(q: ArrayLike) -> Array:
+    """Heading about the map's z axis, rad. Shape (...)."""
+    x, y, z, w = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
+    return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+
+
+def exponential(rotation_vector: ArrayLike) -> Array:
+    """Quaternion of a rotation vector (..., 3), rad."""
+    v = np.asarray(rotation_vector, dtype=np.float64)
+    angle = np.linalg.norm(v, axis=-1, keepdims=True)
+    half = angle / 2.0
+    # sin(a/2)/a without a division by zero: numpy's sinc is sin(pi x)/(pi x)
+    return np.concatenate([v * (0.5 * np.sinc(half / np.pi)), np.cos(half)], axis=-1)
+
+
+def logarithm(q: ArrayLike) -> Array:
+    """Rotation vector (..., 3) of a unit quaternion, angle in [0, pi]."""
+    q = np.asarray(q, dtype=np.float64)
+    q = np.where(q[..., 3:] < 0.0, -q, q)
+    length = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(length, q[..., 3:])
+    factor = np.where(length > 1e-12, angle / np.where(length > 1e-12, length, 1.0), 2.0)
+    return np.asarray(q[..., :3] * factor)
+
+
+def slerp(p: ArrayLike, q: ArrayLike, fraction: ArrayLike) -> Array:
+    """Great-arc interpolation from `p` (fraction 0) to `q` (fraction 1), shapes (..., 4)."""
+    step = logarithm(multiply(conjugate(p), q))
+    return multiply(p, exponential(step * np.asarray(fraction, dtype=np.float64)[..., None]))

@@ -1,0 +1,24 @@
+"""The scenarios that ship: one TOML file each in this folder."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+_FOLDER = Path(__file__).parent
+
+
+def names() -> list[str]:
+    """Names of all shipped scenarios, sorted."""
+    return sorted(path.stem for path in _FOLDER.glob("*.toml"))
+
+
+def path_of(name: str) -> Path | None:
+    """File of a shipped scenario, or None."""
+    return _FOLDER / f"{name}.toml" if name in names() else None
+
+
+def describe(name: str) -> str:
+    """First line of a shipped scenario's description."""
+    data = tomllib.loads((_FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    return str(data.get("description", "")).strip().split("\n")[0]

@@ -1,0 +1,149 @@
+"""From a TOML file to a `Scenario`, with errors that name file, key and what is allowed."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from volery.core.errors import ScenarioError
+from volery.scenario import library
+from volery.scenario.schema import Scenario
+
+
+def load_scenario(name_or_path: str | Path) -> Scenario:
+    """Load a scenario by its name in the library or by the path of a TOML file.
+
+    Raises `ScenarioError` naming file, key and what is allowed.
+    """
+    path = _find(name_or_path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: cannot be read: {error}") from None
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{path}: not valid TOML: {error}") from None
+    scenario = parse_scenario(data, where=str(path))
+    scenario._folder = path.parent
+    return scenario
+
+
+def parse_scenario(data: dict[str, Any], *, where: str = "scenario") -> Scenario:
+    """Check plain data against the schema; `where` names its source in errors."""
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        raise ScenarioError(describe_validation_error(error, where, Scenario, data)) from None
+
+
+def describe_validation_error(
+    error: ValidationError, where: str, model: type[BaseModel], data: Any
+) -> str:
+    """One line a fault: file, key, what was found and what is allowed.
+
+    `data` is the checked input; it tells real keys from pydantic's names of union branches.
+    """
+    faults = error.errors()
+    inner = [f["loc"] for f in faults]
+    # A list whose item is at fault is also reported as too short: that says nothing new.
+    faults = [
+        f
+        for f in faults
+        if f["type"] != "too_short"
+        or not any(len(p) > len(f["loc"]) and p[: len(f["loc"])] == f["loc"] for p in inner)
+    ]
+    lines = [_describe(fault, model, data) for fault in faults]
+    if len(lines) == 1:
+        return f"{where}: {lines[0]}"
+    return f"{where}: {len(lines)} faults\n" + "\n".join(f"  {line}" for line in lines)
+
+
+def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
+    key = _key(fault["loc"], data)
+    message = str(fault["msg"]).removeprefix("Value error, ")
+    if fault["type"] == "extra_forbidden":
+        allowed = _sibling_keys(model, fault["loc"])
+        near = difflib.get_close_matches(str(fault["loc"][-1]), allowed, n=1)
+        hint = f"; did you mean '{near[0]}'?" if near else ""
+        return f"unknown key '{key}'{hint} Allowed here: {', '.join(allowed)}"
+    if fault["type"] == "missing":
+        return f"key '{key}' is missing"
+    if not key:
+        return message
+    found = fault.get("input")
+    shown = f" (found {found!r})" if isinstance(found, str | int | float | bool) else ""
+    return f"key '{key}': {message}{shown}"
+
+
+def _key(location: tuple[int | str, ...], data: Any) -> str:
+    key = ""
+    for position, part in enumerate(location):
+        is_key = isinstance(part, int) or (isinstance(data, dict) and part in data)
+        if not is_key and position < len(location) - 1:
+            continue  # the name of a union branch
+        if isinstance(data, dict):
+            data = data.get(part)
+        elif isinstance(data, list | tuple) and isinstance(part, int):
+            data = data[part] if part < len(data) else None
+        key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else str(part)
+    return key
+
+
+def _sibling_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+    """Keys allowed where the unknown key stands, read from the JSON schema."""
+    schema = model.model_json_schema()
+    node: Any = schema
+    for part in location[:-1]:
+        node = _descend(schema, node, part)
+    node = _resolve(schema, node)
+    return sorted(node.get("properties", {}))
+
+
+def _resolve(schema: Any, node: Any) -> Any:
+    while "$ref" in node:
+        node = schema["$defs"][node["$ref"].rsplit("/", 1)[1]]
+    return node
+
+
+def _descend(schema: Any, node: Any, part: int | str) -> Any:
+    node = _resolve(schema, node)
+    if isinstance(part, int):
+        return _resolve(schema, node.get("items", {}))
+    if part in node.get("properties", {}):
+        return _resolve(schema, node["properties"][part])
+    for option in (*node.get("oneOf", ()), *node.get("anyOf", ())):
+        found = _resolve(schema, option)
+        kind = found.get("properties", {}).get("kind", {})
+        if part == kind.get("const") or part in found.get("properties", {}):
+            return found if part == kind.get("const") else _descend(schema, found, part)
+        if "oneOf" in found:
+            return _descend(schema, found, part)
+    extra = node.get("additionalProperties") or node.get("patternProperties", {})
+    if isinstance(extra, dict) and extra:
+        inner = extra if ("$ref" in extra or "type" in extra) else next(iter(extra.values()))
+        return _resolve(schema, inner)
+    return {}
+
+
+def _find(name_or_path: str | Path) -> Path:
+    path = Path(name_or_path)
+    if path.suffix == ".toml" or path.exists():
+        if path.is_dir():
+            raise ScenarioError(f"{path} is a folder; a scenario is a .toml file")
+        if not path.exists():
+            raise ScenarioError(f"{path}: no such file")
+        return path
+    shipped = library.path_of(str(name_or_path))
+    if shipped is None:
+        known = ", ".join(library.names())
+        near = difflib.get_close_matches(str(name_or_path), library.names(), n=1)
+        hint = f" Did you mean '{near[0]}'?" if near else ""
+        raise ScenarioError(
+            f"no scenario '{name_or_path}':{hint} it is neither a file nor one of: {known}"
+        )
+    return shipped

@@ -1,0 +1,45 @@
+"""Changes to a loaded scenario that a command line asks for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from volery.core.errors import ScenarioError
+from volery.scenario.load import parse_scenario
+from volery.scenario.schema import Scenario
+
+
+def apply(
+    scenario: Scenario,
+    *,
+    uavs: int | None = None,
+    seconds: float | None = None,
+    seed: int | None = None,
+) -> Scenario:
+    """Return the scenario with another fleet size, duration or seed, checked anew.
+
+    `uavs` sets the count of a scenario's only group; a scenario with several groups says itself
+    how many fly, and asking for another number raises `ScenarioError`.
+    """
+    data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
+    if seconds is not None:
+        data["duration_s"] = seconds
+    if seed is not None:
+        data["seed"] = seed
+    if uavs is not None:
+        if uavs < 1:
+            raise ScenarioError(f"--uavs: a run needs at least 1 UAV (found {uavs})")
+        if len(scenario.uavs) > 1:
+            raise ScenarioError(
+                f"--uavs: scenario '{scenario.name}' has {len(scenario.uavs)} groups of UAVs; "
+                "set their counts in its file"
+            )
+        group = scenario.uavs[0]
+        if uavs > 1 and group.last_position_m is None:
+            raise ScenarioError(
+                f"--uavs: scenario '{scenario.name}' gives no last_position_m to spread UAVs to"
+            )
+        data["uavs"] = [{**data["uavs"][0], "count": uavs}]
+    changed = parse_scenario(data, where=scenario.name)
+    changed._folder = scenario.folder
+    return changed

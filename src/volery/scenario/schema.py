@@ -1,0 +1,277 @@
+"""The scenario: frozen data that says what to simulate, checked on construction.
+
+Keys carry their units (`_m`, `_deg`, `_hz`, ...). A TOML file maps onto `Scenario` one to one;
+docs/scenarios.md explains it and `Scenario.model_json_schema()` serves editors.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+
+Vector2 = tuple[float, float]
+Vector3 = tuple[float, float, float]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
+Positive = Annotated[float, Field(gt=0.0)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+Rate = Annotated[float, Field(gt=0.0, le=1000.0)]
+
+
+class _Data(BaseModel):
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, str_strip_whitespace=True
+    )
+
+
+# ------------------------------------------------------------------------------------------ world
+
+
+class FlatTerrain(_Data):
+    """Level ground."""
+
+    kind: Literal["flat"] = "flat"
+    extent_m: Positive = 500.0
+    height_m: float = 0.0
+
+
+class GridTerrain(_Data):
+    """A heightfield from a CSV grid: row k holds the elevations at y = k * spacing."""
+
+    kind: Literal["grid"]
+    file: str
+    spacing_m: Positive
+    origin_m: Vector2 = (0.0, 0.0)
+
+
+class InventoryForest(_Data):
+    """Trees at surveyed places: CSV with `x_m,y_m[,dbh_cm,height_m,species]`."""
+
+    kind: Literal["inventory"]
+    file: str
+    species: str
+    region_m: tuple[float, float, float, float] | None = None
+    """x_min, y_min, x_max, y_max; trees with x_min <= x < x_max are kept. None keeps all."""
+
+    @model_validator(mode="after")
+    def _region_is_a_rectangle(self) -> Self:
+        _check_rectangle(self.region_m)
+        return self
+
+
+class ProceduralForest(_Data):
+    """Trees thrown at random with a minimum spacing."""
+
+    kind: Literal["procedural"]
+    region_m: tuple[float, float, float, float]
+    trees: Annotated[int, Field(ge=0, le=200_000)]
+    minimum_spacing_m: NonNegative = 1.0
+    species: Annotated[dict[str, Positive], Field(min_length=1)]
+    """Species name to its share; shares are normalised."""
+
+    @model_validator(mode="after")
+    def _region_is_a_rectangle(self) -> Self:
+        _check_rectangle(self.region_m)
+        return self
+
+
+def _check_rectangle(region: tuple[float, float, float, float] | None) -> None:
+    if region is not None and not (region[0] < region[2] and region[1] < region[3]):
+        raise ValueError("region_m must be [x_min, y_min, x_max, y_max] with min < max")
+
+
+class Wind(_Data):
+    """Steady wind, ENU."""
+
+    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _is_flyable(self) -> Self:
+        if max(abs(v) for v in self.velocity_m_s) > 60.0:
+            raise ValueError("velocity_m_s components must lie within +-60 m/s")
+        return self
+
+
+class World(_Data):
+    """Ground, trees, air."""
+
+    terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
+    forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
+    wind: Wind = Wind()
+
+
+# ------------------------------------------------------------------------------- sensors and UAVs
+
+
+class Nodding(_Data):
+    """Sinusoidal tilt of a mount about the sensor's y axis (positive looks down)."""
+
+    amplitude_deg: Annotated[float, Field(gt=0.0, le=90.0)] = 45.0
+    period_s: Annotated[float, Field(ge=0.1, le=60.0)] = 2.0
+    offset_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 0.0
+    phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 0.0
+
+
+class _Sensor(_Data):
+    name: Name
+    position_m: Vector3 = (0.0, 0.0, 0.0)
+    """Place of the sensor frame in the body, FLU."""
+    rpy_deg: Vector3 = (0.0, 0.0, 0.0)
+    phase_s: NonNegative = 0.0
+    noise: bool = True
+
+
+class LidarSensor(_Sensor):
+    """A scanning range finder of a named model."""
+
+    kind: Literal["lidar"]
+    name: Name = "horizontal"
+    model: str = "utm_30lx"
+    nodding: Nodding | None = None
+
+
+class ImuSensor(_Sensor):
+    """Accelerometer and gyroscope of a named model."""
+
+    kind: Literal["imu"]
+    name: Name = "imu"
+    model: str = "adis16448"
+    rate_hz: Rate = 200.0
+
+
+class SonarSensor(_Sensor):
+    """Ultrasonic range finder looking down."""
+
+    kind: Literal["sonar"]
+    name: Name = "range"
+    model: str = "downward_sonar"
+    rate_hz: Rate = 20.0
+
+
+class OdometrySensor(_Sensor):
+    """Pose and velocity as an odometry source gives them: true motion plus a stated drift."""
+
+    kind: Literal["odometry"]
+    name: Name = "odom"
+    model: str = "visual_inertial"
+    rate_hz: Rate = 50.0
+
+
+class GroundTruthSensor(_Sensor):
+    """The true state, for reports and checks; autonomy must not read it."""
+
+    kind: Literal["ground_truth"]
+    name: Name = "ground_truth"
+    rate_hz: Rate = 50.0
+
+
+Sensor = Annotated[
+    LidarSensor | ImuSensor | SonarSensor | OdometrySensor | GroundTruthSensor,
+    Field(discriminator="kind"),
+]
+
+
+class Flight(_Data):
+    """How the flight modes fly this type of UAV."""
+
+    take_off_altitude_m: Annotated[float, Field(ge=0.3, le=500.0)] = 2.5
+    """Height above the place of take-off."""
+    return_altitude_m: Annotated[float, Field(ge=0.3, le=500.0)] = 10.0
+    command_timeout_s: Annotated[float, Field(ge=0.05, le=60.0)] = 0.5
+    """Without a new velocity command for this long the UAV holds its place."""
+
+
+class NodeEntry(_Data):
+    """A node that runs beside the UAV, inside the simulation, in lock step."""
+
+    node: Annotated[str, Field(pattern=r"^[\w.]+:\w+$")]
+    """`module:Class` with the node contract of `volery.graph.node`."""
+    parameters: dict[str, Any] = {}
+
+
+class UavType(_Data):
+    """What a UAV is made of and what runs on it."""
+
+    airframe: str = "f450"
+    flight: Flight = Flight()
+    sensors: tuple[Sensor, ...] = ()
+    nodes: tuple[NodeEntry, ...] = ()
+
+    @model_validator(mode="after")
+    def _sensor_names_are_unique(self) -> Self:
+        names = [s.name for s in self.sensors]
+        twice = sorted({n for n in names if names.count(n) > 1})
+        if twice:
+            raise ValueError(f"sensor names must differ; used twice: {', '.join(twice)}")
+        return self
+
+
+class UavGroup(_Data):
+    """One UAV, or `count` of them evenly spaced from `position_m` to `last_position_m`."""
+
+    type: str
+    count: Annotated[int, Field(ge=1, le=10_000)] = 1
+    position_m: Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
+    """x, y (standing on the ground) or x, y, z in the map."""
+    last_position_m: Vector2 | None = None
+    yaw_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 0.0
+    placement: Literal["exact", "nearest_free"] = "exact"
+    """`nearest_free` looks around each place for one with room to stand and to climb."""
+    on_start: Literal["wait", "take_off"] = "wait"
+
+    @model_validator(mode="after")
+    def _many_need_a_line(self) -> Self:
+        if self.count > 1 and self.last_position_m is None:
+            raise ValueError("last_position_m is needed when count is larger than 1")
+        return self
+
+
+# --------------------------------------------------------------------------------------- the whole
+
+
+class Physics(_Data):
+    """The inner step and what a touch does."""
+
+    rate_hz: Annotated[int, Field(ge=200, le=4000)] = 1000
+    on_contact: Literal["crash", "bounce"] = "crash"
+
+
+class Scenario(_Data):
+    """Everything a run needs, as data."""
+
+    name: Name
+    description: str = ""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    duration_s: Annotated[float, Field(gt=0.0, le=1_000_000.0)] = 60.0
+    ends_when: Literal["time_is_up", "all_landed"] = "time_is_up"
+    physics: Physics = Physics()
+    world: World = World()
+    types: Annotated[dict[Name, UavType], Field(min_length=1)]
+    uavs: Annotated[tuple[UavGroup, ...], Field(min_length=1)]
+
+    _folder: Path | None = PrivateAttr(default=None)
+
+    @model_validator(mode="after")
+    def _types_exist(self) -> Self:
+        for i, group in enumerate(self.uavs):
+            if group.type not in self.types:
+                known = ", ".join(sorted(self.types))
+                raise ValueError(f"uavs[{i}].type '{group.type}' is not defined; known: {known}")
+        return self
+
+    @model_validator(mode="after")
+    def _physics_period_is_whole(self) -> Self:
+        if 1_000_000_000 % self.physics.rate_hz:
+            raise ValueError("physics.rate_hz must divide 1e9, e.g. 200, 250, 400, 500, 1000")
+        return self
+
+    @property
+    def folder(self) -> Path | None:
+        """Folder that relative file names start from; None for a scenario made in memory."""
+        return self._folder
+
+    @property
+    def uav_count(self) -> int:
+        """Number of UAVs in all groups."""
+        return sum(group.count for group in self.uavs)
