@@ -26,6 +26,8 @@ import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_CONFIG: Any = numba.config
+
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KEEP_CACHES = 3
 
@@ -100,10 +102,10 @@ def inline_kernel(function: F) -> F:
 
 
 def _decorate(function: F, **options: Any) -> F:
-    saved = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_dir())
+    saved = _CONFIG.CACHE_DIR
+    _CONFIG.CACHE_DIR = str(cache_dir())
     try:
         compiled: F = numba.njit(cache=True, **options)(function)
     finally:
-        numba.config.CACHE_DIR = saved
+        _CONFIG.CACHE_DIR = saved
     return compiled

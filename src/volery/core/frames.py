@@ -40,7 +40,7 @@ enu_from_ned = ned_from_enu
 
 def frd_from_flu(v: ArrayLike) -> Array:
     """Forward-left-up vectors to forward-right-down."""
-    return np.asarray(v, dtype=np.float64) * np.array([1.0, -1.0, -1.0])
+    return np.asarray(np.asarray(v, dtype=np.float64) * np.array([1.0, -1.0, -1.0]))
 
 
 flu_from_frd = frd_from_flu

@@ -89,7 +89,8 @@ def normal_quantile(p: float) -> float:
         ((0.007784695709041462 * q + 0.3224671290700398) * q + 2.445134137142996) * q
         + 3.754408661907416
     ) * q + 1.0
-    return top / low if p < 0.5 else -top / low
+    quantile: float = top / low if p < 0.5 else -top / low
+    return quantile
 
 
 @inline_kernel

@@ -1,0 +1,1 @@
+"""The ROS graph inside the simulation: messages, topics, services, nodes, transforms."""

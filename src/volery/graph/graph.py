@@ -1,0 +1,199 @@
+"""Topics and services of one simulation.
+
+Delivery is deterministic: a publication joins a queue, and `deliver` hands queued messages to
+subscribers first come, first served, in the order of subscription. What a callback publishes joins
+the end of the queue.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from volery.core.errors import GraphError
+from volery.graph.messages import Published, message_type, type_name
+
+Callback = Callable[[Published], None]
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """What is known of a topic."""
+
+    name: str
+    msgtype: str
+    publishers: int
+    subscribers: int
+    messages: int
+
+
+class _Topic:
+    def __init__(self, name: str, msgtype: str) -> None:
+        self.name = name
+        self.msgtype = msgtype
+        self.callbacks: list[Callback] = []
+        self.publishers = 0
+        self.messages = 0
+
+
+class Publisher:
+    """A right to publish one type on one topic."""
+
+    def __init__(self, graph: Graph, topic: _Topic) -> None:
+        self._graph = graph
+        self._topic = topic
+
+    @property
+    def topic(self) -> str:
+        """Name of the topic."""
+        return self._topic.name
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anybody would receive a message; what is not wanted need not be built."""
+        return bool(self._topic.callbacks or self._graph.listens_to_all)
+
+    def publish(self, message: Any) -> None:
+        """Queue a message for delivery."""
+        self._graph.enqueue(self._topic, message)
+
+
+class Subscription:
+    """A running subscription; `cancel` ends it."""
+
+    def __init__(self, callbacks: list[Callback], callback: Callback) -> None:
+        self._callbacks = callbacks
+        self._callback = callback
+
+    def cancel(self) -> None:
+        """Stop receiving."""
+        if self._callback in self._callbacks:
+            self._callbacks.remove(self._callback)
+
+
+@dataclass(frozen=True)
+class _Service:
+    srvtype: str
+    handler: Callable[[Any], Any]
+
+
+class Graph:
+    """All topics and services; `now_ns` tells the simulated time of a publication."""
+
+    def __init__(self, now_ns: Callable[[], int]) -> None:
+        self._now_ns = now_ns
+        self._topics: dict[str, _Topic] = {}
+        self._services: dict[str, _Service] = {}
+        self._to_all: list[Callback] = []
+        self._queue: deque[tuple[_Topic, Published]] = deque()
+
+    # ---------------------------------------------------------------------------------- topics
+
+    @property
+    def listens_to_all(self) -> bool:
+        """Whether a recorder or digest wants every message."""
+        return bool(self._to_all)
+
+    def advertise(self, topic: str, msgtype: str | type[Any]) -> Publisher:
+        """Announce a publisher. `GraphError` if the topic exists with another type."""
+        found = self._topic(topic, msgtype)
+        found.publishers += 1
+        return Publisher(self, found)
+
+    def subscribe(
+        self, topic: str, callback: Callback, msgtype: str | type[Any] | None = None
+    ) -> Subscription:
+        """Call `callback` with each message of `topic`, which must exist or be given a type."""
+        if msgtype is None and topic not in self._topics:
+            raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
+        found = self._topics[topic] if msgtype is None else self._topic(topic, msgtype)
+        found.callbacks.append(callback)
+        return Subscription(found.callbacks, callback)
+
+    def subscribe_all(self, callback: Callback) -> Subscription:
+        """Call `callback` with every message of every topic, before the topic's subscribers."""
+        self._to_all.append(callback)
+        return Subscription(self._to_all, callback)
+
+    def topics(self) -> list[TopicInfo]:
+        """All topics, by name."""
+        return [
+            TopicInfo(t.name, t.msgtype, t.publishers, len(t.callbacks), t.messages)
+            for _, t in sorted(self._topics.items())
+        ]
+
+    def enqueue(self, topic: _Topic, message: Any) -> None:
+        """Queue a message; used by `Publisher`."""
+        name = getattr(message, "__msgtype__", None)
+        if name != topic.msgtype:
+            raise GraphError(f"topic '{topic.name}' carries {topic.msgtype}, not {name}")
+        topic.messages += 1
+        if topic.callbacks or self._to_all:
+            published = Published(topic.name, topic.msgtype, self._now_ns(), message)
+            self._queue.append((topic, published))
+
+    def deliver(self) -> None:
+        """Hand out all queued messages, those published meanwhile included."""
+        while self._queue:
+            topic, published = self._queue.popleft()
+            for callback in tuple(self._to_all):
+                callback(published)
+            for callback in tuple(topic.callbacks):
+                callback(published)
+
+    def _topic(self, name: str, msgtype: str | type[Any]) -> _Topic:
+        wanted = msgtype if isinstance(msgtype, str) else type_name(msgtype)
+        _check_name(name)
+        topic = self._topics.get(name)
+        if topic is None:
+            try:
+                message_type(wanted)
+            except KeyError:
+                raise GraphError(f"topic '{name}': unknown message type '{wanted}'") from None
+            topic = self._topics[name] = _Topic(name, wanted)
+        if topic.msgtype != wanted:
+            raise GraphError(f"topic '{name}' carries {topic.msgtype}, not {wanted}")
+        return topic
+
+    # -------------------------------------------------------------------------------- services
+
+    def offer(self, service: str, srvtype: str, handler: Callable[[Any], Any]) -> None:
+        """Offer a service: `handler(request)` returns the response message."""
+        _check_name(service)
+        if service in self._services:
+            raise GraphError(f"service '{service}' is offered already")
+        self._services[service] = _Service(srvtype, handler)
+
+    def call(self, service: str, request: Any | None = None) -> Any:
+        """Call a service and return its response. `GraphError` if nobody offers it."""
+        found = self._services.get(service)
+        if found is None:
+            raise GraphError(f"nobody offers service '{service}'")
+        if request is None:
+            request = message_type(f"{found.srvtype}_Request")()
+        return found.handler(request)
+
+    def has_service(self, service: str) -> bool:
+        """Whether the service is offered."""
+        return service in self._services
+
+    def services(self) -> dict[str, str]:
+        """Service names and their types."""
+        return {name: s.srvtype for name, s in sorted(self._services.items())}
+
+
+def _check_name(name: str) -> None:
+    parts = name.split("/")
+    if not name.startswith("/") or not all(p.isidentifier() for p in parts[1:]):
+        raise GraphError(
+            f"'{name}' is no valid name: absolute, of letters, digits and _ between slashes"
+        )
+
+
+def check_period(period_s: float) -> None:
+    """Refuse a timer period that is not a positive finite number of seconds."""
+    if not (math.isfinite(period_s) and period_s > 0.0):
+        raise GraphError(f"a timer period must be a positive number of seconds, not {period_s}")

@@ -1,0 +1,92 @@
+"""Messages: the ROS 2 types that Volery speaks, and what a published one carries.
+
+Types are plain dataclasses with numpy arrays from `rosbags`; no ROS installation is needed.
+Services that the store lacks are registered from the definition files in `definitions/`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+from rosbags.typesys.stores import ros2_jazzy as _ros2
+
+from volery.core.clock import stamp_from_ns
+
+Time = _ros2.builtin_interfaces__msg__Time
+Point = _ros2.geometry_msgs__msg__Point
+Pose = _ros2.geometry_msgs__msg__Pose
+PoseStamped = _ros2.geometry_msgs__msg__PoseStamped
+PoseWithCovariance = _ros2.geometry_msgs__msg__PoseWithCovariance
+Quaternion = _ros2.geometry_msgs__msg__Quaternion
+Transform = _ros2.geometry_msgs__msg__Transform
+TransformStamped = _ros2.geometry_msgs__msg__TransformStamped
+Twist = _ros2.geometry_msgs__msg__Twist
+TwistWithCovariance = _ros2.geometry_msgs__msg__TwistWithCovariance
+Vector3 = _ros2.geometry_msgs__msg__Vector3
+Odometry = _ros2.nav_msgs__msg__Odometry
+Clock = _ros2.rosgraph_msgs__msg__Clock
+Imu = _ros2.sensor_msgs__msg__Imu
+JointState = _ros2.sensor_msgs__msg__JointState
+LaserScan = _ros2.sensor_msgs__msg__LaserScan
+Range = _ros2.sensor_msgs__msg__Range
+Header = _ros2.std_msgs__msg__Header
+String = _ros2.std_msgs__msg__String
+TFMessage = _ros2.tf2_msgs__msg__TFMessage
+
+_DEFINITIONS = Path(__file__).parent / "definitions"
+_SERVICES = {"Trigger.srv": "std_srvs/srv/Trigger"}
+
+
+@cache
+def typestore() -> Typestore:
+    """The ROS 2 types (Jazzy) and our own registered definitions."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for file, name in _SERVICES.items():
+        request, response = (_DEFINITIONS / file).read_text(encoding="utf-8").split("---\n")
+        for part, definition in (("Request", request), ("Response", response)):
+            # rosbags files every definition under msg/; services belong under srv/
+            (fields,) = get_types_from_msg(definition, name).values()
+            store.register({f"{name}_{part}": fields})
+    return store
+
+
+def message_type(name: str) -> type[Any]:
+    """Dataclass of a type name such as `sensor_msgs/msg/LaserScan`; `KeyError` if unknown."""
+    return typestore().types[name]
+
+
+def type_name(message_class: type[Any]) -> str:
+    """ROS 2 name of a message dataclass."""
+    name: str = message_class.__msgtype__
+    return name
+
+
+def time_from_ns(time_ns: int) -> Time:
+    """ROS time of a simulated instant."""
+    return Time(*stamp_from_ns(time_ns))
+
+
+def header(time_ns: int, frame_id: str) -> Header:
+    """Header stamped with simulated time."""
+    return Header(time_from_ns(time_ns), frame_id)
+
+
+@dataclass(frozen=True)
+class Published:
+    """One message on one topic. Its arrays are read-only; its bytes are made once, on demand."""
+
+    topic: str
+    msgtype: str
+    time_ns: int
+    """Simulated time of publication."""
+    message: Any
+
+    @cached_property
+    def cdr(self) -> bytes:
+        """The message in CDR, the ROS 2 wire form."""
+        return bytes(typestore().serialize_cdr(self.message, self.msgtype))
