@@ -1,0 +1,1 @@
+"""Carriers of messages in and out of the graph: here, log files."""
