@@ -146,7 +146,7 @@ class SonarSensor(_Sensor):
     kind: Literal["sonar"]
     name: Name = "range"
     model: str = "downward_sonar"
-    rate_hz: Rate = 20.0
+    rate_hz: Rate = 10.0
 
 
 class OdometrySensor(_Sensor):

@@ -1,0 +1,52 @@
+# Everything runs in .venv; `make help` lists what there is.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+SCENARIO ?= forest_survey
+OUT ?= runs/$(SCENARIO)
+
+.DEFAULT_GOAL := help
+.PHONY: help run test lint bench docs-benchmarks clean
+
+help: ## list the targets
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
+
+$(BIN)/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Volery needs Python 3.11 or newer; try: make PYTHON=python3.12 ...")'
+	$(PYTHON) -m venv $(VENV) || { echo "cannot make a virtual environment; on Debian: apt-get install python3-venv"; exit 1; }
+
+$(VENV)/.installed: pyproject.toml | $(BIN)/python
+	@echo "installing volery into $(VENV) ..."
+	$(PIP) install --upgrade pip
+	$(PIP) install --editable .
+	@touch $@
+
+$(VENV)/.installed-tests: $(VENV)/.installed pyproject.toml
+	@echo "installing what the tests need into $(VENV) ..."
+	$(PIP) install --editable '.[test,lint]'
+	@touch $@
+
+$(VENV)/.installed-bench: $(VENV)/.installed pyproject.toml
+	$(PIP) install --editable '.[bench]'
+	@touch $@
+
+run: $(VENV)/.installed ## fly the main job and leave a log and a report under runs/
+	@mkdir -p $(OUT)
+	$(BIN)/volery run $(SCENARIO) --record $(OUT)/flight.mcap --report $(OUT)/report
+
+lint: $(VENV)/.installed-tests ## style, types, layers
+	$(BIN)/ruff check src tests examples
+	$(BIN)/ruff format --check src tests examples
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: lint ## install what tests need, check everything, run the tests
+	$(BIN)/python -m volery.core.warm_up
+	$(BIN)/pytest -n 2 --dist loadfile -m 'not slow' tests
+
+bench: $(VENV)/.installed-bench ## measure this machine and rewrite docs/benchmarks.md
+	$(BIN)/volery bench all --markdown docs/benchmarks.md
+
+clean: ## remove what was built or flown here
+	rm -rf $(VENV) dist build runs .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,278 @@
+"""Fly a route through a forest by what two LIDARs, a sonar and odometry tell.
+
+The level scan shows the surroundings at flight height 40 times a second, the nodding scan fills in
+what is above and below. Returns become points in the odometry frame; the ground's slope is fitted
+to the lowest ones; points near the height of flight are remembered as obstacles; the heading goes
+through the gap that lies best towards the next waypoint, at a speed from which the UAV can stop
+before whatever ends the gap. Height above ground is held by the sonar and the slope ahead.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.gaps import choose_heading, free_distances, wrap
+from volery.autonomy.ground_plane import GroundPlane
+from volery.autonomy.obstacle_memory import ObstacleMemory
+from volery.autonomy.scan_points import Pose, ScanProjector
+from volery.core import rotations
+from volery.graph.messages import JointState, LaserScan, Odometry, Range, String, Twist, Vector3
+from volery.graph.node import Node
+
+Array = NDArray[np.float64]
+
+_PERIOD_S = 0.05
+_SONAR_MEMORY_S = 0.5
+_STUCK_AFTER_S = 8.0
+_STUCK_PROGRESS_M = 2.0
+_DETOUR_S = 5.0
+
+
+class Phase(StrEnum):
+    """Where in its mission the node is."""
+
+    START = "start"
+    CLIMB = "climb"
+    FLY = "fly"
+    SETTLE = "settle"
+    LAND = "land"
+
+
+class GapFollowing(Node):
+    """Takes off, visits `route`, lands. Sees scans, range and odometry; commands `cmd_vel`.
+
+    Parameters
+    ----------
+    route: list of [x, y] waypoints, m, relative to where the UAV took off.
+    height_m: height above ground to fly at.
+    speed_m_s: highest speed along the route.
+    safe_radius_m: distance to keep between the UAV's centre and obstacles.
+    deceleration_m_s2: braking that the speed limit counts on.
+    nodding_mount: [x, y, z] of the nodding LIDAR in the body, m; `level_mount` likewise.
+
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("gap_following", **options)
+        route = self.declare_parameter("route", [[50.0, 0.0]]).value
+        self._route = [np.array(point, dtype=np.float64) for point in route]
+        self._height = float(self.declare_parameter("height_m", 3.0).value)
+        self._speed = float(self.declare_parameter("speed_m_s", 4.0).value)
+        self._safe_radius = float(self.declare_parameter("safe_radius_m", 0.9).value)
+        self._deceleration = float(self.declare_parameter("deceleration_m_s2", 2.0).value)
+        self._level = ScanProjector(self.declare_parameter("level_mount", [0.0, 0.0, 0.0]).value)
+        self._nodding = ScanProjector(
+            self.declare_parameter("nodding_mount", [0.0, 0.0, 0.0]).value
+        )
+
+        self._phase = Phase.START
+        self._pose: Pose | None = None
+        self._home = np.zeros(3)
+        self._next_waypoint = 0
+        self._joint: tuple[int, float, float] | None = None
+        self._range: tuple[int, float] | None = None
+        self._scan_count = {"level": 0, "nodding": 0}
+        self._ground = GroundPlane()
+        self._obstacles = ObstacleMemory()
+        self._low_obstacles = ObstacleMemory(half_width_m=10.0, hits_needed=3)
+        self._last_heading: float | None = None
+        self._progress: tuple[int, float] = (0, math.inf)
+        self._detour: tuple[int, float] | None = None
+        self._detours = 0
+        self._settle_at: Array | None = None
+
+        self.create_subscription(Odometry, "odom", self._on_odometry, 5)
+        self.create_subscription(LaserScan, "laser/horizontal/scan", self._on_level_scan, 5)
+        self.create_subscription(LaserScan, "laser/nodding/scan", self._on_nodding_scan, 5)
+        self.create_subscription(JointState, "joint_states", self._on_joint, 5)
+        self.create_subscription(Range, "range", self._on_range, 5)
+        self._command = self.create_publisher(Twist, "cmd_vel", 1)
+        self._status = self.create_publisher(String, "~/phase", 1)
+        self._take_off = self.create_client("std_srvs/srv/Trigger", "take_off")
+        self._land = self.create_client("std_srvs/srv/Trigger", "land")
+        self.create_timer(_PERIOD_S, self._on_timer)
+
+    # ------------------------------------------------------------------------------ what it sees
+
+    def _on_odometry(self, message: Odometry) -> None:
+        self._pose = Pose.from_odometry(message)
+
+    def _on_joint(self, message: JointState) -> None:
+        stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+        self._joint = (stamp, float(message.position[0]), float(message.velocity[0]))
+
+    def _on_range(self, message: Range) -> None:
+        if math.isfinite(message.range):
+            self._range = (self.get_clock().now_ns(), message.range)
+
+    def _on_level_scan(self, scan: LaserScan) -> None:
+        if self._takes_part("level"):
+            self._remember(self._level.points(scan, self._pose))
+
+    def _on_nodding_scan(self, scan: LaserScan) -> None:
+        if self._joint is not None and self._takes_part("nodding"):
+            self._remember(self._nodding.points(scan, self._pose, self._joint))
+
+    def _takes_part(self, which: str) -> bool:
+        """Every second scan is enough at these speeds and halves the load."""
+        self._scan_count[which] += 1
+        return self._scan_count[which] % 2 == 0 and self._phase is not Phase.LAND
+
+    def _remember(self, points: Array | None) -> None:
+        if points is None or len(points) == 0:
+            return
+        now = self.get_clock().now_ns()
+        self._ground.add(points, now)
+        above_ground = points[:, 2] - self._ground.height_at(points[:, :2])
+        near_flight_height = np.abs(above_ground - self._height) < 1.1
+        tall = above_ground > 0.7
+        self._obstacles.add(points[near_flight_height & tall, :2], now)
+        below = tall & (above_ground < self._height)
+        self._low_obstacles.add(points[below, :2], now)
+
+    # ------------------------------------------------------------------------------ what it does
+
+    def _on_timer(self) -> None:
+        if self._pose is None:
+            return
+        step = {
+            Phase.START: self._start,
+            Phase.CLIMB: self._climb,
+            Phase.FLY: self._fly,
+            Phase.SETTLE: self._settle,
+            Phase.LAND: self._wait,
+        }[self._phase]
+        step(self._pose)
+        if self._status.wanted:
+            self._status.publish(String(str(self._phase)))
+
+    def _start(self, pose: Pose) -> None:
+        if self._take_off.service_is_ready() and self._take_off.call().success:
+            self._home = pose.position.copy()
+            self._ground.height = float(pose.position[2])
+            self._ground.anchor = pose.position[:2].copy()
+            self._phase = Phase.CLIMB
+
+    def _climb(self, pose: Pose) -> None:
+        self._refit_ground(pose)
+        if pose.position[2] - self._home[2] > self._height - 0.5:
+            self._phase = Phase.FLY
+
+    def _fly(self, pose: Pose) -> None:
+        self._refit_ground(pose)
+        to_goal = self._home[:2] + self._route[self._next_waypoint] - pose.position[:2]
+        distance = float(np.hypot(*to_goal))
+        if distance < 2.0 or (distance < 6.0 and self._is_stuck(distance)):
+            self._next_waypoint += 1
+            self._progress = (self.get_clock().now_ns(), math.inf)
+            if self._next_waypoint == len(self._route):
+                self._phase = Phase.SETTLE
+                self._settle_at = self._landing_place(pose)
+            return
+        self._go_towards(pose, to_goal, distance)
+
+    def _settle(self, pose: Pose) -> None:
+        """Move to a place without low growth, then land there."""
+        self._refit_ground(pose)
+        assert self._settle_at is not None
+        to_place = self._settle_at - pose.position[:2]
+        distance = float(np.hypot(*to_place))
+        if distance < 0.6 or self._is_stuck(distance):
+            if self._land.call().success:
+                self._phase = Phase.LAND
+            return
+        self._go_towards(pose, to_place, distance)
+
+    def _wait(self, pose: Pose) -> None:
+        """The flight mode lands by itself."""
+
+    def _go_towards(self, pose: Pose, to_goal: Array, distance: float) -> None:
+        now = self.get_clock().now_ns()
+        goal_angle = math.atan2(to_goal[1], to_goal[0])
+        goal_angle = self._detoured(goal_angle, distance, now)
+        obstacles = self._obstacles.around(pose.position[:2], now, 14.0)
+        free = free_distances(obstacles, self._safe_radius, 14.0)
+        heading = choose_heading(free, goal_angle, distance, self._last_heading)
+        if heading is None:
+            self._last_heading = None
+            self._publish(pose, np.zeros(2), 0.6)
+            return
+        self._last_heading = heading.angle
+        speed = self._speed_limit(heading.free_m, distance, obstacles)
+        misaligned = abs(float(wrap(np.array(heading.angle - pose.yaw))))
+        if misaligned > math.radians(50.0):
+            speed = min(speed, 0.5)  # look where you go before going there
+        direction = np.array([math.cos(heading.angle), math.sin(heading.angle)])
+        yaw_rate = 1.8 * float(wrap(np.array(heading.angle - pose.yaw)))
+        self._publish(pose, speed * direction, max(-1.2, min(1.2, yaw_rate)))
+
+    def _speed_limit(self, free_m: float, goal_m: float, obstacles: Array) -> float:
+        stop_within = max(min(free_m - 0.3, goal_m), 0.05)
+        speed = min(self._speed, math.sqrt(2.0 * self._deceleration * stop_within))
+        if len(obstacles):
+            nearest = float(np.hypot(obstacles[:, 0], obstacles[:, 1]).min())
+            speed = min(speed, max(0.4, 2.0 * (nearest - 0.4)))
+        return speed
+
+    def _detoured(self, goal_angle: float, distance: float, now: int) -> float:
+        """Turn aside for a while, left and right in turn, when there is no progress."""
+        if self._detour is not None and now < self._detour[0]:
+            return goal_angle + self._detour[1]
+        if self._detour is not None:
+            self._detour = None
+            self._progress = (now, distance)
+        if self._is_stuck(distance):
+            self._detours += 1
+            side = 1.0 if self._detours % 2 else -1.0
+            self._detour = (now + round(_DETOUR_S * 1e9), side * math.radians(100.0))
+        return goal_angle
+
+    def _is_stuck(self, distance: float) -> bool:
+        since, best = self._progress
+        now = self.get_clock().now_ns()
+        if distance < best - _STUCK_PROGRESS_M:
+            self._progress = (now, distance)
+            return False
+        return now - since > _STUCK_AFTER_S * 1e9
+
+    def _landing_place(self, pose: Pose) -> Array:
+        """Nearest place within 8 m that has no growth within 1 m."""
+        now = self.get_clock().now_ns()
+        growth = self._low_obstacles.around(pose.position[:2], now, 10.0)
+        best, best_cost = np.zeros(2), math.inf
+        for radius in np.arange(0.0, 8.1, 1.0):
+            for angle in np.arange(0.0, 2.0 * math.pi, math.pi / 8.0):
+                place = radius * np.array([math.cos(angle), math.sin(angle)])
+                gap = float(np.hypot(*(growth - place).T).min()) if len(growth) else math.inf
+                cost = float(radius) + 20.0 * max(0.0, 1.2 - gap)
+                if cost < best_cost:
+                    best, best_cost = place, cost
+        return np.asarray(pose.position[:2] + best)
+
+    # -------------------------------------------------------------------------------- vertically
+
+    def _refit_ground(self, pose: Pose) -> None:
+        self._ground.fit(pose.position, self._ground_below(pose), self.get_clock().now_ns())
+
+    def _ground_below(self, pose: Pose) -> float | None:
+        if self._range is None:
+            return None
+        time_ns, distance = self._range
+        if self.get_clock().now_ns() - time_ns > _SONAR_MEMORY_S * 1e9:
+            return None
+        return float(pose.position[2]) - distance
+
+    def _publish(self, pose: Pose, velocity: Array, yaw_rate: float) -> None:
+        """Command a level velocity (odometry frame) together with the climb that holds height."""
+        above = float(pose.position[2]) - float(self._ground.height_at(pose.position[:2]))
+        climb = 1.2 * (self._height - above) + float(velocity @ self._ground.slope)
+        climb = max(-1.0, min(2.0, climb))
+        forward = rotations.rotate(rotations.from_rpy(0.0, 0.0, -pose.yaw), [*velocity, 0.0])
+        self._command.publish(
+            Twist(Vector3(float(forward[0]), float(forward[1]), climb), Vector3(0.0, 0.0, yaw_rate))
+        )

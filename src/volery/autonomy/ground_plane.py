@@ -1,0 +1,64 @@
+"""The slope of the ground ahead, from the lowest LIDAR returns."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_CELL_M = 2.0
+_CELLS = 16
+_RADIUS_M = 13.0
+_RIDGE = 8.0
+"""Weight that pulls the slope to zero where few returns reach the ground."""
+
+
+class GroundPlane:
+    """Plane z = height + slope . (xy - anchor), fitted to the lowest recent point of each cell."""
+
+    def __init__(self, keep_s: float = 3.0) -> None:
+        self._keep_ns = round(keep_s * 1e9)
+        self._low = np.zeros((_CELLS, _CELLS, 3))
+        self._seen_ns = np.full((_CELLS, _CELLS), -(1 << 60), dtype=np.int64)
+        self.anchor = np.zeros(2)
+        self.height = 0.0
+        self.slope = np.zeros(2)
+
+    def height_at(self, xy: Array) -> Array:
+        """Height of the plane below points (..., 2), m."""
+        return np.asarray(self.height + (xy - self.anchor) @ self.slope)
+
+    def add(self, points: Array, time_ns: int) -> None:
+        """Take in points (K, 3), m in a fixed frame."""
+        order = np.argsort(-points[:, 2], kind="stable")
+        points = points[order]  # of a cell's points the last one written is the lowest
+        cells = np.floor(points[:, :2] / _CELL_M).astype(np.int64) % _CELLS
+        lowest = np.full((_CELLS, _CELLS, 3), np.inf)
+        lowest[cells[:, 0], cells[:, 1]] = points
+        new = np.isfinite(lowest[..., 2])
+        stale = time_ns - self._seen_ns > self._keep_ns
+        moved = np.hypot(*(np.moveaxis(lowest[..., :2] - self._low[..., :2], -1, 0))) > 2 * _CELL_M
+        take = new & (stale | moved | (lowest[..., 2] <= self._low[..., 2] + 0.05))
+        self._low[take] = lowest[take]
+        self._seen_ns[take] = time_ns
+
+    def fit(self, position: Array, height_below: float | None, time_ns: int) -> None:
+        """Refit around `position` (3,); `height_below` is the ground's height there if known."""
+        fresh = self._low[time_ns - self._seen_ns <= self._keep_ns]
+        offset = fresh[:, :2] - position[:2]
+        near = np.hypot(offset[:, 0], offset[:, 1]) < _RADIUS_M
+        offset, z = offset[near], fresh[near, 2]
+        base = height_below if height_below is not None else float(self.height_at(position[:2]))
+        weight = np.ones(len(z))
+        slope = self.slope
+        for _ in range(3):
+            residual = z - base - offset @ slope
+            # Points well above the plane are trunks and leaves, not ground.
+            weight = 1.0 / (1.0 + (np.maximum(residual, 0.0) / 0.4) ** 2 + (residual / 2.0) ** 2)
+            normal = (offset * weight[:, None]).T @ offset + _RIDGE * np.eye(2)
+            slope = np.linalg.solve(normal, (offset * weight[:, None]).T @ (z - base))
+        steepness = float(np.hypot(*slope))
+        self.slope = slope if steepness < 1.0 else slope / steepness
+        self.anchor = position[:2].copy()
+        self.height = base

@@ -1,0 +1,74 @@
+"""What is due when: sensors and timers on one integer clock."""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from volery.core.clock import Schedule
+
+What = TypeVar("What")
+
+
+@dataclass(order=True)
+class _Entry(Generic[What]):
+    due_step: int
+    order: int
+    k: int = field(compare=False)
+    schedule: Schedule = field(compare=False)
+    lag_ns: int = field(compare=False)
+    what: What = field(compare=False)
+
+
+@dataclass(frozen=True)
+class Due(Generic[What]):
+    """A firing: the k-th of its schedule, nominally at `instant_ns`."""
+
+    what: What
+    k: int
+    instant_ns: int
+
+
+class Agenda(Generic[What]):
+    """Periodic entries; each fires at the first physics step at or after its instant plus lag.
+
+    Entries due at one step fire in the order in which they were added.
+    """
+
+    def __init__(self, dt_ns: int) -> None:
+        self._dt_ns = dt_ns
+        self._heap: list[_Entry[What]] = []
+        self._added = 0
+
+    def add(self, what: What, schedule: Schedule, *, lag_ns: int = 0, after_step: int = -1) -> None:
+        """Fire `what` by `schedule`, `lag_ns` late (a sweep must end before it is known).
+
+        Firings at or before `after_step` are skipped.
+        """
+        entry = _Entry(0, self._added, 0, schedule, lag_ns, what)
+        entry.due_step = self._step_of(entry)
+        while entry.due_step <= after_step:
+            entry.k += 1
+            entry.due_step = self._step_of(entry)
+        self._added += 1
+        heapq.heappush(self._heap, entry)
+
+    def next_step(self) -> int | None:
+        """Step of the next firing, None when the agenda is empty."""
+        return self._heap[0].due_step if self._heap else None
+
+    def pop_due(self, step: int) -> list[Due[What]]:
+        """All firings due at or before `step`, in order; their next ones are entered."""
+        due = []
+        while self._heap and self._heap[0].due_step <= step:
+            entry = self._heap[0]
+            due.append(Due(entry.what, entry.k, entry.schedule.instant_ns(entry.k)))
+            entry.k += 1
+            entry.due_step = self._step_of(entry)
+            heapq.heapreplace(self._heap, entry)
+        return due
+
+    def _step_of(self, entry: _Entry[What]) -> int:
+        instant = entry.schedule.instant_ns(entry.k) + entry.lag_ns
+        return -(-instant // self._dt_ns)

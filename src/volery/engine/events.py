@@ -1,0 +1,47 @@
+"""What happened to a UAV, with time and place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from volery.core.clock import s_from_ns
+
+
+class EventKind(StrEnum):
+    """Kinds of events."""
+
+    TOUCH_DOWN = "touch_down"
+    IMPACT = "impact"
+    """Hit the ground harder than a landing allows."""
+    COLLISION = "collision"
+    """Touched a tree, another solid or another UAV."""
+    MODE = "mode"
+    """Changed its flight mode."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """One happening. `partner` names what was touched, `detail` anything else worth saying."""
+
+    time_ns: int
+    uav: str
+    kind: EventKind
+    position_map: tuple[float, float, float]
+    speed_m_s: float
+    partner: str = ""
+    detail: str = ""
+
+    def describe(self) -> str:
+        """One line for people."""
+        x, y, z = self.position_map
+        where = f"at ({x:.1f}, {y:.1f}, {z:.1f}) m"
+        time = f"{s_from_ns(self.time_ns):.3f} s"
+        if self.kind is EventKind.MODE:
+            return f"{time}  {self.uav} {self.detail} {where}"
+        what = {
+            EventKind.TOUCH_DOWN: "touched down",
+            EventKind.IMPACT: "hit the ground",
+            EventKind.COLLISION: f"hit {self.partner}",
+        }[self.kind]
+        return f"{time}  {self.uav} {what} at {self.speed_m_s:.2f} m/s {where}"

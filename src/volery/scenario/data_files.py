@@ -1,0 +1,48 @@
+"""Data files that describe parts (airframes, sensors): TOML checked against a pydantic model."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from volery.core.errors import DataFileError
+from volery.scenario.load import describe_validation_error
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def load_data_file(path: Path, model: type[Model]) -> Model:
+    """Read `path` into `model`. Raises `DataFileError` naming file, key and what is allowed."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataFileError(f"{path}: cannot be read: {error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise DataFileError(f"{path}: not valid TOML: {error}") from None
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise DataFileError(describe_validation_error(error, str(path), model, data)) from None
+
+
+def find_data_file(name: str, shipped: Path, what: str, folder: Path | None = None) -> Path:
+    """Path of a part: a `.toml` path (beside the scenario or as given) or a shipped name.
+
+    Raises `DataFileError` listing the shipped names.
+    """
+    if name.endswith(".toml"):
+        for place in ((folder or Path()) / name, Path(name)):
+            if place.is_file():
+                return place
+        raise DataFileError(f"no {what} file '{name}'")
+    path = shipped / f"{name}.toml"
+    if path.is_file():
+        return path
+    known = sorted(p.stem for p in shipped.glob("*.toml"))
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f" Did you mean '{near[0]}'?" if near else ""
+    raise DataFileError(f"no {what} '{name}'.{hint} Known: {', '.join(known)}, or a .toml path")

@@ -1,0 +1,106 @@
+"""What sensors measured, as batches: one object for all sensors of a bank at one instant.
+
+Row i of every array belongs to `sensors[i]`. Arrays are fresh, owned by the sample and read-only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from volery.sensors.lidar import LidarModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SensorId:
+    """Which sensor of which UAV."""
+
+    uav: int
+    """Row of the UAV in the fleet."""
+    uav_name: str
+    name: str
+
+
+@dataclass(frozen=True)
+class LidarScans:
+    """One sweep of each LIDAR of a bank."""
+
+    sensors: tuple[SensorId, ...]
+    stamp_ns: int
+    """Time of the first beam."""
+    model: LidarModel
+    ranges: NDArray[np.float32]
+    """(S, beams) m; +inf no return, -inf nearer than the least range (REP-117)."""
+
+
+@dataclass(frozen=True)
+class ImuReadings:
+    """Rates and specific forces in the sensors' frames."""
+
+    sensors: tuple[SensorId, ...]
+    stamp_ns: int
+    angular_velocity: Array
+    """(S, 3) rad/s."""
+    specific_force: Array
+    """(S, 3) m/s^2; +g upward at rest."""
+    angular_velocity_variance: float
+    specific_force_variance: float
+
+
+@dataclass(frozen=True)
+class RangeReadings:
+    """Distances of single-cone range finders."""
+
+    sensors: tuple[SensorId, ...]
+    stamp_ns: int
+    ranges: Array
+    """(S,) m; +inf nothing in reach, -inf nearer than the least range (REP-117)."""
+    field_of_view_rad: float
+    range_min_m: float
+    range_max_m: float
+
+
+@dataclass(frozen=True)
+class OdometryReadings:
+    """Poses in the odometry frame and twists in the body."""
+
+    sensors: tuple[SensorId, ...]
+    stamp_ns: int
+    position_odom: Array
+    """(S, 3) m."""
+    attitude: Array
+    """(S, 4) x y z w, odom from body."""
+    velocity_body: Array
+    """(S, 3) m/s, FLU."""
+    omega_body: Array
+    """(S, 3) rad/s, FLU."""
+    pose_variance: Array
+    """(S, 6): x, y, z m^2 and roll, pitch, yaw rad^2."""
+    twist_variance: Array
+    """(S, 6)."""
+    is_ground_truth: bool
+
+
+@dataclass(frozen=True)
+class JointAngles:
+    """Angles of nodding mounts; positive tilts the sensor downward."""
+
+    sensors: tuple[SensorId, ...]
+    stamp_ns: int
+    angle: Array
+    """(S,) rad."""
+    rate: Array
+    """(S,) rad/s."""
+
+
+Samples: TypeAlias = LidarScans | ImuReadings | RangeReadings | OdometryReadings | JointAngles
+
+
+def owned(array: NDArray[Any]) -> NDArray[Any]:
+    """The array, made read-only."""
+    array.flags.writeable = False
+    return array

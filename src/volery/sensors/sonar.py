@@ -1,0 +1,118 @@
+"""Ultrasonic range finders: the nearest echo within a cone."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat
+from volery.world.scene import Scene
+
+from volery.core import rng, rotations
+from volery.core.clock import Schedule
+from volery.scenario.data_files import find_data_file, load_data_file
+from volery.sensors.samples import RangeReadings, SensorId, owned
+from volery.vehicle.fleet import Fleet
+
+Array = NDArray[np.float64]
+_MODELS = Path(__file__).parent / "models"
+_RINGS = ((0.0, 1), (0.5, 6), (1.0, 12))
+"""Rays of the cone: share of the half angle and number of rays on that ring."""
+
+
+class SonarModel(BaseModel):
+    """Reach, cone and noise; see the data files in `models/`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    name: str
+    range_min_m: NonNegativeFloat
+    range_max_m: PositiveFloat
+    resolution_m: PositiveFloat
+    field_of_view_deg: float = Field(gt=0.0, lt=180.0)
+    noise_m: NonNegativeFloat
+
+
+def load_sonar_model(name: str, folder: Path | None = None) -> SonarModel:
+    """Model by shipped name or `.toml` path."""
+    return load_data_file(find_data_file(name, _MODELS, "sonar model", folder), SonarModel)
+
+
+class SonarBank:
+    """All sonars of one model, rate and phase; they look along their frame's x axis.
+
+    `position_body` (S, 3) m and `attitude_body` (S, 4) place each sensor frame in its body (FLU);
+    `keys` (S,) are the noise streams, or None for sensors without noise.
+    """
+
+    name = "sonar"
+    lag_ns = 0
+
+    def __init__(
+        self,
+        model: SonarModel,
+        schedule: Schedule,
+        sensors: tuple[SensorId, ...],
+        position_body: Array,
+        attitude_body: Array,
+        keys: NDArray[np.uint64] | None,
+        scene: Scene,
+    ) -> None:
+        self.schedule = schedule
+        self.sensors = sensors
+        self._model = model
+        self._scene = scene
+        self._rows = np.array([s.uav for s in sensors])
+        self._position_body = position_body
+        self._body_from_sensor = attitude_body
+        self._keys = keys
+        self._cone = _cone_directions(math.radians(model.field_of_view_deg) / 2.0)
+
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> RangeReadings:
+        """Reading number k (counted from 0) of all sensors of the bank."""
+        rows, rays = self._rows, len(self._cone)
+        attitude = fleet.state.attitude[rows]
+        map_from_sensor = rotations.multiply(attitude, self._body_from_sensor)
+        origin = fleet.state.position_map[rows] + rotations.rotate(attitude, self._position_body)
+        directions = rotations.rotate(map_from_sensor[:, None, :], self._cone[None, :, :])
+        hits = self._scene.cast(
+            np.repeat(origin, rays, axis=0),
+            directions.reshape(-1, 3),
+            self._model.range_max_m,
+            exclude=np.repeat(rows, rays),
+        )
+        nearest = hits.distance.reshape(-1, rays).min(axis=1).astype(np.float64)
+        if self._keys is not None:
+            noise = np.empty((len(rows), 1))
+            rng.fill_normal(self._keys, k, noise)
+            nearest += self._model.noise_m * noise[:, 0]
+            step = self._model.resolution_m
+            nearest = np.round(nearest / step) * step
+        nearest[nearest > self._model.range_max_m] = np.inf
+        nearest[nearest < self._model.range_min_m] = -np.inf
+        return RangeReadings(
+            self.sensors,
+            time_ns,
+            owned(nearest),
+            math.radians(self._model.field_of_view_deg),
+            self._model.range_min_m,
+            self._model.range_max_m,
+        )
+
+
+def _cone_directions(half_angle: float) -> Array:
+    rays = []
+    for share, count in _RINGS:
+        off_axis = share * half_angle
+        for i in range(count):
+            around = 2.0 * math.pi * i / count
+            rays.append(
+                [
+                    math.cos(off_axis),
+                    math.sin(off_axis) * math.cos(around),
+                    math.sin(off_axis) * math.sin(around),
+                ]
+            )
+    return np.array(rays)

@@ -1,0 +1,38 @@
+"""Compiled kernels are cached, and an edited kernel never meets a stale cache."""
+
+import os
+import subprocess
+import sys
+
+from volery.core import compiled
+
+
+def test_cache_key_depends_on_every_kernel_source(monkeypatch, tmp_path):
+    source = tmp_path / "callee.py"
+    source.write_text("x = 1  # kernel")
+    monkeypatch.setattr(compiled, "_PACKAGE", tmp_path)
+    before = compiled._cache_key()
+    source.write_text("x = 2  # kernel")
+    assert compiled._cache_key() != before
+
+
+def test_unwritable_cache_falls_back_to_a_temporary_folder(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    code = "from volery.core.compiled import cache_dir; print(cache_dir())"
+    env = {**os.environ, "VOLERY_CACHE_DIR": str(blocked), "TMPDIR": str(tmp_path)}
+    out = subprocess.run(
+        [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True
+    )
+    assert out.stdout.strip().startswith(str(tmp_path / "volery-kernels"))
+
+
+def test_old_caches_are_swept(tmp_path):
+    for i in range(6):
+        folder = tmp_path / f"old{i}"
+        folder.mkdir()
+        os.utime(folder, (i, i))
+    keep = tmp_path / "now"
+    keep.mkdir()
+    compiled._sweep(tmp_path, keep)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["now", "old4", "old5"]
