@@ -1,0 +1,308 @@
+"""The one place that knows Embree's C interface: the library inside the `embreex` wheel.
+
+ctypes builds scenes; compiled kernels cast packets of rays and ask for nearest points through
+`numba.types.ExternalFunction`, which, unlike a ctypes function, lets a kernel be cached on disk.
+Names, numbers and layouts are those of Embree 4's headers (`include/embree4/rtcore_*.h`, version
+4.4, RTC_MAX_INSTANCE_LEVEL_COUNT = 1, instance arrays built in); `load` checks the library's
+version, and `Device` casts a ray and a point query at a known triangle before it is trusted.
+
+A packet holds LANES rays, structure of arrays: row r of lane k is float `r * LANES + k` of a
+64-byte aligned block of PACKET_ROWS * LANES floats. An INVALID geometry number after a cast means
+that the lane hit nothing.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.util
+import weakref
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import llvmlite.binding as llvm
+import numpy as np
+from numba import types
+from numpy.typing import ArrayLike, NDArray
+
+from volery.core.compiled import inline_kernel, kernel
+from volery.core.errors import VoleryError
+from volery.world.mesh import Mesh
+
+
+class PaddedMesh(NamedTuple):
+    """A mesh as Embree reads it: vertices 16 bytes at a time, so one more row ends the array."""
+
+    vertices: NDArray[np.float32]
+    """(V + 1, 3), the last row unused."""
+    triangles: NDArray[np.uint32]
+    """(T, 3)."""
+
+
+def padded(mesh: Mesh) -> PaddedMesh:
+    """Copy of a mesh in the form that Embree may read."""
+    vertices = np.zeros((len(mesh.vertices) + 1, 3), dtype=np.float32)
+    vertices[:-1] = mesh.vertices
+    return PaddedMesh(vertices, np.ascontiguousarray(mesh.triangles, dtype=np.uint32))
+
+
+class EmbreeError(VoleryError):
+    """Embree refused a call; the message names the call and Embree's reason."""
+
+
+class EmbreeUnavailableError(EmbreeError):
+    """The library, or something in it that is needed, is not there."""
+
+
+SUPPORTED_MAJOR_MINOR = (4, 4)
+INVALID = 0xFFFFFFFF
+
+QUALITY_LOW, QUALITY_MEDIUM, QUALITY_HIGH = 0, 1, 2
+SCENE_DYNAMIC, SCENE_COMPACT, SCENE_ROBUST = 1, 2, 4
+
+_GEOMETRY_TRIANGLE, _GEOMETRY_INSTANCE = 0, 121
+_BUFFER_INDEX, _BUFFER_VERTEX = 0, 1
+_FORMAT_UINT3, _FORMAT_FLOAT3, _FORMAT_FLOAT3X4_ROW_MAJOR = 0x5003, 0x9003, 0x9134
+_PROPERTY_VERSION_MAJOR, _PROPERTY_VERSION_MINOR = 1, 2
+
+# Rows of a packet: RTCRayN, then RTCHitN.
+ORIGIN, NEAR, DIRECTION, TIME, FAR, MASK, RAY_ID, FLAGS = 0, 3, 4, 7, 8, 9, 10, 11
+NORMAL, U, V, PRIMITIVE, GEOMETRY, INSTANCE, INSTANCE_PRIMITIVE = 12, 15, 16, 17, 18, 19, 20
+PACKET_ROWS = 21
+
+# Words (32 bit) of RTCPointQueryContext: two 4x4 matrices, column-major, then the instance stack.
+CONTEXT_INSTANCE, CONTEXT_INSTANCE_PRIMITIVE, CONTEXT_STACK_SIZE = 32, 33, 34
+CONTEXT_WORDS = 36
+# RTCPointQueryFunctionArguments in 64-bit words; the third is primitive | geometry << 32.
+QUERY_WORD, USER_WORD, PRIMITIVE_WORD, CONTEXT_WORD = 0, 1, 2, 3
+QUERY_RADIUS = 4
+"""Float of RTCPointQuery (x, y, z, time, radius)."""
+
+LANES = 16 if llvm.get_host_cpu_features().get("avx512f", False) else 8
+"""Rays a packet: 16 with AVX-512, else 8."""
+_INTERSECT, _OCCLUDED = f"rtcIntersect{LANES}", f"rtcOccluded{LANES}"
+
+_P, _SIZE, _INT, _UINT = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_uint
+_SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "rtcNewDevice": (_P, (ctypes.c_char_p,)),
+    "rtcReleaseDevice": (None, (_P,)),
+    "rtcGetDeviceError": (_INT, (_P,)),
+    "rtcGetDeviceLastErrorMessage": (ctypes.c_char_p, (_P,)),
+    "rtcGetDeviceProperty": (ctypes.c_ssize_t, (_P, _INT)),
+    "rtcNewScene": (_P, (_P,)),
+    "rtcReleaseScene": (None, (_P,)),
+    "rtcSetSceneFlags": (None, (_P, _INT)),
+    "rtcSetSceneBuildQuality": (None, (_P, _INT)),
+    "rtcCommitScene": (None, (_P,)),
+    "rtcNewGeometry": (_P, (_P, _INT)),
+    "rtcReleaseGeometry": (None, (_P,)),
+    "rtcSetSharedGeometryBuffer": (None, (_P, _INT, _UINT, _INT, _P, _SIZE, _SIZE, _SIZE)),
+    "rtcSetGeometryInstancedScene": (None, (_P, _P)),
+    "rtcSetGeometryTransform": (None, (_P, _UINT, _INT, _P)),
+    "rtcCommitGeometry": (None, (_P,)),
+    "rtcAttachGeometryByID": (None, (_P, _P, _UINT)),
+}
+_CALLED_FROM_KERNELS = (_INTERSECT, _OCCLUDED, "rtcPointQuery")
+
+intersect_packet: Any = types.ExternalFunction(
+    _INTERSECT, types.void(types.intp, types.intp, types.intp, types.intp)
+)
+"""(valid, scene, packet, arguments): closest hits of the lanes whose `valid` is -1."""
+occluded_packet: Any = types.ExternalFunction(
+    _OCCLUDED, types.void(types.intp, types.intp, types.intp, types.intp)
+)
+"""(valid, scene, packet, arguments): sets FAR of a lane that hits anything to -inf."""
+point_query: Any = types.ExternalFunction(
+    "rtcPointQuery",
+    types.boolean(types.intp, types.intp, types.intp, types.intp, types.intp),
+)
+"""(scene, query, context, callback, user data)."""
+
+
+def library_folder() -> Path:
+    """Folder of the shared libraries that come with the `embreex` wheel."""
+    spec = importlib.util.find_spec("embreex")
+    if spec is None or spec.origin is None:
+        raise EmbreeUnavailableError("the package embreex is not installed")
+    return Path(spec.origin).parent.parent / "embreex.libs"
+
+
+@cache
+def load() -> ctypes.CDLL:
+    """Load Embree, once, for ctypes and for compiled kernels."""
+    folder = library_folder()
+    # The wheel's tools append a hash to each library's name; Embree needs TBB, so TBB comes first.
+    paths = [*sorted(folder.glob("libtbb*.so*")), *sorted(folder.glob("libembree4*.so*"))]
+    if not paths or not paths[-1].name.startswith("libembree4"):
+        raise EmbreeUnavailableError(f"no libembree4 in {folder}")
+    try:
+        for path in paths:
+            library = ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
+            llvm.load_library_permanently(str(path))
+    except (OSError, RuntimeError) as error:
+        raise EmbreeUnavailableError(f"cannot load {paths[-1]}: {error}") from error
+    for name in (*_SIGNATURES, *_CALLED_FROM_KERNELS):
+        try:
+            function = getattr(library, name)
+        except AttributeError:
+            raise EmbreeUnavailableError(f"{paths[-1].name} has no symbol {name}") from None
+        if name in _SIGNATURES:
+            function.restype, function.argtypes = _SIGNATURES[name]
+    return library
+
+
+def _release(library: ctypes.CDLL, device: int, scenes: list[int]) -> None:
+    """Give every handle back; run once, by `Device.close` or when the device is collected."""
+    while scenes:
+        library.rtcReleaseScene(scenes.pop())
+    library.rtcReleaseDevice(device)
+
+
+class Device:
+    """An Embree device: makes scenes, owns them, checks every call, gives all back in `close`.
+
+    Built with one thread, so that the same input gives the same tree, and the same hits, each time.
+    """
+
+    def __init__(self, config: str = "threads=1,set_affinity=0") -> None:
+        library = load()
+        device = library.rtcNewDevice(config.encode())
+        if not device:
+            code = library.rtcGetDeviceError(None)
+            reason = library.rtcGetDeviceLastErrorMessage(None) or b""
+            raise EmbreeUnavailableError(
+                f"Embree makes no device (error {code}): {reason.decode() or 'no reason given'}"
+            )
+        self._library = library
+        self._device: int = device
+        self._scenes: list[int] = []
+        self._buffers: list[NDArray[Any]] = []
+        self._finalizer = weakref.finalize(self, _release, library, device, self._scenes)
+        version = (self._property(_PROPERTY_VERSION_MAJOR), self._property(_PROPERTY_VERSION_MINOR))
+        if version != SUPPORTED_MAJOR_MINOR:
+            self.close()
+            raise EmbreeUnavailableError(
+                f"Embree {version[0]}.{version[1]} is not the supported "
+                f"{SUPPORTED_MAJOR_MINOR[0]}.{SUPPORTED_MAJOR_MINOR[1]}"
+            )
+
+    def close(self) -> None:
+        """Release all scenes and the device; no handle may be used afterwards."""
+        self._finalizer()
+        self._buffers.clear()
+
+    def _property(self, number: int) -> int:
+        return int(self._library.rtcGetDeviceProperty(self._device, number))
+
+    def check(self, call: str) -> None:
+        """Raise what Embree has to say about the calls so far."""
+        code = self._library.rtcGetDeviceError(self._device)
+        if code:
+            reason = self._library.rtcGetDeviceLastErrorMessage(self._device) or b""
+            raise EmbreeError(f"{call} failed (Embree error {code}): {reason.decode()}")
+
+    def new_scene(self, *, quality: int = QUALITY_HIGH, flags: int = 0) -> int:
+        """An empty scene."""
+        scene = self._library.rtcNewScene(self._device)
+        self.check("rtcNewScene")
+        self._scenes.append(scene)
+        self._library.rtcSetSceneBuildQuality(scene, quality)
+        self._library.rtcSetSceneFlags(scene, flags)
+        return int(scene)
+
+    def attach_mesh(self, scenes: Sequence[int], number: int, mesh: PaddedMesh) -> None:
+        """Add a mesh to each of `scenes`, which share it and its arrays, as geometry `number`."""
+        lib = self._library
+        self._buffers.extend((mesh.vertices, mesh.triangles))
+        geometry = lib.rtcNewGeometry(self._device, _GEOMETRY_TRIANGLE)
+        buffers = (
+            (_BUFFER_VERTEX, _FORMAT_FLOAT3, mesh.vertices, len(mesh.vertices) - 1),
+            (_BUFFER_INDEX, _FORMAT_UINT3, mesh.triangles, len(mesh.triangles)),
+        )
+        for kind, layout, array, count in buffers:
+            lib.rtcSetSharedGeometryBuffer(
+                geometry, kind, 0, layout, array.ctypes.data, 0, 12, count
+            )
+        self._attach(scenes, number, geometry)
+        self.check(f"adding mesh {number} to a scene")
+
+    def attach_instances(
+        self,
+        scenes: Sequence[int],
+        numbers: ArrayLike,
+        subscenes: Sequence[int],
+        transforms: ArrayLike,
+    ) -> None:
+        """Add instances of committed scenes to each of `scenes`, which share them.
+
+        numbers: (N,) geometry numbers; transforms: (N, 3, 4), scene from sub-scene.
+        """
+        lib = self._library
+        matrices = np.ascontiguousarray(transforms, dtype=np.float32).reshape(-1, 3, 4)
+        address = matrices.ctypes.data
+        identities = np.asarray(numbers).tolist()
+        for i, (number, subscene) in enumerate(zip(identities, subscenes, strict=True)):
+            geometry = lib.rtcNewGeometry(self._device, _GEOMETRY_INSTANCE)
+            lib.rtcSetGeometryInstancedScene(geometry, subscene)
+            lib.rtcSetGeometryTransform(geometry, 0, _FORMAT_FLOAT3X4_ROW_MAJOR, address + 48 * i)
+            self._attach(scenes, number, geometry)
+        self.check("adding instances to a scene")
+
+    def _attach(self, scenes: Sequence[int], number: int, geometry: int) -> None:
+        self._library.rtcCommitGeometry(geometry)
+        for scene in scenes:
+            self._library.rtcAttachGeometryByID(scene, geometry, number)
+        self._library.rtcReleaseGeometry(geometry)  # the scene holds it now
+
+    def commit(self, scene: int) -> None:
+        """Build the scene's search tree; it can be cast at from now on."""
+        self._library.rtcCommitScene(scene)
+        self.check("rtcCommitScene")
+
+
+@inline_kernel
+def aligned_floats(count: int) -> NDArray[np.float32]:
+    """`count` zeroed floats that begin at a multiple of 64 bytes."""
+    raw = np.zeros(count + 16, dtype=np.float32)
+    start = (16 - (raw.ctypes.data >> 2) % 16) % 16
+    return raw[start : start + count]
+
+
+@kernel
+def _cast_one(scene: int, x: float, y: float) -> tuple[float, int, int]:
+    """Distance, geometry and instance number of a ray downward from (x, y, 1)."""
+    packet = aligned_floats(PACKET_ROWS * LANES)
+    words = packet.view(np.uint32)
+    valid = aligned_floats(LANES).view(np.int32)
+    valid[0] = -1
+    packet[ORIGIN * LANES] = x
+    packet[(ORIGIN + 1) * LANES] = y
+    packet[(ORIGIN + 2) * LANES] = 1.0
+    packet[(DIRECTION + 2) * LANES] = -1.0
+    packet[FAR * LANES] = 10.0
+    words[MASK * LANES] = INVALID
+    words[GEOMETRY * LANES] = INVALID
+    words[INSTANCE * LANES] = INVALID
+    intersect_packet(valid.ctypes.data, scene, packet.ctypes.data, 0)
+    return packet[FAR * LANES], words[GEOMETRY * LANES], words[INSTANCE * LANES]
+
+
+def self_test(device: Device) -> None:
+    """Cast at a known instance of a known triangle: a changed layout shows here, not in a flight.
+
+    Raises EmbreeUnavailableError when the answer is wrong.
+    """
+    triangle = Mesh(
+        np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32), np.array([[0, 1, 2]], np.uint32)
+    )
+    part = device.new_scene()
+    device.attach_mesh([part], 3, padded(triangle))
+    device.commit(part)
+    scene = device.new_scene()
+    lowered = np.array([[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, -0.5]])
+    device.attach_instances([scene], [7], [part], lowered)
+    device.commit(scene)
+    hit, miss = _cast_one(scene, 5.2, 0.3), _cast_one(scene, 4.2, 0.3)
+    if abs(hit[0] - 1.5) > 1e-6 or hit[1:] != (3, 7) or miss[1] != INVALID:
+        raise EmbreeUnavailableError("Embree's ray packets are not laid out as expected")

@@ -1,0 +1,148 @@
+"""Scenes in Embree, instanced: one tree model is stored once, however often it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.workers import Workers, new_counter
+from volery.world import embree
+from volery.world.point_query import callback_address, nearest_points
+from volery.world.scene_content import BodyShape, SceneContent
+from volery.world.scene_kernels import BodyTable, SceneHandle, cast_rays, find_occluded
+
+FEW_RAYS = 5000
+"""A batch up to this size is cast by the calling thread alone: waking another costs more."""
+
+
+class EmbreeBackend:
+    """Ray casting and point queries through Embree's C interface."""
+
+    def __init__(self, content: SceneContent) -> None:
+        self._content = content
+        self._device = embree.Device()
+        try:
+            embree.self_test(self._device)
+            self._build()
+        except BaseException:
+            self._device.close()
+            raise
+        self._shapes: dict[int, int] = {}
+
+    def _build(self) -> None:
+        content, device = self._content, self._device
+        self._static = device.new_scene()
+        self._obstacles = device.new_scene()  # the same without the ground
+        models = []
+        for first in content.tree_parts:
+            model = device.new_scene()
+            for k in range(2):
+                part = content.parts[first + k]
+                if len(part.triangles):
+                    device.attach_mesh([model], k, part)
+            device.commit(model)
+            models.append(model)
+        if content.has_terrain:
+            device.attach_mesh([self._static], 0, content.parts[0])
+        both = [self._static, self._obstacles]
+        device.attach_instances(
+            both,
+            np.arange(1, 1 + content.trees),
+            [models[i] for i in content.tree_model],
+            content.tree_transforms,
+        )
+        for number in range(1 + content.trees, content.instances):
+            part = content.parts[content.table.first_part[number]]
+            if len(part.triangles):
+                device.attach_mesh(both, number, part)
+        for scene in both:
+            device.commit(scene)
+
+    def handle(self, bodies: BodyTable) -> SceneHandle:
+        """What kernels need, with these bodies."""
+        content = self._content
+        return SceneHandle(
+            static=self._static,
+            moving_offset=content.instances,
+            normal_matrix=content.normal_matrix,
+            material=content.material,
+            bodies=bodies,
+        )
+
+    def shape_scenes(self, shapes: Sequence[BodyShape]) -> NDArray[np.int64]:
+        """Embree scenes of body shapes, built once a shape."""
+        device = self._device
+        scenes = []
+        for shape in shapes:
+            scene = device.new_scene()
+            for number, (mesh, _) in enumerate(shape.parts):
+                if len(mesh):
+                    device.attach_mesh([scene], number, embree.padded(mesh))
+            device.commit(scene)
+            scenes.append(scene)
+        return np.array(scenes, dtype=np.int64)
+
+    def cast(
+        self,
+        handle: SceneHandle,
+        workers: Workers,
+        origins: NDArray[np.float64],
+        directions: NDArray[np.float64],
+        reach: float,
+        exclude: NDArray[np.int32],
+        fraction: float,
+        out: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32], NDArray[np.uint8]],
+    ) -> None:
+        """Fill distance, normal, instance, material."""
+        workers.run(
+            cast_rays,
+            handle,
+            origins,
+            directions,
+            reach,
+            exclude,
+            fraction,
+            new_counter(),
+            *out,
+            alone=len(origins) <= FEW_RAYS,
+        )
+
+    def occluded(
+        self,
+        handle: SceneHandle,
+        workers: Workers,
+        origins: NDArray[np.float64],
+        targets: NDArray[np.float64],
+        exclude: NDArray[np.int32],
+        fraction: float,
+        out: NDArray[np.bool_],
+    ) -> None:
+        """Fill `out`."""
+        workers.run(
+            find_occluded,
+            handle,
+            origins,
+            targets,
+            exclude,
+            fraction,
+            new_counter(),
+            out,
+            alone=len(origins) <= FEW_RAYS,
+        )
+
+    def clearance(
+        self,
+        points: NDArray[np.float64],
+        reach: float,
+        include_terrain: bool,
+        out: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]],
+    ) -> None:
+        """Fill distance, nearest, instance."""
+        scene = self._static if include_terrain else self._obstacles
+        nearest_points(scene, callback_address(), self._content.table, points, reach, *out)
+
+    def close(self) -> None:
+        """Give all handles back."""
+        self._device.close()

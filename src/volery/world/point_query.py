@@ -1,0 +1,288 @@
+"""Compiled nearest-point queries: the exact nearest point of any triangle to a point of the map.
+
+Embree walks its search tree and calls back for every triangle that may be near; the callback is
+compiled, so no Python runs. Distances are taken in the map frame, in double precision, and are
+therefore right for trees scaled unequally in height and width, too. `nearest_in_all` does the same
+without Embree, over everything: slow, for the fallback and as the reference of tests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numba import types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from volery.core.compiled import cache_dir, inline_kernel, kernel
+from volery.world.embree import (
+    CONTEXT_INSTANCE,
+    CONTEXT_INSTANCE_PRIMITIVE,
+    CONTEXT_STACK_SIZE,
+    CONTEXT_WORD,
+    CONTEXT_WORDS,
+    INVALID,
+    PRIMITIVE_WORD,
+    QUERY_RADIUS,
+    QUERY_WORD,
+    USER_WORD,
+    aligned_floats,
+    point_query,
+)
+
+_carray: Any = vars(numba)["carray"]
+_config: Any = vars(numba)["config"]
+_INVALID = np.uint32(INVALID)
+_FAR_AWAY_M = 1e7
+# State of a query, 64-bit floats: point, squared distance, nearest point, instance.
+_POINT, _SQUARED, _NEAREST, _INSTANCE, _STATE_WORDS = 0, 3, 4, 7, 8
+
+
+class TriangleTable(NamedTuple):
+    """Where the triangles of a scene's instances lie in memory."""
+
+    vertices: NDArray[np.int64]
+    """(parts,) address of a part's vertices, float32 triples."""
+    triangles: NDArray[np.int64]
+    """(parts,) address of a part's triangles, uint32 triples."""
+    length: NDArray[np.int64]
+    """(parts,) number of triangles."""
+    first_part: NDArray[np.int64]
+    """(instances + 1,) parts of instance i are first_part[i] .. first_part[i] + part_count[i]."""
+    part_count: NDArray[np.int64]
+    """(instances,)."""
+    transform: NDArray[np.float64]
+    """(instances, 12) rows of the 3x4 matrix, map from instance."""
+    bounds: NDArray[np.float64]
+    """(instances, 6) lowest and highest corner in the map; empty instances: low > high."""
+
+
+@intrinsic
+def _make_pointer(_context: Any, _address: Any) -> Any:
+    """Pointer with that address."""
+
+    def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], context.get_value_type(types.voidptr))
+
+    return types.voidptr(types.intp), generate
+
+
+_pointer: Any = _make_pointer
+
+
+@inline_kernel
+def _nearest_on_triangle(
+    point: tuple[float, float, float],
+    a: tuple[float, float, float],
+    b: tuple[float, float, float],
+    c: tuple[float, float, float],
+) -> tuple[float, float, float]:
+    """Nearest point of a triangle, by the regions of its corners, edges and face.
+
+    C. Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
+    """
+    abx, aby, abz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    acx, acy, acz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    px, py, pz = point[0] - a[0], point[1] - a[1], point[2] - a[2]
+    d1 = abx * px + aby * py + abz * pz
+    d2 = acx * px + acy * py + acz * pz
+    if d1 <= 0.0 and d2 <= 0.0:
+        return a
+    px, py, pz = point[0] - b[0], point[1] - b[1], point[2] - b[2]
+    d3 = abx * px + aby * py + abz * pz
+    d4 = acx * px + acy * py + acz * pz
+    if d3 >= 0.0 and d4 <= d3:
+        return b
+    px, py, pz = point[0] - c[0], point[1] - c[1], point[2] - c[2]
+    d5 = abx * px + aby * py + abz * pz
+    d6 = acx * px + acy * py + acz * pz
+    if d6 >= 0.0 and d5 <= d6:
+        return c
+    v, w = 0.0, 0.0
+    vc = d1 * d4 - d3 * d2
+    vb = d5 * d2 - d1 * d6
+    va = d3 * d6 - d5 * d4
+    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v = d1 / (d1 - d3) if d1 > d3 else 0.0
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        w = d2 / (d2 - d6) if d2 > d6 else 0.0
+    elif va <= 0.0 and d4 >= d3 and d5 >= d6:
+        whole = (d4 - d3) + (d5 - d6)
+        w = (d4 - d3) / whole if whole > 0.0 else 0.0
+        v = 1.0 - w
+    else:
+        whole = va + vb + vc
+        if whole > 0.0:
+            v = vb / whole
+            w = vc / whole
+    return a[0] + v * abx + w * acx, a[1] + v * aby + w * acy, a[2] + v * abz + w * acz
+
+
+@inline_kernel
+def _corner(
+    vertices: NDArray[np.float32], row: int, m: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Vertex `row` in the map."""
+    x, y, z = float(vertices[row, 0]), float(vertices[row, 1]), float(vertices[row, 2])
+    return (
+        m[0] * x + m[1] * y + m[2] * z + m[3],
+        m[4] * x + m[5] * y + m[6] * z + m[7],
+        m[8] * x + m[9] * y + m[10] * z + m[11],
+    )
+
+
+@inline_kernel
+def _try_triangle(
+    state: NDArray[np.float64],
+    vertices_address: int,
+    triangles_address: int,
+    triangle: int,
+    matrix: NDArray[np.float64],
+    instance: int,
+) -> bool:
+    """Keep the triangle's nearest point if it is nearer than what `state` holds."""
+    corners = _carray(_pointer(triangles_address + 12 * triangle), (3,), np.uint32)
+    # The number of vertices is not known here and not needed: rows are read by address.
+    vertices = _carray(_pointer(vertices_address), (1 << 32, 3), np.float32)
+    point = (state[_POINT], state[_POINT + 1], state[_POINT + 2])
+    x, y, z = _nearest_on_triangle(
+        point,
+        _corner(vertices, corners[0], matrix),
+        _corner(vertices, corners[1], matrix),
+        _corner(vertices, corners[2], matrix),
+    )
+    squared = (x - point[0]) ** 2 + (y - point[1]) ** 2 + (z - point[2]) ** 2
+    if squared >= state[_SQUARED]:
+        return False
+    state[_SQUARED] = squared
+    state[_NEAREST], state[_NEAREST + 1], state[_NEAREST + 2] = x, y, z
+    state[_INSTANCE] = instance
+    return True
+
+
+def _consider(arguments: Any) -> bool:
+    """Embree's callback for one triangle; shrinks the query's radius when it is nearer."""
+    words = _carray(arguments, (4,), np.int64)
+    # User data: addresses of state, vertices, triangles, first_part, transform.
+    user = _carray(_pointer(words[USER_WORD]), (5,), np.int64)
+    state = _carray(_pointer(user[0]), (_STATE_WORDS,), np.float64)
+    context = _carray(_pointer(words[CONTEXT_WORD]), (CONTEXT_WORDS,), np.uint32)
+    triangle = words[PRIMITIVE_WORD] & 0xFFFFFFFF
+    part = (words[PRIMITIVE_WORD] >> 32) & 0xFFFFFFFF
+    instance: Any = np.int64(context[CONTEXT_INSTANCE])
+    if context[CONTEXT_STACK_SIZE] == 0:
+        instance, part = part, 0
+    part += _carray(_pointer(user[3] + 8 * instance), (1,), np.int64)[0]
+    vertices = _carray(_pointer(user[1] + 8 * part), (1,), np.int64)[0]
+    triangles = _carray(_pointer(user[2] + 8 * part), (1,), np.int64)[0]
+    matrix = _carray(_pointer(user[4] + 96 * instance), (12,), np.float64)
+    if not _try_triangle(state, vertices, triangles, triangle, matrix, instance):
+        return False
+    query = _carray(_pointer(words[QUERY_WORD]), (5,), np.float32)
+    query[QUERY_RADIUS] = np.sqrt(state[_SQUARED]) * (1.0 + 1e-6)
+    return True
+
+
+def _compile_callback(function: Callable[..., Any]) -> Any:
+    saved = _config.CACHE_DIR
+    _config.CACHE_DIR = str(cache_dir())
+    try:
+        return numba.cfunc(types.boolean(types.voidptr), cache=True)(function)
+    finally:
+        _config.CACHE_DIR = saved
+
+
+_compiled: list[Any] = []
+
+
+def callback_address() -> int:
+    """Address of the compiled callback; compiles it, or reads it from the cache, at first use."""
+    if not _compiled:
+        _compiled.append(_compile_callback(_consider))
+    return int(_compiled[0].address)
+
+
+@kernel
+def nearest_points(
+    scene: int,
+    callback: int,
+    table: TriangleTable,
+    points: NDArray[np.float64],
+    reach: float,
+    distance: NDArray[np.float64],
+    nearest: NDArray[np.float64],
+    instance: NDArray[np.int32],
+) -> None:
+    """Nearest point of the Embree scene to each point, if nearer than `reach`."""
+    query = aligned_floats(16)
+    context_floats = aligned_floats(CONTEXT_WORDS)
+    context = context_floats.view(np.uint32)
+    state = np.zeros(_STATE_WORDS)
+    user = np.zeros(5, dtype=np.int64)
+    user[0] = state.ctypes.data
+    user[1] = table.vertices.ctypes.data
+    user[2] = table.triangles.ctypes.data
+    user[3] = table.first_part.ctypes.data
+    user[4] = table.transform.ctypes.data
+    limit = min(reach, _FAR_AWAY_M)
+    for i in range(points.shape[0]):
+        for j in range(3):
+            query[j] = points[i, j]
+            state[_POINT + j] = points[i, j]
+            state[_NEAREST + j] = points[i, j]
+        query[3] = 0.0
+        # The query's own point is rounded to 32 bits: look a little further than that.
+        query[QUERY_RADIUS] = limit * (1.0 + 1e-6) + 1e-4
+        state[_SQUARED] = limit * limit
+        state[_INSTANCE] = -1.0
+        context[CONTEXT_INSTANCE] = _INVALID
+        context[CONTEXT_INSTANCE_PRIMITIVE] = _INVALID
+        context[CONTEXT_STACK_SIZE] = 0
+        point_query(scene, query.ctypes.data, context.ctypes.data, callback, user.ctypes.data)
+        instance[i] = int(state[_INSTANCE])
+        distance[i] = np.sqrt(state[_SQUARED]) if instance[i] >= 0 else reach
+        for j in range(3):
+            nearest[i, j] = state[_NEAREST + j]
+
+
+@kernel
+def nearest_in_all(
+    table: TriangleTable,
+    first_instance: int,
+    points: NDArray[np.float64],
+    reach: float,
+    distance: NDArray[np.float64],
+    nearest: NDArray[np.float64],
+    instance: NDArray[np.int32],
+) -> None:
+    """The same without Embree: every triangle of every instance whose box is near enough."""
+    state = np.zeros(_STATE_WORDS)
+    limit = min(reach, _FAR_AWAY_M)
+    for i in range(points.shape[0]):
+        for j in range(3):
+            state[_POINT + j] = points[i, j]
+            state[_NEAREST + j] = points[i, j]
+        state[_SQUARED] = limit * limit
+        state[_INSTANCE] = -1.0
+        for n in range(first_instance, table.part_count.shape[0]):
+            squared = 0.0
+            for j in range(3):
+                gap = max(
+                    table.bounds[n, j] - points[i, j], points[i, j] - table.bounds[n, 3 + j], 0.0
+                )
+                squared += gap * gap
+            if squared >= state[_SQUARED]:
+                continue
+            matrix = table.transform[n]
+            for part in range(table.first_part[n], table.first_part[n] + table.part_count[n]):
+                for triangle in range(table.length[part]):
+                    _try_triangle(
+                        state, table.vertices[part], table.triangles[part], triangle, matrix, n
+                    )
+        instance[i] = int(state[_INSTANCE])
+        distance[i] = np.sqrt(state[_SQUARED]) if instance[i] >= 0 else reach
+        for j in range(3):
+            nearest[i, j] = state[_NEAREST + j]

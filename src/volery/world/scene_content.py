@@ -1,0 +1,171 @@
+"""What a scene holds, as flat tables that both ray casting backends read.
+
+Instances: 0 is the terrain, 1..T the trees in forest order, then the solids. An instance shows one
+or more parts; a part is a mesh with a material, shared by all instances of a tree model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.world.embree import PaddedMesh, padded
+from volery.world.materials import Material
+from volery.world.mesh import Mesh
+from volery.world.point_query import TriangleTable
+from volery.world.terrain import Terrain
+from volery.world.trees.model import DetailLevel
+
+if TYPE_CHECKING:
+    from volery.world.forest import Forest
+
+_MOST_PARTS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A fixed thing in the map: a wall, a test cylinder; its mesh is in map coordinates."""
+
+    mesh: Mesh
+    material: Material
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class BodyShape:
+    """What the others see of a UAV: meshes in the body frame (FLU) with their materials."""
+
+    parts: tuple[tuple[Mesh, Material], ...]
+
+    @property
+    def radius(self) -> float:
+        """Radius of the sphere about the body's origin that holds all parts, m."""
+        lengths = [
+            float(np.linalg.norm(mesh.vertices, axis=1).max())
+            for mesh, _ in self.parts
+            if len(mesh.vertices)
+        ]
+        return max(lengths, default=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class SceneContent:
+    """Tables over instances and parts; see `TriangleTable` for the indexing."""
+
+    parts: tuple[PaddedMesh, ...]
+    table: TriangleTable
+    material: NDArray[np.uint8]
+    """(instances, 2) materials of the instance's parts."""
+    normal_matrix: NDArray[np.float32]
+    """(instances, 9) rows of the inverse transpose of the instance's 3x3 matrix."""
+    tree_parts: NDArray[np.int64]
+    """(models,) first part of each tree model."""
+    tree_model: NDArray[np.int32]
+    """(trees,) model of each tree."""
+    tree_transforms: NDArray[np.float32]
+    """(trees, 3, 4) map from tree."""
+    has_terrain: bool
+    solids: int
+
+    @property
+    def trees(self) -> int:
+        """Number of trees."""
+        return len(self.tree_model)
+
+    @property
+    def instances(self) -> int:
+        """Number of static instances, the terrain's number counted even where there is none."""
+        return 1 + self.trees + self.solids
+
+
+def _part_bounds(part: PaddedMesh) -> NDArray[np.float64]:
+    vertices = part.vertices[:-1]
+    if not len(vertices):
+        return np.array([[np.inf] * 3, [-np.inf] * 3])
+    return np.stack([vertices.min(axis=0), vertices.max(axis=0)]).astype(np.float64)
+
+
+def _instance_bounds(
+    low: NDArray[np.float64], high: NDArray[np.float64], transform: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Boxes (N, 6) in the map that hold the boxes (N, 3), (N, 3) turned by (N, 3, 4)."""
+    empty: NDArray[np.bool_] = np.logical_not(np.isfinite(low).all(axis=1))
+    centre = np.where(empty[:, None], 0.0, (low + high) / 2.0)
+    half = np.where(empty[:, None], 0.0, (high - low) / 2.0)
+    middle = np.einsum("nij,nj->ni", transform[:, :, :3], centre) + transform[:, :, 3]
+    extent = np.einsum("nij,nj->ni", np.abs(transform[:, :, :3]), half)
+    bounds = np.concatenate([middle - extent, middle + extent], axis=1)
+    bounds[empty] = [np.inf] * 3 + [-np.inf] * 3
+    return bounds
+
+
+def collect(
+    terrain: Terrain | None, forest: Forest | None, detail: DetailLevel, solids: Sequence[Solid]
+) -> SceneContent:
+    """Tables of a world at one level of detail."""
+    models = forest.models if forest is not None else ()
+    trees = len(forest.model_index) if forest is not None else 0
+    meshes: list[Mesh] = []
+    if terrain is not None:
+        meshes.append(terrain.mesh())
+    tree_parts = np.empty(len(models), dtype=np.int64)
+    for i, model in enumerate(models):
+        tree_parts[i] = len(meshes)
+        level = model.levels[detail]
+        meshes.extend((level.wood, level.leaves))
+    solid_part = len(meshes)
+    meshes.extend(solid.mesh for solid in solids)
+    parts = tuple(padded(mesh) for mesh in meshes)
+
+    count = 1 + trees + len(solids)
+    transforms = np.broadcast_to(np.eye(3, 4), (count, 3, 4)).copy()
+    first = np.zeros(count, dtype=np.int64)
+    parts_of = np.ones(count, dtype=np.int64)
+    parts_of[0] = terrain is not None
+    material = np.zeros((count, _MOST_PARTS), dtype=np.uint8)
+    material[0] = Material.GROUND
+    tree_transforms = np.zeros((0, 3, 4), dtype=np.float32)
+    model_index = np.zeros(0, dtype=np.int32)
+    if forest is not None:
+        tree_transforms = np.ascontiguousarray(forest.tree_transforms(), dtype=np.float32)
+        model_index = np.asarray(forest.model_index, dtype=np.int32)
+        transforms[1 : 1 + trees] = tree_transforms
+        first[1 : 1 + trees] = tree_parts[model_index]
+        parts_of[1 : 1 + trees] = 2
+        material[1 : 1 + trees] = (Material.WOOD, Material.LEAF)
+    first[1 + trees :] = solid_part + np.arange(len(solids))
+    for i, solid in enumerate(solids):
+        material[1 + trees + i] = solid.material
+
+    boxes = np.array([_part_bounds(part) for part in parts]).reshape(-1, 2, 3)
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    for k in range(_MOST_PARTS):
+        rows = parts_of > k
+        low[rows] = np.minimum(low[rows], boxes[first[rows] + k, 0])
+        high[rows] = np.maximum(high[rows], boxes[first[rows] + k, 1])
+    inverse = np.linalg.inv(transforms[:, :, :3])
+    return SceneContent(
+        parts=parts,
+        table=TriangleTable(
+            vertices=np.array([p.vertices.ctypes.data for p in parts], dtype=np.int64),
+            triangles=np.array([p.triangles.ctypes.data for p in parts], dtype=np.int64),
+            length=np.array([len(p.triangles) for p in parts], dtype=np.int64),
+            first_part=first,
+            part_count=parts_of,
+            transform=transforms.reshape(count, 12),
+            bounds=_instance_bounds(low, high, transforms),
+        ),
+        material=material,
+        normal_matrix=np.ascontiguousarray(
+            np.swapaxes(inverse, 1, 2).reshape(count, 9), dtype=np.float32
+        ),
+        tree_parts=tree_parts,
+        tree_model=model_index,
+        tree_transforms=tree_transforms,
+        has_terrain=terrain is not None,
+        solids=len(solids),
+    )
