@@ -184,7 +184,7 @@ class Terrain:
         d, c = index[1:, :-1], index[1:, 1:]
         triangles = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], axis=2)
         vertices = np.stack([x, y, heights], axis=-1).reshape(-1, 3)
-        return Mesh(vertices.astype(np.float32), triangles.reshape(-1, 3))
+        return Mesh(vertices.astype(np.float32), triangles.reshape(-1, 3).astype(np.uint32))
 
 
 def _broadcast(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

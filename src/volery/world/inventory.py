@@ -1,0 +1,141 @@
+"""Reading tree inventories: CSV files with a heading row and one tree a row.
+
+Columns `x_m` and `y_m` are required; `dbh_cm`, `height_m` and `species` may follow in any order,
+and an empty field means "not measured". All bad rows are reported together, with their row numbers
+in the file (the heading is row 1).
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.errors import DataFileError
+from volery.world.trees import species_names
+
+_REQUIRED = ("x_m", "y_m")
+_OPTIONAL = ("dbh_cm", "height_m", "species")
+_SHOWN_FAULTS = 20
+_THICKEST_CM, _TALLEST_M = 1500.0, 130.0
+"""Beyond any living tree: a larger number is a slip of units."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inventory:
+    """Trees as surveyed: N rows, lengths in m, NaN and "" where not measured.
+
+    position: (N, 2) in the map. dbh_m, height_m: (N,). species: N names.
+    """
+
+    position: NDArray[np.float64]
+    dbh_m: NDArray[np.float64]
+    height_m: NDArray[np.float64]
+    species: tuple[str, ...]
+
+    def __len__(self) -> int:
+        """Number of trees."""
+        return len(self.position)
+
+    def within(self, region: tuple[float, float, float, float]) -> Inventory:
+        """Trees with x0 <= x < x1 and y0 <= y < y1 of `region` (x0, y0, x1, y1), m."""
+        x, y = self.position.T
+        kept = (x >= region[0]) & (x < region[2]) & (y >= region[1]) & (y < region[3])
+        rows = np.flatnonzero(kept)
+        return Inventory(
+            self.position[rows],
+            self.dbh_m[rows],
+            self.height_m[rows],
+            tuple(self.species[k] for k in rows),
+        )
+
+
+def read_inventory(path: str | Path) -> Inventory:
+    """Read an inventory; raises one DataFileError that lists every bad row."""
+    path = Path(path)
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = list(csv.reader(file))
+    except FileNotFoundError:
+        raise DataFileError(f"inventory {path} does not exist") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DataFileError(f"inventory {path} cannot be read: {error}") from None
+    if not rows or not any(field.strip() for field in rows[0]):
+        raise DataFileError(f"inventory {path} is empty; its first row must name the columns")
+    columns = _columns(path, [field.strip() for field in rows[0]])
+    faults: list[str] = []
+    numbers: list[list[float]] = []
+    names: list[str] = []
+    known = frozenset(species_names())
+    for number, row in enumerate(rows[1:], start=2):
+        if not any(field.strip() for field in row):
+            continue
+        fault, values, name = _parse(row, columns, len(rows[0]), known)
+        if fault:
+            faults.append(f"row {number}: {fault}")
+        else:
+            numbers.append(values)
+            names.append(name)
+    if faults:
+        more = len(faults) - _SHOWN_FAULTS
+        shown = "; ".join(faults[:_SHOWN_FAULTS]) + (f"; and {more} more" if more > 0 else "")
+        plural = "row" if len(faults) == 1 else "rows"
+        raise DataFileError(f"inventory {path} has {len(faults)} bad {plural}: {shown}")
+    table = np.array(numbers, dtype=np.float64).reshape(-1, 4)
+    return Inventory(table[:, :2], table[:, 2], table[:, 3], tuple(names))
+
+
+def _columns(path: Path, heading: list[str]) -> dict[str, int]:
+    allowed = ", ".join((*_REQUIRED, *_OPTIONAL))
+    for name in heading:
+        if name not in _REQUIRED + _OPTIONAL:
+            raise DataFileError(f"inventory {path}: unknown column {name!r}; allowed: {allowed}")
+        if heading.count(name) > 1:
+            raise DataFileError(f"inventory {path}: column {name!r} occurs twice")
+    for name in _REQUIRED:
+        if name not in heading:
+            raise DataFileError(f"inventory {path}: column {name!r} is missing; allowed: {allowed}")
+    return {name: heading.index(name) for name in heading}
+
+
+def _parse(
+    row: list[str], columns: dict[str, int], width: int, known: frozenset[str]
+) -> tuple[str, list[float], str]:
+    """What is wrong with a row ("" if nothing), x, y, dbh and height in m, species."""
+    if len(row) != width:
+        return f"{len(row)} fields, the heading has {width}", [], ""
+    values: list[float] = []
+    for column in ("x_m", "y_m", "dbh_cm", "height_m"):
+        text = row[columns[column]].strip() if column in columns else ""
+        if not text:
+            if column in _REQUIRED:
+                return f"{column} is empty", [], ""
+            values.append(math.nan)
+            continue
+        try:
+            value = float(text)
+        except ValueError:
+            return f"{column} {text!r} is not a number", [], ""
+        fault = _wrong(column, value)
+        if fault:
+            return f"{column} {text} {fault}", [], ""
+        values.append(value / 100.0 if column == "dbh_cm" else value)
+    name = row[columns["species"]].strip() if "species" in columns else ""
+    if name and name not in known:
+        return f"unknown species {name!r}; known: {', '.join(sorted(known))}", [], ""
+    return "", values, name
+
+
+def _wrong(column: str, value: float) -> str:
+    if not math.isfinite(value):
+        return "is not finite"
+    if column in _REQUIRED:
+        return ""
+    if value <= 0.0:
+        return "must be above 0"
+    highest = _THICKEST_CM if column == "dbh_cm" else _TALLEST_M
+    return f"is above {highest:g}" if value > highest else ""

@@ -1,0 +1,227 @@
+"""What all forms of trees share: the stem, leaf-bearing shoots, and the meshes of each level."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.world.mesh import EMPTY, Mesh, concatenate
+from volery.world.trees.branches import UP, Branches, across, tubes, unit
+from volery.world.trees.foliage import Blades, quads, stand_ins
+from volery.world.trees.model import BREAST_HEIGHT_M, DetailLevel, TreeMesh
+from volery.world.trees.species import Simplified, Species
+
+Array = NDArray[np.float64]
+
+GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
+"""Turn between successive branches: spreads them evenly around the stem."""
+
+
+class Facets(NamedTuple):
+    """How finely a shoot becomes a tube; zero sides leave it out."""
+
+    segments: int
+    sides: int
+
+
+_FACETS: dict[DetailLevel, tuple[Facets, ...]] = {
+    DetailLevel.VISUAL: (Facets(99, 12), Facets(99, 6), Facets(4, 4), Facets(2, 3)),
+    DetailLevel.SENSING: (Facets(99, 7), Facets(3, 3), Facets(1, 3), Facets(0, 0)),
+    DetailLevel.COARSE: (Facets(99, 5), Facets(2, 3), Facets(0, 0), Facets(0, 0)),
+}
+"""By order: stem, limbs on the stem, shoots on the limbs, twigs. All levels share the stem's rings
+so that the trunk has the same radius everywhere."""
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """What a form needs to know to grow one variant: sizes in m, maturity 0 thin to 1 thick."""
+
+    species: Species
+    height: float
+    dbh: float
+    maturity: float
+    rng: np.random.Generator
+
+    def between(self, pair: tuple[float, float]) -> float:
+        """Value for this size class out of a pair for the thinnest and the thickest."""
+        return pair[0] + (pair[1] - pair[0]) * self.maturity
+
+    def count(self, pair: tuple[float, float]) -> int:
+        """Number for this size class; numbers grow geometrically."""
+        return max(1, round(float(pair[0] * (pair[1] / pair[0]) ** self.maturity)))
+
+    @property
+    def crown_radius(self) -> float:
+        """Radius of the crown, m."""
+        return self.species.crown_width.radius(self.dbh)
+
+    @property
+    def crown_base(self) -> float:
+        """Height of the lowest branches, m."""
+        return self.height * self.between(self.species.crown.base)
+
+    def envelope(self, share: Array) -> Array:
+        """Crown radius as a share of the largest, at `share` of the crown's depth from below."""
+        widest = self.species.crown.widest
+        below = (widest - share) / (widest + 0.35)
+        above = (share - widest) / (1.0 - widest + 0.03)
+        return np.sqrt(1.0 - np.clip(np.where(share < widest, below, above), 0.0, 0.999) ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Growth:
+    """A grown variant: stem (one shoot), limbs by order, leaves in order of growth."""
+
+    stem: Branches
+    limbs: Sequence[Branches]
+    blades: Blades | None = None
+    capped: bool = False
+
+    def fitted(self, height: float) -> Growth:
+        """The same tree stretched along z so that its highest point is `height`, m."""
+        tops = [float(b.points[..., 2].max()) for b in (self.stem, *self.limbs)]
+        if self.blades is not None and len(self.blades):
+            reach = 0.5 * self.blades.length * self.blades.axis[:, 2]
+            tops.append(float((self.blades.middle[:, 2] + np.abs(reach)).max()))
+        factor = height / max(tops)
+        return Growth(
+            self.stem.scaled_z(factor),
+            [b.scaled_z(factor) for b in self.limbs],
+            None if self.blades is None else self.blades.scaled_z(factor),
+            self.capped,
+        )
+
+    def wood(self, level: DetailLevel) -> Mesh:
+        """Stem and limbs as tubes."""
+        parts = []
+        for order, shoots in enumerate((self.stem, *self.limbs)):
+            facets = _FACETS[level][min(order, 3)]
+            if facets.sides:
+                capped = self.capped and (order == 0 or level is DetailLevel.VISUAL)
+                parts.append(tubes(shoots.decimated(facets.segments), facets.sides, capped=capped))
+        return concatenate(parts)
+
+    def mesh(
+        self,
+        level: DetailLevel,
+        height: float,
+        simplified: tuple[int, float] | None,
+        rng: np.random.Generator,
+    ) -> TreeMesh:
+        """Surface at a level; nothing rises above `height`.
+
+        simplified: number of leaf triangles and their spread; None shows every leaf.
+        """
+        if self.blades is None:
+            leaves = EMPTY
+        elif simplified is None:
+            leaves = quads(self.blades)
+        else:
+            leaves = stand_ins(self.blades, *simplified, rng)
+        return TreeMesh(_below(self.wood(level), height), _below(leaves, height))
+
+
+def _below(mesh: Mesh, height: float) -> Mesh:
+    ceiling = np.array([np.inf, np.inf, height], dtype=np.float32)
+    return Mesh(np.minimum(mesh.vertices, ceiling), mesh.triangles)
+
+
+def simplification(species: Species, level: DetailLevel, maturity: float) -> tuple[int, float]:
+    """Leaf triangles and their spread at a coarser level."""
+    rule = species.sensing if level is DetailLevel.SENSING else species.coarse
+    assert isinstance(rule, Simplified)
+    few, many = rule.leaf_triangles
+    low, high = rule.spread
+    return round(few * (many / few) ** maturity), low + (high - low) * maturity
+
+
+def stem(site: Site, *, top: float | None = None, broken: float = 0.0) -> Branches:
+    """The trunk up to `top` (the tree's height), with roots below the ground for slopes.
+
+    broken: share of the former height that is missing; the trunk ends thick.
+    """
+    trunk = site.species.trunk
+    top = site.height if top is None else top
+    breast = min(BREAST_HEIGHT_M, 0.5 * top)
+    sink = 2.5 * site.dbh + 0.05
+    roots = 0.9 * site.dbh + 0.05
+    low = np.array([-sink, 0.0, roots, breast])
+    z = np.unique(np.concatenate([low[low < top], np.linspace(breast, top, 9)]).round(6))
+    whole = top / (1.0 - broken) if broken else 1.02 * top
+
+    def profile(height: Array | float) -> Array:
+        left = np.clip(1.0 - np.asarray(height) / whole, 0.0, None) ** trunk.taper
+        swell = 1.0 + (trunk.flare - 1.0) * np.exp(-np.maximum(height, 0.0) / roots)
+        return np.asarray(left * swell)
+
+    radius = 0.5 * site.dbh * profile(np.maximum(z, 0.0)) / profile(breast)
+    phase = site.rng.uniform(0.0, 2.0 * np.pi, (2, 2))
+    weight = site.rng.normal(0.0, trunk.bend * top, (2, 2)) * np.array([[1.0], [0.4]])
+    course = np.clip(z / top, 0.0, None)[:, None, None] * np.array([[2.2], [5.5]])
+    sway = (weight * (np.sin(course + phase) - np.sin(phase))).sum(axis=1)
+    points = np.concatenate([sway, z[:, None]], axis=1)
+    return Branches(points[None], np.maximum(radius, 0.002)[None])
+
+
+def on_stem(trunk: Branches, height: Array) -> tuple[Array, Array]:
+    """Points (N, 3) and radii (N,) of the trunk at heights (N,), m."""
+    line, radii = trunk.points[0], trunk.radii[0]
+    x, y, r = (np.interp(height, line[:, 2], a) for a in (line[:, 0], line[:, 1], radii))
+    return np.stack([x, y, height], axis=1), r
+
+
+def leaf_count(site: Site) -> tuple[int, float]:
+    """Number of leaves to show and the area that they cover together, m^2."""
+    leaf = site.species.leaf
+    assert leaf is not None
+    area = site.between(leaf.area_index) * np.pi * site.crown_radius**2
+    each = 0.5 * leaf.length_m * leaf.width_m
+    return int(np.clip(area / each, 24, leaf.most)), area
+
+
+def along(
+    shoots: Branches, count: int, rng: np.random.Generator, start: float = 0.15
+) -> tuple[Array, Array]:
+    """`count` points spread evenly over the length of all shoots, from `start` of each on.
+
+    Returns points and unit tangents (count, 3), in order of growth.
+    """
+    bounds = np.concatenate([[0.0], np.cumsum(shoots.lengths)])
+    place = (np.arange(count) + rng.random(count)) / count * bounds[-1]
+    row = np.clip(np.searchsorted(bounds, place, side="right") - 1, 0, len(shoots.points) - 1)
+    fraction = start + (1.0 - start) * (place - bounds[row]) / np.diff(bounds)[row]
+    last = shoots.points.shape[1] - 1
+    k = np.minimum((fraction * last).astype(np.int64), last - 1)
+    begin, end = shoots.points[row, k], shoots.points[row, k + 1]
+    return begin + (fraction * last - k)[:, None] * (end - begin), unit(end - begin)
+
+
+def flat_leaves(
+    points: Array,
+    tangents: Array,
+    site: Site,
+    *,
+    forward: float,
+    tilt: float,
+    grown: Array | float = 1.0,
+) -> Blades:
+    """Leaves in two rows along shoots, faces up, as most plants hold them.
+
+    forward: how far leaves lean along the shoot (tangent against sideways). tilt: scatter of the
+    faces about the vertical. grown: size of each leaf as a share of the species' leaf.
+    """
+    leaf, rng, count = site.species.leaf, site.rng, len(points)
+    assert leaf is not None
+    level, _ = across(tangents)
+    row = np.where(np.arange(count) % 2 == 0, 1.0, -1.0)[:, None]
+    scatter = rng.normal(0.0, 0.3, (count, 3))
+    axis = unit(forward * tangents + row * level - leaf.droop * UP + scatter)
+    side = unit(np.cross(UP + rng.normal(0.0, tilt, (count, 3)), axis))
+    size = rng.uniform(0.75, 1.25, count) * grown
+    length, width = leaf.length_m * size, leaf.width_m * size
+    return Blades(points + 0.55 * length[:, None] * axis, axis, side, length, width)
