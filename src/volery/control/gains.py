@@ -1,0 +1,134 @@
+"""Gains of the control layers, derived from an airframe.
+
+The rotors' lag bounds everything: the rate loop gets 0.4 / lag (a damping near 0.8), and each layer
+above a third or so of the bandwidth of the layer below. An airframe file may override each
+bandwidth. Torques are angular accelerations times inertia, so gains need no unit of the vehicle.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.vehicle.airframe import (
+    MAX_ROTORS,
+    Airframe,
+    allocation_matrix,
+    hover_thrusts,
+)
+
+GUIDANCE_PERIOD_S = 0.004
+"""Position, velocity and flight modes run at 250 Hz, attitude and rates at every step."""
+_THRUST_RESERVE = 0.9
+"""Share of the full thrust that guidance may ask for; the rest steers."""
+_LEAST_THRUST = 0.15
+"""Share of the weight that guidance keeps, so that attitude stays in hand."""
+_IDLE_SPEED = 0.1
+"""Idle speed of a rotor, share of its hover speed."""
+
+GAINS = np.dtype(
+    [
+        ("rotors", "i8"),
+        ("mass", "f8"),
+        ("weight", "f8"),
+        ("inertia", "f8", 3),
+        ("allocation", "f8", (MAX_ROTORS, 4)),
+        ("idle_thrust", "f8"),
+        ("full_thrust", "f8"),
+        ("inverse_thrust_constant", "f8"),
+        ("rate", "f8", 3),
+        ("rate_integral", "f8", 3),
+        ("rate_integral_limit", "f8", 3),
+        ("attitude", "f8"),
+        ("yaw", "f8"),
+        ("rate_limit", "f8"),
+        ("yaw_rate_limit", "f8"),
+        ("velocity", "f8"),
+        ("velocity_integral", "f8"),
+        ("velocity_integral_limit", "f8"),
+        ("position", "f8"),
+        ("brake", "f8"),
+        ("acceleration", "f8"),
+        ("climb_acceleration", "f8"),
+        ("tilt_tangent", "f8"),
+        ("least_thrust", "f8"),
+        ("most_thrust", "f8"),
+        ("speed", "f8"),
+        ("climb", "f8"),
+        ("descent", "f8"),
+        ("take_off", "f8"),
+        ("landing", "f8"),
+        ("tick", "f8"),
+        ("tick_steps", "i8"),
+    ],
+    align=True,
+)
+"""One airframe's control as kernels read it: SI, FLU."""
+
+
+def tick_steps_of(dt: float) -> int:
+    """Physics steps a guidance tick."""
+    return max(1, round(GUIDANCE_PERIOD_S / dt))
+
+
+def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:
+    """The (1,) `GAINS` row of an airframe stepped by `dt` s."""
+    row = np.zeros(1, GAINS)
+    rotors, limits, wish = airframe.rotors, airframe.limits, airframe.control
+    count = len(rotors.places)
+    inertia = np.array(airframe.body.inertia_kg_m2)
+    allocation = allocation_matrix(airframe)
+    trim = hover_thrusts(airframe)
+    most = airframe.max_rotor_thrust * airframe.weight / float(trim.max())
+
+    rate = wish.rate or 0.4 / (0.5 * (rotors.rise_time_s + rotors.fall_time_s))
+    yaw_rate = wish.yaw_rate or 0.5 * rate
+    attitude = wish.attitude or rate / 3.0
+    yaw = wish.yaw or yaw_rate / 4.0
+    velocity = wish.velocity or attitude / 3.0
+    position = wish.position or velocity / 2.4
+
+    row["rotors"] = count
+    row["mass"] = airframe.body.mass_kg
+    row["weight"] = airframe.weight
+    row["inertia"] = inertia
+    row["allocation"][0, :count] = allocation
+    row["idle_thrust"] = _IDLE_SPEED**2 * trim.min()
+    row["full_thrust"] = airframe.max_rotor_thrust
+    row["inverse_thrust_constant"] = 1.0 / rotors.thrust_n_s2
+    bandwidths = np.array([rate, rate, yaw_rate])
+    row["rate"] = bandwidths
+    row["rate_integral"] = 0.1 * bandwidths**2
+    # a third of what the rotors can turn about each axis in hover
+    authority = np.min(
+        np.minimum(trim, airframe.max_rotor_thrust - trim)[:, None]
+        / np.maximum(np.abs(allocation[:, 1:]), 1e-12),
+        axis=0,
+    )
+    row["rate_integral_limit"] = authority / inertia / 3.0
+    row["attitude"] = attitude
+    row["yaw"] = yaw
+    row["rate_limit"] = math.radians(limits.rate_deg_s)
+    row["yaw_rate_limit"] = math.radians(limits.yaw_rate_deg_s)
+    row["velocity"] = velocity
+    row["velocity_integral"] = 0.25 * velocity**2
+    row["velocity_integral_limit"] = 8.0
+    row["position"] = position
+    row["brake"] = 0.6 * limits.acceleration_m_s2
+    row["acceleration"] = limits.acceleration_m_s2
+    row["climb_acceleration"] = min(
+        limits.acceleration_m_s2, 0.6 * (_THRUST_RESERVE * most / airframe.body.mass_kg - 9.80665)
+    )
+    row["tilt_tangent"] = math.tan(math.radians(limits.tilt_deg))
+    row["least_thrust"] = _LEAST_THRUST * airframe.weight
+    row["most_thrust"] = _THRUST_RESERVE * most
+    row["speed"] = limits.speed_m_s
+    row["climb"] = limits.climb_m_s
+    row["descent"] = limits.descent_m_s
+    row["take_off"] = limits.take_off_m_s
+    row["landing"] = limits.landing_m_s
+    row["tick_steps"] = tick_steps_of(dt)
+    row["tick"] = tick_steps_of(dt) * dt
+    return row

@@ -1,0 +1,76 @@
+"""From thrust and torque to rotor speeds, and what gives way when a rotor has no more to give.
+
+Thrusts are `allocation_matrix` times (thrust, torques). Where that leaves a rotor's range, the
+vehicle keeps its attitude first: roll and pitch are scaled only where they alone exceed the range,
+thrust then moves to where roll and pitch fit, and yaw gets what room is left.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.compiled import inline_kernel
+
+Array = NDArray[np.float64]
+
+
+@inline_kernel
+def mix(gains: Any, thrust: float, tx: float, ty: float, tz: float, reference: Array) -> None:
+    """Rotor speeds (MAX_ROTORS,) rad/s into `reference` for a thrust (N) and torques (N m), FLU."""
+    low, high = gains.idle_thrust, gains.full_thrust
+    fits = True
+    for r in range(gains.rotors):
+        f = (
+            gains.allocation[r, 0] * thrust
+            + gains.allocation[r, 1] * tx
+            + gains.allocation[r, 2] * ty
+            + gains.allocation[r, 3] * tz
+        )
+        reference[r] = f
+        fits = fits and low <= f <= high
+    if not fits:
+        _share(gains, thrust, tx, ty, tz, reference)
+    for r in range(gains.rotors):
+        reference[r] = math.sqrt(reference[r] * gains.inverse_thrust_constant)
+
+
+@inline_kernel
+def _share(gains: Any, thrust: float, tx: float, ty: float, tz: float, force: Array) -> None:
+    """Thrusts (N) within the rotors' range, by priority; `force` is overwritten."""
+    low, high = gains.idle_thrust, gains.full_thrust
+    # the largest share of roll and pitch for which some collective thrust keeps all rotors in range
+    share = 1.0
+    for a in range(gains.rotors):
+        for b in range(gains.rotors):
+            ca, cb = gains.allocation[a, 0], gains.allocation[b, 0]
+            ua = gains.allocation[a, 1] * tx + gains.allocation[a, 2] * ty
+            ub = gains.allocation[b, 1] * tx + gains.allocation[b, 2] * ty
+            # low <= ca T + s ua and cb T + s ub <= high
+            need = ub / cb - ua / ca
+            room = high / cb - low / ca
+            if need > room:
+                share = min(share, max(room, 0.0) / need)
+    least, most = -math.inf, math.inf
+    for r in range(gains.rotors):
+        c = gains.allocation[r, 0]
+        u = share * (gains.allocation[r, 1] * tx + gains.allocation[r, 2] * ty)
+        least = max(least, (low - u) / c)
+        most = min(most, (high - u) / c)
+    total = min(max(thrust, least), most)
+    turn = 1.0
+    for r in range(gains.rotors):
+        f = gains.allocation[r, 0] * total + share * (
+            gains.allocation[r, 1] * tx + gains.allocation[r, 2] * ty
+        )
+        force[r] = f
+        y = gains.allocation[r, 3] * tz
+        if y > 0.0:
+            turn = min(turn, max(high - f, 0.0) / y)
+        elif y < 0.0:
+            turn = min(turn, max(f - low, 0.0) / -y)
+    for r in range(gains.rotors):
+        force[r] = min(max(force[r] + turn * gains.allocation[r, 3] * tz, low), high)

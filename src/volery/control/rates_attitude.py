@@ -1,0 +1,93 @@
+"""The inner layers, run at every physics step: attitude to body rates to torques to rotor speeds.
+
+The attitude error is split into tilt (the shortest turn that aligns the thrust axis) and the turn
+about it, so that a large yaw error never spoils the tilt (D. Brescianini, R. D'Andrea, "Tilt-
+prioritized quadrocopter attitude control", 2018). Rates are held by a proportional-integral law
+on angular acceleration with the gyroscopic torque fed forward.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from volery.control.mixer import mix
+from volery.control.setpoints import ControlLevel
+from volery.core.compiled import inline_kernel
+
+_STOPPED = int(ControlLevel.STOPPED)
+_ROTORS = int(ControlLevel.ROTORS)
+_ATTITUDE = int(ControlLevel.ATTITUDE)
+
+
+@inline_kernel
+def stabilise(pilot: Any, estimate: Any, gains: Any, dt: float) -> None:
+    """Rotor speeds of a `PILOT` from its attitude or rates setpoint and thrust.
+
+    estimate: a record with `attitude` and `omega_body`.
+    """
+    if pilot.level <= _ROTORS:
+        if pilot.level == _STOPPED:
+            for r in range(gains.rotors):
+                pilot.rotor_reference[r] = 0.0
+        return
+    if pilot.level >= _ATTITUDE:
+        _rates_from_attitude(pilot, estimate, gains)
+    ox, oy, oz = estimate.omega_body[0], estimate.omega_body[1], estimate.omega_body[2]
+    ix, iy, iz = gains.inertia[0], gains.inertia[1], gains.inertia[2]
+    tx = ix * _angular_acceleration(pilot, gains, 0, ox, dt) + (iz - iy) * oy * oz
+    ty = iy * _angular_acceleration(pilot, gains, 1, oy, dt) + (ix - iz) * oz * ox
+    tz = iz * _angular_acceleration(pilot, gains, 2, oz, dt) + (iy - ix) * ox * oy
+    mix(gains, pilot.thrust, tx, ty, tz, pilot.rotor_reference)
+
+
+@inline_kernel
+def _angular_acceleration(pilot: Any, gains: Any, axis: int, rate: float, dt: float) -> float:
+    error = pilot.rates[axis] - rate
+    limit = gains.rate_integral_limit[axis]
+    integral = pilot.rate_integral[axis] + gains.rate_integral[axis] * error * dt
+    integral = min(max(integral, -limit), limit)
+    pilot.rate_integral[axis] = integral
+    wanted: float = gains.rate[axis] * error + integral
+    return wanted
+
+
+@inline_kernel
+def _rates_from_attitude(pilot: Any, estimate: Any, gains: Any) -> None:
+    """Body rates that turn the present attitude into the wanted one."""
+    x, y, z, w = (
+        estimate.attitude[0],
+        estimate.attitude[1],
+        estimate.attitude[2],
+        estimate.attitude[3],
+    )
+    sx, sy, sz, sw = pilot.attitude[0], pilot.attitude[1], pilot.attitude[2], pilot.attitude[3]
+    # error = conjugate(present) * wanted
+    ex = w * sx - x * sw - y * sz + z * sy
+    ey = w * sy + x * sz - y * sw - z * sx
+    ez = w * sz - x * sy + y * sx - z * sw
+    ew = w * sw + x * sx + y * sy + z * sz
+    # error = tilt * turn about z; n = cos(tilt / 2)
+    n = math.sqrt(ez * ez + ew * ew)
+    if n > 1e-6:
+        k = 2.0 * gains.attitude / n
+        px, py = k * (ew * ex - ez * ey), k * (ez * ex + ew * ey)
+        turn = 2.0 * gains.yaw * ez / n
+        if ew < 0.0:
+            turn = -turn
+    else:  # upside down: any way round is as short
+        px, py, turn = 2.0 * gains.attitude, 0.0, 0.0
+    limit = gains.rate_limit
+    size = px * px + py * py
+    if size > limit * limit:
+        k = limit / math.sqrt(size)
+        px *= k
+        py *= k
+    # the commanded turn is about the map's z: its share about the body's axes
+    up_x, up_y = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w)
+    up_z = 1.0 - 2.0 * (x * x + y * y)
+    limit = gains.yaw_rate_limit
+    turn = min(max(turn + pilot.yaw_rate * up_z, -limit), limit)
+    pilot.rates[0] = px + pilot.yaw_rate * up_x
+    pilot.rates[1] = py + pilot.yaw_rate * up_y
+    pilot.rates[2] = turn

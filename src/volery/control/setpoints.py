@@ -1,0 +1,119 @@
+"""What the controllers are told: one record a UAV, from flight mode down to rotor speeds.
+
+Each layer reads its setpoint and writes that of the layer below. A command enters at the layer it
+is meant for; `ControlLevel` says which one, and layers above it are silent.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.core.errors import CommandError
+from volery.vehicle.airframe import MAX_ROTORS
+
+Array = NDArray[np.float64]
+
+MAX_COORDINATE = 1e6
+"""m; no position farther from the map's origin is accepted."""
+
+
+class ControlLevel(IntEnum):
+    """The layer at which a UAV is commanded."""
+
+    STOPPED = 0
+    """Rotors stand still."""
+    ROTORS = 1
+    """Speeds of the rotors."""
+    RATES = 2
+    """Body rates and thrust."""
+    ATTITUDE = 3
+    """Attitude and thrust."""
+    GUIDED = 4
+    """Velocity, position or a flight mode."""
+
+
+PILOT = np.dtype(
+    [
+        ("mode", "i8"),  # flight_modes.FlightMode
+        ("level", "i8"),  # ControlLevel
+        ("phase", "i8"),  # of a flight mode that has several
+        ("calm_ticks", "i8"),  # guidance ticks for which a condition of the mode has held
+        ("deadline_step", "i8"),  # a velocity command holds until this step
+        ("timeout_steps", "i8"),  # ... and is renewed by this many
+        ("velocity_in_heading", "?"),  # velocity_target turns with the vehicle's heading
+        ("braking", "?"),  # HOLD and LAND: stop first, then lock the place
+        ("turning", "?"),  # heading follows yaw_rate_target instead of heading_target
+        ("home", "f8", 3),  # m, map: where the last take-off began
+        ("return_height", "f8"),  # m, map
+        ("position_target", "f8", 3),  # m, map
+        ("velocity_target", "f8", 3),  # m/s, map or heading frame
+        ("heading_target", "f8", 2),  # cosine and sine
+        ("yaw_rate_target", "f8"),  # rad/s
+        ("heading", "f8", 2),  # setpoint moving towards its target, cosine and sine
+        ("velocity", "f8", 3),  # m/s, map: setpoint moving towards its target
+        ("velocity_integral", "f8", 3),  # m/s^2
+        ("attitude", "f8", 4),  # map from body
+        ("thrust", "f8"),  # N along the body's z
+        ("yaw_rate", "f8"),  # rad/s, fed forward to the rates
+        ("rates", "f8", 3),  # rad/s, FLU
+        ("rate_integral", "f8", 3),  # rad/s^2
+        ("rotor_reference", "f8", MAX_ROTORS),  # rad/s
+    ],
+    align=True,
+)
+"""Commands, setpoints and controller states of one UAV."""
+
+
+def new_pilots(attitude: Array) -> NDArray[np.void]:
+    """Pilots (N,) of UAVs that stand still with `attitude` (N, 4)."""
+    pilots = np.zeros(len(attitude), PILOT)
+    pilots["attitude"] = attitude
+    x, y, z, w = attitude.T
+    heading = np.stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (w * z + x * y)], axis=-1)
+    length = np.linalg.norm(heading, axis=-1, keepdims=True)
+    heading = np.where(length > 1e-6, heading / np.maximum(length, 1e-6), [1.0, 0.0])
+    pilots["heading"] = pilots["heading_target"] = heading
+    return pilots
+
+
+def checked(what: str, value: ArrayLike, shape: tuple[int, ...], limit: float) -> Array:
+    """`value` as finite floats of `shape` within +-`limit`, or a CommandError that says why not."""
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise CommandError(f"{what} must be numbers") from None
+    if array.shape != shape:
+        raise CommandError(f"{what} must have shape {shape}, not {array.shape}")
+    if not np.isfinite(array).all():
+        raise CommandError(f"{what} = {_shown(array)} is not finite")
+    if (np.abs(array) > limit).any():
+        raise CommandError(f"{what} = {_shown(array)} is out of range; +-{limit:.6g} is allowed")
+    return array
+
+
+def checked_within(what: str, value: ArrayLike, shape: tuple[int, ...], high: float) -> Array:
+    """Like `checked`, for numbers from 0 to `high`."""
+    array = checked(what, value, shape, math.inf)
+    if (array < 0.0).any() or (array > high).any():
+        raise CommandError(
+            f"{what} = {_shown(array)} is out of range; from 0 to {high:.6g} is allowed"
+        )
+    return array
+
+
+def checked_attitude(value: ArrayLike) -> Array:
+    """Unit quaternion (4,) of a command; lengths between 0.9 and 1.1 are made 1."""
+    q = checked("attitude", value, (4,), 1.1)
+    length = float(np.linalg.norm(q))
+    if not 0.9 <= length <= 1.1:
+        raise CommandError(f"attitude has length {length:.3g}; a unit quaternion is needed")
+    return np.asarray(q / length)
+
+
+def _shown(array: Array) -> Any:
+    return array.tolist()

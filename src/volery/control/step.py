@@ -1,0 +1,137 @@
+"""The fused step: control and plant of all UAVs, for many steps in one call."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.flight_modes import CRASHED, guide, stop
+from volery.control.gains import GAINS
+from volery.control.rates_attitude import stabilise
+from volery.control.setpoints import PILOT
+from volery.core.compiled import inline_kernel, kernel
+from volery.vehicle.aerodynamics import PLANT
+from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
+from volery.vehicle.fleet import BODY
+from volery.vehicle.kernels import step_body
+from volery.world.terrain import TerrainGrid
+
+Array = NDArray[np.float64]
+
+UAV = np.dtype([("body", BODY), ("pilot", PILOT), ("model", "i8")], align=True)
+"""One UAV: its plant, its control, and the row of its airframe."""
+MODEL = np.dtype([("plant", PLANT), ("gains", GAINS)], align=True)
+"""One airframe."""
+
+EVENT = np.dtype(
+    [
+        ("step", "i8"),
+        ("uav", "i8"),
+        ("kind", "i8"),
+        ("mode", "i8"),
+        ("speed", "f8"),
+        ("position", "f8", 3),
+    ],
+    align=True,
+)
+"""One happening; `kind` is `TOUCH_DOWN`, `IMPACT` or `MODE_CHANGE`."""
+MODE_CHANGE = 3
+EVENTS_A_STEP = 3
+"""At most, of one UAV."""
+
+
+@kernel
+def advance_fleet(
+    uavs: NDArray[np.void],
+    models: NDArray[np.void],
+    heights: Array,
+    origin_x: float,
+    origin_y: float,
+    spacing: float,
+    steepest: float,
+    history_position: Array,
+    history_attitude: Array,
+    wind_x: float,
+    wind_y: float,
+    wind_z: float,
+    events: NDArray[np.void],
+    step: int,
+    steps: int,
+    tick_steps: int,
+    dt: float,
+    bounce: bool,
+) -> tuple[int, int, bool]:
+    """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
+
+    Ends early after a step in which a budget ran out or the events' buffer grew full. Returns the
+    steps done, the events written, and whether a budget ran out.
+    """
+    grid = TerrainGrid(heights, origin_x, origin_y, spacing)
+    scratch = np.empty(SCRATCH_SHAPE)
+    count = uavs.shape[0]
+    rows = history_position.shape[0]
+    written = 0
+    spent = False
+    done = 0
+    while done < steps and not spent and written + EVENTS_A_STEP * count <= events.shape[0]:
+        tick = step % tick_steps == 0
+        row = (step + 1) % rows
+        for i in range(count):
+            body = uavs[i].body
+            pilot = uavs[i].pilot
+            if body.asleep:
+                for k in range(3):
+                    body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
+            else:
+                plant = models[uavs[i].model].plant
+                gains = models[uavs[i].model].gains
+                estimate = body  # what control knows of the motion: for now, the truth
+                mode = pilot.mode
+                if tick:
+                    guide(pilot, estimate, gains, step)
+                stabilise(pilot, estimate, gains, dt)
+                touch = step_body(
+                    body,
+                    plant,
+                    pilot.rotor_reference,
+                    wind_x,
+                    wind_y,
+                    wind_z,
+                    grid,
+                    steepest,
+                    bounce,
+                    scratch,
+                    step + 1,
+                    dt,
+                )
+                if touch != NO_TOUCH:
+                    _note(events[written], step + 1, i, touch, mode, body.touch_speed, body)
+                    written += 1
+                    if touch == IMPACT and not bounce:
+                        body.crashed = True
+                        pilot.mode = CRASHED
+                        stop(pilot)
+                if pilot.mode != mode:
+                    _note(events[written], step + 1, i, MODE_CHANGE, pilot.mode, 0.0, body)
+                    written += 1
+                spent = spent or body.contact_budget <= 0.0 or body.separation_budget <= 0.0
+            for k in range(3):
+                history_position[row, i, k] = body.position_map[k]
+            for k in range(4):
+                history_attitude[row, i, k] = body.attitude[k]
+        step += 1
+        done += 1
+    return done, written, spent
+
+
+@inline_kernel
+def _note(event: Any, step: int, uav: int, kind: int, mode: int, speed: float, body: Any) -> None:
+    event.step = step
+    event.uav = uav
+    event.kind = kind
+    event.mode = mode
+    event.speed = speed
+    for k in range(3):
+        event.position[k] = body.position_map[k]

@@ -1,0 +1,168 @@
+"""Forces of the air: rotors after RotorS and PX4, quadratic drag of the body.
+
+A rotor at speed w whose hub moves at v through the air, v_par along its axis and v_perp across:
+
+    thrust          F = kF w^2 clamp(1 - |v_par| / 25, 0, 1)      along the axis
+    in-plane drag   H = -w c_d v_perp                             at the hub
+    reaction torque -s F kM                                       about the axis
+    rolling moment  -w s c_r v_perp
+
+with s = +1 for a rotor that turns counter-clockwise seen from above. Its speed follows the command
+as a first-order lag, faster up than down, solved exactly. Source of form and constants: the motor
+model plugins of RotorS (ETH Zurich) and PX4's Gazebo Classic simulation.
+
+The body's drag along each of its axes is -1/2 rho C_d A |v| v_i, v relative to the wind (modelling
+choice; the areas are the airframe's).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.compiled import inline_kernel
+from volery.vehicle.airframe import MAX_FEET, MAX_ROTORS, Airframe
+
+Array = NDArray[np.float64]
+
+AIR_DENSITY = 1.225
+"""kg/m^3: International Standard Atmosphere at sea level."""
+INFLOW_SPEED = 25.0
+"""m/s along the axis at which a rotor's thrust is gone (RotorS, PX4)."""
+_INVERSE_INFLOW = 1.0 / INFLOW_SPEED
+MAX_CONTACTS = MAX_FEET + MAX_ROTORS + 2
+
+PLANT = np.dtype(
+    [
+        ("mass", "f8"),
+        ("inertia", "f8", 3),
+        ("drag", "f8", 3),
+        ("rotors", "i8"),
+        ("rotor_position", "f8", (MAX_ROTORS, 3)),
+        ("rotor_axis", "f8", (MAX_ROTORS, 3)),
+        ("spin", "f8", MAX_ROTORS),
+        ("thrust_constant", "f8"),
+        ("torque_constant", "f8"),
+        ("rotor_drag", "f8"),
+        ("rolling", "f8"),
+        ("rise", "f8"),
+        ("rise_half", "f8"),
+        ("fall", "f8"),
+        ("fall_half", "f8"),
+        ("contacts", "i8"),
+        ("contact_point", "f8", (MAX_CONTACTS, 3)),
+        ("contact_radius", "f8"),
+        ("friction", "f8"),
+        ("restitution", "f8"),
+        ("landing_limit", "f8"),
+    ],
+    align=True,
+)
+"""One airframe as kernels read it: SI, FLU, lag factors for one time step and half of it."""
+
+
+def plant_of(airframe: Airframe, dt: float) -> NDArray[np.void]:
+    """The (1,) `PLANT` row of an airframe stepped by `dt` s."""
+    row = np.zeros(1, PLANT)
+    body, rotors, ground = airframe.body, airframe.rotors, airframe.ground
+    row["mass"] = body.mass_kg
+    row["inertia"] = body.inertia_kg_m2
+    row["drag"] = 0.5 * AIR_DENSITY * np.array(body.drag_area_m2)
+    count = len(rotors.places)
+    row["rotors"] = count
+    row["rotor_position"][0, :count] = [place.position_m for place in rotors.places]
+    row["rotor_axis"][0, :count] = [place.axis for place in rotors.places]
+    row["spin"][0, :count] = [1.0 if p.direction == "ccw" else -1.0 for p in rotors.places]
+    row["thrust_constant"] = rotors.thrust_n_s2
+    row["torque_constant"] = rotors.torque_m
+    row["rotor_drag"] = rotors.drag_n_s2_m
+    row["rolling"] = rotors.rolling_n_s2
+    row["rise"] = math.exp(-dt / rotors.rise_time_s)
+    row["rise_half"] = math.exp(-0.5 * dt / rotors.rise_time_s)
+    row["fall"] = math.exp(-dt / rotors.fall_time_s)
+    row["fall_half"] = math.exp(-0.5 * dt / rotors.fall_time_s)
+    points = contact_points(airframe)
+    row["contacts"] = len(points)
+    row["contact_point"][0, : len(points)] = points
+    row["contact_radius"] = np.linalg.norm(points, axis=1).max()
+    row["friction"] = ground.friction
+    row["restitution"] = ground.restitution
+    row["landing_limit"] = ground.landing_speed_limit_m_s
+    return row
+
+
+def contact_points(airframe: Airframe) -> Array:
+    """Points (P, 3) of the body that the ground can touch: feet, rotor tips, roof; m, FLU."""
+    points = [np.array(foot) for foot in airframe.ground.feet_m]
+    for place in airframe.rotors.places:
+        hub = np.array(place.position_m)
+        arm = math.hypot(hub[0], hub[1])
+        reach = 1.0 + airframe.rotors.radius_m / arm if arm > 1e-6 else 1.0
+        points.append(hub * np.array([reach, reach, 1.0]))
+    roof = max(airframe.body.size_m[2] / 2.0, *(p[2] for p in points))
+    points.append(np.array([0.0, 0.0, roof]))
+    return np.array(points)
+
+
+@inline_kernel
+def air_wrench(
+    plant: Any,
+    rotor_speed: Array,
+    reference: Array,
+    vx: float,
+    vy: float,
+    vz: float,
+    ox: float,
+    oy: float,
+    oz: float,
+) -> tuple[float, float, float, float, float, float]:
+    """Force and torque of the air at mid-step, FLU; `rotor_speed` is moved on by a whole step.
+
+    plant: a `PLANT` record. rotor_speed, reference: (MAX_ROTORS,) rad/s. (vx, vy, vz) m/s: velocity
+    of the centre of mass through the air, (ox, oy, oz) rad/s: body rates, both FLU and at mid-step.
+    Returns (fx, fy, fz, tx, ty, tz) in N and N m.
+    """
+    speed = math.sqrt(vx * vx + vy * vy + vz * vz)
+    fx = -plant.drag[0] * speed * vx
+    fy = -plant.drag[1] * speed * vy
+    fz = -plant.drag[2] * speed * vz
+    tx = ty = tz = 0.0
+    for r in range(plant.rotors):
+        wanted = reference[r]
+        lead = rotor_speed[r] - wanted
+        if lead < 0.0:
+            w = wanted + lead * plant.rise_half
+            rotor_speed[r] = wanted + lead * plant.rise
+        else:
+            w = wanted + lead * plant.fall_half
+            rotor_speed[r] = wanted + lead * plant.fall
+        px, py, pz = (
+            plant.rotor_position[r, 0],
+            plant.rotor_position[r, 1],
+            plant.rotor_position[r, 2],
+        )
+        ax, ay, az = plant.rotor_axis[r, 0], plant.rotor_axis[r, 1], plant.rotor_axis[r, 2]
+        hx = vx + oy * pz - oz * py
+        hy = vy + oz * px - ox * pz
+        hz = vz + ox * py - oy * px
+        along = hx * ax + hy * ay + hz * az
+        hx -= along * ax
+        hy -= along * ay
+        hz -= along * az
+        thrust = plant.thrust_constant * w * w * max(1.0 - abs(along) * _INVERSE_INFLOW, 0.0)
+        drag = w * plant.rotor_drag
+        gx = thrust * ax - drag * hx
+        gy = thrust * ay - drag * hy
+        gz = thrust * az - drag * hz
+        reaction = plant.spin[r] * thrust * plant.torque_constant
+        rolling = plant.spin[r] * w * plant.rolling
+        fx += gx
+        fy += gy
+        fz += gz
+        tx += py * gz - pz * gy - reaction * ax - rolling * hx
+        ty += pz * gx - px * gz - reaction * ay - rolling * hy
+        tz += px * gy - py * gx - reaction * az - rolling * hz
+    return fx, fy, fz, tx, ty, tz

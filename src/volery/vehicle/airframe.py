@@ -1,0 +1,243 @@
+"""Airframes: what a vehicle is, as a data file with the source of every number.
+
+A file names masses, rotors (any number from 4 to 12, anywhere, with any axis), feet and limits;
+gains follow from these numbers unless the file overrides a bandwidth. `load_airframe` takes the
+name of a vehicle that ships with Volery or the path of a user's own TOML file.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from volery.scenario.data_files import find_data_file, load_data_file
+
+GRAVITY = 9.80665
+"""Standard gravity, m/s^2 (ISO 80000-3)."""
+MAX_ROTORS = 12
+MAX_FEET = 8
+_HOVER_MARGIN = 1.1
+_AIRFRAMES = Path(__file__).parent / "airframes"
+
+Array = NDArray[np.float64]
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Vector = tuple[float, float, float]
+PositiveVector = tuple[Positive, Positive, Positive]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def _possible_inertia(moments: PositiveVector) -> PositiveVector:
+    x, y, z = sorted(moments)
+    if x + y < z * (1.0 - 1e-9):
+        raise ValueError("no body has one moment of inertia above the sum of the other two")
+    return moments
+
+
+def _unit(axis: Vector) -> Vector:
+    length = math.hypot(*axis)
+    if length < 1e-6:
+        raise ValueError("an axis needs a direction")
+    return axis[0] / length, axis[1] / length, axis[2] / length
+
+
+class Body(_Table):
+    """The rigid body; axes x forward, y left, z up, origin at the centre of mass."""
+
+    mass_kg: Positive
+    inertia_kg_m2: Annotated[PositiveVector, AfterValidator(_possible_inertia)]
+    """Principal moments Ixx, Iyy, Izz; the body axes are taken to be the principal ones."""
+    drag_area_m2: tuple[NotNegative, NotNegative, NotNegative]
+    """Drag coefficient times area along each axis."""
+    size_m: PositiveVector
+    """Box that range sensors of other vehicles see."""
+    collision_radius_m: Positive
+    """Sphere about the origin that holds the whole vehicle, rotor discs included."""
+
+
+class RotorPlace(_Table):
+    """Where a rotor sits and how it turns, seen from above."""
+
+    position_m: Vector
+    direction: Literal["ccw", "cw"]
+    axis: Annotated[Vector, AfterValidator(_unit)] = (0.0, 0.0, 1.0)
+    """Direction of its thrust; made a unit vector."""
+
+
+class Rotors(_Table):
+    """The rotors, all alike; the model is that of RotorS and PX4 (see `vehicle.aerodynamics`)."""
+
+    thrust_n_s2: Positive
+    torque_m: Positive
+    drag_n_s2_m: NotNegative
+    rolling_n_s2: NotNegative
+    rise_time_s: Positive
+    fall_time_s: Positive
+    max_speed_rad_s: Positive
+    radius_m: Positive
+    places: Annotated[tuple[RotorPlace, ...], Field(min_length=4, max_length=MAX_ROTORS)]
+
+
+class Ground(_Table):
+    """How the vehicle stands and what it survives."""
+
+    feet_m: Annotated[tuple[Vector, ...], Field(min_length=3, max_length=MAX_FEET)]
+    landing_speed_limit_m_s: Positive
+    friction: Annotated[float, Field(ge=0.0, le=2.0)]
+    restitution: Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class Limits(_Table):
+    """What the controllers may ask of the vehicle."""
+
+    tilt_deg: Annotated[float, Field(gt=0.0, le=75.0)]
+    speed_m_s: Positive
+    climb_m_s: Positive
+    descent_m_s: Positive
+    take_off_m_s: Positive
+    landing_m_s: Positive
+    acceleration_m_s2: Positive
+    rate_deg_s: Positive
+    """Roll and pitch rate."""
+    yaw_rate_deg_s: Positive
+
+
+class Bandwidths(_Table):
+    """Bandwidths of the control loops, rad/s; what is left out follows from the rotors' lag."""
+
+    rate: Positive | None = None
+    yaw_rate: Positive | None = None
+    attitude: Positive | None = None
+    yaw: Positive | None = None
+    velocity: Positive | None = None
+    position: Positive | None = None
+
+
+class Airframe(_Table):
+    """A vehicle: body, rotors, feet, limits and, where given, bandwidths."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z0-9_]+$")]
+    title: str
+    body: Body
+    rotors: Rotors
+    ground: Ground
+    limits: Limits
+    control: Bandwidths = Bandwidths()
+
+    @model_validator(mode="after")
+    def _can_fly(self) -> Self:
+        farthest = _farthest(self)
+        if self.body.collision_radius_m < farthest - 1e-6:
+            raise ValueError(
+                f"body.collision_radius_m = {self.body.collision_radius_m} leaves out feet or "
+                f"rotors; at least {farthest:.3f} is needed"
+            )
+        if self.ground.landing_speed_limit_m_s <= self.limits.landing_m_s:
+            raise ValueError(
+                f"limits.landing_m_s = {self.limits.landing_m_s} must be below "
+                f"ground.landing_speed_limit_m_s = {self.ground.landing_speed_limit_m_s}"
+            )
+        _check_feet(self)
+        _check_hover(self)
+        return self
+
+    @property
+    def weight(self) -> float:
+        """N."""
+        return self.body.mass_kg * GRAVITY
+
+    @property
+    def max_rotor_thrust(self) -> float:
+        """Thrust of one rotor at full speed in still air, N."""
+        return self.rotors.thrust_n_s2 * self.rotors.max_speed_rad_s**2
+
+    @property
+    def ground_offset(self) -> float:
+        """Height of the origin over level ground when standing on it, m."""
+        return -min(foot[2] for foot in self.ground.feet_m)
+
+
+def wrench_matrix(airframe: Airframe) -> Array:
+    """Force and torque (6, R) on the body, FLU, per newton of each rotor's thrust."""
+    columns = []
+    for place in airframe.rotors.places:
+        axis = np.array(place.axis)
+        spin = 1.0 if place.direction == "ccw" else -1.0
+        torque = np.cross(place.position_m, axis) - spin * airframe.rotors.torque_m * axis
+        columns.append(np.concatenate([axis, torque]))
+    return np.array(columns).T
+
+
+def allocation_matrix(airframe: Airframe) -> Array:
+    """Rotor thrusts (R, 4) per unit of thrust along z and torque about x, y, z.
+
+    The pseudo-inverse of the rotors' geometry: among all thrusts that give the wanted wrench, those
+    of the least sum of squares.
+    """
+    return np.asarray(np.linalg.pinv(wrench_matrix(airframe)[2:]))
+
+
+def hover_thrusts(airframe: Airframe) -> Array:
+    """Thrust of each rotor (R,) that carries the weight without torque, N."""
+    return allocation_matrix(airframe)[:, 0] * airframe.weight
+
+
+def _farthest(airframe: Airframe) -> float:
+    points = [math.hypot(*foot) for foot in airframe.ground.feet_m]
+    for place in airframe.rotors.places:
+        x, y, z = place.position_m
+        points.append(math.hypot(math.hypot(x, y) + airframe.rotors.radius_m, z))
+    return max(points)
+
+
+def _check_feet(airframe: Airframe) -> None:
+    feet = np.array(airframe.ground.feet_m)
+    if feet[:, 2].max() >= 0.0:
+        raise ValueError("ground.feet_m must lie below the centre of mass (z < 0)")
+    bearings = np.sort(np.arctan2(feet[:, 1], feet[:, 0]))
+    gaps = np.diff(np.append(bearings, bearings[0] + 2.0 * math.pi))
+    if gaps.max() >= math.pi - 1e-6:
+        raise ValueError("ground.feet_m must surround the centre of mass, else it falls over")
+
+
+def _check_hover(airframe: Airframe) -> None:
+    matrix = wrench_matrix(airframe)[2:]
+    scaled = matrix / np.abs(matrix).max(axis=1, keepdims=True).clip(1e-12)
+    if np.linalg.matrix_rank(scaled, tol=1e-6) < 4:
+        raise ValueError(
+            "rotors.places cannot steer: thrust, roll, pitch and yaw must be free of each other"
+        )
+    lift = float(matrix[0].clip(0.0).sum()) * airframe.max_rotor_thrust
+    if lift < _HOVER_MARGIN * airframe.weight:
+        raise ValueError(
+            f"rotors lift {lift:.3g} N at full speed; {_HOVER_MARGIN * airframe.weight:.3g} N, "
+            "the weight and a tenth, are needed to hover"
+        )
+    trim = hover_thrusts(airframe)
+    for number, thrust in enumerate(trim):
+        if not 0.0 < thrust < airframe.max_rotor_thrust:
+            raise ValueError(
+                f"rotors.places.{number} would have to pull {thrust:.3g} N in hover; more than 0 "
+                f"and less than {airframe.max_rotor_thrust:.3g} N is possible"
+            )
+
+
+def airframe_names() -> tuple[str, ...]:
+    """Names of the airframes that ship with Volery."""
+    return tuple(sorted(path.stem for path in _AIRFRAMES.glob("*.toml")))
+
+
+def load_airframe(name: str | Path, folder: Path | None = None) -> Airframe:
+    """Airframe of a shipped name such as `f450`, or of a `.toml` file, also beside `folder`.
+
+    Raises DataFileError that names the file, each wrong key and what is allowed there.
+    """
+    return load_data_file(find_data_file(str(name), _AIRFRAMES, "airframe", folder), Airframe)
