@@ -1,0 +1,305 @@
+"""The report as one HTML file with everything inside, for light and dark screens and for paper."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Iterable
+from html import escape
+from pathlib import Path
+
+from volery.core.errors import VoleryError
+from volery.report import charts, maps
+from volery.report.flight_data import FlightData, UavTrack
+from volery.report.palette import uav_color
+
+_EVENTS_SHOWN = 60
+
+
+class ReportError(VoleryError):
+    """The report cannot be written."""
+
+
+def check_folder(folder: Path) -> None:
+    """Make the folder and try to write there, before a long flight rather than after it.
+
+    Raises ReportError that says what the system objects to.
+    """
+    probe = folder / ".volery-probe"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe.write_bytes(b"")
+        probe.unlink()
+    except OSError as error:
+        raise ReportError(f"{folder}: cannot write the report there: {error.strerror}") from None
+
+
+def write_report(flight: FlightData, folder: str | Path) -> Path:
+    """Write `index.html` into `folder` (made if missing) and return its path."""
+    path = Path(folder) / "index.html"
+    check_folder(path.parent)
+    text = page(flight)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ReportError(f"{path}: cannot write the report: {error.strerror}") from None
+    return path
+
+
+def page(flight: FlightData) -> str:
+    """The whole page as text."""
+    title = escape(flight.scenario)
+    count = len(flight.uavs)
+    fleet = f"{count} UAV{'s' if count != 1 else ''}"
+    parts = [
+        "<!doctype html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        '<meta name="color-scheme" content="light dark">',
+        f"<title>{title} · flight report</title>",
+        f"<style>{_STYLE}</style></head><body><main>",
+        '<header><p class="kicker">Volery flight report</p>',
+        f"<h1>{title}</h1>",
+        f'<p class="lead">{escape(flight.description)}</p>' if flight.description else "",
+        f'<p class="note">{escape(_ending(flight))}</p>' if flight.interrupted else "",
+        "</header>",
+        _tiles(flight, fleet),
+        *_figures(flight),
+        _uav_table(flight),
+        _events(flight),
+        _details(flight),
+        "</main></body></html>",
+    ]
+    return "\n".join(part for part in parts if part) + "\n"
+
+
+def _ending(flight: FlightData) -> str:
+    return (
+        f"{flight.interrupted}: this report shows the {flight.simulated_s:.1f} s flown "
+        f"of {flight.planned_s:g} s."
+    )
+
+
+def _tiles(flight: FlightData, fleet: str) -> str:
+    nearest = min((u.minimum_clearance_m for u in flight.uavs), default=math.inf)
+    flown = sum(u.distance_m for u in flight.uavs)
+    fastest = max((float(u.speed_m_s.max(initial=0.0)) for u in flight.uavs), default=0.0)
+    tiles = [
+        (f"{flight.simulated_s:.1f} s", f"flown by {fleet}"),
+        (_length(flown), "distance in all"),
+        (f"{fastest:.1f} m/s", "greatest speed"),
+        (_clearance(nearest, flight), "closest to a tree"),
+        (str(flight.contacts), "contact" if flight.contacts == 1 else "contacts"),
+        (f"{flight.real_time_factor:.1f} ×", "real time"),
+    ]
+    cells = "".join(
+        f"<div><dd>{escape(value)}</dd><dt>{escape(name)}</dt></div>" for value, name in tiles
+    )
+    return f'<dl class="tiles">{cells}</dl>'
+
+
+def _figures(flight: FlightData) -> list[str]:
+    number = 0
+    found: list[str] = []
+
+    def caption(text: str) -> str:
+        nonlocal number
+        number += 1
+        return f"<figcaption><b>Figure {number}.</b> {text}</figcaption>"
+
+    def picture(data: bytes, alternative: str, text: str) -> str:
+        source = base64.b64encode(data).decode()
+        image = f'<img alt="{escape(alternative)}" src="data:image/png;base64,{source}">'
+        return f'<figure class="map">{image}{caption(text)}</figure>'
+
+    def chart(svg: str, text: str) -> str:
+        return f'<figure class="chart">{svg}{caption(text)}</figure>'
+
+    trees = "Circles are tree crowns, the dots in them trunks, to scale. " if flight.trees else ""
+    crosses = "Red crosses mark contacts. " if flight.contacts else ""
+    found.append("<h2>The flight</h2>")
+    found.append(
+        picture(
+            maps.top_view(flight),
+            "Map of the world with the paths flown",
+            f"The flight from above. {trees}A ring is where a UAV started, a disc where it was "
+            f"at the end. {crosses}North is up.",
+        )
+    )
+    aslant, above = maps.aslant_view(flight), maps.lidar_view(flight)
+    if flight.lidar is not None and aslant is not None and above is not None:
+        found.append("<h2>What the LIDARs saw</h2>")
+        numbers = (
+            f"{len(flight.lidar.points_map):,} points, one a voxel of {flight.lidar.voxel_m:g} m, "
+            f"from {flight.lidar.scans:,} scans"
+        )
+        found.append(
+            picture(
+                aslant,
+                "LIDAR points seen aslant",
+                f"The LIDAR map seen from the south, {numbers}. Each beam is placed by the true "
+                "pose that the UAV had at its instant.",
+            )
+        )
+        found.append(
+            picture(
+                above,
+                "LIDAR points from above",
+                "The same map from above, coloured by height above the ground; the ground itself "
+                "is grey.",
+            )
+        )
+    found.append("<h2>Height, clearance, speed</h2>")
+    found.append('<div class="pair">')
+    found.append(chart(charts.height_chart(flight), "Height above the ground straight below."))
+    found.append(
+        chart(
+            charts.clearance_chart(flight),
+            "Distance from the UAV's middle to the nearest tree, exact to the leaf; searched up "
+            f"to {flight.clearance_reach_m:g} m, where the line stays if there is none.",
+        )
+    )
+    found.append(chart(charts.speed_chart(flight), "Speed over the ground and upward together."))
+    if flight.stage_seconds:
+        found.append(
+            chart(
+                charts.load_chart(flight),
+                "Computing time of each stage: its share of the wall time, and what it would take "
+                f"of one real-time second. The run took {flight.wall_s:.1f} s for "
+                f"{flight.simulated_s:.1f} simulated seconds.",
+            )
+        )
+    found.append("</div>")
+    return found
+
+
+def _uav_table(flight: FlightData) -> str:
+    head = ("UAV", "distance", "mean speed", "max speed", "mean height", "closest to a tree")
+    rows = "".join(_uav_row(k, uav, flight) for k, uav in enumerate(flight.uavs))
+    names = "".join(f"<th>{name}</th>" for name in head)
+    return (
+        '<h2>The fleet</h2><div class="scroll"><table class="numbers">'
+        f"<thead><tr>{names}</tr></thead><tbody>{rows}</tbody></table></div>"
+    )
+
+
+def _uav_row(number: int, uav: UavTrack, flight: FlightData) -> str:
+    samples = len(uav.time_s) > 0
+    seconds = float(uav.time_s[-1] - uav.time_s[0]) if samples else 0.0
+    mean = uav.distance_m / seconds if seconds > 0.0 else 0.0
+    cells = (
+        _length(uav.distance_m),
+        f"{mean:.2f} m/s",
+        f"{float(uav.speed_m_s.max(initial=0.0)):.2f} m/s",
+        f"{float(uav.height_m.mean()):.2f} m" if samples else "none",
+        _clearance(uav.minimum_clearance_m, flight),
+    )
+    swatch = f'<i style="background:{uav_color(number)}"></i>'
+    values = "".join(f"<td>{escape(cell)}</td>" for cell in cells)
+    return f"<tr><th>{swatch}{escape(uav.name)}</th>{values}</tr>"
+
+
+def _events(flight: FlightData) -> str:
+    if not flight.events:
+        return ""
+    shown = flight.events[:_EVENTS_SHOWN]
+    lines = "".join(
+        f"<li{' class=contact' if event.is_contact else ''}>{escape(event.text)}</li>"
+        for event in shown
+    )
+    more = len(flight.events) - len(shown)
+    rest = f"<p>and {more} more; the log holds them all.</p>" if more > 0 else ""
+    return f'<h2>Events</h2><ol class="events">{lines}</ol>{rest}'
+
+
+def _details(flight: FlightData) -> str:
+    rows: list[tuple[str, str]] = [
+        ("scenario", flight.scenario),
+        ("seed", str(flight.seed)),
+        ("simulated time", f"{flight.simulated_s:.3f} s"),
+        ("wall time", f"{flight.wall_s:.2f} s"),
+        ("real-time factor", f"{flight.real_time_factor:.2f}"),
+    ]
+    if flight.log_path is not None:
+        rows.append(("log", f"{flight.log_path} ({flight.log_messages:,} messages)"))
+    if flight.digest:
+        rows.append(("digest (SHA-256)", flight.digest))
+    rows += list(flight.machine.items())
+    rows += [(f"{name} version", version) for name, version in flight.versions.items()]
+    return f"<h2>How it was made</h2>{_definition_table(rows)}"
+
+
+def _definition_table(rows: Iterable[tuple[str, str]]) -> str:
+    lines = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows)
+    return f'<div class="scroll"><table class="facts"><tbody>{lines}</tbody></table></div>'
+
+
+def _length(metres: float) -> str:
+    return f"{metres / 1000.0:.2f} km" if metres >= 1000.0 else f"{metres:.1f} m"
+
+
+def _clearance(metres: float, flight: FlightData) -> str:
+    if math.isinf(metres):
+        return f"> {flight.clearance_reach_m:g} m"
+    return f"{metres:.2f} m"
+
+
+_STYLE = """
+:root { --page: #fbfaf7; --ink: #1d2126; --faint: #5d6670; --grid: #e3e1da; --card: #ffffff;
+  --accent: #2c6e49; --alarm: #c92a2a; }
+@media (prefers-color-scheme: dark) {
+  :root { --page: #14181d; --ink: #e6e8ea; --faint: #9aa4ae; --grid: #2b3138; --card: #1a1f26;
+    --accent: #7fc79a; --alarm: #ff8787; }
+  .map img { filter: brightness(.9); } }
+* { box-sizing: border-box; }
+html { -webkit-text-size-adjust: 100%; }
+body { margin: 0; background: var(--page); color: var(--ink);
+  font: 17px/1.6 system-ui, -apple-system, "Segoe UI", "Noto Sans", "Liberation Sans", sans-serif; }
+main { max-width: 1080px; margin: 0 auto; padding: 3.5rem 1.5rem 5rem; }
+h1, h2 { font-family: "Iowan Old Style", "Palatino Linotype", Palatino, "Noto Serif",
+  "Liberation Serif", Georgia, serif; font-weight: 600; letter-spacing: -.01em; }
+h1 { font-size: clamp(2.2rem, 6vw, 3.4rem); line-height: 1.1; margin: .1em 0 .35em; }
+h2 { font-size: 1.6rem; margin: 3.2rem 0 1rem; }
+.kicker { margin: 0; color: var(--accent); font-size: .85rem; font-weight: 600;
+  letter-spacing: .09em; text-transform: uppercase; }
+.lead { margin: 0; max-width: 44em; font-size: 1.15rem; color: var(--faint); }
+.note { border-left: 4px solid var(--alarm); padding: .4em 1em; background: var(--card); }
+.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(9.5rem, 1fr)); gap: 1px;
+  margin: 2.2rem 0 0; background: var(--grid); border: 1px solid var(--grid); border-radius: 10px;
+  overflow: hidden; }
+.tiles div { display: flex; flex-direction: column; padding: 1rem 1.1rem; background: var(--card); }
+.tiles dd { margin: 0; font-size: 1.55rem; font-weight: 600; font-variant-numeric: tabular-nums;
+  white-space: nowrap; }
+.tiles dt { color: var(--faint); font-size: .88rem; }
+figure { margin: 0 0 1.8rem; }
+figcaption { margin-top: .6rem; color: var(--faint); font-size: .92rem; line-height: 1.5;
+  max-width: 52em; }
+figcaption b { color: var(--ink); }
+.map img { display: block; width: 100%; height: auto; border-radius: 10px;
+  border: 1px solid var(--grid); }
+.pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 30rem), 1fr));
+  gap: 1.2rem; }
+.chart { margin: 0; padding: 1rem 1.1rem; background: var(--card); border: 1px solid var(--grid);
+  border-radius: 10px; }
+.chart svg { display: block; width: 100%; height: auto; }
+.chart text { font-family: system-ui, -apple-system, "Segoe UI", "Noto Sans", "Liberation Sans",
+  sans-serif; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; width: 100%; font-size: .95rem; }
+th, td { padding: .5rem .9rem .5rem 0; border-bottom: 1px solid var(--grid); text-align: left;
+  vertical-align: top; }
+thead th { color: var(--faint); font-weight: 500; font-size: .86rem; }
+tbody th { font-weight: 600; white-space: nowrap; }
+.numbers td, .numbers thead th:not(:first-child) { text-align: right; white-space: nowrap;
+  font-variant-numeric: tabular-nums; }
+.numbers i { display: inline-block; width: .75em; height: .75em; border-radius: 50%;
+  margin-right: .6em; }
+.facts th { width: 13rem; color: var(--faint); font-weight: 500; }
+.facts td { overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
+.events { padding: 0; list-style: none; font-variant-numeric: tabular-nums; font-size: .95rem; }
+.events li { padding: .35rem 0; border-bottom: 1px solid var(--grid); }
+.events .contact { color: var(--alarm); }
+@media (max-width: 600px) { main { padding: 2rem 1rem 3rem; } body { font-size: 16px; }
+  .facts th { width: 8rem; white-space: normal; } }
+@media print { body { background: #fff; } figure, table { break-inside: avoid; } }
+"""
