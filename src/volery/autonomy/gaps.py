@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 SECTORS = 180
-SECTOR_ANGLES: Array = -np.pi + (np.arange(SECTORS) + 0.5) * (2.0 * np.pi / SECTORS)
+SECTOR_ANGLES: Array = np.linspace(-np.pi, np.pi, SECTORS, endpoint=False) + np.pi / SECTORS
 SECTOR_ANGLES.flags.writeable = False
 
 
@@ -36,7 +36,7 @@ def free_distances(obstacles: Array, safe_radius: float, reach: float) -> Array:
     hits = (along > 0.0) & (aside_squared < safe_radius**2)
     until = along - np.sqrt(np.maximum(safe_radius**2 - aside_squared, 0.0))
     blocked = np.where(hits, np.maximum(until, 0.0), reach)
-    return np.minimum(free, blocked.min(axis=0))
+    return np.asarray(np.minimum(free, blocked.min(axis=0)))
 
 
 @dataclass(frozen=True)

@@ -77,8 +77,8 @@ class ScanProjector:
         beam_s = (np.flatnonzero(keep) * self._every) * scan.time_increment
         sensor = self._directions[keep] * ranges[keep, None]
         if joint is not None:
-            tilt = joint[1] + joint[2] * ((stamp - joint[0]) * 1e-9 + beam_s)
-            sensor = _tilted(sensor, tilt)
+            since_joint = (stamp - joint[0]) * 1e-9 + beam_s
+            sensor = _tilted(sensor, np.asarray(joint[1] + joint[2] * since_joint))
         since_pose = (stamp - pose.time_ns) * 1e-9 + beam_s
         turned = rotations.exponential(pose.omega_body * since_pose[:, None])
         body = rotations.rotate(turned, sensor + self._mount)

@@ -96,7 +96,7 @@ class GraphPublisher:
         base = f"{sensor.uav_name}/base_link"
         if kind is LidarScans:
             self._advertise(scan_topic(sensor), LaserScan)
-            if mount.nodding is None:
+            if not mount.nods:
                 self._static.append(_mount_transform(base, laser_frame(sensor), mount))
         elif kind is JointAngles:
             self._advertise(f"/{sensor.uav_name}/joint_states", JointState)
@@ -142,7 +142,7 @@ class GraphPublisher:
                     model.angle_max_rad,
                     model.angle_increment_rad,
                     model.time_increment_s,
-                    model.scan_time_s,
+                    1.0 / model.rate_hz,
                     model.range_min_m,
                     model.range_max_m,
                     scans.ranges[i],

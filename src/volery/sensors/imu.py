@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat
 
-from volery.core import rng, rotations
+from volery.control.fleet import Fleet
+from volery.core import rng
 from volery.core.clock import NS_PER_S, Schedule
 from volery.scenario.data_files import find_data_file, load_data_file
+from volery.sensors.inertial_kernels import feel_motion
 from volery.sensors.samples import ImuReadings, SensorId, owned
-from volery.vehicle.fleet import Fleet
 
 Array = NDArray[np.float64]
-GRAVITY_MAP = np.array([0.0, 0.0, -9.80665])
 _MODELS = Path(__file__).parent / "models"
 
 
@@ -84,21 +84,17 @@ class ImuBank:
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> ImuReadings:
         """Reading number k (counted from 0) of all sensors of the bank."""
-        state, rows = fleet.state, self._rows
-        omega = state.omega_body[rows]
-        lever = self._position_body
-        acceleration_body = rotations.rotate(
-            rotations.conjugate(state.attitude[rows]), state.acceleration_map[rows] - GRAVITY_MAP
-        )
-        force = (
-            acceleration_body
-            + np.cross(state.angular_acceleration_body[rows], lever)
-            + np.cross(omega, np.cross(omega, lever))
-        )
-        sensor_from_body = rotations.conjugate(self._body_from_sensor)
-        reading = np.concatenate(
-            [rotations.rotate(sensor_from_body, omega), rotations.rotate(sensor_from_body, force)],
-            axis=1,
+        state = fleet.state
+        reading = np.empty((len(self._rows), 6))
+        feel_motion(
+            self._rows,
+            state.attitude,
+            state.omega_body,
+            state.acceleration_map,
+            state.angular_acceleration_body,
+            self._position_body,
+            self._body_from_sensor,
+            reading,
         )
         if self._keys is not None:
             noise = _draw(self._keys, 1 + 2 * k)

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, NonNegativeFloat
 
+from volery.control.fleet import Fleet
 from volery.core import rng, rotations
 from volery.core.clock import Schedule
 from volery.scenario.data_files import find_data_file, load_data_file
+from volery.sensors.inertial_kernels import body_twists
 from volery.sensors.samples import OdometryReadings, SensorId, owned
-from volery.vehicle.fleet import Fleet
 
 Array = NDArray[np.float64]
 _MODELS = Path(__file__).parent / "models"
@@ -137,6 +138,6 @@ class GroundTruthBank:
 
 def _twist_body(fleet: Fleet, rows: NDArray[np.int64]) -> Array:
     state = fleet.state
-    body_from_map = rotations.conjugate(state.attitude[rows])
-    velocity_body = rotations.rotate(body_from_map, state.velocity_map[rows])
-    return np.concatenate([velocity_body, state.omega_body[rows]], axis=1)
+    twist = np.empty((len(rows), 6))
+    body_twists(rows, state.attitude, state.velocity_map, state.omega_body, twist)
+    return twist

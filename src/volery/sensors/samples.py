@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
 from volery.sensors.lidar import LidarModel
 
 Array = NDArray[np.float64]

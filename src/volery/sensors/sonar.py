@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat
-from volery.world.scene import Scene
 
+from volery.control.fleet import Fleet
 from volery.core import rng, rotations
 from volery.core.clock import Schedule
 from volery.scenario.data_files import find_data_file, load_data_file
 from volery.sensors.samples import RangeReadings, SensorId, owned
-from volery.vehicle.fleet import Fleet
+from volery.world.scene import Scene
 
 Array = NDArray[np.float64]
 _MODELS = Path(__file__).parent / "models"

@@ -1,0 +1,150 @@
+"""Touches between UAVs and what stands or flies around them, by conservative advancement.
+
+A UAV's body counts as a sphere of its airframe's `collision_radius_m`. A look at the geometry tells
+how far it may move before anything can touch it; the fused dynamics count that distance down and
+come back when it is used up. So nothing is tunnelled at any speed, and looks are rare.
+
+Between UAVs the distance left is shared: for each pair, the gap is never smaller than the sum of
+both budgets, so no two can touch before one of them asks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.fleet import Fleet
+from volery.engine.events import Event, EventKind
+from volery.world.scene import Scene
+
+Array = NDArray[np.float64]
+
+_LOOK_REACH_M = 8.0
+"""Nothing further away is looked for; the look is repeated after that distance."""
+_LEAST_BUDGET_M = 1e-3
+"""While touching, look again after each millimetre."""
+_RELEASE_M = 0.02
+"""Gap at which a touch is over and another one is a new event."""
+_FRICTION = 0.4
+
+
+@dataclass(frozen=True)
+class Bounce:
+    """How bodies answer a touch."""
+
+    restitution: float
+    crashes: bool
+
+
+CRASH = Bounce(restitution=0.15, crashes=True)
+BOUNCE = Bounce(restitution=0.5, crashes=False)
+
+
+class Collisions:
+    """Keeps the fleet's distance budgets filled and turns touches into events and impulses."""
+
+    def __init__(
+        self,
+        fleet: Fleet,
+        scene: Scene,
+        names: tuple[str, ...],
+        response: Bounce,
+        emit: Callable[[Event], None],
+    ) -> None:
+        self._fleet = fleet
+        self._scene = scene
+        self._names = names
+        self._response = response
+        self._emit = emit
+        self._radius = np.array([a.body.collision_radius_m for a in fleet.airframes])
+        self._touching_solid = np.zeros(len(names), dtype=bool)
+        self._touching_uav = np.zeros((len(names), len(names)), dtype=bool)
+        fleet.state.contact_budget[:] = 0.0
+        fleet.state.separation_budget[:] = 0.0
+
+    def resolve(self, time_ns: int) -> None:
+        """Look around every UAV whose budget is used up; strike, report, and refill."""
+        state = self._fleet.state
+        used_up = np.flatnonzero(state.contact_budget <= 0.0)
+        if len(used_up):
+            self._resolve_solids(used_up, time_ns)
+        if len(self._names) > 1:
+            for i in np.flatnonzero(state.separation_budget <= 0.0):
+                self._resolve_others(int(i), time_ns)
+
+    # ----------------------------------------------------------------------- trees and buildings
+
+    def _resolve_solids(self, rows: NDArray[np.int64], time_ns: int) -> None:
+        state = self._fleet.state
+        found = self._scene.clearance(
+            state.position_map[rows], _LOOK_REACH_M, include_terrain=False
+        )
+        gaps = found.distance - self._radius[rows]
+        for k, i in enumerate(rows):
+            if gaps[k] <= 0.0:
+                away = state.position_map[i] - found.nearest[k]
+                self._touch_solid(int(i), away, int(found.instance[k]), time_ns)
+            elif gaps[k] > _RELEASE_M:
+                self._touching_solid[i] = False
+        state.contact_budget[rows] = np.maximum(gaps, _LEAST_BUDGET_M)
+
+    def _touch_solid(self, i: int, away: Array, instance: int, time_ns: int) -> None:
+        normal = _unit(away)
+        approach = -float(normal @ self._fleet.state.velocity_map[i])
+        if not self._touching_solid[i]:
+            self._touching_solid[i] = True
+            self._report(i, approach, self._scene.instance_name(instance), time_ns)
+        if approach > 0.0:
+            self._fleet.strike(i, normal, self._response.restitution, _FRICTION)
+
+    # --------------------------------------------------------------------------------- other UAVs
+
+    def _resolve_others(self, i: int, time_ns: int) -> None:
+        """Share the distance to each other UAV between the two of them."""
+        state = self._fleet.state
+        apart = state.position_map[i] - state.position_map
+        gaps = np.sqrt((apart * apart).sum(axis=1)) - self._radius - self._radius[i]
+        gaps[i] = np.inf
+        for j in np.flatnonzero(gaps <= 0.0):
+            self._touch_uav(i, int(j), apart[j], time_ns)
+        released = gaps > _RELEASE_M
+        self._touching_uav[i, released] = False
+        self._touching_uav[released, i] = False
+        half = np.maximum(0.5 * gaps, 0.5 * _LEAST_BUDGET_M)
+        state.separation_budget[i] = half.min()
+        others = np.arange(len(gaps)) != i
+        state.separation_budget[others] = np.minimum(state.separation_budget[others], half[others])
+
+    def _touch_uav(self, i: int, j: int, apart: Array, time_ns: int) -> None:
+        state = self._fleet.state
+        normal = _unit(apart)
+        approach = -float(normal @ (state.velocity_map[i] - state.velocity_map[j]))
+        if not self._touching_uav[i, j]:
+            self._touching_uav[i, j] = self._touching_uav[j, i] = True
+            self._report(i, approach, self._names[j], time_ns)
+            self._report(j, approach, self._names[i], time_ns)
+        if approach > 0.0:
+            self._fleet.strike_pair(i, j, normal, self._response.restitution, _FRICTION)
+
+    def _report(self, i: int, speed: float, partner: str, time_ns: int) -> None:
+        x, y, z = self._fleet.state.position_map[i].tolist()
+        self._emit(
+            Event(
+                time_ns,
+                self._names[i],
+                EventKind.COLLISION,
+                (x, y, z),
+                max(speed, 0.0),
+                partner,
+            )
+        )
+        if self._response.crashes:
+            self._fleet.crash(i)
+
+
+def _unit(vector: Array) -> Array:
+    length = float(np.linalg.norm(vector))
+    return vector / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])

@@ -1,0 +1,36 @@
+"""Commands from other threads: taken in between two ticks, never in the middle of one."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+from volery.core.errors import VoleryError
+
+
+class Inbox:
+    """What outside clients want done. Any thread may post; the engine's thread works it off.
+
+    Code that runs in the engine's own thread between ticks (nodes, a user's script) commands the
+    fleet directly: that too takes effect with the next physics step.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
+
+    def post(self, action: Callable[[], Any]) -> Future[Any]:
+        """Have `action()` called before the next tick; the future holds its result or error."""
+        future: Future[Any] = Future()
+        self._waiting.append((action, future))
+        return future
+
+    def work_off(self) -> None:
+        """Call everything that waits, in the order of arrival."""
+        for _ in range(len(self._waiting)):
+            action, future = self._waiting.popleft()
+            try:
+                future.set_result(action())
+            except VoleryError as error:
+                future.set_exception(error)

@@ -1,0 +1,33 @@
+"""What the compiled steps noted of landings, impacts and modes, as events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from volery.control.fleet import Fleet, FleetEvent, FleetEventKind
+from volery.engine.events import Event, EventKind
+
+_KINDS = {
+    FleetEventKind.TOUCH_DOWN: EventKind.TOUCH_DOWN,
+    FleetEventKind.IMPACT: EventKind.IMPACT,
+    FleetEventKind.MODE: EventKind.MODE,
+}
+
+
+def drain(fleet: Fleet, names: tuple[str, ...]) -> Iterator[Event]:
+    """Events of the fleet since the last call, oldest first."""
+    for noted in fleet.drain_events():
+        yield _event(noted, names[noted.uav], fleet.dt_ns)
+
+
+def _event(noted: FleetEvent, name: str, dt_ns: int) -> Event:
+    kind = _KINDS[noted.kind]
+    return Event(
+        noted.step * dt_ns,
+        name,
+        kind,
+        noted.position_map,
+        noted.speed_m_s,
+        partner="" if kind is EventKind.MODE else "ground",
+        detail=f"changed to {noted.mode.name}" if kind is EventKind.MODE else "",
+    )

@@ -1,0 +1,49 @@
+"""The topics and services by which the graph commands UAVs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from volery.core.errors import CommandError
+from volery.graph.graph import Graph
+from volery.graph.messages import Published, Twist, message_type
+from volery.runtime.uav import Uav
+
+_TRIGGER = "std_srvs/srv/Trigger"
+
+
+def open_commands(graph: Graph, uav: Uav) -> None:
+    """Listen to `/uavN/cmd_vel` and offer take_off, hold, land and return_home for one UAV.
+
+    A Twist is taken in the level heading frame; numbers that are not finite are ignored, as a
+    refused command on a topic has nobody to tell. Services answer with `success` and a reason.
+    """
+    response_type = message_type(f"{_TRIGGER}_Response")
+
+    def on_twist(published: Published) -> None:
+        linear, angular = published.message.linear, published.message.angular
+        try:
+            uav.command_velocity([linear.x, linear.y, linear.z], angular.z)
+        except CommandError:
+            return
+
+    def serve(action: Callable[[], None]) -> Callable[[Any], Any]:
+        def handle(_request: Any) -> Any:
+            try:
+                action()
+            except CommandError as error:
+                return response_type(success=False, message=str(error))
+            return response_type(success=True, message="")
+
+        return handle
+
+    graph.subscribe(f"/{uav.name}/cmd_vel", on_twist, Twist)
+    actions: dict[str, Callable[[], None]] = {
+        "take_off": uav.take_off,
+        "hold": uav.hold,
+        "land": uav.land,
+        "return_home": uav.return_home,
+    }
+    for name, action in actions.items():
+        graph.offer(f"/{uav.name}/{name}", _TRIGGER, serve(action))

@@ -1,0 +1,155 @@
+"""Where UAVs stand at the start, and whether they can stand there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core import rotations
+from volery.core.errors import PlacementError
+from volery.scenario.schema import Scenario, UavGroup
+from volery.vehicle.airframe import Airframe
+from volery.world.scene import Scene
+from volery.world.terrain import Terrain
+
+Array = NDArray[np.float64]
+
+_SEARCH_STEP_M = 1.0
+_SEARCH_RADIUS_M = 30.0
+_ROOM_TO_STAND_M = 1.5
+_CLIMB_LOOKS = 4
+"""Heights at which `nearest_free` wants room, from the ground to the take-off altitude."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """One UAV before the first step."""
+
+    name: str
+    group: int
+    """Row in the scenario's `uavs`."""
+    type_name: str
+    airframe: Airframe
+    position_map: Array
+    attitude: Array
+    on_ground: bool
+    takes_off: bool
+
+
+def place_uavs(
+    scenario: Scenario, airframes: dict[str, Airframe], scene: Scene, terrain: Terrain
+) -> tuple[Start, ...]:
+    """Places of all UAVs, numbered from uav1 through the groups.
+
+    Raises `PlacementError` naming the UAV, its key and what it stands in: a tree, the ground,
+    another UAV.
+    """
+    starts: list[Start] = []
+    for g, group in enumerate(scenario.uavs):
+        airframe = airframes[group.type]
+        yaw = rotations.from_rpy(0.0, 0.0, math.radians(group.yaw_deg))
+        altitude = scenario.types[group.type].flight.take_off_altitude_m
+        for k in range(group.count):
+            name = f"uav{len(starts) + 1}"
+            where = f"{scenario.name}: uavs[{g}] ({name})"
+            place = _nominal_place(group, k, airframe, terrain)
+            if group.placement == "nearest_free":
+                place = _nearest_free(place, airframe, altitude, scene, terrain, starts, where)
+            _check(place, airframe, scene, terrain, starts, where)
+            starts.append(
+                Start(
+                    name,
+                    g,
+                    group.type,
+                    airframe,
+                    place,
+                    yaw,
+                    on_ground=place[2] - _standing(place[:2], airframe, terrain)[2] < 0.3,
+                    takes_off=group.on_start == "take_off",
+                )
+            )
+    return tuple(starts)
+
+
+def _nominal_place(group: UavGroup, k: int, airframe: Airframe, terrain: Terrain) -> Array:
+    xy = np.array(group.position_m[:2])
+    if group.last_position_m is not None and group.count > 1:
+        xy = xy + (np.array(group.last_position_m) - xy) * (k / (group.count - 1))
+    if len(group.position_m) == 3:
+        return np.array([xy[0], xy[1], group.position_m[2]])
+    return _standing(xy, airframe, terrain)
+
+
+def _standing(xy: Array, airframe: Airframe, terrain: Terrain) -> Array:
+    """Body position with all feet at or above the ground."""
+    z = max(
+        float(terrain.height(xy[0] + foot[0], xy[1] + foot[1])) - foot[2]
+        for foot in airframe.ground.feet_m
+    )
+    return np.array([xy[0], xy[1], z + 0.002])
+
+
+def _nearest_free(
+    place: Array,
+    airframe: Airframe,
+    altitude: float,
+    scene: Scene,
+    terrain: Terrain,
+    others: list[Start],
+    where: str,
+) -> Array:
+    """Nearest place on a spiral with room to stand, to climb and to keep from the others."""
+    for radius in np.arange(0.0, _SEARCH_RADIUS_M, _SEARCH_STEP_M):
+        around = max(1, int(2.0 * math.pi * radius / _SEARCH_STEP_M))
+        for i in range(around):
+            angle = 2.0 * math.pi * i / around
+            xy = place[:2] + radius * np.array([math.cos(angle), math.sin(angle)])
+            candidate = _standing(xy, airframe, terrain)
+            column = candidate + np.linspace(0.0, altitude, _CLIMB_LOOKS)[:, None] * [0.0, 0.0, 1.0]
+            room = scene.clearance(column, _ROOM_TO_STAND_M, include_terrain=False).distance
+            apart = all(
+                np.linalg.norm(candidate - other.position_map) > 2.0 * _ROOM_TO_STAND_M
+                for other in others
+            )
+            if apart and room.min() >= _ROOM_TO_STAND_M:
+                return candidate
+    raise PlacementError(
+        f"{where}: no free place within {_SEARCH_RADIUS_M:g} m of "
+        f"({place[0]:.1f}, {place[1]:.1f}) m; allowed is a place with {_ROOM_TO_STAND_M} m of room"
+    )
+
+
+def _check(
+    place: Array,
+    airframe: Airframe,
+    scene: Scene,
+    terrain: Terrain,
+    others: list[Start],
+    where: str,
+) -> None:
+    at = f"position_m ({place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f})"
+    ground = float(terrain.height(place[0], place[1]))
+    if place[2] < ground:
+        raise PlacementError(
+            f"{where}: {at} lies {ground - place[2]:.2f} m under the ground; "
+            f"z must be at least {_standing(place[:2], airframe, terrain)[2]:.2f} there"
+        )
+    radius = airframe.body.collision_radius_m
+    look = scene.clearance(place[None], radius, include_terrain=False)
+    if look.instance[0] >= 0:
+        raise PlacementError(
+            f"{where}: {at} lies in {scene.instance_name(int(look.instance[0]))}, "
+            f"{look.distance[0]:.2f} m from it; at least {radius:.2f} m is needed "
+            '(placement = "nearest_free" finds a place by itself)'
+        )
+    for other in others:
+        distance = float(np.linalg.norm(place - other.position_map))
+        needed = radius + other.airframe.body.collision_radius_m
+        if distance < needed:
+            raise PlacementError(
+                f"{where}: {at} overlaps {other.name}, {distance:.2f} m away; "
+                f"at least {needed:.2f} m is needed"
+            )

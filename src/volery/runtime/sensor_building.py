@@ -1,0 +1,160 @@
+"""Gathers the sensors of all UAVs into banks that are sampled together."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.fleet import Fleet
+from volery.core import rotations
+from volery.core.clock import Schedule, ns_from_s
+from volery.core.rng import stream_key
+from volery.engine.engine import SensorBank
+from volery.runtime.placement import Start
+from volery.scenario import schema
+from volery.sensors.imu import ImuBank, load_imu_model
+from volery.sensors.joints import JointBank
+from volery.sensors.lidar import load_lidar
+from volery.sensors.lidar_bank import LidarBank
+from volery.sensors.mount import Mount, make_mount
+from volery.sensors.odometry import GroundTruthBank, OdometryBank, load_odometry_model
+from volery.sensors.samples import SensorId
+from volery.sensors.sonar import SonarBank, load_sonar_model
+from volery.world.scene import Scene
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One sensor on one UAV, before it joins a bank."""
+
+    id: SensorId
+    spec: Any
+    mount: Mount
+    key: np.uint64
+
+    @property
+    def bank_key(self) -> tuple[Any, ...]:
+        """Sensors with equal keys are sampled together."""
+        spec = self.spec
+        rate, model = getattr(spec, "rate_hz", None), getattr(spec, "model", None)
+        return (spec.kind, model, rate, spec.phase_s, spec.noise)
+
+
+def fit_sensors(scenario: schema.Scenario, starts: Sequence[Start]) -> list[Fitted]:
+    """Every sensor of every UAV, in fleet order."""
+    return [
+        Fitted(
+            SensorId(row, start.name, spec.name),
+            spec,
+            _mount(spec),
+            stream_key(scenario.seed, f"{start.name}/{spec.kind}/{spec.name}"),
+        )
+        for row, start in enumerate(starts)
+        for spec in scenario.types[start.type_name].sensors
+    ]
+
+
+def build_banks(
+    scenario: schema.Scenario, fitted: Sequence[Fitted], fleet: Fleet, scene: Scene
+) -> list[SensorBank]:
+    """Banks of all sensors, in a fixed order."""
+    groups: dict[tuple[Any, ...], list[Fitted]] = defaultdict(list)
+    for sensor in fitted:
+        groups[sensor.bank_key].append(sensor)
+    builder = _Builder(scenario, fleet, scene)
+    banks = [builder.build(group) for group in groups.values()]
+    nodding = [sensor for sensor in fitted if sensor.mount.nods]
+    if nodding:
+        banks.append(JointBank(tuple(s.id for s in nodding), tuple(s.mount for s in nodding)))
+    return banks
+
+
+class _Builder:
+    def __init__(self, scenario: schema.Scenario, fleet: Fleet, scene: Scene) -> None:
+        self._folder = scenario.folder
+        self._fleet = fleet
+        self._scene = scene
+
+    def build(self, group: list[Fitted]) -> SensorBank:
+        by_kind: dict[str, Callable[[list[Fitted]], SensorBank]] = {
+            "lidar": self._lidar,
+            "imu": self._imu,
+            "sonar": self._sonar,
+            "odometry": self._odometry,
+            "ground_truth": self._ground_truth,
+        }
+        return by_kind[group[0].spec.kind](group)
+
+    def _lidar(self, group: list[Fitted]) -> SensorBank:
+        model = load_lidar(group[0].spec.model)
+        return LidarBank(
+            model,
+            Schedule.from_hz(model.rate_hz, _phase_ns(group)),
+            _ids(group),
+            tuple(s.mount for s in group),
+            _keys(group),
+            self._scene,
+        )
+
+    def _imu(self, group: list[Fitted]) -> SensorBank:
+        spec = group[0].spec
+        model = load_imu_model(spec.model, self._folder)
+        return ImuBank(model, _schedule(group), _ids(group), *_places(group), _keys(group))
+
+    def _sonar(self, group: list[Fitted]) -> SensorBank:
+        model = load_sonar_model(group[0].spec.model, self._folder)
+        return SonarBank(
+            model, _schedule(group), _ids(group), *_places(group), _keys(group), self._scene
+        )
+
+    def _odometry(self, group: list[Fitted]) -> SensorBank:
+        model = load_odometry_model(group[0].spec.model, self._folder)
+        return OdometryBank(model, _schedule(group), _ids(group), _keys(group), self._fleet)
+
+    def _ground_truth(self, group: list[Fitted]) -> SensorBank:
+        return GroundTruthBank(_schedule(group), _ids(group))
+
+
+def _mount(spec: Any) -> Mount:
+    roll, pitch, yaw = (math.radians(angle) for angle in spec.rpy_deg)
+    attitude = rotations.from_rpy(roll, pitch, yaw)
+    nodding: schema.Nodding | None = getattr(spec, "nodding", None)
+    if nodding is None:
+        return make_mount(spec.position_m, attitude)
+    return make_mount(
+        spec.position_m,
+        attitude,
+        amplitude_rad=math.radians(nodding.amplitude_deg),
+        period_s=nodding.period_s,
+        offset_rad=math.radians(nodding.offset_deg),
+        phase_rad=math.radians(nodding.phase_deg),
+    )
+
+
+def _ids(group: list[Fitted]) -> tuple[SensorId, ...]:
+    return tuple(sensor.id for sensor in group)
+
+
+def _places(group: list[Fitted]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return (
+        np.array([s.mount.position_body for s in group]),
+        np.array([s.mount.attitude_body for s in group]),
+    )
+
+
+def _keys(group: list[Fitted]) -> NDArray[np.uint64] | None:
+    return np.array([s.key for s in group]) if group[0].spec.noise else None
+
+
+def _phase_ns(group: list[Fitted]) -> int:
+    return ns_from_s(group[0].spec.phase_s)
+
+
+def _schedule(group: list[Fitted]) -> Schedule:
+    return Schedule.from_hz(group[0].spec.rate_hz, _phase_ns(group))

@@ -1,0 +1,108 @@
+"""A handle on one UAV of a running simulation."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.control.fleet import Fleet
+from volery.control.flight_modes import FlightMode
+from volery.scenario.schema import Flight
+
+Array = NDArray[np.float64]
+
+
+class Uav:
+    """Reads the true state of a UAV and commands it; commands act from the next physics step."""
+
+    def __init__(self, fleet: Fleet, row: int, name: str, flight: Flight) -> None:
+        self._fleet = fleet
+        self._row = row
+        self._flight = flight
+        self.name = name
+
+    # ------------------------------------------------------------------------------------- state
+
+    @property
+    def position_map(self) -> Array:
+        """(3,) m."""
+        return np.array(self._fleet.state.position_map[self._row])
+
+    @property
+    def velocity_map(self) -> Array:
+        """(3,) m/s."""
+        return np.array(self._fleet.state.velocity_map[self._row])
+
+    @property
+    def attitude(self) -> Array:
+        """(4,) quaternion x y z w, map from body."""
+        return np.array(self._fleet.state.attitude[self._row])
+
+    @property
+    def omega_body(self) -> Array:
+        """(3,) rad/s, FLU."""
+        return np.array(self._fleet.state.omega_body[self._row])
+
+    @property
+    def rotor_speed(self) -> Array:
+        """(R,) rad/s."""
+        rotors = len(self._fleet.airframes[self._row].rotors.places)
+        return np.array(self._fleet.state.rotor_speed[self._row, :rotors])
+
+    @property
+    def mode(self) -> FlightMode:
+        """Present flight mode."""
+        return self._fleet.mode(self._row)
+
+    @property
+    def crashed(self) -> bool:
+        """Whether its rotors have stopped for good."""
+        return bool(self._fleet.state.crashed[self._row])
+
+    # ------------------------------------------------------------------------------ flight modes
+
+    def take_off(self, altitude_m: float | None = None) -> None:
+        """Climb to `altitude_m` above the present place (default: the scenario's) and hold."""
+        altitude = self._flight.take_off_altitude_m if altitude_m is None else altitude_m
+        self._fleet.take_off(self._row, altitude)
+
+    def hold(self) -> None:
+        """Stop and stay."""
+        self._fleet.hold(self._row)
+
+    def go_to(self, position_map: ArrayLike, yaw: float | None = None) -> None:
+        """Fly to `position_map` (3,) m and hold there; `yaw` in rad, None keeps the heading."""
+        self._fleet.command_position(self._row, position_map, yaw)
+
+    def land(self) -> None:
+        """Descend here and stop the rotors on the ground."""
+        self._fleet.land(self._row)
+
+    def return_home(self) -> None:
+        """Climb, fly back to where it took off and land there."""
+        self._fleet.return_home(self._row, self._flight.return_altitude_m)
+
+    # ------------------------------------------------------------------------ lower-level commands
+
+    def command_velocity(self, velocity: ArrayLike, yaw_rate: float = 0.0) -> None:
+        """Fly at `velocity` (3,) m/s in the level heading frame (FLU), turning at `yaw_rate` rad/s.
+
+        Holds when no further command comes within the scenario's `command_timeout_s`.
+        """
+        self._fleet.command_velocity_body(self._row, velocity, yaw_rate)
+
+    def command_velocity_map(self, velocity: ArrayLike, yaw_rate: float = 0.0) -> None:
+        """Fly at `velocity` (3,) m/s in the map, turning at `yaw_rate` rad/s."""
+        self._fleet.command_velocity_map(self._row, velocity, yaw_rate)
+
+    def command_attitude(self, attitude: ArrayLike, thrust: float) -> None:
+        """Hold `attitude` (4,) with `thrust` N along the body's z axis."""
+        self._fleet.command_attitude(self._row, attitude, thrust)
+
+    def command_rates(self, omega_body: ArrayLike, thrust: float) -> None:
+        """Turn at `omega_body` (3,) rad/s with `thrust` N along the body's z axis."""
+        self._fleet.command_rates(self._row, omega_body, thrust)
+
+    def command_rotor_speeds(self, speeds: ArrayLike) -> None:
+        """Turn the rotors at `speeds` (R,) rad/s."""
+        self._fleet.command_rotor_speeds(self._row, speeds)

@@ -1,0 +1,66 @@
+"""What a body feels and how it moves, seen from sensor and body frames."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.compiled import kernel
+from volery.core.rotation_kernels import cross, rotate_vector
+
+Array = NDArray[np.float64]
+
+GRAVITY = 9.80665
+"""Standard gravity, m/s^2 (ISO 80000-3)."""
+
+
+@kernel
+def feel_motion(
+    rows: NDArray[np.int64],
+    attitude: Array,
+    omega_body: Array,
+    acceleration_map: Array,
+    angular_acceleration_body: Array,
+    lever_body: Array,
+    body_from_sensor: Array,
+    out: Array,
+) -> None:
+    """Rates (rad/s) and specific force (m/s^2) at each sensor, in its frame: out (S, 6).
+
+    State arrays are (N, 3) or (N, 4), read at `rows` (S,); `lever_body` (S, 3) m and
+    `body_from_sensor` (S, 4) place the sensors.
+    """
+    for s in range(len(rows)):
+        i = rows[s]
+        q, w, d = attitude[i], omega_body[i], lever_body[s]
+        fx, fy, fz = rotate_vector(
+            -q[0],
+            -q[1],
+            -q[2],
+            q[3],
+            acceleration_map[i, 0],
+            acceleration_map[i, 1],
+            acceleration_map[i, 2] + GRAVITY,
+        )
+        b = angular_acceleration_body[i]
+        ex, ey, ez = cross(b[0], b[1], b[2], d[0], d[1], d[2])
+        ux, uy, uz = cross(w[0], w[1], w[2], d[0], d[1], d[2])
+        cx, cy, cz = cross(w[0], w[1], w[2], ux, uy, uz)
+        m = body_from_sensor[s]
+        out[s, 0], out[s, 1], out[s, 2] = rotate_vector(-m[0], -m[1], -m[2], m[3], w[0], w[1], w[2])
+        out[s, 3], out[s, 4], out[s, 5] = rotate_vector(
+            -m[0], -m[1], -m[2], m[3], fx + ex + cx, fy + ey + cy, fz + ez + cz
+        )
+
+
+@kernel
+def body_twists(
+    rows: NDArray[np.int64], attitude: Array, velocity_map: Array, omega_body: Array, out: Array
+) -> None:
+    """Velocity (m/s) and rates (rad/s) in the body: out (S, 6)."""
+    for s in range(len(rows)):
+        i = rows[s]
+        q, v = attitude[i], velocity_map[i]
+        out[s, 0], out[s, 1], out[s, 2] = rotate_vector(-q[0], -q[1], -q[2], q[3], v[0], v[1], v[2])
+        for k in range(3):
+            out[s, 3 + k] = omega_body[i, k]

@@ -1,0 +1,32 @@
+"""Encoders of nodding mounts: the angle that a LIDAR is tilted by."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from volery.control.fleet import Fleet
+from volery.core.clock import NS_PER_S, Schedule
+from volery.sensors.mount import Mount, nodding_angle_at
+from volery.sensors.samples import JointAngles, SensorId, owned
+
+_RATE_HZ = 80.0
+_DIFFERENCE_NS = 1_000_000
+
+
+class JointBank:
+    """All nodding mounts, read out 80 times a second: at the start and in the middle of a turn."""
+
+    name = "joints"
+    lag_ns = 0
+
+    def __init__(self, sensors: tuple[SensorId, ...], mounts: tuple[Mount, ...]) -> None:
+        self.schedule = Schedule.from_hz(_RATE_HZ)
+        self.sensors = sensors
+        self._mounts = mounts
+
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> JointAngles:  # noqa: ARG002
+        """Angles and rates now."""
+        now = np.array([nodding_angle_at(mount, time_ns) for mount in self._mounts])
+        soon = np.array([nodding_angle_at(m, time_ns + _DIFFERENCE_NS) for m in self._mounts])
+        rate = (soon - now) / (_DIFFERENCE_NS / NS_PER_S)
+        return JointAngles(self.sensors, time_ns, owned(now), owned(rate))
