@@ -103,7 +103,7 @@ def forest_from_inventory(
         _draw_missing(
             load_species(name), np.flatnonzero(names == name), dbh, height, seed, diameters
         )
-    yaw = generator(seed, "forest/yaw").uniform(-np.pi, np.pi, len(trees))
+    yaw = _quarter_turns(len(trees), seed)
     variant = generator(seed, "forest/variant").random(len(trees))
     rows = np.arange(len(trees))
     if region is not None:
@@ -159,9 +159,18 @@ def procedural_forest(
         _draw_missing(
             load_species(name), np.flatnonzero(chosen == name), dbh, height, seed, diameters
         )
-    yaw = generator(seed, "forest/yaw").uniform(-np.pi, np.pi, count)
+    yaw = _quarter_turns(count, seed)
     variant = generator(seed, "forest/variant").random(count)
     return _assemble(position, chosen, dbh, height, yaw, variant, terrain, seed)
+
+
+def _quarter_turns(count: int, seed: int) -> Array:
+    """Yaws in steps of 90 degrees: bounding boxes stay as tight as the models' own.
+
+    Turning trees freely widens their boxes by a quarter on average and costs a tenth of the rays a
+    second; with several variants a size class nobody sees the difference.
+    """
+    return 0.5 * np.pi * generator(seed, "forest/yaw").integers(0, 4, count)
 
 
 def _check(region: Region) -> None:

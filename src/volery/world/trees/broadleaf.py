@@ -16,7 +16,7 @@ from volery.world.trees.growth import (
     stem,
 )
 
-_TWIGS_FROM = 0.45
+_TWIGS_FROM = 0.2
 """Maturity from which shoots carry twigs of their own."""
 
 
@@ -31,7 +31,7 @@ def broadleaf(site: Site) -> Growth:
     bearing = concatenated([b.decimated(2) for b in orders[1:]])
     count, area = leaf_count(site)
     points, tangents = along(bearing, count, site.rng)
-    blades = flat_leaves(points, tangents, site, forward=0.7, tilt=0.45).with_area(area)
+    blades = flat_leaves(points, tangents, site, forward=0.7, tilt=0.35).with_area(area)
     return Growth(trunk, orders, blades)
 
 
@@ -84,6 +84,6 @@ def _side_shoots(
         length,
         radius,
         segments=4,
-        lift=0.25,
+        lift=0.12,
         wobble=0.12,
     )

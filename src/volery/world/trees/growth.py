@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -30,11 +30,12 @@ class Facets(NamedTuple):
 
 _FACETS: dict[DetailLevel, tuple[Facets, ...]] = {
     DetailLevel.VISUAL: (Facets(99, 12), Facets(99, 6), Facets(4, 4), Facets(2, 3)),
-    DetailLevel.SENSING: (Facets(99, 7), Facets(3, 3), Facets(1, 3), Facets(0, 0)),
+    DetailLevel.SENSING: (Facets(99, 7), Facets(3, 3), Facets(0, 0), Facets(0, 0)),
     DetailLevel.COARSE: (Facets(99, 5), Facets(2, 3), Facets(0, 0), Facets(0, 0)),
 }
 """By order: stem, limbs on the stem, shoots on the limbs, twigs. All levels share the stem's rings
-so that the trunk has the same radius everywhere."""
+so that the trunk has the same radius everywhere. Thin shoots are left to the visual level: they
+hide among the leaves, whose stand-ins make up for them, and their long boxes slow every ray."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +68,11 @@ class Site:
 
     def envelope(self, share: Array) -> Array:
         """Crown radius as a share of the largest, at `share` of the crown's depth from below."""
-        widest = self.species.crown.widest
+        widest, power = self.species.crown.widest, 1.0 + self.species.crown.roundness
         below = (widest - share) / (widest + 0.35)
         above = (share - widest) / (1.0 - widest + 0.03)
-        return np.sqrt(1.0 - np.clip(np.where(share < widest, below, above), 0.0, 0.999) ** 2)
+        beside = np.clip(np.where(share < widest, below, above), 0.0, 0.999)
+        return np.asarray((1.0 - beside**power) ** (1.0 / power))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,17 +84,34 @@ class Growth:
     blades: Blades | None = None
     capped: bool = False
 
-    def fitted(self, height: float) -> Growth:
-        """The same tree stretched along z so that its highest point is `height`, m."""
-        tops = [float(b.points[..., 2].max()) for b in (self.stem, *self.limbs)]
-        if self.blades is not None and len(self.blades):
-            reach = 0.5 * self.blades.length * self.blades.axis[:, 2]
-            tops.append(float((self.blades.middle[:, 2] + np.abs(reach)).max()))
+    def fitted(self, height: float, radius: float) -> Growth:
+        """The same tree within its allometry: a crown of about `radius`, `height` exactly, m.
+
+        Shoots that strayed far outside are drawn in, so that bounding boxes stay tight.
+        """
+
+        def drawn_in(points: Array) -> Array:
+            axis, _ = on_stem(self.stem, points[..., 2].ravel())
+            axis = axis.reshape(points.shape) * np.array([1.0, 1.0, 0.0])
+            out = points[..., :2] - axis[..., :2]
+            far = np.linalg.norm(out, axis=-1, keepdims=True)
+            kept, rest = 0.75 * radius, 0.4 * radius
+            near = kept + rest * np.tanh((far - kept) / rest)
+            factor = np.where(far > kept, near / np.maximum(far, 1e-9), 1.0)
+            return np.concatenate([axis[..., :2] + factor * out, points[..., 2:]], axis=-1)
+
+        limbs = [Branches(drawn_in(b.points), b.radii) for b in self.limbs]
+        blades = self.blades
+        tops = [float(b.points[..., 2].max()) for b in (self.stem, *limbs)]
+        if blades is not None and len(blades):
+            blades = replace(blades, middle=drawn_in(blades.middle))
+            reach = np.abs(0.5 * blades.length * blades.axis[:, 2])
+            tops.append(float((blades.middle[:, 2] + reach).max()))
         factor = height / max(tops)
         return Growth(
             self.stem.scaled_z(factor),
-            [b.scaled_z(factor) for b in self.limbs],
-            None if self.blades is None else self.blades.scaled_z(factor),
+            [b.scaled_z(factor) for b in limbs],
+            None if blades is None else blades.scaled_z(factor),
             self.capped,
         )
 
@@ -151,7 +170,7 @@ def stem(site: Site, *, top: float | None = None, broken: float = 0.0) -> Branch
     sink = 2.5 * site.dbh + 0.05
     roots = 0.9 * site.dbh + 0.05
     low = np.array([-sink, 0.0, roots, breast])
-    z = np.unique(np.concatenate([low[low < top], np.linspace(breast, top, 9)]).round(6))
+    z = np.unique(np.concatenate([low[low < top], np.linspace(breast, top, 11)]).round(6))
     whole = top / (1.0 - broken) if broken else 1.02 * top
 
     def profile(height: Array | float) -> Array:
@@ -219,7 +238,7 @@ def flat_leaves(
     assert leaf is not None
     level, _ = across(tangents)
     row = np.where(np.arange(count) % 2 == 0, 1.0, -1.0)[:, None]
-    scatter = rng.normal(0.0, 0.3, (count, 3))
+    scatter = rng.normal(0.0, 0.25, (count, 3))
     axis = unit(forward * tangents + row * level - leaf.droop * UP + scatter)
     side = unit(np.cross(UP + rng.normal(0.0, tilt, (count, 3)), axis))
     size = rng.uniform(0.75, 1.25, count) * grown

@@ -51,7 +51,7 @@ def grow_model(species: Species, size_class: int, variant: int, seed: int) -> Tr
     height = float(species.height.height(np.array([dbh]))[0])
     maturity = species.maturity(size_class)
     site = Site(species, height, dbh, maturity, generator(seed, stream))
-    grown = _FORMS[species.form](site).fitted(height)
+    grown = _FORMS[species.form](site).fitted(height, site.crown_radius)
 
     def mesh(level: DetailLevel) -> TreeMesh:
         simple = None

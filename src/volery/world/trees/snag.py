@@ -32,7 +32,7 @@ def _limbs(site: Site, trunk: Branches, rng: np.random.Generator) -> Branches:
     azimuth = GOLDEN_ANGLE * np.arange(count) + rng.normal(0.0, 0.5, count)
     upright = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (count, 3))
     # most limbs broke close to the trunk, a few are whole
-    length = site.crown_radius * (0.15 + 0.95 * rng.random(count) ** 2)
+    length = site.crown_radius * (0.15 + 0.95 * rng.random(count) ** 1.4)
     return grow(
         rng,
         base,

@@ -55,6 +55,8 @@ class Crown(Data):
     """How far branches bend up over their length, rad."""
     widest: Share
     """Where the crown is widest, as a share of its depth from below."""
+    roundness: Share
+    """Outline above the widest place: 1 an ellipse, 0 a straight cone."""
     twigs: Pair
     """Side shoots a branch."""
     source: str
