@@ -53,21 +53,26 @@ def open_log(path: str | Path, *, overwrite: bool = False, compression: Compress
 
     """
     path = Path(path)
+    kind = check_target(path, overwrite=overwrite)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.unlink(missing_ok=True)
+        return kind(path, compression)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot create the log: {error.strerror}") from None
+
+
+def check_target(path: Path, *, overwrite: bool = False) -> type[McapLog] | type[BagLog]:
+    """The kind of log that `open_log` would begin; RecordingError where it would refuse."""
     kinds: dict[str, type[McapLog] | type[BagLog]] = {".mcap": McapLog, ".bag": BagLog}
     kind = kinds.get(path.suffix.lower())
     if kind is None:
         raise RecordingError(f"{path}: a log is named .mcap (ROS 2) or .bag (ROS 1)")
     if path.is_dir():
         raise RecordingError(f"{path}: cannot create the log: it is a folder")
-    if path.exists():
-        if not overwrite:
-            raise RecordingError(f"{path}: exists already; choose another name or overwrite it")
-        path.unlink()
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return kind(path, compression)
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot create the log: {error.strerror}") from None
+    if path.exists() and not overwrite:
+        raise RecordingError(f"{path}: exists already; choose another name or overwrite it")
+    return kind
 
 
 class Log(ABC):

@@ -72,13 +72,14 @@ class FlightCollector:
         self._uavs = {name: _Uav() for name in simulation.uav_names}
         graph = simulation.graph
         for name, uav in self._uavs.items():
-            graph.subscribe(f"/{name}/ground_truth/odom", self._track(uav))
+            graph.subscribe(f"/{name}/ground_truth/odom", self._track(uav), "nav_msgs/msg/Odometry")
         mounts: Mapping[str, Any] = simulation.mounts
         weights = {t: NODDING_WEIGHT if m.nods else 1.0 for t, m in mounts.items()}
         for topic, mount in mounts.items():
             uav = self._uavs[topic.split("/")[1]]
             rate_hz = SCANS_PER_S * weights[topic] / sum(weights.values())
-            graph.subscribe(topic, self._scan(uav, mount, round(NS_PER_S / rate_hz)))
+            receive = self._scan(uav, mount, round(NS_PER_S / rate_hz))
+            graph.subscribe(topic, receive, "sensor_msgs/msg/LaserScan")
 
     def _track(self, uav: _Uav) -> Callable[[Published], None]:
         def receive(published: Published) -> None:

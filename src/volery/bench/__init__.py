@@ -1,0 +1,1 @@
+"""Benches: modules with `measure() -> dict[str, float]`, run by `volery bench NAME`."""

@@ -1,0 +1,153 @@
+"""The commands and their options; each command's work is in its own module."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from volery.cli.guard import guarded
+
+app = typer.Typer(
+    name="volery",
+    help="Flies many UAVs with LIDARs through forests in lock step.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"volery {version('volery')}")
+        raise typer.Exit
+
+
+@app.callback()
+def volery(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_version, is_eager=True, help="Print the version and exit."
+        ),
+    ] = False,
+) -> None:
+    """Fly many UAVs with LIDARs through forests in lock step."""
+
+
+@app.command()
+@guarded
+def run(
+    scenario: Annotated[str, typer.Argument(help="Name from `volery list`, or a TOML file.")],
+    uavs: Annotated[int | None, typer.Option(help="Number of UAVs.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Simulated seconds to fly.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of everything random.")] = None,
+    speed: Annotated[
+        str, typer.Option(help="Factor of real time, such as 1 or 2.5, or max.")
+    ] = "max",
+    threads: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Threads; results do not depend on it.")
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Write a log: .mcap (ROS 2) or .bag (ROS 1).")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Write an illustrated report into this folder.")
+    ] = None,
+    digest: Annotated[
+        bool, typer.Option("--digest", help="Print the SHA-256 over all states and messages.")
+    ] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an existing log.")
+    ] = False,
+) -> None:
+    """Fly a scenario."""
+    from volery.cli.run import RunOptions, fly, parse_speed
+
+    options = RunOptions(
+        scenario=scenario,
+        uavs=uavs,
+        seconds=seconds,
+        seed=seed,
+        speed=parse_speed(speed),
+        threads=threads,
+        record=record,
+        report=report,
+        digest=digest,
+        overwrite=overwrite,
+    )
+    code = fly(options)
+    if code:
+        raise typer.Exit(code)
+
+
+@app.command("list")
+@guarded
+def list_scenarios() -> None:
+    """List the scenarios that ship."""
+    from volery.cli.listing import show_scenarios
+
+    show_scenarios()
+
+
+@app.command()
+@guarded
+def info(file: Annotated[Path, typer.Argument(help="A .mcap or .bag log.")]) -> None:
+    """Show what is in a log."""
+    from volery.cli.logs import show_log
+
+    if not show_log(file):
+        raise typer.Exit(1)
+
+
+@app.command()
+@guarded
+def recover(
+    file: Annotated[Path, typer.Argument(help="A log that was cut off.")],
+    out: Annotated[
+        Path | None, typer.Argument(help="The new log; FILE.recovered by default.")
+    ] = None,
+) -> None:
+    """Write a log that was cut off as a whole file."""
+    from volery.cli.logs import recover_log
+
+    recover_log(file, out)
+
+
+@app.command()
+@guarded
+def bench(
+    name: Annotated[str, typer.Argument(help="lidar, fleet, dynamics, start, or all.")],
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object a bench.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Write the JSON to this file too.")] = None,
+    markdown: Annotated[
+        Path | None, typer.Option(help="Write a page with figures and bounds.")
+    ] = None,
+) -> None:
+    """Measure how fast Volery is on this machine."""
+    from volery.cli.benching import measure_and_show
+
+    measure_and_show(name, as_json=json, out=out, markdown=markdown)
+
+
+@app.command()
+@guarded
+def doctor() -> None:
+    """Check this machine and installation; each line is ok or says how to mend it."""
+    from volery.cli.doctor import examine
+
+    if not examine():
+        raise typer.Exit(1)
+
+
+def main() -> None:
+    """Entry point of the command `volery`."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,53 @@
+"""`volery bench`: measure, show, keep."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import typer
+
+from volery.bench.document import render
+from volery.bench.registry import BENCHES, Result, find
+from volery.cli.tables import print_table
+from volery.core.errors import VoleryError
+
+
+def measure_and_show(name: str, *, as_json: bool, out: Path | None, markdown: Path | None) -> None:
+    """Measure one bench, or all of them each in a process of its own."""
+    for path in (out, markdown):
+        if path is not None and not path.parent.is_dir():
+            raise VoleryError(f"{path}: there is no folder {path.parent}")
+    results = [_in_own_process(each) for each in BENCHES] if name == "all" else [find(name).run()]
+    for result in results:
+        if as_json:
+            typer.echo(result.to_json())
+        else:
+            _show(result)
+    if out is not None:
+        plain = [result.as_dict() for result in results]
+        text = json.dumps(plain if name == "all" else plain[0], indent=2)
+        out.write_text(text + "\n", encoding="utf-8")
+    if markdown is not None:
+        markdown.write_text(render(results), encoding="utf-8")
+
+
+def _in_own_process(name: str) -> Result:
+    """A bench unspoilt by what the others left in memory."""
+    command = [sys.executable, "-m", "volery.cli.app", "bench", name, "--json"]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode:
+        raise VoleryError(f"bench '{name}' failed with exit code {done.returncode}")
+    return Result.from_json(done.stdout.strip().splitlines()[-1])
+
+
+def _show(result: Result) -> None:
+    bounds = BENCHES[result.bench].bounds
+    rows = []
+    for figure, value in result.figures.items():
+        bound = bounds.get(figure)
+        verdict = "" if bound is None else "ok" if bound.holds(value) else "missed"
+        rows.append((figure, f"{value:,.4g}", str(bound or ""), verdict))
+    print_table((result.bench, "figure", "bound", ""), rows, right=(1, 2))

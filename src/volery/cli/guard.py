@@ -1,0 +1,49 @@
+"""What a command does with an error: one line on stderr and an exit code, never a traceback."""
+
+from __future__ import annotations
+
+import functools
+import os
+import sys
+from collections.abc import Callable
+from typing import ParamSpec
+
+import typer
+
+from volery.core.errors import VoleryError
+
+P = ParamSpec("P")
+
+USER_ERROR = 2
+INTERRUPTED = 130
+"""128 + SIGINT, as shells have it."""
+
+
+def complain(text: str) -> None:
+    """Say `error: ...` on stderr."""
+    typer.echo(f"error: {text}", err=True)
+
+
+def guarded(command: Callable[P, None]) -> Callable[P, None]:
+    """Turn a user's mistakes and Ctrl-C into a line and an exit code."""
+
+    @functools.wraps(command)
+    def run(*arguments: P.args, **options: P.kwargs) -> None:
+        try:
+            command(*arguments, **options)
+        except VoleryError as error:
+            complain(str(error))
+            raise typer.Exit(USER_ERROR) from None
+        except KeyboardInterrupt:
+            typer.echo("stopped", err=True)
+            raise typer.Exit(INTERRUPTED) from None
+        except BrokenPipeError:
+            # The reader of our output went away (`volery list | head -1`): end quietly.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(0) from None
+        except OSError as error:
+            where = f"{error.filename}: " if error.filename else ""
+            complain(f"{where}{error.strerror or error}")
+            raise typer.Exit(USER_ERROR) from None
+
+    return run

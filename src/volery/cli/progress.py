@@ -1,0 +1,77 @@
+"""Progress of a flight: a bar on a terminal, a few plain lines elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import Any
+
+import typer
+
+_PLAIN_PERIOD_S = 10.0
+
+
+class FlightProgress:
+    """Shows simulated time and real-time factor while a flight runs."""
+
+    def __init__(self, name: str, duration_s: float) -> None:
+        self._name = name
+        self._duration_s = duration_s
+        self._bar: Any = None
+        self._task: Any = None
+        self._told_at = time.monotonic()
+
+    def __enter__(self) -> FlightProgress:
+        """Begin, with the building of the world."""
+        if sys.stdout.isatty():
+            from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+
+            self._bar = Progress(
+                SpinnerColumn(),
+                TextColumn("[bold]{task.description}"),
+                BarColumn(bar_width=None),
+                TextColumn("{task.fields[state]}"),
+                expand=True,
+                transient=True,
+            )
+            self._bar.start()
+            self._task = self._bar.add_task(
+                self._name, total=self._duration_s, state="building the world"
+            )
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Take the bar away."""
+        self._stop()
+
+    def update(self, time_s: float, real_time_factor: float) -> None:
+        """Show how far the flight is."""
+        state = f"{time_s:.1f} of {self._duration_s:g} s  {real_time_factor:.1f} x real time"
+        if self._bar is not None:
+            self._bar.update(self._task, completed=time_s, state=state)
+        elif time.monotonic() - self._told_at > _PLAIN_PERIOD_S:
+            self._told_at = time.monotonic()
+            typer.echo(f"{self._name}: {state}")
+
+    def note(self, text: str) -> None:
+        """Say what is done after the flight; an empty text ends it."""
+        if sys.stdout.isatty():
+            sys.stdout.write(f"\r\x1b[2K{text}")
+            sys.stdout.flush()
+
+    def finish(self, time_s: float) -> None:
+        """The flight is over: what follows is printed below."""
+        if self._bar is not None:
+            self._bar.update(self._task, completed=time_s)
+        self._stop()
+
+    def _stop(self) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None

@@ -1,0 +1,185 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from fake_simulation import FakeSimulation
+from typer.testing import CliRunner
+
+from volery.bench import registry
+from volery.bench.document import read_results, render
+from volery.bench.machine import describe_machine, describe_versions
+from volery.bench.registry import Result
+from volery.bridges.bag import open_log
+from volery.cli import doctor
+from volery.cli.app import app
+from volery.core.errors import VoleryError
+from volery.scenario import library
+from volery.scenario.load import load_scenario
+
+runner = CliRunner()
+FIGURES = {"ns_per_drone_step_n1000": 120.5, "us_per_step_n1": 2.5, "other": 3.0}
+
+
+def test_help_is_quick_and_imports_nothing_heavy() -> None:
+    code = (
+        "import sys\n"
+        "from typer.testing import CliRunner\n"
+        "from volery.cli.app import app\n"
+        "assert CliRunner().invoke(app, ['--help']).exit_code == 0\n"
+        "heavy = {'numpy', 'numba', 'matplotlib', 'rosbags', 'pydantic'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_every_command_is_explained() -> None:
+    for name in ("run", "list", "info", "recover", "bench", "doctor"):
+        result = runner.invoke(app, [name, "--help"])
+        assert result.exit_code == 0
+        assert name in result.stdout
+
+
+def test_version() -> None:
+    result = runner.invoke(app, ["--version"])
+    assert result.stdout == "volery 0.1.0\n"
+
+
+def test_list() -> None:
+    lines = runner.invoke(app, ["list"]).stdout.splitlines()
+    assert lines[0].split() == ["scenario", "UAVs", "duration", "what", "it", "is"]
+    for name in library.names():
+        assert any(line.startswith(f"{name} ") and library.describe(name) in line for line in lines)
+
+
+def make_log(path: Path, *, whole: bool) -> None:
+    simulation = FakeSimulation(load_scenario("hover"))
+    log = open_log(path)
+    simulation.graph.subscribe_all(log.write)
+    simulation.run()
+    log.close() if whole else log.abort()
+
+
+@pytest.mark.parametrize("suffix", [".mcap", ".bag"])
+def test_info_and_recover(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"flight{suffix}"
+    make_log(path, whole=False)
+    result = runner.invoke(app, ["info", str(path)])
+    assert result.exit_code == 1
+    assert "cut off" in result.stderr
+    assert f"volery recover {path}" in result.stderr
+    assert "sensor_msgs/msg/LaserScan" in result.stdout
+    result = runner.invoke(app, ["recover", str(path)])
+    assert result.exit_code == 0
+    mended = tmp_path / f"flight.recovered{suffix}"
+    assert f"written to {mended}" in result.stdout
+    result = runner.invoke(app, ["info", str(mended)])
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert "40.0 Hz" in result.stdout
+    assert "duration  " in result.stdout
+    result = runner.invoke(app, ["recover", str(mended)])
+    assert "is whole: nothing to recover" in result.stdout
+
+
+@pytest.mark.parametrize("content", [b"", b"no log", b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"])
+def test_info_of_a_broken_file(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "broken.mcap"
+    path.write_bytes(content)
+    result = runner.invoke(app, ["info", str(path)])
+    assert result.exit_code == 1
+    assert result.stderr.startswith(f"error: {path}: ")
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_info_and_recover_of_a_missing_file(tmp_path: Path) -> None:
+    path = str(tmp_path / "none.bag")
+    for words, code in ((["info", path], 1), (["recover", path], 2)):
+        result = runner.invoke(app, words)
+        assert result.exit_code == code
+        assert "none.bag: cannot read the log: No such file" in result.stderr
+
+
+def test_doctor() -> None:
+    result = runner.invoke(app, ["doctor"])
+    assert result.exit_code == 0, result.stdout
+    assert result.stdout.splitlines()[-1] == "ready to fly"
+    assert all(line.startswith(("ok ", "note ")) for line in result.stdout.splitlines()[:-1])
+
+
+def test_doctor_says_how_to_mend(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken() -> str:
+        raise doctor.UnfitError("it is broken; run `mend it`")
+
+    def strange() -> str:
+        raise RuntimeError("what is this")
+
+    for essential, code in ((True, 1), (False, 0)):
+        checks = (doctor.Check("thing", broken, essential), doctor.Check("x", strange, False))
+        monkeypatch.setattr(doctor, "CHECKS", checks)
+        result = runner.invoke(app, ["doctor"])
+        assert result.exit_code == code
+        assert "thing: it is broken; run `mend it`" in result.stdout
+        assert "note  x: RuntimeError('what is this')" in result.stdout
+
+
+def test_doctor_finds_a_cache_that_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    from volery.core import compiled
+
+    monkeypatch.setattr(compiled, "cache_dir", lambda: Path("/tmp/volery-kernels-0/abc"))
+    with pytest.raises(doctor.UnfitError, match="VOLERY_CACHE_DIR"):
+        doctor._kernels()
+
+
+@pytest.fixture
+def quick_bench(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = SimpleNamespace(measure=lambda: dict(FIGURES))
+    monkeypatch.setattr(registry.importlib, "import_module", lambda name: module)
+
+
+@pytest.mark.usefixtures("quick_bench")
+def test_bench(tmp_path: Path) -> None:
+    out, page = tmp_path / "dynamics.json", tmp_path / "benchmarks.md"
+    words = ["bench", "dynamics", "--json", "--out", str(out), "--markdown", str(page)]
+    result = runner.invoke(app, words)
+    assert result.exit_code == 0, result.stderr
+    printed = json.loads(result.stdout)
+    assert list(printed) == ["bench", "machine", "figures"]
+    assert printed["figures"] == FIGURES
+    assert {"processor", "cores", "memory", "python", "numba", "embreex"} <= set(printed["machine"])
+    assert json.loads(out.read_text()) == printed
+    assert read_results(out) == [Result.from_dict(printed)]
+    text = page.read_text()
+    assert "| `ns_per_drone_step_n1000` | 120.5 | <= 150 |" in text
+    assert "| `us_per_step_n1` | 2.5 | <= 1.5 (missed) |" in text
+    assert "| `other` | 3 | reported |" in text
+    table = runner.invoke(app, ["bench", "dynamics"]).stdout
+    assert "missed" in table
+
+
+def test_bench_mistakes(tmp_path: Path) -> None:
+    result = runner.invoke(app, ["bench", "speed"])
+    assert result.exit_code == 2
+    assert "no bench 'speed'; there are lidar, fleet, dynamics, start, or all" in result.stderr
+    result = runner.invoke(app, ["bench", "lidar", "--out", str(tmp_path / "no" / "x.json")])
+    assert result.exit_code == 2
+    assert "there is no folder" in result.stderr
+    for content in ("{}", "[1]", '"x"', "no json"):
+        path = tmp_path / "bad.json"
+        path.write_text(content)
+        with pytest.raises(VoleryError):
+            read_results(path)
+
+
+def test_page_names_every_machine() -> None:
+    here = {**describe_machine(), **describe_versions()}
+    there = {**here, "processor": "Another CPU"}
+    results = [Result("lidar", here, {"rays_per_s_1_thread": 7e6}), Result("new", there, {"x": 1})]
+    text = render(results)
+    assert "## Machine 1" in text
+    assert "Another CPU" in text
+    assert "## new (machine 2)" in text
+    assert "| `rays_per_s_1_thread` | 7e+06 | >= 6e+06 |" in text
