@@ -23,9 +23,7 @@ class FakeGraph:
     def __init__(self) -> None:
         self.callbacks: dict[str, list[Callable[[m.Published], None]]] = {}
 
-    def subscribe(
-        self, topic: str, callback: Callable[[m.Published], None], msgtype: str
-    ) -> None:
+    def subscribe(self, topic: str, callback: Callable[[m.Published], None], msgtype: str) -> None:
         self.callbacks.setdefault(topic, []).append(callback)
 
     def send(self, topic: str, time_ns: int, message: Any) -> None:

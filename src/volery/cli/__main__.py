@@ -1,0 +1,5 @@
+"""`python -m volery.cli` is the command `volery`."""
+
+from volery.cli.app import main
+
+main()
