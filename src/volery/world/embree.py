@@ -83,6 +83,15 @@ LANES = 16 if llvm.get_host_cpu_features().get("avx512f", False) else 8
 """Rays a packet: 16 with AVX-512, else 8."""
 _INTERSECT, _OCCLUDED = f"rtcIntersect{LANES}", f"rtcOccluded{LANES}"
 
+# RTCIntersectArguments, 32-bit words: flags, feature mask, then pointers that stay null.
+ARGUMENT_WORDS = 16
+FLAGS_WORD, FEATURES_WORD = 0, 1
+COHERENT = 1 << 16
+"""Query flag: the packet's rays run close together; Embree then moves them down the tree as one.
+
+For the beams of a scan this halves the time with 16 lanes; scattered rays are better off without.
+"""
+
 _P, _SIZE, _INT, _UINT = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_uint
 _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "rtcNewDevice": (_P, (ctypes.c_char_p,)),
@@ -267,6 +276,15 @@ def aligned_floats(count: int) -> NDArray[np.float32]:
     raw = np.zeros(count + 16, dtype=np.float32)
     start = (16 - (raw.ctypes.data >> 2) % 16) % 16
     return raw[start : start + count]
+
+
+@inline_kernel
+def coherent_arguments() -> NDArray[np.int32]:
+    """Arguments for a packet of rays that run close together; 0 stands for the default ones."""
+    arguments = aligned_floats(ARGUMENT_WORDS).view(np.int32)
+    arguments[FLAGS_WORD] = COHERENT
+    arguments[FEATURES_WORD] = -1
+    return arguments
 
 
 @kernel

@@ -87,7 +87,7 @@ class Scene:
         self.workers = Workers(threads)
         self.solids = tuple(solids)
         self._content = collect(terrain, forest, detail, self.solids)
-        self._backend = _make_backend(self._content, backend)
+        self.backend: EmbreeBackend | EmbreexBackend = _make_backend(self._content, backend)
         self._bodies = _no_bodies()
 
     @property
@@ -98,16 +98,16 @@ class Scene:
     @property
     def compiled(self) -> bool:
         """Whether kernels can cast in this scene through `handle`."""
-        return isinstance(self._backend, EmbreeBackend)
+        return isinstance(self.backend, EmbreeBackend)
 
     @property
     def handle(self) -> SceneHandle:
         """What compiled kernels need to cast in this scene; only while the scene is open."""
-        return self._backend.handle(self._bodies)
+        return self.backend.handle(self._bodies)
 
     def close(self) -> None:
         """Give memory and threads back; the scene must not be asked anything afterwards."""
-        self._backend.close()
+        self.backend.close()
         self.workers.close()
 
     def instance_name(self, instance: int) -> str:
@@ -137,7 +137,7 @@ class Scene:
                 materials[i, k] = Material(material)
         pose = np.tile([0.0, 0.0, -1e6, 0.0, 0.0, 0.0, 1.0], (len(index), 1))
         self._bodies = BodyTable(
-            scene=self._backend.shape_scenes(shapes)[index],
+            scene=self.backend.shape_scenes(shapes)[index],
             radius=np.array([shape.radius for shape in shapes])[index],
             material=np.ascontiguousarray(materials[index]),
             start=pose,
@@ -184,7 +184,7 @@ class Scene:
             np.empty(count, np.int32),
             np.empty(count, np.uint8),
         )
-        self._backend.cast(
+        self.backend.cast(
             self.handle,
             self.workers,
             o,
@@ -210,7 +210,7 @@ class Scene:
         """
         o, t = _ray_arrays(origins, targets, "targets")
         result = np.empty(len(o), dtype=np.bool_)
-        self._backend.occluded(
+        self.backend.occluded(
             self.handle, self.workers, o, t, _rows(exclude, len(o)), float(fraction), result
         )
         return result
@@ -227,7 +227,7 @@ class Scene:
         result = Clearance(
             np.empty(len(p)), np.empty((len(p), 3)), np.empty(len(p), dtype=np.int32)
         )
-        self._backend.clearance(p, float(reach_m), include_terrain, result)
+        self.backend.clearance(p, float(reach_m), include_terrain, result)
         return result
 
 

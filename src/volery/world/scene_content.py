@@ -94,8 +94,8 @@ def _instance_bounds(
 ) -> NDArray[np.float64]:
     """Boxes (N, 6) in the map that hold the boxes (N, 3), (N, 3) turned by (N, 3, 4)."""
     empty: NDArray[np.bool_] = np.logical_not(np.isfinite(low).all(axis=1))
-    centre = np.where(empty[:, None], 0.0, (low + high) / 2.0)
-    half = np.where(empty[:, None], 0.0, (high - low) / 2.0)
+    low, high = np.where(empty[:, None], 0.0, low), np.where(empty[:, None], 0.0, high)
+    centre, half = (low + high) / 2.0, (high - low) / 2.0
     middle = np.einsum("nij,nj->ni", transform[:, :, :3], centre) + transform[:, :, 3]
     extent = np.einsum("nij,nj->ni", np.abs(transform[:, :, :3]), half)
     bounds = np.concatenate([middle - extent, middle + extent], axis=1)

@@ -23,11 +23,11 @@ from volery.world.embree import (
     INVALID,
     LANES,
     MASK,
-    NEAR,
     NORMAL,
     ORIGIN,
     PACKET_ROWS,
     aligned_floats,
+    coherent_arguments,
     intersect_packet,
     occluded_packet,
 )
@@ -35,6 +35,8 @@ from volery.world.embree import (
 _INVALID = np.uint32(INVALID)
 _CHUNK = 512
 """Rays of one piece of work; a multiple of LANES, so that packets do not depend on the threads."""
+_TOGETHER_M, _TOGETHER_COSINE = 1.0, 0.9
+"""Rays of a packet count as running close together up to this distance and angle."""
 _SHORT_OF_TARGET_M = 1e-4
 """`occluded` looks this much less far than the target, so that the target's surface is no cover."""
 
@@ -68,56 +70,62 @@ class SceneHandle(NamedTuple):
     bodies: BodyTable
 
 
-class Packet(NamedTuple):
-    """Memory of one packet of LANES rays, and of its image in a body's frame."""
+class RayBlock(NamedTuple):
+    """Rays and results of one piece of work, P packets of LANES rays; used by one thread at a time.
+
+    Kernels fill `rays` (and `skip`, `fraction`), call `cast_block` and read the rest.
+    """
 
     rays: NDArray[np.float32]
+    """(P, PACKET_ROWS, LANES) Embree's packets. Set ORIGIN and unit DIRECTION, map; read FAR, m,
+    and NORMAL, map, of any length, facing any side."""
     words: NDArray[np.uint32]
-    valid: NDArray[np.int32]
-    body_rays: NDArray[np.float32]
-    body_words: NDArray[np.uint32]
-    body_valid: NDArray[np.int32]
+    """The same memory as whole numbers."""
     skip: NDArray[np.int32]
-    """(LANES,) body row that a lane does not see, -1 for none."""
+    """(P, LANES) row of the body that a ray does not see, -1 for none."""
+    fraction: NDArray[np.float64]
+    """(P,) where in their interval of motion a packet sees the bodies."""
     instance: NDArray[np.int32]
-    """(LANES,) result: instance number, -1 for none."""
+    """(P, LANES) result: instance number, -1 for none."""
     material: NDArray[np.uint8]
-    """(LANES,) result."""
+    """(P, LANES) result."""
     near: NDArray[np.int32]
-    """(N,) body rows that the next packets may touch; the count is an argument."""
+    """(N,) body rows that these rays may touch; the count is an argument."""
+    valid: NDArray[np.int32]
+    """(LANES,) -1 for the lanes that are cast."""
+    body_rays: NDArray[np.float32]
+    """(PACKET_ROWS, LANES) a packet in a body's frame."""
+    body_words: NDArray[np.uint32]
+    """The same memory as whole numbers."""
+    body_valid: NDArray[np.int32]
+    """(LANES,)."""
+    coherent: NDArray[np.int32]
+    """Embree's arguments for rays that run close together."""
 
 
-@inline_kernel
-def new_packet(bodies: int) -> Packet:
-    """Memory for casting in a scene with that many bodies."""
-    rays = aligned_floats(PACKET_ROWS * LANES)
-    body_rays = aligned_floats(PACKET_ROWS * LANES)
-    valid = aligned_floats(LANES).view(np.int32)
-    body_valid = aligned_floats(LANES).view(np.int32)
-    return Packet(
-        rays,
-        rays.view(np.uint32),
-        valid,
-        body_rays,
-        body_rays.view(np.uint32),
-        body_valid,
-        np.full(LANES, -1, dtype=np.int32),
-        np.full(LANES, -1, dtype=np.int32),
-        np.zeros(LANES, dtype=np.uint8),
+@kernel
+def new_block(rays: int, bodies: int) -> RayBlock:
+    """Memory for `rays` rays in a scene with that many bodies."""
+    packets = (rays + LANES - 1) // LANES
+    memory = aligned_floats(packets * PACKET_ROWS * LANES)
+    body_memory = aligned_floats(PACKET_ROWS * LANES)
+    block = RayBlock(
+        memory.reshape((packets, PACKET_ROWS, LANES)),
+        memory.view(np.uint32).reshape((packets, PACKET_ROWS, LANES)),
+        np.full((packets, LANES), -1, dtype=np.int32),
+        np.ones(packets),
+        np.zeros((packets, LANES), dtype=np.int32),
+        np.zeros((packets, LANES), dtype=np.uint8),
         np.zeros(max(bodies, 1), dtype=np.int32),
+        aligned_floats(LANES).view(np.int32),
+        body_memory.reshape((PACKET_ROWS, LANES)),
+        body_memory.view(np.uint32).reshape((PACKET_ROWS, LANES)),
+        aligned_floats(LANES).view(np.int32),
+        coherent_arguments(),
     )
-
-
-@inline_kernel
-def reset_packet(packet: Packet, lanes: int, reach: float) -> None:
-    """Make the first `lanes` lanes ready for a cast of that reach; origins and directions stay."""
-    for k in range(LANES):
-        packet.valid[k] = -1 if k < lanes else 0
-        packet.rays[FAR * LANES + k] = reach
-        packet.rays[NEAR * LANES + k] = 0.0
-        packet.words[MASK * LANES + k] = _INVALID
-        packet.words[GEOMETRY * LANES + k] = _INVALID
-        packet.words[INSTANCE * LANES + k] = _INVALID
+    block.words[:, MASK, :] = _INVALID
+    block.body_words[MASK, :] = _INVALID
+    return block
 
 
 @inline_kernel
@@ -171,26 +179,23 @@ def near_bodies(
 
 
 @inline_kernel
-def _may_touch(packet: Packet, lanes: int, x: float, y: float, z: float, radius: float) -> bool:
-    """Whether any of the lanes may meet the sphere; never wrong when it says no."""
-    rays = packet.rays
+def _may_touch(
+    rays: NDArray[np.float32], lanes: int, x: float, y: float, z: float, radius: float
+) -> bool:
+    """Whether any of a packet's lanes may meet the sphere; never wrong when it says no."""
     m = lanes // 2
     shift, spread, reach = 0.0, 0.0, 0.0
     for k in range(lanes):
         s, d = 0.0, 0.0
         for row in range(3):
-            s += abs(rays[(ORIGIN + row) * LANES + k] - rays[(ORIGIN + row) * LANES + m])
-            d += abs(rays[(DIRECTION + row) * LANES + k] - rays[(DIRECTION + row) * LANES + m])
+            s += abs(rays[ORIGIN + row, k] - rays[ORIGIN + row, m])
+            d += abs(rays[DIRECTION + row, k] - rays[DIRECTION + row, m])
         shift, spread = max(shift, s), max(spread, d)
-        reach = max(reach, rays[FAR * LANES + k])
-    cx = x - rays[ORIGIN * LANES + m]
-    cy = y - rays[(ORIGIN + 1) * LANES + m]
-    cz = z - rays[(ORIGIN + 2) * LANES + m]
-    along = (
-        cx * rays[DIRECTION * LANES + m]
-        + cy * rays[(DIRECTION + 1) * LANES + m]
-        + cz * rays[(DIRECTION + 2) * LANES + m]
-    )
+        reach = max(reach, rays[FAR, k])
+    cx = x - rays[ORIGIN, m]
+    cy = y - rays[ORIGIN + 1, m]
+    cz = z - rays[ORIGIN + 2, m]
+    along = cx * rays[DIRECTION, m] + cy * rays[DIRECTION + 1, m] + cz * rays[DIRECTION + 2, m]
     away = cx * cx + cy * cy + cz * cz
     slack = radius + shift + spread * (np.sqrt(away) + radius + shift)
     if along < -slack or along > reach + slack:
@@ -211,91 +216,109 @@ def _rotation(
 
 
 @inline_kernel
-def _into_body(packet: Packet, lanes: int, row: int, pose: tuple[float, ...]) -> None:
+def _into_body(block: RayBlock, p: int, lanes: int, row: int, pose: tuple[float, ...]) -> None:
     """Fill the body-frame packet; lanes that do not see this body stay masked."""
     x, y, z, qx, qy, qz, qw = pose
     a, b, c = _rotation(qx, qy, qz, qw)
-    rays, out = packet.rays, packet.body_rays
+    rays, out = block.rays[p], block.body_rays
     for k in range(LANES):
-        ox = rays[ORIGIN * LANES + k] - x
-        oy = rays[(ORIGIN + 1) * LANES + k] - y
-        oz = rays[(ORIGIN + 2) * LANES + k] - z
-        dx = rays[DIRECTION * LANES + k]
-        dy = rays[(DIRECTION + 1) * LANES + k]
-        dz = rays[(DIRECTION + 2) * LANES + k]
+        ox, oy, oz = rays[ORIGIN, k] - x, rays[ORIGIN + 1, k] - y, rays[ORIGIN + 2, k] - z
+        dx, dy, dz = rays[DIRECTION, k], rays[DIRECTION + 1, k], rays[DIRECTION + 2, k]
         for j in range(3):
-            out[(ORIGIN + j) * LANES + k] = a[j] * ox + b[j] * oy + c[j] * oz
-            out[(DIRECTION + j) * LANES + k] = a[j] * dx + b[j] * dy + c[j] * dz
-        out[FAR * LANES + k] = rays[FAR * LANES + k]
-        out[NEAR * LANES + k] = 0.0
-        packet.body_words[MASK * LANES + k] = _INVALID
-        packet.body_words[GEOMETRY * LANES + k] = _INVALID
-        packet.body_valid[k] = -1 if k < lanes and packet.skip[k] != row else 0
+            out[ORIGIN + j, k] = a[j] * ox + b[j] * oy + c[j] * oz
+            out[DIRECTION + j, k] = a[j] * dx + b[j] * dy + c[j] * dz
+        out[FAR, k] = rays[FAR, k]
+        block.body_words[GEOMETRY, k] = _INVALID
+        block.body_valid[k] = -1 if k < lanes and block.skip[p, k] != row else 0
 
 
 @inline_kernel
-def cast_packet(
-    scene: SceneHandle, packet: Packet, lanes: int, near_count: int, fraction: float
-) -> None:
-    """Closest hits of the packet's first `lanes` lanes among static geometry and near bodies.
-
-    Afterwards FAR holds the distance, NORMAL the map normal (any length, any side) and the
-    packet's `instance` and `material` tell what was hit, -1 and NONE for nothing.
-    """
-    rays, words = packet.rays, packet.words
-    if scene.static != 0:
-        intersect_packet(packet.valid.ctypes.data, scene.static, rays.ctypes.data, 0)
-    for k in range(lanes):
-        part = words[GEOMETRY * LANES + k]
-        if part == _INVALID:
-            packet.instance[k] = -1
-            packet.material[k] = 0
-            continue
-        number = words[INSTANCE * LANES + k]
-        if number == _INVALID:  # terrain and solids are geometry of the top level
-            packet.instance[k] = part
-            packet.material[k] = scene.material[part, 0]
-            continue
-        packet.instance[k] = number
-        packet.material[k] = scene.material[number, part]
-        x = rays[NORMAL * LANES + k]
-        y = rays[(NORMAL + 1) * LANES + k]
-        z = rays[(NORMAL + 2) * LANES + k]
-        m = scene.normal_matrix[number]
-        rays[NORMAL * LANES + k] = m[0] * x + m[1] * y + m[2] * z
-        rays[(NORMAL + 1) * LANES + k] = m[3] * x + m[4] * y + m[5] * z
-        rays[(NORMAL + 2) * LANES + k] = m[6] * x + m[7] * y + m[8] * z
-    for n in range(near_count):
-        _cast_at_body(scene, packet, lanes, packet.near[n], fraction)
-
-
-@inline_kernel
-def _cast_at_body(
-    scene: SceneHandle, packet: Packet, lanes: int, row: int, fraction: float
-) -> None:
+def _cast_at_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: int) -> None:
+    """Let one body shorten the rays of packet `p`."""
     bodies = scene.bodies
-    pose = body_pose(bodies, row, fraction)
-    if not _may_touch(packet, lanes, pose[0], pose[1], pose[2], bodies.radius[row]):
+    pose = body_pose(bodies, row, block.fraction[p])
+    rays = block.rays[p]
+    if not _may_touch(rays, lanes, pose[0], pose[1], pose[2], bodies.radius[row]):
         return
-    _into_body(packet, lanes, row, pose)
-    intersect_packet(
-        packet.body_valid.ctypes.data, bodies.scene[row], packet.body_rays.ctypes.data, 0
-    )
-    found = packet.body_rays
+    _into_body(block, p, lanes, row, pose)
+    found = block.body_rays
+    intersect_packet(block.body_valid.ctypes.data, bodies.scene[row], found.ctypes.data, 0)
     a, b, c = _rotation(pose[3], pose[4], pose[5], pose[6])
     for k in range(lanes):
-        part = packet.body_words[GEOMETRY * LANES + k]
-        if part == _INVALID or packet.body_valid[k] == 0:
+        part = block.body_words[GEOMETRY, k]
+        if part == _INVALID or block.body_valid[k] == 0:
             continue
-        x = found[NORMAL * LANES + k]
-        y = found[(NORMAL + 1) * LANES + k]
-        z = found[(NORMAL + 2) * LANES + k]
-        packet.rays[FAR * LANES + k] = found[FAR * LANES + k]
-        packet.rays[NORMAL * LANES + k] = a[0] * x + a[1] * y + a[2] * z
-        packet.rays[(NORMAL + 1) * LANES + k] = b[0] * x + b[1] * y + b[2] * z
-        packet.rays[(NORMAL + 2) * LANES + k] = c[0] * x + c[1] * y + c[2] * z
-        packet.instance[k] = scene.moving_offset + row
-        packet.material[k] = bodies.material[row, part]
+        x, y, z = found[NORMAL, k], found[NORMAL + 1, k], found[NORMAL + 2, k]
+        rays[FAR, k] = found[FAR, k]
+        rays[NORMAL, k] = a[0] * x + a[1] * y + a[2] * z
+        rays[NORMAL + 1, k] = b[0] * x + b[1] * y + b[2] * z
+        rays[NORMAL + 2, k] = c[0] * x + c[1] * y + c[2] * z
+        block.instance[p, k] = scene.moving_offset + row
+        block.material[p, k] = bodies.material[row, part]
+
+
+@inline_kernel
+def _together(rays: NDArray[np.float32], lanes: int) -> bool:
+    """Whether first and last ray of a packet run close together."""
+    last = lanes - 1
+    apart, along = 0.0, 0.0
+    for row in range(3):
+        apart += abs(rays[ORIGIN + row, 0] - rays[ORIGIN + row, last])
+        along += rays[DIRECTION + row, 0] * rays[DIRECTION + row, last]
+    return bool(apart < _TOGETHER_M and along > _TOGETHER_COSINE)
+
+
+@kernel
+def cast_block(
+    scene: SceneHandle, block: RayBlock, count: int, reach: float, near_count: int
+) -> None:
+    """Closest hits of the block's first `count` rays among static geometry and near bodies.
+
+    One call handles many packets: handing so many arrays to a function costs as much as a ray.
+    """
+    rays, words, valid = block.rays, block.words, block.valid
+    instance, material = block.instance, block.material
+    rays_address, valid_address = rays.ctypes.data, valid.ctypes.data
+    coherent_address = block.coherent.ctypes.data
+    static, material_of, matrix_of = scene.static, scene.material, scene.normal_matrix
+    packets = (count + LANES - 1) // LANES
+    limit = np.float32(reach)
+    for k in range(LANES):
+        valid[k] = -1
+    for p in range(packets):
+        lanes = min(LANES, count - p * LANES)
+        for k in range(lanes, LANES):
+            valid[k] = 0
+        for k in range(LANES):
+            rays[p, FAR, k] = limit
+            words[p, GEOMETRY, k] = _INVALID
+            words[p, INSTANCE, k] = _INVALID
+        if static != 0:
+            arguments = coherent_address if _together(rays[p], lanes) else 0
+            intersect_packet(
+                valid_address, static, rays_address + p * (PACKET_ROWS * LANES * 4), arguments
+            )
+        for k in range(LANES):
+            part = words[p, GEOMETRY, k]
+            number = words[p, INSTANCE, k]
+            if part == _INVALID:
+                instance[p, k] = -1
+                material[p, k] = 0
+            elif number == _INVALID:  # terrain and solids are geometry of the top level
+                instance[p, k] = part
+                material[p, k] = material_of[part, 0]
+            else:
+                instance[p, k] = number
+                material[p, k] = material_of[number, part]
+                x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
+                for j in range(3):
+                    rays[p, NORMAL + j, k] = (
+                        matrix_of[number, 3 * j] * x
+                        + matrix_of[number, 3 * j + 1] * y
+                        + matrix_of[number, 3 * j + 2] * z
+                    )
+        for n in range(near_count):
+            _cast_at_body(scene, block, p, lanes, block.near[n])
 
 
 @inline_kernel
@@ -318,6 +341,13 @@ def _near_chunk(
     return near_bodies(scene.bodies, (x0, y0, z0), (x1, y1, z1), reach, near)
 
 
+@inline_kernel
+def _load_skips(block: RayBlock, exclude: NDArray[np.int32], first: int, last: int) -> None:
+    for i in range(first, last):
+        p, k = (i - first) // LANES, (i - first) % LANES
+        block.skip[p, k] = exclude[i] if exclude.shape[0] > 1 else exclude[0]
+
+
 @kernel
 def cast_rays(
     scene: SceneHandle,
@@ -334,89 +364,79 @@ def cast_rays(
 ) -> None:
     """Cast rays in chunks taken from `counter`; `exclude` has one row, or one a ray."""
     count = origins.shape[0]
-    packet = new_packet(scene.bodies.scene.shape[0])
-    rays = packet.rays
+    block = new_block(_CHUNK, scene.bodies.scene.shape[0])
+    block.fraction[:] = fraction
+    rays = block.rays
     while True:
         first = fetch_add(counter.ctypes.data) * _CHUNK
         if first >= count:
             return
         last = min(first + _CHUNK, count)
-        near_count = _near_chunk(scene, origins, first, last, reach, packet.near)
-        for start in range(first, last, LANES):
-            lanes = min(LANES, last - start)
-            for k in range(lanes):
-                i = start + k
-                for j in range(3):
-                    rays[(ORIGIN + j) * LANES + k] = origins[i, j]
-                    rays[(DIRECTION + j) * LANES + k] = directions[i, j]
-                packet.skip[k] = exclude[i] if exclude.shape[0] > 1 else exclude[0]
-            reset_packet(packet, lanes, reach)
-            cast_packet(scene, packet, lanes, near_count, fraction)
-            for k in range(lanes):
-                i = start + k
-                instance[i] = packet.instance[k]
-                material[i] = packet.material[k]
-                if packet.instance[k] < 0:
-                    distance[i] = np.inf
-                    normal[i, 0], normal[i, 1], normal[i, 2] = 0.0, 0.0, 0.0
-                    continue
-                distance[i] = rays[FAR * LANES + k]
-                x = rays[NORMAL * LANES + k]
-                y = rays[(NORMAL + 1) * LANES + k]
-                z = rays[(NORMAL + 2) * LANES + k]
-                facing = x * directions[i, 0] + y * directions[i, 1] + z * directions[i, 2]
-                length = np.sqrt(x * x + y * y + z * z)
-                scale = (-1.0 if facing > 0.0 else 1.0) / max(length, 1e-30)
-                normal[i, 0], normal[i, 1], normal[i, 2] = x * scale, y * scale, z * scale
+        near_count = _near_chunk(scene, origins, first, last, reach, block.near)
+        _load_skips(block, exclude, first, last)
+        for i in range(first, last):
+            p, k = (i - first) // LANES, (i - first) % LANES
+            for j in range(3):
+                rays[p, ORIGIN + j, k] = origins[i, j]
+                rays[p, DIRECTION + j, k] = directions[i, j]
+        cast_block(scene, block, last - first, reach, near_count)
+        for i in range(first, last):
+            p, k = (i - first) // LANES, (i - first) % LANES
+            instance[i] = block.instance[p, k]
+            material[i] = block.material[p, k]
+            if block.instance[p, k] < 0:
+                distance[i] = np.inf
+                normal[i, 0], normal[i, 1], normal[i, 2] = 0.0, 0.0, 0.0
+                continue
+            distance[i] = rays[p, FAR, k]
+            x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
+            facing = x * directions[i, 0] + y * directions[i, 1] + z * directions[i, 2]
+            length = np.sqrt(x * x + y * y + z * z)
+            scale = (-1.0 if facing > 0.0 else 1.0) / max(length, 1e-30)
+            normal[i, 0], normal[i, 1], normal[i, 2] = x * scale, y * scale, z * scale
 
 
 @inline_kernel
 def _aim(
-    packet: Packet,
+    block: RayBlock,
     origins: NDArray[np.float64],
     targets: NDArray[np.float64],
-    start: int,
+    first: int,
+    p: int,
     lanes: int,
 ) -> None:
     """Fill a packet with rays that end just short of their targets."""
-    rays = packet.rays
-    reset_packet(packet, lanes, 0.0)
-    for k in range(lanes):
-        i = start + k
+    rays, valid = block.rays[p], block.valid
+    for k in range(LANES):
+        i = first + p * LANES + min(k, lanes - 1)
         length = 0.0
         for j in range(3):
             length += (targets[i, j] - origins[i, j]) ** 2
         length = np.sqrt(length)
         for j in range(3):
-            rays[(ORIGIN + j) * LANES + k] = origins[i, j]
-            rays[(DIRECTION + j) * LANES + k] = (targets[i, j] - origins[i, j]) / max(
+            rays[ORIGIN + j, k] = origins[i, j]
+            rays[DIRECTION + j, k] = (targets[i, j] - origins[i, j]) / max(
                 length, _SHORT_OF_TARGET_M
             )
-        rays[FAR * LANES + k] = max(length - _SHORT_OF_TARGET_M, 0.0)
-        if length <= _SHORT_OF_TARGET_M:
-            packet.valid[k] = 0
+        rays[FAR, k] = max(length - _SHORT_OF_TARGET_M, 0.0)
+        valid[k] = -1 if k < lanes and length > _SHORT_OF_TARGET_M else 0
 
 
 @inline_kernel
-def _hide_behind_body(
-    scene: SceneHandle, packet: Packet, lanes: int, row: int, fraction: float
-) -> None:
+def _hide_behind_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: int) -> None:
     """Mark, by FAR = -inf, the lanes that meet a body."""
-    pose = body_pose(scene.bodies, row, fraction)
-    if not _may_touch(packet, lanes, pose[0], pose[1], pose[2], scene.bodies.radius[row]):
+    pose = body_pose(scene.bodies, row, block.fraction[p])
+    rays, found, sees = block.rays[p], block.body_rays, block.body_valid
+    if not _may_touch(rays, lanes, pose[0], pose[1], pose[2], scene.bodies.radius[row]):
         return
-    _into_body(packet, lanes, row, pose)
-    far = packet.rays[FAR * LANES : (FAR + 1) * LANES]
-    body_far = packet.body_rays[FAR * LANES : (FAR + 1) * LANES]
+    _into_body(block, p, lanes, row, pose)
     for k in range(lanes):
-        if packet.valid[k] == 0 or far[k] < 0.0:
-            packet.body_valid[k] = 0
-    occluded_packet(
-        packet.body_valid.ctypes.data, scene.bodies.scene[row], packet.body_rays.ctypes.data, 0
-    )
+        if block.valid[k] == 0 or rays[FAR, k] < 0.0:
+            sees[k] = 0
+    occluded_packet(sees.ctypes.data, scene.bodies.scene[row], found.ctypes.data, 0)
     for k in range(lanes):
-        if packet.body_valid[k] != 0 and body_far[k] < 0.0:
-            far[k] = -np.inf
+        if sees[k] != 0 and found[FAR, k] < 0.0:
+            rays[FAR, k] = -np.inf
 
 
 @kernel
@@ -431,8 +451,8 @@ def find_occluded(
 ) -> None:
     """Whether anything lies between origins and targets, in chunks taken from `counter`."""
     count = origins.shape[0]
-    packet = new_packet(scene.bodies.scene.shape[0])
-    rays = packet.rays
+    block = new_block(_CHUNK, scene.bodies.scene.shape[0])
+    block.fraction[:] = fraction
     while True:
         first = fetch_add(counter.ctypes.data) * _CHUNK
         if first >= count:
@@ -444,15 +464,16 @@ def find_occluded(
             for j in range(3):
                 squared += (targets[i, j] - origins[i, j]) ** 2
             longest = max(longest, squared)
-        near_count = _near_chunk(scene, origins, first, last, np.sqrt(longest), packet.near)
-        for start in range(first, last, LANES):
-            lanes = min(LANES, last - start)
-            _aim(packet, origins, targets, start, lanes)
-            for k in range(lanes):
-                packet.skip[k] = exclude[start + k] if exclude.shape[0] > 1 else exclude[0]
+        near_count = _near_chunk(scene, origins, first, last, np.sqrt(longest), block.near)
+        _load_skips(block, exclude, first, last)
+        for p in range((last - first + LANES - 1) // LANES):
+            lanes = min(LANES, last - first - p * LANES)
+            _aim(block, origins, targets, first, p, lanes)
+            rays = block.rays[p]
             if scene.static != 0:
-                occluded_packet(packet.valid.ctypes.data, scene.static, rays.ctypes.data, 0)
+                arguments = block.coherent.ctypes.data if _together(rays, lanes) else 0
+                occluded_packet(block.valid.ctypes.data, scene.static, rays.ctypes.data, arguments)
             for n in range(near_count):
-                _hide_behind_body(scene, packet, lanes, packet.near[n], fraction)
+                _hide_behind_body(scene, block, p, lanes, block.near[n])
             for k in range(lanes):
-                occluded[start + k] = rays[FAR * LANES + k] < 0.0
+                occluded[first + p * LANES + k] = rays[FAR, k] < 0.0

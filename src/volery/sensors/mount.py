@@ -1,0 +1,98 @@
+"""Where a sensor sits on a UAV, and how it nods."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.core.compiled import inline_kernel, kernel
+
+_NS = 1e-9
+_TWO_PI = 2.0 * math.pi
+
+
+class Mount(NamedTuple):
+    """Pose of a sensor in the body frame (FLU); optionally it nods about the sensor's y axis.
+
+    The nodding angle at time t is offset + amplitude sin(2 pi t / period + phase); a positive angle
+    turns the sensor's x axis down. Without nodding `period_s` is 0.
+    """
+
+    position_body: NDArray[np.float64]
+    """(3,) m."""
+    attitude_body: NDArray[np.float64]
+    """(4,) unit quaternion, body from sensor base."""
+    amplitude_rad: float
+    period_s: float
+    offset_rad: float
+    phase_rad: float
+
+    @property
+    def nods(self) -> bool:
+        """Whether the sensor moves against the body."""
+        return self.period_s > 0.0
+
+
+def make_mount(
+    position_body: ArrayLike = (0.0, 0.0, 0.0),
+    attitude_body: ArrayLike = (0.0, 0.0, 0.0, 1.0),
+    *,
+    amplitude_rad: float = 0.0,
+    period_s: float = 0.0,
+    offset_rad: float = 0.0,
+    phase_rad: float = 0.0,
+) -> Mount:
+    """Checked mount; ValueError for numbers that are not finite or of the wrong shape."""
+    position = np.ascontiguousarray(position_body, dtype=np.float64)
+    attitude = np.ascontiguousarray(attitude_body, dtype=np.float64)
+    numbers = np.array([amplitude_rad, period_s, offset_rad, phase_rad], dtype=np.float64)
+    if position.shape != (3,) or attitude.shape != (4,):
+        raise ValueError("a mount needs a position (3,) and an attitude quaternion (4,)")
+    length = float(np.linalg.norm(attitude))
+    if not (np.isfinite(position).all() and np.isfinite(numbers).all() and length > 0.0):
+        raise ValueError("a mount's numbers must be finite and its quaternion not zero")
+    if period_s < 0.0:
+        raise ValueError(f"period_s must not be negative, not {period_s}")
+    return Mount(
+        position,
+        attitude / length,
+        float(amplitude_rad),
+        float(period_s),
+        float(offset_rad),
+        float(phase_rad),
+    )
+
+
+@inline_kernel
+def nodding_angle(mount: Mount, time_ns: int) -> float:
+    """Angle about the sensor's y axis at a time, rad."""
+    if mount.period_s <= 0.0:
+        return mount.offset_rad
+    # The phase is reduced in integers first: a long run loses no precision.
+    period_ns = int(round(mount.period_s / _NS))
+    turn = (time_ns % period_ns) / period_ns
+    angle: float = mount.offset_rad + mount.amplitude_rad * np.sin(_TWO_PI * turn + mount.phase_rad)
+    return angle
+
+
+@inline_kernel
+def sensor_attitude(mount: Mount, time_ns: int) -> tuple[float, float, float, float]:
+    """Quaternion, body from sensor, at a time."""
+    x, y, z, w = (
+        mount.attitude_body[0],
+        mount.attitude_body[1],
+        mount.attitude_body[2],
+        mount.attitude_body[3],
+    )
+    half = 0.5 * nodding_angle(mount, time_ns)
+    s, c = np.sin(half), np.cos(half)
+    return x * c - z * s, y * c + w * s, z * c + x * s, w * c - y * s
+
+
+@kernel
+def nodding_angle_at(mount: Mount, time_ns: int) -> float:
+    """`nodding_angle` for callers in Python."""
+    return nodding_angle(mount, time_ns)
