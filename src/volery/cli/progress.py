@@ -37,7 +37,9 @@ class FlightProgress:
             )
             self._bar.start()
             self._task = self._bar.add_task(
-                self._name, total=self._duration_s, state="building the world"
+                self._name,
+                total=self._duration_s,
+                state="building the world; a first run compiles its kernels",
             )
         return self
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 TRACK_PERIOD_NS = NS_PER_S // 20
-SCANS_PER_S = 40.0
+SCANS_PER_S = 12.0
 """Scans of the whole fleet that are mapped in a simulated second."""
 NODDING_WEIGHT = 4.0
 """A nodding scanner sees the third dimension: it gets more of the scans than a level one."""
@@ -196,8 +196,8 @@ class FlightCollector:
 def scan_points(scan: Any, mount: Any, poses: deque[tuple[int, Any]]) -> NDArray[np.float64] | None:
     """Map points (n, 3) of a LaserScan, each beam cast from the pose it had; None without poses.
 
-    The body's pose at the first and at the last beam is interpolated between `poses` (time in ns,
-    geometry_msgs/Pose), and again in between.
+    Each beam is placed from the body's poses at the first and at the last beam, which come from
+    `poses` (time in ns, geometry_msgs/Pose), and the two places are interpolated.
     """
     start_ns, end_ns = _stamp_ns(scan), _end_ns(scan)
     if not poses or poses[0][0] > start_ns:
@@ -207,10 +207,7 @@ def scan_points(scan: Any, mount: Any, poses: deque[tuple[int, Any]]) -> NDArray
         (ranges >= scan.range_min) & (ranges <= min(scan.range_max, MAX_RANGE_M))
     )
     fraction = (beams / max(len(ranges) - 1, 1))[:, None]
-    (p0, q0), (p1, q1) = _pose_at(poses, start_ns), _pose_at(poses, end_ns)
-    q1 = q1 if q0 @ q1 >= 0.0 else -q1
-    position = p0 + fraction * (p1 - p0)
-    attitude = rotations.normalize(q0 + fraction * (q1 - q0))
+    ends = (_pose_at(poses, start_ns), _pose_at(poses, end_ns))
     azimuth = scan.angle_min + scan.angle_increment * beams
     reach = ranges[beams]
     along = np.stack([reach * np.cos(azimuth), reach * np.sin(azimuth), np.zeros(len(beams))], -1)
@@ -218,8 +215,10 @@ def scan_points(scan: Any, mount: Any, poses: deque[tuple[int, Any]]) -> NDArray
     if nod is not None:
         # about the sensor's y axis, positive looks down
         along = np.stack([along[:, 0] * np.cos(nod), along[:, 1], -along[:, 0] * np.sin(nod)], -1)
-    in_body = rotations.rotate(mount.attitude_body, along) + np.asarray(mount.position_body)
-    return position + rotations.rotate(attitude, in_body)
+    in_body = along @ rotations.matrix(mount.attitude_body).T + np.asarray(mount.position_body)
+    # a sweep turns the body by a few hundredths of a radian: points may be interpolated
+    first, last = (p + in_body @ rotations.matrix(q).T for p, q in ends)
+    return np.asarray(first + fraction * (last - first))
 
 
 def _nodding_angles(mount: Any, start_ns: int, end_ns: int, fraction: Array) -> Array | None:

@@ -25,7 +25,7 @@ class VoxelSet:
         """Add points (n, 3) within a million voxels of the origin."""
         self._pending.append(_keys(points, self.voxel_m))
         self._count += len(points)
-        if self._count > _PENDING:
+        if self._count > max(_PENDING, len(self._keys) // 2):
             self._merge()
 
     def centers(self) -> NDArray[np.float32]:
