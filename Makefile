@@ -33,7 +33,7 @@ $(VENV)/.installed-bench: $(VENV)/.installed pyproject.toml
 
 run: $(VENV)/.installed ## fly the main job and leave a log and a report under runs/
 	@mkdir -p $(OUT)
-	$(BIN)/volery run $(SCENARIO) --record $(OUT)/flight.mcap --report $(OUT)/report
+	$(BIN)/volery run $(SCENARIO) --record $(OUT)/flight.mcap --overwrite --report $(OUT)/report
 
 lint: $(VENV)/.installed-tests ## style, types, layers
 	$(BIN)/ruff check src tests examples
@@ -42,7 +42,7 @@ lint: $(VENV)/.installed-tests ## style, types, layers
 	$(BIN)/lint-imports
 
 test: lint ## install what tests need, check everything, run the tests
-	$(BIN)/python -m volery.core.warm_up
+	$(BIN)/python -m volery.runtime.warm_up
 	$(BIN)/pytest -n 2 --dist loadfile -m 'not slow' tests
 
 bench: $(VENV)/.installed-bench ## measure this machine and rewrite docs/benchmarks.md

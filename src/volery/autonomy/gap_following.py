@@ -62,8 +62,8 @@ class GapFollowing(Node):
         route = self.declare_parameter("route", [[50.0, 0.0]]).value
         self._route = [np.array(point, dtype=np.float64) for point in route]
         self._height = float(self.declare_parameter("height_m", 3.0).value)
-        self._speed = float(self.declare_parameter("speed_m_s", 4.0).value)
-        self._safe_radius = float(self.declare_parameter("safe_radius_m", 0.9).value)
+        self._speed = float(self.declare_parameter("speed_m_s", 3.0).value)
+        self._safe_radius = float(self.declare_parameter("safe_radius_m", 1.1).value)
         self._deceleration = float(self.declare_parameter("deceleration_m_s2", 2.0).value)
         self._level = ScanProjector(self.declare_parameter("level_mount", [0.0, 0.0, 0.0]).value)
         self._nodding = ScanProjector(
@@ -76,9 +76,9 @@ class GapFollowing(Node):
         self._next_waypoint = 0
         self._joint: tuple[int, float, float] | None = None
         self._range: tuple[int, float] | None = None
-        self._scan_count = {"level": 0, "nodding": 0}
+        self._level_scans = 0
         self._ground = GroundPlane()
-        self._obstacles = ObstacleMemory()
+        self._obstacles = ObstacleMemory(hits_needed=1, keep_s=10.0)
         self._low_obstacles = ObstacleMemory(half_width_m=10.0, hits_needed=3)
         self._last_heading: float | None = None
         self._progress: tuple[int, float] = (0, math.inf)
@@ -111,17 +111,13 @@ class GapFollowing(Node):
             self._range = (self.get_clock().now_ns(), message.range)
 
     def _on_level_scan(self, scan: LaserScan) -> None:
-        if self._takes_part("level"):
+        self._level_scans += 1
+        if self._level_scans % 2 == 0:  # every second one is enough at these speeds
             self._remember(self._level.points(scan, self._pose))
 
     def _on_nodding_scan(self, scan: LaserScan) -> None:
-        if self._joint is not None and self._takes_part("nodding"):
+        if self._joint is not None:
             self._remember(self._nodding.points(scan, self._pose, self._joint))
-
-    def _takes_part(self, which: str) -> bool:
-        """Every second scan is enough at these speeds and halves the load."""
-        self._scan_count[which] += 1
-        return self._scan_count[which] % 2 == 0 and self._phase is not Phase.LAND
 
     def _remember(self, points: Array | None) -> None:
         if points is None or len(points) == 0:

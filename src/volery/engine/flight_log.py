@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from volery.control.fleet import Fleet, FleetEvent, FleetEventKind
+from volery.control.flight_modes import FlightMode
 from volery.engine.events import Event, EventKind
 
 _KINDS = {
@@ -17,6 +18,8 @@ _KINDS = {
 def drain(fleet: Fleet, names: tuple[str, ...]) -> Iterator[Event]:
     """Events of the fleet since the last call, oldest first."""
     for noted in fleet.drain_events():
+        if noted.kind is FleetEventKind.TOUCH_DOWN and noted.mode is FlightMode.LANDED:
+            continue  # settles where it was put down
         yield _event(noted, names[noted.uav], fleet.dt_ns)
 
 

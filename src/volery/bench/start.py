@@ -1,0 +1,62 @@
+"""From typing a command to the first LIDAR scan of the main job, and the memory of the whole job.
+
+Each figure is taken from processes of their own: one with an empty folder of compiled kernels, some
+with a filled one, one that flies the main job with log and report.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+_WARM_REPEATS = 5
+_FIRST_FRAME = """
+import volery
+simulation = volery.Simulation(volery.load_scenario("forest_survey"))
+scans = []
+simulation.graph.subscribe("/uav1/laser/horizontal/scan", scans.append)
+while not scans:
+    simulation.step(5)
+"""
+
+
+def measure() -> dict[str, float]:
+    """Figures of the bench `start`."""
+    with tempfile.TemporaryDirectory() as folder:
+        cache = Path(folder) / "cache"
+        cold = _first_frame_s(cache)
+        warm = statistics.median(_first_frame_s(cache) for _ in range(_WARM_REPEATS))
+        wall, peak_mb = _main_job(Path(folder), cache)
+    return {
+        "first_frame_s_cold": cold,
+        "first_frame_s_warm": warm,
+        "peak_mb_main_job": peak_mb,
+        "main_job_wall_s": wall,
+    }
+
+
+def _first_frame_s(cache: Path) -> float:
+    before = time.perf_counter()
+    subprocess.run([sys.executable, "-c", _FIRST_FRAME], check=True, env=_environment(cache))
+    return time.perf_counter() - before
+
+
+def _main_job(folder: Path, cache: Path) -> tuple[float, float]:
+    """Wall seconds and peak resident memory (MB of 1e6 bytes) of the main job in its own process."""
+    command = [sys.executable, "-m", "volery.cli", "run", "forest_survey"]
+    command += ["--record", str(folder / "flight.mcap"), "--report", str(folder / "report")]
+    before = time.perf_counter()
+    process = subprocess.Popen(command, env=_environment(cache), stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    if status != 0:
+        raise RuntimeError(f"the main job ended with status {status}")
+    return time.perf_counter() - before, usage.ru_maxrss * 1024 / 1e6
+
+
+def _environment(cache: Path) -> dict[str, str]:
+    return {**os.environ, "VOLERY_CACHE_DIR": str(cache)}

@@ -1,0 +1,93 @@
+"""Scenarios that many tests fly."""
+
+import copy
+
+import pytest
+
+from volery.runtime import Simulation
+from volery.scenario.load import parse_scenario
+
+LIDARS = [
+    {"kind": "lidar", "name": "horizontal", "position_m": [0.0, 0.0, 0.18]},
+    {
+        "kind": "lidar",
+        "name": "nodding",
+        "position_m": [0.1, 0.0, -0.08],
+        "nodding": {"amplitude_deg": 45.0, "period_s": 2.0},
+    },
+]
+OTHERS = [
+    {"kind": "imu"},
+    {"kind": "sonar", "position_m": [0.0, 0.0, -0.05], "rpy_deg": [0.0, 90.0, 0.0]},
+    {"kind": "odometry"},
+    {"kind": "ground_truth"},
+]
+FLAT = {
+    "name": "flat",
+    "types": {"f450": {"sensors": OTHERS}},
+    "uavs": [{"type": "f450", "position_m": [0.0, 0.0], "last_position_m": [20.0, 0.0]}],
+}
+WOOD = {
+    "name": "wood",
+    "world": {
+        "terrain": {"kind": "flat", "extent_m": 100.0},
+        "forest": {
+            "kind": "procedural",
+            "region_m": [0.0, 0.0, 100.0, 100.0],
+            "trees": 150,
+            "minimum_spacing_m": 2.0,
+            "species": {"broadleaf": 1.0},
+        },
+        "wind": {"velocity_m_s": [1.0, -0.5, 0.0]},
+    },
+    "types": {
+        "surveyor": {
+            "sensors": LIDARS + OTHERS,
+            "nodes": [
+                {
+                    "node": "volery.autonomy.gap_following:GapFollowing",
+                    "parameters": {
+                        "route": [[60.0, 0.0]],
+                        "level_mount": [0.0, 0.0, 0.18],
+                        "nodding_mount": [0.1, 0.0, -0.08],
+                    },
+                }
+            ],
+        }
+    },
+    "uavs": [
+        {
+            "type": "surveyor",
+            "count": 2,
+            "position_m": [15.0, 40.0],
+            "last_position_m": [15.0, 60.0],
+            "placement": "nearest_free",
+        }
+    ],
+}
+
+
+@pytest.fixture
+def flat_data():
+    """A UAV with all small sensors on level ground, as plain data to change."""
+    return copy.deepcopy(FLAT)
+
+
+@pytest.fixture
+def wood_data():
+    """Two UAVs that cross a small wood on their LIDARs, as plain data to change."""
+    return copy.deepcopy(WOOD)
+
+
+@pytest.fixture
+def simulate():
+    """Build simulations that are closed at the end of the test."""
+    made = []
+
+    def build(data, **options):
+        made.append(Simulation(parse_scenario(data), **{"threads": 1, **options}))
+        return made[-1]
+
+    yield build
+    for simulation in made:
+        simulation.close()

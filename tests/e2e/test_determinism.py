@@ -1,0 +1,60 @@
+"""Same scenario and seed, same bytes: at any speed, however sliced, with one or two threads."""
+
+import pytest
+
+from volery.core.errors import CommandError
+
+SECONDS = 6.0
+
+
+def digest_of(simulate, data, *, threads=1, fly=None):
+    simulation = simulate(data, threads=threads)
+    simulation.enable_digest()
+    (fly or (lambda s: s.run(SECONDS)))(simulation)
+    assert simulation.time_s == pytest.approx(SECONDS)
+    assert any(name.endswith("scan") for name in simulation.mounts)
+    return simulation.digest()
+
+
+def slices(simulation):
+    for seconds in (0.001, 0.0185, 0.5, 0.0005, 1.0):
+        simulation.run(seconds)
+    while simulation.time_s < SECONDS:
+        simulation.step(min(37, round((SECONDS - simulation.time_s) * 1000)))
+
+
+def test_threads_slices_and_speed_do_not_matter(simulate, wood_data):
+    reference = digest_of(simulate, wood_data)
+    assert digest_of(simulate, wood_data) == reference
+    assert digest_of(simulate, wood_data, threads=2) == reference
+    assert digest_of(simulate, wood_data, fly=slices) == reference
+    assert digest_of(simulate, wood_data, fly=lambda s: s.run(SECONDS, speed=20.0)) == reference
+
+
+def test_another_seed_gives_another_run(simulate, flat_data):
+    flat_data["uavs"][0]["on_start"] = "take_off"
+    digests = []
+    for seed in (1, 2):
+        simulation = simulate({**flat_data, "seed": seed})
+        simulation.enable_digest()
+        simulation.run(1.0)
+        digests.append(simulation.digest())
+    assert digests[0] != digests[1]
+
+
+def test_an_added_uav_changes_nobody_elses_noise(simulate, flat_data):
+    def imu_of_first(count):
+        flat_data["uavs"][0]["count"] = count
+        simulation = simulate(flat_data)
+        got = []
+        simulation.graph.subscribe("/uav1/imu", lambda m: got.append(m.cdr))
+        simulation.run(0.5)
+        return got
+
+    assert imu_of_first(1) == imu_of_first(3)
+    assert len(imu_of_first(1)) == 101
+
+
+def test_digest_must_be_asked_for(simulate, flat_data):
+    with pytest.raises(CommandError, match="enable_digest"):
+        simulate(flat_data).digest()

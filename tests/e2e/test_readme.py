@@ -1,0 +1,58 @@
+"""What the README promises: its script runs, its commands exist, its links lead somewhere."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_the_first_commands_are_run_and_test():
+    (first, *_) = blocks("sh")
+    commands = [line.split("#")[0].strip() for line in first.splitlines() if line.startswith("make")]
+    assert commands == ["make run", "make test"]
+
+
+def test_every_make_target_named_exists():
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for target in re.findall(r"`?make ([a-z-]+)", README):
+        assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
+
+
+def test_the_script_runs_and_is_ten_lines(tmp_path):
+    (script,) = blocks("python")
+    assert len(script.strip().splitlines()) <= 10
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", script],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=240,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "LANDED" in done.stdout
+
+
+def test_the_volery_commands_exist():
+    named = set(re.findall(r"^volery ([a-z]+)", "\n".join(blocks("sh")), flags=re.MULTILINE))
+    assert {"run", "list", "info", "bench", "doctor"} <= named
+    helped = subprocess.run(
+        [sys.executable, "-m", "volery.cli", "--help"], capture_output=True, text=True, check=True
+    ).stdout
+    for command in named:
+        assert command in helped
+
+
+def test_links_lead_somewhere():
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        for target in re.findall(r"\]\(([^)#]+)[^)]*\)", text):
+            if not target.startswith("http"):
+                assert (page.parent / target).exists(), f"{page.name} -> {target}"

@@ -1,0 +1,52 @@
+"""The wheel, built and installed in a clean environment, holds its data and flies."""
+
+import subprocess
+import sys
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FLY = """
+import volery, pathlib
+assert "site-packages" in volery.__file__, volery.__file__
+with volery.Simulation(volery.load_scenario("longleaf")) as simulation:
+    simulation.run(1.0)
+    print(len(simulation.forest), simulation.time_s)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_wheel_in_a_clean_environment(tmp_path):
+    subprocess.run(
+        [sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(ROOT)],
+        check=True,
+        capture_output=True,
+    )
+    (wheel,) = tmp_path.glob("*.whl")
+    names = zipfile.ZipFile(wheel).namelist()
+    for suffix in (
+        "scenario/library/forest_survey.toml",
+        "world/data/forests/bei_trees.csv",
+        "vehicle/airframes/f450.toml",
+        "sensors/models/utm_30lx.toml",
+        "graph/definitions/Trigger.srv",
+        "py.typed",
+    ):
+        assert any(name.endswith(suffix) for name in names), suffix
+    assert not any("tests" in name or name.endswith(".pyc") for name in names)
+    venv.create(tmp_path / "env", with_pip=True)
+    python = tmp_path / "env" / "bin" / "python"
+    pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*pip, str(wheel)], check=True)
+    flown = subprocess.run(
+        [str(python), "-c", FLY], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert flown.stdout.startswith("584 ")
+    listed = subprocess.run(
+        [str(python.parent / "volery"), "list"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert "forest_survey" in listed.stdout

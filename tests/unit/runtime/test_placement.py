@@ -1,0 +1,72 @@
+"""UAVs that cannot stand where the scenario puts them are refused with the reason."""
+
+import numpy as np
+import pytest
+
+from volery.core.errors import DataFileError, PlacementError, ScenarioError
+
+
+def test_under_the_ground(simulate, flat_data):
+    flat_data["uavs"] = [{"type": "f450", "position_m": [0.0, 0.0, -1.0]}]
+    with pytest.raises(PlacementError, match=r"uavs\[0\] \(uav1\).*under the ground.*at least"):
+        simulate(flat_data)
+
+
+def test_inside_a_tree(simulate, wood_data):
+    free = simulate(wood_data)
+    x, y, _ = free.forest.position_map[0]
+    wood_data["uavs"] = [{"type": "surveyor", "position_m": [float(x), float(y)]}]
+    with pytest.raises(PlacementError, match=r"lies in tree \d+.*nearest_free"):
+        simulate(wood_data)
+
+
+def test_overlapping_each_other(simulate, flat_data):
+    flat_data["uavs"] = [
+        {"type": "f450", "position_m": [0.0, 0.0]},
+        {"type": "f450", "position_m": [0.3, 0.0]},
+    ]
+    with pytest.raises(PlacementError, match=r"uavs\[1\] \(uav2\).*overlaps uav1"):
+        simulate(flat_data)
+
+
+def test_nearest_free_finds_room_to_stand_and_climb(simulate, wood_data):
+    simulation = simulate(wood_data)
+    for uav in simulation.uavs.values():
+        column = uav.position_map + np.array([[0, 0, 0], [0, 0, 1], [0, 0, 2]])
+        room = simulation.scene.clearance(column, 1.5, include_terrain=False)
+        assert room.distance.min() >= 1.4
+
+
+def test_a_line_of_uavs_is_evenly_spaced(simulate, flat_data):
+    flat_data["uavs"][0]["count"] = 5
+    simulation = simulate(flat_data)
+    xs = [uav.position_map[0] for uav in simulation.uavs.values()]
+    np.testing.assert_allclose(xs, [0, 5, 10, 15, 20])
+    assert simulation.uav_names == ("uav1", "uav2", "uav3", "uav4", "uav5")
+
+
+def test_missing_files_name_the_places_looked_at(simulate, flat_data):
+    flat_data["world"] = {"terrain": {"kind": "grid", "file": "no.csv", "spacing_m": 5.0}}
+    with pytest.raises(DataFileError, match=r"no file 'no\.csv'"):
+        simulate(flat_data)
+    flat_data["world"] = {}
+    flat_data["types"]["f450"]["airframe"] = "f45"
+    with pytest.raises(DataFileError, match="Did you mean 'f450'"):
+        simulate(flat_data)
+
+
+@pytest.mark.parametrize(
+    ("node", "parameters", "words"),
+    [
+        ("volery.autonomy.gap_following:Gap", {}, "has no class"),
+        ("volery.no_such:Gap", {}, "cannot be imported"),
+        ("volery.core.clock:Schedule", {}, "no subclass"),
+        ("volery.autonomy.gap_following:GapFollowing", {"rout": []}, "no parameter rout"),
+        ("volery.autonomy.gap_following:GapFollowing", {"speed_m_s": "x"}, "must be like"),
+    ],
+)
+def test_nodes_that_do_not_start(simulate, flat_data, node, parameters, words):
+    flat_data["types"]["f450"]["nodes"] = [{"node": node, "parameters": parameters}]
+    with pytest.raises(ScenarioError, match=r"types\.f450\.nodes\[0\]") as caught:
+        simulate(flat_data)
+    assert words in str(caught.value)
