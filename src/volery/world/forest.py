@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 Region = tuple[float, float, float, float]
 
 _LOWEST_TREE_M = 0.3
-_DARTS_PER_TREE = 60
+_DARTS_PER_TREE = 30
 """Random places tried for each tree before its forest counts as full."""
 
 
@@ -170,7 +170,7 @@ def _quarter_turns(count: int, seed: int) -> Array:
     Turning trees freely widens their boxes by a quarter on average and costs a tenth of the rays a
     second; with several variants a size class nobody sees the difference.
     """
-    return 0.5 * np.pi * generator(seed, "forest/yaw").integers(0, 4, count)
+    return np.asarray(0.5 * np.pi * generator(seed, "forest/yaw").integers(0, 4, count), np.float64)
 
 
 def _check(region: Region) -> None:

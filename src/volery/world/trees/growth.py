@@ -132,7 +132,7 @@ class Growth:
         simplified: tuple[int, float] | None,
         rng: np.random.Generator,
     ) -> TreeMesh:
-        """Surface at a level; nothing rises above `height`.
+        """Surface at a level; its highest point is `height`.
 
         simplified: number of leaf triangles and their spread; None shows every leaf.
         """
@@ -142,12 +142,19 @@ class Growth:
             leaves = quads(self.blades)
         else:
             leaves = stand_ins(self.blades, *simplified, rng)
-        return TreeMesh(_below(self.wood(level), height), _below(leaves, height))
+        wood = self.wood(level)
+        top = max(float(m.bounds[1, 2]) for m in (wood, leaves) if len(m))
+        base = max(0.0, float(self.limbs[0].points[:, 0, 2].min()))
+        return TreeMesh(*(_reaching(m, base, top, height) for m in (wood, leaves)))
 
 
-def _below(mesh: Mesh, height: float) -> Mesh:
-    ceiling = np.array([np.inf, np.inf, height], dtype=np.float32)
-    return Mesh(np.minimum(mesh.vertices, ceiling), mesh.triangles)
+def _reaching(mesh: Mesh, base: float, top: float, height: float) -> Mesh:
+    """The mesh of a tree whose top is `top`, stretched above `base` so that it becomes `height`."""
+    z = mesh.vertices[:, 2].astype(np.float64)
+    stretched = base + (z - base) * (height - base) / (top - base)
+    vertices = mesh.vertices.copy()
+    vertices[:, 2] = np.minimum(np.where(z > base, stretched, z), height)
+    return Mesh(vertices, mesh.triangles)
 
 
 def simplification(species: Species, level: DetailLevel, maturity: float) -> tuple[int, float]:
