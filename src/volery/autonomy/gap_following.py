@@ -76,10 +76,9 @@ class GapFollowing(Node):
         self._next_waypoint = 0
         self._joint: tuple[int, float, float] | None = None
         self._range: tuple[int, float] | None = None
-        self._level_scans = 0
         self._ground = GroundPlane()
-        self._obstacles = ObstacleMemory(hits_needed=1, keep_s=10.0)
-        self._low_obstacles = ObstacleMemory(half_width_m=10.0, hits_needed=3)
+        self._obstacles = ObstacleMemory()
+        self._low_obstacles = ObstacleMemory(half_width_m=10.0, looks_needed=3)
         self._last_heading: float | None = None
         self._progress: tuple[int, float] = (0, math.inf)
         self._detour: tuple[int, float] | None = None
@@ -111,25 +110,22 @@ class GapFollowing(Node):
             self._range = (self.get_clock().now_ns(), message.range)
 
     def _on_level_scan(self, scan: LaserScan) -> None:
-        self._level_scans += 1
-        if self._level_scans % 2 == 0:  # every second one is enough at these speeds
+        if self._pose is not None:
             self._remember(self._level.points(scan, self._pose))
 
     def _on_nodding_scan(self, scan: LaserScan) -> None:
-        if self._joint is not None:
+        if self._pose is not None and self._joint is not None:
             self._remember(self._nodding.points(scan, self._pose, self._joint))
 
-    def _remember(self, points: Array | None) -> None:
-        if points is None or len(points) == 0:
-            return
+    def _remember(self, points: Array) -> None:
         now = self.get_clock().now_ns()
         self._ground.add(points, now)
         above_ground = points[:, 2] - self._ground.height_at(points[:, :2])
         near_flight_height = np.abs(above_ground - self._height) < 1.1
         tall = above_ground > 0.7
-        self._obstacles.add(points[near_flight_height & tall, :2], now)
+        self._obstacles.add(points[near_flight_height & tall], now)
         below = tall & (above_ground < self._height)
-        self._low_obstacles.add(points[below, :2], now)
+        self._low_obstacles.add(points[below], now)
 
     # ------------------------------------------------------------------------------ what it does
 

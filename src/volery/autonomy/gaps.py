@@ -7,16 +7,24 @@ headings free out to some distance.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from volery.core.compiled import kernel
 
 Array = NDArray[np.float64]
 
 SECTORS = 180
 SECTOR_ANGLES: Array = np.linspace(-np.pi, np.pi, SECTORS, endpoint=False) + np.pi / SECTORS
 SECTOR_ANGLES.flags.writeable = False
+
+_LOOKS_AHEAD_M = (9.0, 6.0, 4.0, 2.5, 1.2)
+"""How far a way should be free: far ones are preferred, nearer ones will do."""
+_LOYALTY = 0.35
+_OPENNESS = 0.25
 
 
 def free_distances(obstacles: Array, safe_radius: float, reach: float) -> Array:
@@ -26,17 +34,27 @@ def free_distances(obstacles: Array, safe_radius: float, reach: float) -> Array:
     only the half plane towards it, so that a way out stays open.
     """
     free = np.full(SECTORS, reach)
-    if len(obstacles) == 0:
-        return free
-    distance = np.hypot(obstacles[:, 0], obstacles[:, 1])
-    along = obstacles[:, 0, None] * np.cos(SECTOR_ANGLES) + obstacles[:, 1, None] * np.sin(
-        SECTOR_ANGLES
-    )
-    aside_squared = distance[:, None] ** 2 - along**2
-    hits = (along > 0.0) & (aside_squared < safe_radius**2)
-    until = along - np.sqrt(np.maximum(safe_radius**2 - aside_squared, 0.0))
-    blocked = np.where(hits, np.maximum(until, 0.0), reach)
-    return np.asarray(np.minimum(free, blocked.min(axis=0)))
+    _shorten(np.ascontiguousarray(obstacles, dtype=np.float64), safe_radius, free)
+    return free
+
+
+@kernel
+def _shorten(obstacles: Array, safe_radius: float, free: Array) -> None:
+    width = 2.0 * math.pi / SECTORS
+    for k in range(obstacles.shape[0]):
+        x, y = obstacles[k, 0], obstacles[k, 1]
+        distance = math.sqrt(x * x + y * y)
+        half = 0.5 * math.pi if distance <= safe_radius else math.asin(safe_radius / distance)
+        bearing = math.atan2(y, x)
+        first = math.ceil((bearing - half + math.pi) / width - 0.5)
+        last = math.floor((bearing + half + math.pi) / width - 0.5)
+        for sector in range(first, last + 1):
+            off = -math.pi + (sector + 0.5) * width - bearing
+            aside = distance * math.sin(off)
+            inside = safe_radius * safe_radius - aside * aside
+            until = max(distance * math.cos(off) - math.sqrt(max(inside, 0.0)), 0.0)
+            s = sector % SECTORS
+            free[s] = min(free[s], until)
 
 
 @dataclass(frozen=True)
@@ -55,18 +73,15 @@ def choose_heading(
     Wants gaps that are free far ahead and settles for nearer ones; within a gap it prefers what
     lies nearest to the goal's direction, with some loyalty to the previous choice.
     """
-    for wanted in (9.0, 6.0, 4.0, 2.5, 1.2):
-        needed = min(wanted, goal_distance)
-        passable = free >= needed
+    off_goal = np.abs(wrap(SECTOR_ANGLES - goal_angle))
+    cost = off_goal + _OPENNESS * (1.0 - np.minimum(free / 12.0, 1.0))
+    if previous_angle is not None:
+        cost += _LOYALTY * np.abs(wrap(SECTOR_ANGLES - previous_angle))
+    for wanted in _LOOKS_AHEAD_M:
+        passable = free >= min(wanted, goal_distance)
         if not passable.any():
             continue
-        off_goal = np.abs(wrap(SECTOR_ANGLES - goal_angle))
-        cost = off_goal.copy()
-        if previous_angle is not None:
-            cost += 0.35 * np.abs(wrap(SECTOR_ANGLES - previous_angle))
-        cost += 0.25 * (1.0 - np.minimum(free / 12.0, 1.0))
-        cost[~passable] = np.inf
-        best = int(np.argmin(cost))
+        best = int(np.argmin(np.where(passable, cost, np.inf)))
         if off_goal[best] > 2.0 and wanted > 2.5:
             continue  # rather a near gap ahead than a far one behind
         return Heading(float(SECTOR_ANGLES[best]), float(free[best]))

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
+
+from volery.core.compiled import kernel
 
 Array = NDArray[np.float64]
 
 _CELL_M = 2.0
 _CELLS = 16
 _RADIUS_M = 13.0
+_NOISE_M = 0.05
 _RIDGE = 8.0
 """Weight that pulls the slope to zero where few returns reach the ground."""
 
@@ -31,17 +36,7 @@ class GroundPlane:
 
     def add(self, points: Array, time_ns: int) -> None:
         """Take in points (K, 3), m in a fixed frame."""
-        order = np.argsort(-points[:, 2], kind="stable")
-        points = points[order]  # of a cell's points the last one written is the lowest
-        cells = np.floor(points[:, :2] / _CELL_M).astype(np.int64) % _CELLS
-        lowest = np.full((_CELLS, _CELLS, 3), np.inf)
-        lowest[cells[:, 0], cells[:, 1]] = points
-        new = np.isfinite(lowest[..., 2])
-        stale = time_ns - self._seen_ns > self._keep_ns
-        moved = np.hypot(*(np.moveaxis(lowest[..., :2] - self._low[..., :2], -1, 0))) > 2 * _CELL_M
-        take = new & (stale | moved | (lowest[..., 2] <= self._low[..., 2] + 0.05))
-        self._low[take] = lowest[take]
-        self._seen_ns[take] = time_ns
+        _keep_lowest(points, time_ns, self._keep_ns, self._low, self._seen_ns)
 
     def fit(self, position: Array, height_below: float | None, time_ns: int) -> None:
         """Refit around `position` (3,); `height_below` is the ground's height there if known."""
@@ -62,3 +57,17 @@ class GroundPlane:
         self.slope = slope if steepness < 1.0 else slope / steepness
         self.anchor = position[:2].copy()
         self.height = base
+
+
+@kernel
+def _keep_lowest(
+    points: Array, time_ns: int, keep_ns: int, low: Array, seen_ns: NDArray[np.int64]
+) -> None:
+    for k in range(points.shape[0]):
+        x, y, z = points[k, 0], points[k, 1], points[k, 2]
+        i, j = math.floor(x / _CELL_M) % _CELLS, math.floor(y / _CELL_M) % _CELLS
+        stale = time_ns - seen_ns[i, j] > keep_ns
+        moved = abs(x - low[i, j, 0]) + abs(y - low[i, j, 1]) > 2.0 * _CELL_M
+        if stale or moved or z <= low[i, j, 2] + _NOISE_M:
+            low[i, j, 0], low[i, j, 1], low[i, j, 2] = x, y, z
+            seen_ns[i, j] = time_ns

@@ -2,50 +2,69 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.compiled import kernel
+
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 class ObstacleMemory:
     """Square cells that wrap around: the map follows the vehicle without copying.
 
-    A cell counts as occupied while it was hit `hits_needed` times and seen within `keep_s`.
+    A cell counts as occupied while it was seen within `keep_s`, in `looks_needed` different looks.
     """
 
     def __init__(
         self,
         cell_m: float = 0.25,
         half_width_m: float = 16.0,
-        keep_s: float = 8.0,
-        hits_needed: int = 2,
+        keep_s: float = 10.0,
+        looks_needed: int = 1,
     ) -> None:
         self._cell = cell_m
         self._reach = half_width_m
         self._keep_ns = round(keep_s * 1e9)
-        self._hits_needed = hits_needed
+        self._looks_needed = looks_needed
         size = int(2 * half_width_m / cell_m)
-        self._size = size
         self._address = np.full((size, size, 2), np.iinfo(np.int64).min)
         self._seen_ns = np.zeros((size, size), dtype=np.int64)
-        self._hits = np.zeros((size, size), dtype=np.int64)
+        self._looks = np.zeros((size, size), dtype=np.int64)
 
     def add(self, points: Array, time_ns: int) -> None:
-        """Mark the cells of points (K, 2), m in a fixed frame."""
-        if len(points) == 0:
-            return
-        cells = np.unique(np.floor(points / self._cell).astype(np.int64), axis=0)
-        i, j = cells[:, 0] % self._size, cells[:, 1] % self._size
-        renewed = np.any(self._address[i, j] != cells, axis=1)
-        expired = time_ns - self._seen_ns[i, j] > self._keep_ns
-        self._hits[i, j] = np.where(renewed | expired, 1, self._hits[i, j] + 1)
-        self._address[i, j] = cells
-        self._seen_ns[i, j] = time_ns
+        """Mark the cells of the points (K, 2+) of one look, m in a fixed frame."""
+        _mark(points, time_ns, self._cell, self._keep_ns, self._address, self._seen_ns, self._looks)
 
     def around(self, center: Array, time_ns: int, radius_m: float) -> Array:
         """Centres (K, 2) of occupied cells within `radius_m` of `center`, relative to it."""
-        alive = (self._hits >= self._hits_needed) & (time_ns - self._seen_ns <= self._keep_ns)
+        alive = (self._looks >= self._looks_needed) & (time_ns - self._seen_ns <= self._keep_ns)
         relative = (self._address[alive] + 0.5) * self._cell - center
         near = np.hypot(relative[:, 0], relative[:, 1]) <= min(radius_m, self._reach)
         return np.asarray(relative[near])
+
+
+@kernel
+def _mark(
+    points: Array,
+    time_ns: int,
+    cell: float,
+    keep_ns: int,
+    address: Integers,
+    seen_ns: Integers,
+    looks: Integers,
+) -> None:
+    size = address.shape[0]
+    for k in range(points.shape[0]):
+        a, b = math.floor(points[k, 0] / cell), math.floor(points[k, 1] / cell)
+        i, j = a % size, b % size
+        other = address[i, j, 0] != a or address[i, j, 1] != b
+        if other or time_ns - seen_ns[i, j] > keep_ns:
+            looks[i, j] = 1
+        elif seen_ns[i, j] != time_ns:
+            looks[i, j] += 1
+        address[i, j, 0], address[i, j, 1] = a, b
+        seen_ns[i, j] = time_ns

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.compiled import kernel
+from volery.core.rotation_kernels import cross, rotate_vector
 from volery.graph.messages import LaserScan, Odometry
 
 Array = NDArray[np.float64]
@@ -51,45 +54,80 @@ class Pose:
 class ScanProjector:
     """Projects the scans of one LIDAR at `mount` (3,) in the body, its axes along the body's."""
 
-    def __init__(self, mount: Sequence[float], reach_m: float = 15.0, keep_every: int = 3) -> None:
+    def __init__(self, mount: Sequence[float], reach_m: float = 15.0, keep_every: int = 2) -> None:
         self._mount = np.array(mount, dtype=np.float64)
         self._reach = reach_m
         self._every = keep_every
-        self._directions: Array | None = None
 
     def points(
-        self, scan: LaserScan, pose: Pose | None, joint: tuple[int, float, float] | None = None
-    ) -> Array | None:
-        """Returns within reach as points (K, 3); None before the first odometry.
+        self, scan: LaserScan, pose: Pose, joint: tuple[int, float, float] = (0, 0.0, 0.0)
+    ) -> Array:
+        """Returns within reach as points (K, 3).
 
         `joint` is stamp (ns), angle (rad) and rate (rad/s) of a nodding mount, positive downward.
         """
-        if pose is None:
-            return None
-        ranges = scan.ranges[:: self._every]
-        if self._directions is None or len(self._directions) != len(ranges):
-            angle = scan.angle_min + scan.angle_increment * self._every * np.arange(len(ranges))
-            self._directions = np.stack(
-                [np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1
-            )
-        keep = (ranges > _NEAREST_M) & (ranges < self._reach)
         stamp = scan.header.stamp.sec * 1_000_000_000 + scan.header.stamp.nanosec
-        beam_s = (np.flatnonzero(keep) * self._every) * scan.time_increment
-        sensor = self._directions[keep] * ranges[keep, None]
-        if joint is not None:
-            since_joint = (stamp - joint[0]) * 1e-9 + beam_s
-            sensor = _tilted(sensor, np.asarray(joint[1] + joint[2] * since_joint))
-        since_pose = (stamp - pose.time_ns) * 1e-9 + beam_s
-        turned = rotations.exponential(pose.omega_body * since_pose[:, None])
-        body = rotations.rotate(turned, sensor + self._mount)
-        position = pose.position + pose.velocity * since_pose[:, None]
-        return np.asarray(position + rotations.rotate(pose.attitude, body))
+        points = np.empty((len(scan.ranges) // self._every + 1, 3))
+        count = _project(
+            scan.ranges,
+            self._every,
+            self._reach,
+            scan.angle_min,
+            scan.angle_increment,
+            scan.time_increment,
+            joint[1],
+            joint[2],
+            (stamp - joint[0]) * 1e-9,
+            (stamp - pose.time_ns) * 1e-9,
+            self._mount,
+            pose.position,
+            pose.attitude,
+            pose.velocity,
+            pose.omega_body,
+            points,
+        )
+        return points[:count]
 
 
-def _tilted(points: Array, tilt: Array) -> Array:
-    """Points (K, 3) turned about y by `tilt` (K,)."""
-    c, s = np.cos(tilt), np.sin(tilt)
-    return np.stack(
-        [c * points[:, 0] + s * points[:, 2], points[:, 1], c * points[:, 2] - s * points[:, 0]],
-        axis=1,
-    )
+@kernel
+def _project(
+    ranges: NDArray[np.float32],
+    every: int,
+    reach: float,
+    angle_min: float,
+    angle_increment: float,
+    time_increment: float,
+    tilt: float,
+    tilt_rate: float,
+    since_joint: float,
+    since_pose: float,
+    mount: Array,
+    position: Array,
+    attitude: Array,
+    velocity: Array,
+    omega: Array,
+    points: Array,
+) -> int:
+    """Fill `points`, return their number; the turn since the pose is taken to first order."""
+    count = 0
+    for beam in range(0, len(ranges), every):
+        distance = ranges[beam]
+        if not _NEAREST_M < distance < reach:
+            continue
+        angle = angle_min + beam * angle_increment
+        delay = beam * time_increment
+        x, y = distance * math.cos(angle), distance * math.sin(angle)
+        nod = tilt + tilt_rate * (since_joint + delay)
+        bx = math.cos(nod) * x + mount[0]
+        by = y + mount[1]
+        bz = -math.sin(nod) * x + mount[2]
+        t = since_pose + delay
+        tx, ty, tz = cross(omega[0] * t, omega[1] * t, omega[2] * t, bx, by, bz)
+        mx, my, mz = rotate_vector(
+            attitude[0], attitude[1], attitude[2], attitude[3], bx + tx, by + ty, bz + tz
+        )
+        points[count, 0] = position[0] + velocity[0] * t + mx
+        points[count, 1] = position[1] + velocity[1] * t + my
+        points[count, 2] = position[2] + velocity[2] * t + mz
+        count += 1
+    return count

@@ -14,10 +14,15 @@ IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 IDENTITY.flags.writeable = False
 
 
+def _components(array: ArrayLike) -> tuple[Array, ...]:
+    array = np.asarray(array, dtype=np.float64)
+    return tuple(array[..., k] for k in range(array.shape[-1]))
+
+
 def multiply(p: ArrayLike, q: ArrayLike) -> Array:
     """Composition: `rotate(multiply(p, q), v) == rotate(p, rotate(q, v))`. Shapes (..., 4)."""
-    px, py, pz, pw = np.moveaxis(np.asarray(p, dtype=np.float64), -1, 0)
-    qx, qy, qz, qw = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
+    px, py, pz, pw = _components(p)
+    qx, qy, qz, qw = _components(q)
     return np.stack(
         [
             pw * qx + px * qw + py * qz - pz * qy,
@@ -42,16 +47,22 @@ def normalize(q: ArrayLike) -> Array:
 
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:
     """Vectors `v` (..., 3) turned by `q` (..., 4)."""
-    q = np.asarray(q, dtype=np.float64)
-    v = np.asarray(v, dtype=np.float64)
-    u, w = q[..., :3], q[..., 3:]
-    t = 2.0 * np.cross(u, v)
-    return np.asarray(v + w * t + np.cross(u, t))
+    x, y, z, w = _components(q)
+    vx, vy, vz = _components(v)
+    tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
+    return np.stack(
+        [
+            vx + w * tx + y * tz - z * ty,
+            vy + w * ty + z * tx - x * tz,
+            vz + w * tz + x * ty - y * tx,
+        ],
+        axis=-1,
+    )
 
 
 def matrix(q: ArrayLike) -> Array:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
-    x, y, z, w = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
+    x, y, z, w = _components(q)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -105,7 +116,7 @@ def from_rpy(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
 
 def to_rpy(q: ArrayLike) -> Array:
     """Roll, pitch, yaw (..., 3), rad; pitch in [-pi/2, pi/2]."""
-    x, y, z, w = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
+    x, y, z, w = _components(q)
     return np.stack(
         [
             np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
@@ -118,7 +129,7 @@ def to_rpy(q: ArrayLike) -> Array:
 
 def yaw_of(q: ArrayLike) -> Array:
     """Heading about the map's z axis, rad. Shape (...)."""
-    x, y, z, w = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
+    x, y, z, w = _components(q)
     return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
 
 

@@ -10,7 +10,7 @@ S = 1_000_000_000
 
 
 def test_obstacles_need_two_looks_and_are_forgotten():
-    memory = ObstacleMemory(keep_s=2.0, hits_needed=2)
+    memory = ObstacleMemory(keep_s=2.0, looks_needed=2)
     memory.add(np.array([[3.0, 1.0]]), 0)
     assert len(memory.around(np.zeros(2), 0, 10.0)) == 0
     memory.add(np.array([[3.0, 1.0]]), S // 10)
@@ -20,7 +20,7 @@ def test_obstacles_need_two_looks_and_are_forgotten():
 
 
 def test_a_distant_place_that_shares_the_cell_is_not_mixed_up():
-    memory = ObstacleMemory(half_width_m=16.0, hits_needed=1)
+    memory = ObstacleMemory(half_width_m=16.0, looks_needed=1)
     memory.add(np.array([[1.0, 1.0]]), 0)
     memory.add(np.array([[33.0, 1.0]]), 1)
     around_new = memory.around(np.array([33.0, 1.0]), 1, 5.0)
