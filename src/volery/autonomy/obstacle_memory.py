@@ -41,10 +41,20 @@ class ObstacleMemory:
 
     def around(self, center: Array, time_ns: int, radius_m: float) -> Array:
         """Centres (K, 2) of occupied cells within `radius_m` of `center`, relative to it."""
-        alive = (self._looks >= self._looks_needed) & (time_ns - self._seen_ns <= self._keep_ns)
-        relative = (self._address[alive] + 0.5) * self._cell - center
-        near = np.hypot(relative[:, 0], relative[:, 1]) <= min(radius_m, self._reach)
-        return np.asarray(relative[near])
+        found = np.empty((self._looks.size, 2))
+        count = _gather(
+            center[0],
+            center[1],
+            min(radius_m, self._reach),
+            time_ns - self._keep_ns,
+            self._cell,
+            self._looks_needed,
+            self._address,
+            self._seen_ns,
+            self._looks,
+            found,
+        )
+        return found[:count].copy()
 
 
 @kernel
@@ -68,3 +78,28 @@ def _mark(
             looks[i, j] += 1
         address[i, j, 0], address[i, j, 1] = a, b
         seen_ns[i, j] = time_ns
+
+
+@kernel
+def _gather(
+    x: float,
+    y: float,
+    radius: float,
+    since_ns: int,
+    cell: float,
+    looks_needed: int,
+    address: Integers,
+    seen_ns: Integers,
+    looks: Integers,
+    found: Array,
+) -> int:
+    count = 0
+    for i in range(address.shape[0]):
+        for j in range(address.shape[1]):
+            if looks[i, j] < looks_needed or seen_ns[i, j] < since_ns:
+                continue
+            dx, dy = (address[i, j, 0] + 0.5) * cell - x, (address[i, j, 1] + 0.5) * cell - y
+            if dx * dx + dy * dy <= radius * radius:
+                found[count, 0], found[count, 1] = dx, dy
+                count += 1
+    return count

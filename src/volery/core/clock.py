@@ -42,4 +42,8 @@ class Schedule:
 
     def instant_ns(self, k: int) -> int:
         """Time of the k-th firing."""
-        return self.phase_ns + round(k * NS_PER_S / self.rate_hz)
+        rate = self.rate_hz
+        # Integers throughout, rounded half up: this runs once for every measurement.
+        return self.phase_ns + (2 * k * NS_PER_S * rate.denominator + rate.numerator) // (
+            2 * rate.numerator
+        )
