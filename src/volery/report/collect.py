@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 TRACK_PERIOD_NS = NS_PER_S // 20
-SCANS_PER_S = 12.0
+SCANS_PER_S = 24.0
 """Scans of the whole fleet that are mapped in a simulated second."""
 NODDING_WEIGHT = 4.0
 """A nodding scanner sees the third dimension: it gets more of the scans than a level one."""

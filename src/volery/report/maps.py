@@ -22,7 +22,11 @@ _WIDTH = 11.0
 _NIGHT = "#10151b"
 _NIGHT_INK = "#c9d1d9"
 _GROUND = LinearSegmentedColormap.from_list("ground", ["#dfe5d3", "#f1eee0", "#e6d9c2"])
-_GROUND_RETURN = (84, 97, 112)
+_GROUND_RETURN = (70, 81, 94)
+_ASPECT = 1.15
+"""Width over height that a map should have at least."""
+_DARKEST = 0.25
+"""Where on the colour scale the lowest plants begin: the darkest colours drown in the night."""
 _TREE_M = 0.6
 """LIDAR points higher than this above the ground are taken for plants."""
 
@@ -68,14 +72,16 @@ def lidar_view(flight: FlightData) -> bytes | None:
     box = _frame(flight, margin_m=30.0)
     lidar = flight.lidar
     plant = lidar.height_m > _TREE_M
-    norm = Normalize(0.0, _tall(lidar.height_m[plant]))
+    norm = Normalize(0.0, _tall(lidar.height_m[plant]), clip=True)
     pixel = max(lidar.voxel_m, (box[2] - box[0]) / (_WIDTH * _DPI * 1.2))
     image = np.zeros((*_shape(box, pixel), 4), np.uint8)
     ground = _raster(lidar.points_map[~plant], lidar.height_m[~plant], box, pixel)
     image[np.isfinite(ground)] = (*_GROUND_RETURN, 255)
     tops = _raster(lidar.points_map[plant], lidar.height_m[plant], box, pixel)
     seen = np.isfinite(tops)
-    image[seen] = colormaps["viridis"](0.12 + 0.88 * np.asarray(norm(tops[seen])), bytes=True)
+    image[seen] = colormaps["viridis"](
+        _DARKEST + (1.0 - _DARKEST) * np.asarray(norm(tops[seen])), bytes=True
+    )
     figure, axes = _map(box, _NIGHT)
     axes.imshow(image, extent=(box[0], box[2], box[1], box[3]), origin="lower", zorder=1)
     _draw_paths(axes, flight, outline=_NIGHT)
@@ -122,7 +128,9 @@ def aslant_view(flight: FlightData) -> bytes | None:
     shown = front >= 0
     tall, south = height[front[shown]], points[front[shown], 1]
     norm = Normalize(0.0, _tall(height[height > _TREE_M]), clip=True)
-    colors = colormaps["viridis"](0.12 + 0.88 * np.asarray(norm(tall)), bytes=True)[:, :3]
+    colors = colormaps["viridis"](_DARKEST + (1.0 - _DARKEST) * np.asarray(norm(tall)), bytes=True)[
+        :, :3
+    ]
     colors = np.where(tall[:, None] <= _TREE_M, np.array(_GROUND_RETURN), colors)
     image[shown] = colors * (1.0 - 0.45 * (south - box[1]) / depth)[:, None]
     figure = Figure(figsize=(_WIDTH, _WIDTH * len(image) / pixels_x), facecolor=_NIGHT)
@@ -146,12 +154,16 @@ def _frame(flight: FlightData, margin_m: float) -> Box:
         return x0, y0, x1, y1
     flown = np.concatenate(tracks)
     low, high = flown.min(axis=0) - margin_m, flown.max(axis=0) + margin_m
-    size, middle = high - low, (low + high) / 2.0
-    size = np.maximum(size, size[::-1] * (0.5, 0.45))
-    low, high = middle - size / 2.0, middle + size / 2.0
-    outer = flown.min(axis=0) - 5.0, flown.max(axis=0) + 5.0
-    low = np.minimum(np.maximum(low, (x0, y0)), outer[0])
-    high = np.maximum(np.minimum(high, (x1, y1)), outer[1])
+    size = high - low
+    size = np.maximum(size, (_ASPECT * size[1], 0.45 * size[0]))
+    # inside the world where it is large enough, else around the paths
+    world_low, world_high = np.array([x0, y0]), np.array([x1, y1])
+    least = flown.max(axis=0) - flown.min(axis=0) + 10.0
+    size = np.maximum(np.minimum(size, world_high - world_low), least)
+    middle = (low + high) / 2.0
+    low = np.clip(middle - size / 2.0, world_low, np.maximum(world_high - size, world_low))
+    low = np.clip(low, flown.max(axis=0) + 5.0 - size, flown.min(axis=0) - 5.0)
+    high = low + size
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
@@ -181,7 +193,7 @@ def _draw_ground(axes: Axes, ground: Ground, box: Box) -> None:
         )
     else:
         shaded = LightSource(315.0, 40.0).shade(
-            heights[::-1], _GROUND, blend_mode="soft", vert_exag=2.0, dx=spacing, dy=spacing
+            heights[::-1], _GROUND, blend_mode="soft", vert_exag=4.0, dx=spacing, dy=spacing
         )
         axes.imshow(shaded, extent=extent, origin="upper", interpolation="bilinear", zorder=0)
         step = _round_step(relief / 10.0)
@@ -257,7 +269,7 @@ def _scale_bar(axes: Axes, box: Box, ink: str, outline: str) -> None:
 
 def _height_key(figure: Figure, norm: Normalize) -> None:
     axes = figure.add_axes((0.77, 0.035, 0.2, 0.012))
-    ramp = np.linspace(0.12, 1.0, 128)[None, :]
+    ramp = np.linspace(_DARKEST, 1.0, 128)[None, :]
     extent = (0.0, float(norm.vmax or 1.0), 0.0, 1.0)
     axes.imshow(ramp, aspect="auto", cmap="viridis", vmin=0.0, vmax=1.0, extent=extent)
     axes.set_yticks([])
@@ -291,8 +303,14 @@ def _raster(
     return image
 
 
+def _plant_colors(share: Any) -> NDArray[np.uint8]:
+    """Colours (n, 4) of heights given as shares (n,) of the tallest."""
+    scale = _DARKEST + (1.0 - _DARKEST) * np.asarray(share)
+    return np.asarray(colormaps["viridis"](scale, bytes=True))
+
+
 def _tall(heights: NDArray[np.floating]) -> float:
-    return max(float(np.quantile(heights, 0.995)), 1.0) if len(heights) else 1.0
+    return max(float(np.quantile(heights, 0.98)), 1.0) if len(heights) else 1.0
 
 
 def _round_step(value: float) -> float:
