@@ -156,8 +156,8 @@ def test_collects_a_flight(tmp_path: Path) -> None:
     assert track.minimum_clearance_m == pytest.approx(0.0, abs=1e-9)
     assert flight.lidar is not None
     assert np.abs(flight.lidar.points_map[:, 0] - 30.0).max() < 0.3
-    # of the 80 scans sent in a simulated second, 24 are mapped
-    assert 40 <= flight.lidar.scans <= 2 * 24 + 4
+    # of the 80 scans sent in a simulated second, at most 24 are mapped
+    assert 25 <= flight.lidar.scans <= 2 * 24 + 4
     assert flight.contacts == 1
     assert flight.real_time_factor == pytest.approx(4.0)
     assert (flight.scenario, flight.seed, flight.digest) == ("fake", 4, "abc")
