@@ -88,8 +88,8 @@ def test_coarser_levels_let_as_many_rays_through(name):
         visual = gaps[DetailLevel.VISUAL]
         # real foliage has gaps, and is not empty
         assert 0.2 < visual[0] < 0.92
-        np.testing.assert_allclose(gaps[DetailLevel.SENSING], visual, atol=0.06)
-        np.testing.assert_allclose(gaps[DetailLevel.COARSE], visual, atol=0.09)
+        np.testing.assert_allclose(gaps[DetailLevel.SENSING], visual, atol=0.05)
+        np.testing.assert_allclose(gaps[DetailLevel.COARSE], visual, atol=0.08)
 
 
 @pytest.mark.parametrize("name", LEAFY)
