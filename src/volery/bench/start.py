@@ -47,7 +47,7 @@ def _first_frame_s(cache: Path) -> float:
 
 
 def _main_job(folder: Path, cache: Path) -> tuple[float, float]:
-    """Wall seconds and peak resident memory (MB of 1e6 bytes) of the main job in its own process."""
+    """Wall seconds and peak resident memory (MB, 1e6 bytes) of the main job in its own process."""
     command = [sys.executable, "-m", "volery.cli", "run", "forest_survey"]
     command += ["--record", str(folder / "flight.mcap"), "--report", str(folder / "report")]
     before = time.perf_counter()
