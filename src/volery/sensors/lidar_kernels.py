@@ -1,7 +1,8 @@
 """Compiled LIDAR: each beam from the pose it had, then what the electronics make of its echo.
 
 The sensor's pose is looked up in the fleet's history every LANES beams; between them origin and
-axes are interpolated. All random numbers come from the scan's stream, numbered by scan and beam, so a scan does not depend on its batch.
+axes are interpolated. All random numbers come from the scan's stream, numbered by scan and beam, so
+a scan does not depend on its batch.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ def nodding_angle(mount: Mount, time_ns: int) -> float:
     if mount.period_s <= 0.0:
         return mount.offset_rad
     # The phase is reduced in integers first: a long run loses no precision.
-    period_ns = int(round(mount.period_s / _NS))
+    period_ns = round(mount.period_s / _NS)
     turn = (time_ns % period_ns) / period_ns
     angle: float = mount.offset_rad + mount.amplitude_rad * np.sin(_TWO_PI * turn + mount.phase_rad)
     return angle

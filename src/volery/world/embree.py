@@ -83,6 +83,9 @@ LANES = 16 if llvm.get_host_cpu_features().get("avx512f", False) else 8
 """Rays a packet: 16 with AVX-512, else 8."""
 _INTERSECT, _OCCLUDED = f"rtcIntersect{LANES}", f"rtcOccluded{LANES}"
 
+_CONFIG = "threads=1,set_affinity=0" + (",frequency_level=simd512" if LANES == 16 else "")
+"""One thread; AVX-512 may be used in full where there is any (a few per cent faster)."""
+
 # RTCIntersectArguments, 32-bit words: flags, feature mask, then pointers that stay null.
 ARGUMENT_WORDS = 16
 FLAGS_WORD, FEATURES_WORD = 0, 1
@@ -174,7 +177,7 @@ class Device:
     Built with one thread, so that the same input gives the same tree, and the same hits, each time.
     """
 
-    def __init__(self, config: str = "threads=1,set_affinity=0") -> None:
+    def __init__(self, config: str = _CONFIG) -> None:
         library = load()
         device = library.rtcNewDevice(config.encode())
         if not device:

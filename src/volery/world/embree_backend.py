@@ -33,7 +33,9 @@ class EmbreeBackend:
 
     def _build(self) -> None:
         content, device = self._content, self._device
-        self._static = device.new_scene()
+        # Robust: no ray slips between two triangles of the ground, not even straight down at a grid
+        # point. Trees do without, for speed: an edge of theirs meets a ray only by chance.
+        self._static = device.new_scene(flags=embree.SCENE_ROBUST)
         self._obstacles = device.new_scene()  # the same without the ground
         models = []
         for first in content.tree_parts:

@@ -8,7 +8,7 @@ where it was at the ray's own time, and a UAV's own body is simply left out.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,13 @@ _CHUNK = 512
 """Rays of one piece of work; a multiple of LANES, so that packets do not depend on the threads."""
 _TOGETHER_M, _TOGETHER_COSINE = 1.0, 0.9
 """Rays of a packet count as running close together up to this distance and angle."""
+_LEAST_COMPONENT = np.float32(1e-12)
+"""Smaller components of a direction are made zero.
+
+Embree's coherent traversal sorts rays by the signs of their directions, but takes the reciprocal of
+a component below 1e-18 as positive: one beam at -90 degrees, whose cosine is a rounding error, then
+makes its neighbours miss.
+"""
 _SHORT_OF_TARGET_M = 1e-4
 """`occluded` looks this much less far than the target, so that the target's surface is no cover."""
 
@@ -78,7 +85,7 @@ class RayBlock(NamedTuple):
 
     rays: NDArray[np.float32]
     """(P, PACKET_ROWS, LANES) Embree's packets. Set ORIGIN and unit DIRECTION, map; read FAR, m,
-    and NORMAL, map, of any length, facing any side."""
+    and, where something was hit, NORMAL, map, of any length, facing any side."""
     words: NDArray[np.uint32]
     """The same memory as whole numbers."""
     skip: NDArray[np.int32]
@@ -258,6 +265,24 @@ def _cast_at_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: 
 
 
 @inline_kernel
+def _settled(component: Any) -> Any:
+    """A component of a direction, zero where it is next to nothing."""
+    return component if abs(component) >= _LEAST_COMPONENT else np.float32(0.0)
+
+
+@inline_kernel
+def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], reach: float) -> None:
+    """Set the rows of a packet that a cast changes."""
+    for k in range(LANES):
+        rays[FAR, k] = reach
+        words[GEOMETRY, k] = _INVALID
+        words[INSTANCE, k] = _INVALID
+    for j in range(DIRECTION, DIRECTION + 3):
+        for k in range(LANES):
+            rays[j, k] = _settled(rays[j, k])
+
+
+@inline_kernel
 def _together(rays: NDArray[np.float32], lanes: int) -> bool:
     """Whether first and last ray of a packet run close together."""
     last = lanes - 1
@@ -282,17 +307,14 @@ def cast_block(
     coherent_address = block.coherent.ctypes.data
     static, material_of, matrix_of = scene.static, scene.material, scene.normal_matrix
     packets = (count + LANES - 1) // LANES
-    limit = np.float32(reach)
+    limit: Any = np.float32(reach)
     for k in range(LANES):
         valid[k] = -1
     for p in range(packets):
         lanes = min(LANES, count - p * LANES)
         for k in range(lanes, LANES):
             valid[k] = 0
-        for k in range(LANES):
-            rays[p, FAR, k] = limit
-            words[p, GEOMETRY, k] = _INVALID
-            words[p, INSTANCE, k] = _INVALID
+        _make_ready(rays[p], words[p], limit)
         if static != 0:
             arguments = coherent_address if _together(rays[p], lanes) else 0
             intersect_packet(
@@ -344,8 +366,8 @@ def _near_chunk(
 @inline_kernel
 def _load_skips(block: RayBlock, exclude: NDArray[np.int32], first: int, last: int) -> None:
     for i in range(first, last):
-        p, k = (i - first) // LANES, (i - first) % LANES
-        block.skip[p, k] = exclude[i] if exclude.shape[0] > 1 else exclude[0]
+        row = exclude[i] if exclude.shape[0] > 1 else exclude[0]
+        block.skip[(i - first) // LANES, (i - first) % LANES] = row
 
 
 @kernel
@@ -373,27 +395,35 @@ def cast_rays(
             return
         last = min(first + _CHUNK, count)
         near_count = _near_chunk(scene, origins, first, last, reach, block.near)
-        _load_skips(block, exclude, first, last)
-        for i in range(first, last):
-            p, k = (i - first) // LANES, (i - first) % LANES
-            for j in range(3):
-                rays[p, ORIGIN + j, k] = origins[i, j]
-                rays[p, DIRECTION + j, k] = directions[i, j]
+        if near_count > 0:
+            _load_skips(block, exclude, first, last)
+        packets = (last - first + LANES - 1) // LANES
+        for p in range(packets):
+            start = first + p * LANES
+            for k in range(min(LANES, last - start)):
+                for j in range(3):
+                    rays[p, ORIGIN + j, k] = origins[start + k, j]
+                    rays[p, DIRECTION + j, k] = directions[start + k, j]
         cast_block(scene, block, last - first, reach, near_count)
-        for i in range(first, last):
-            p, k = (i - first) // LANES, (i - first) % LANES
-            instance[i] = block.instance[p, k]
-            material[i] = block.material[p, k]
-            if block.instance[p, k] < 0:
-                distance[i] = np.inf
-                normal[i, 0], normal[i, 1], normal[i, 2] = 0.0, 0.0, 0.0
-                continue
-            distance[i] = rays[p, FAR, k]
-            x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
-            facing = x * directions[i, 0] + y * directions[i, 1] + z * directions[i, 2]
-            length = np.sqrt(x * x + y * y + z * z)
-            scale = (-1.0 if facing > 0.0 else 1.0) / max(length, 1e-30)
-            normal[i, 0], normal[i, 1], normal[i, 2] = x * scale, y * scale, z * scale
+        for p in range(packets):
+            start = first + p * LANES
+            for k in range(min(LANES, last - start)):
+                i = start + k
+                hit = block.instance[p, k] >= 0
+                x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
+                facing = (
+                    x * rays[p, DIRECTION, k]
+                    + y * rays[p, DIRECTION + 1, k]
+                    + z * rays[p, DIRECTION + 2, k]
+                )
+                squared = max(x * x + y * y + z * z, np.float32(1e-30))
+                scale = np.copysign(np.float32(1.0), -facing) / np.sqrt(squared)
+                instance[i] = block.instance[p, k]
+                material[i] = block.material[p, k]
+                distance[i] = rays[p, FAR, k] if hit else np.float32(np.inf)
+                normal[i, 0] = x * scale if hit else np.float32(0.0)
+                normal[i, 1] = y * scale if hit else np.float32(0.0)
+                normal[i, 2] = z * scale if hit else np.float32(0.0)
 
 
 @inline_kernel
@@ -415,9 +445,8 @@ def _aim(
         length = np.sqrt(length)
         for j in range(3):
             rays[ORIGIN + j, k] = origins[i, j]
-            rays[DIRECTION + j, k] = (targets[i, j] - origins[i, j]) / max(
-                length, _SHORT_OF_TARGET_M
-            )
+            component = (targets[i, j] - origins[i, j]) / max(length, _SHORT_OF_TARGET_M)
+            rays[DIRECTION + j, k] = _settled(np.float32(component))
         rays[FAR, k] = max(length - _SHORT_OF_TARGET_M, 0.0)
         valid[k] = -1 if k < lanes and length > _SHORT_OF_TARGET_M else 0
 
@@ -465,7 +494,8 @@ def find_occluded(
                 squared += (targets[i, j] - origins[i, j]) ** 2
             longest = max(longest, squared)
         near_count = _near_chunk(scene, origins, first, last, np.sqrt(longest), block.near)
-        _load_skips(block, exclude, first, last)
+        if near_count > 0:
+            _load_skips(block, exclude, first, last)
         for p in range((last - first + LANES - 1) // LANES):
             lanes = min(LANES, last - first - p * LANES)
             _aim(block, origins, targets, first, p, lanes)
