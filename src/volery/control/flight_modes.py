@@ -22,7 +22,7 @@ from volery.control.velocity_position import (
     turn_heading,
     velocity_towards,
 )
-from volery.core.compiled import inline_kernel
+from volery.vehicle.compiled import inner_kernel
 
 
 class FlightMode(IntEnum):
@@ -76,7 +76,7 @@ _GROUND_S = 0.3
 CLIMBING, CROSSING, DESCENDING = 0, 1, 2
 
 
-@inline_kernel
+@inner_kernel
 def guide(pilot: Any, estimate: Any, gains: Any, step: int) -> None:
     """One guidance tick of a `PILOT`: mode changes, then velocity, attitude and thrust setpoints.
 
@@ -123,7 +123,7 @@ def guide(pilot: Any, estimate: Any, gains: Any, step: int) -> None:
         _feel_ground(pilot, gains, vz)
 
 
-@inline_kernel
+@inner_kernel
 def _lock_place(pilot: Any, estimate: Any) -> None:
     pilot.braking = False
     for k in range(3):
@@ -132,7 +132,7 @@ def _lock_place(pilot: Any, estimate: Any) -> None:
         pilot.position_target[2] = pilot.return_height
 
 
-@inline_kernel
+@inner_kernel
 def _change_mode(pilot: Any, estimate: Any) -> None:
     """End what has arrived: TAKE_OFF and GO_TO hold, RETURN goes on to its next phase."""
     dx = pilot.position_target[0] - estimate.position_map[0]
@@ -162,7 +162,7 @@ def _change_mode(pilot: Any, estimate: Any) -> None:
             pilot.calm_ticks = 0
 
 
-@inline_kernel
+@inner_kernel
 def _feel_ground(pilot: Any, gains: Any, vz: float) -> None:
     """Stop the rotors once the ground has carried part of the weight for a while."""
     carried = pilot.thrust < _GROUND_THRUST * gains.weight and abs(vz) < _GROUND_M_S
@@ -172,7 +172,7 @@ def _feel_ground(pilot: Any, gains: Any, vz: float) -> None:
         pilot.mode = LANDED
 
 
-@inline_kernel
+@inner_kernel
 def stop(pilot: Any) -> None:
     """Rotors off, controllers at rest."""
     pilot.level = _STOPPED

@@ -20,7 +20,7 @@ from volery.vehicle.airframe import (
 )
 
 GUIDANCE_PERIOD_S = 0.004
-"""Position, velocity and flight modes run at 250 Hz, attitude and rates at every step."""
+"""Flight modes, position, velocity and attitude run at 250 Hz, rates at every step."""
 _THRUST_RESERVE = 0.9
 """Share of the full thrust that guidance may ask for; the rest steers."""
 _LEAST_THRUST = 0.15

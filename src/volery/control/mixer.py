@@ -10,17 +10,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from volery.core.compiled import inline_kernel
-
-Array = NDArray[np.float64]
+from volery.vehicle.compiled import inner_kernel
 
 
-@inline_kernel
-def mix(gains: Any, thrust: float, tx: float, ty: float, tz: float, reference: Array) -> None:
-    """Rotor speeds (MAX_ROTORS,) rad/s into `reference` for a thrust (N) and torques (N m), FLU."""
+@inner_kernel
+def mix(gains: Any, thrust: float, tx: float, ty: float, tz: float, pilot: Any) -> None:
+    """Rotor speeds into `pilot.rotor_reference`, rad/s, for a thrust (N) and torques (N m), FLU."""
     low, high = gains.idle_thrust, gains.full_thrust
     fits = True
     for r in range(gains.rotors):
@@ -30,17 +25,15 @@ def mix(gains: Any, thrust: float, tx: float, ty: float, tz: float, reference: A
             + gains.allocation[r, 2] * ty
             + gains.allocation[r, 3] * tz
         )
-        reference[r] = f
+        pilot.rotor_reference[r] = math.sqrt(max(f, 0.0) * gains.inverse_thrust_constant)
         fits = fits and low <= f <= high
     if not fits:
-        _share(gains, thrust, tx, ty, tz, reference)
-    for r in range(gains.rotors):
-        reference[r] = math.sqrt(reference[r] * gains.inverse_thrust_constant)
+        _share(gains, thrust, tx, ty, tz, pilot)
 
 
-@inline_kernel
-def _share(gains: Any, thrust: float, tx: float, ty: float, tz: float, force: Array) -> None:
-    """Thrusts (N) within the rotors' range, by priority; `force` is overwritten."""
+@inner_kernel
+def _share(gains: Any, thrust: float, tx: float, ty: float, tz: float, pilot: Any) -> None:
+    """Like `mix` where a rotor's range is exceeded."""
     low, high = gains.idle_thrust, gains.full_thrust
     # the largest share of roll and pitch for which some collective thrust keeps all rotors in range
     share = 1.0
@@ -66,11 +59,13 @@ def _share(gains: Any, thrust: float, tx: float, ty: float, tz: float, force: Ar
         f = gains.allocation[r, 0] * total + share * (
             gains.allocation[r, 1] * tx + gains.allocation[r, 2] * ty
         )
-        force[r] = f
+        pilot.rotor_reference[r] = f
         y = gains.allocation[r, 3] * tz
         if y > 0.0:
             turn = min(turn, max(high - f, 0.0) / y)
         elif y < 0.0:
             turn = min(turn, max(f - low, 0.0) / -y)
     for r in range(gains.rotors):
-        force[r] = min(max(force[r] + turn * gains.allocation[r, 3] * tz, low), high)
+        f = pilot.rotor_reference[r] + turn * gains.allocation[r, 3] * tz
+        f = min(max(f, low), high)
+        pilot.rotor_reference[r] = math.sqrt(f * gains.inverse_thrust_constant)

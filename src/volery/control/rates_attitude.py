@@ -1,4 +1,4 @@
-"""The inner layers, run at every physics step: attitude to body rates to torques to rotor speeds.
+"""The inner layers: attitude to body rates at guidance ticks, rates to rotor speeds at each step.
 
 The attitude error is split into tilt (the shortest turn that aligns the thrust axis) and the turn
 about it, so that a large yaw error never spoils the tilt (D. Brescianini, R. D'Andrea, "Tilt-
@@ -13,35 +13,33 @@ from typing import Any
 
 from volery.control.mixer import mix
 from volery.control.setpoints import ControlLevel
-from volery.core.compiled import inline_kernel
+from volery.vehicle.compiled import inner_kernel
 
 _STOPPED = int(ControlLevel.STOPPED)
 _ROTORS = int(ControlLevel.ROTORS)
 _ATTITUDE = int(ControlLevel.ATTITUDE)
 
 
-@inline_kernel
-def stabilise(pilot: Any, estimate: Any, gains: Any, dt: float) -> None:
-    """Rotor speeds of a `PILOT` from its attitude or rates setpoint and thrust.
+@inner_kernel
+def hold_rates(pilot: Any, estimate: Any, gains: Any, dt: float) -> None:
+    """Rotor speeds of a `PILOT` from its rates setpoint and thrust.
 
-    estimate: a record with `attitude` and `omega_body`.
+    estimate: a record with `omega_body`.
     """
     if pilot.level <= _ROTORS:
         if pilot.level == _STOPPED:
             for r in range(gains.rotors):
                 pilot.rotor_reference[r] = 0.0
         return
-    if pilot.level >= _ATTITUDE:
-        _rates_from_attitude(pilot, estimate, gains)
     ox, oy, oz = estimate.omega_body[0], estimate.omega_body[1], estimate.omega_body[2]
     ix, iy, iz = gains.inertia[0], gains.inertia[1], gains.inertia[2]
     tx = ix * _angular_acceleration(pilot, gains, 0, ox, dt) + (iz - iy) * oy * oz
     ty = iy * _angular_acceleration(pilot, gains, 1, oy, dt) + (ix - iz) * oz * ox
     tz = iz * _angular_acceleration(pilot, gains, 2, oz, dt) + (iy - ix) * ox * oy
-    mix(gains, pilot.thrust, tx, ty, tz, pilot.rotor_reference)
+    mix(gains, pilot.thrust, tx, ty, tz, pilot)
 
 
-@inline_kernel
+@inner_kernel
 def _angular_acceleration(pilot: Any, gains: Any, axis: int, rate: float, dt: float) -> float:
     error = pilot.rates[axis] - rate
     limit = gains.rate_integral_limit[axis]
@@ -52,9 +50,14 @@ def _angular_acceleration(pilot: Any, gains: Any, axis: int, rate: float, dt: fl
     return wanted
 
 
-@inline_kernel
-def _rates_from_attitude(pilot: Any, estimate: Any, gains: Any) -> None:
-    """Body rates that turn the present attitude into the wanted one."""
+@inner_kernel
+def hold_attitude(pilot: Any, estimate: Any, gains: Any) -> None:
+    """Body rates of a `PILOT` that turn the present attitude into the wanted one.
+
+    estimate: a record with `attitude`.
+    """
+    if pilot.level < _ATTITUDE:
+        return
     x, y, z, w = (
         estimate.attitude[0],
         estimate.attitude[1],

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from volery.control.flight_modes import CRASHED, guide, stop
 from volery.control.gains import GAINS
-from volery.control.rates_attitude import stabilise
+from volery.control.rates_attitude import hold_attitude, hold_rates
 from volery.control.setpoints import PILOT
-from volery.core.compiled import inline_kernel, kernel
 from volery.vehicle.aerodynamics import PLANT
+from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
 from volery.vehicle.fleet import BODY
-from volery.vehicle.kernels import step_body
+from volery.vehicle.kernels import accelerate, carry, meet_ground, near_ground
 from volery.world.terrain import TerrainGrid
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ EVENTS_A_STEP = 3
 """At most, of one UAV."""
 
 
-@kernel
+@fused_kernel
 def advance_fleet(
     uavs: NDArray[np.void],
     models: NDArray[np.void],
@@ -91,21 +91,15 @@ def advance_fleet(
                 mode = pilot.mode
                 if tick:
                     guide(pilot, estimate, gains, step)
-                stabilise(pilot, estimate, gains, dt)
-                touch = step_body(
-                    body,
-                    plant,
-                    pilot.rotor_reference,
-                    wind_x,
-                    wind_y,
-                    wind_z,
-                    grid,
-                    steepest,
-                    bounce,
-                    scratch,
-                    step + 1,
-                    dt,
-                )
+                    hold_attitude(pilot, estimate, gains)
+                hold_rates(pilot, estimate, gains, dt)
+                accelerate(body, plant, pilot, wind_x, wind_y, wind_z, dt)
+                touch = NO_TOUCH
+                if near_ground(body, dt):
+                    touch = meet_ground(
+                        body, plant, pilot, grid, steepest, bounce, scratch, step + 1, dt
+                    )
+                carry(body, dt)
                 if touch != NO_TOUCH:
                     _note(events[written], step + 1, i, touch, mode, body.touch_speed, body)
                     written += 1
@@ -126,7 +120,7 @@ def advance_fleet(
     return done, written, spent
 
 
-@inline_kernel
+@inner_kernel
 def _note(event: Any, step: int, uav: int, kind: int, mode: int, speed: float, body: Any) -> None:
     event.step = step
     event.uav = uav

@@ -12,11 +12,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from volery.core.compiled import inline_kernel
 from volery.vehicle.airframe import GRAVITY
+from volery.vehicle.compiled import inner_kernel
 
 
-@inline_kernel
+@inner_kernel
 def approach_speed(distance: float, gain: float, brake: float, limit: float) -> float:
     """Speed (m/s) towards a goal `distance` m away from which `brake` (m/s^2) still stops."""
     linear = brake / (gain * gain)
@@ -25,7 +25,7 @@ def approach_speed(distance: float, gain: float, brake: float, limit: float) -> 
     return min(math.sqrt(2.0 * brake * (distance - 0.5 * linear)), limit)
 
 
-@inline_kernel
+@inner_kernel
 def velocity_towards(
     pilot: Any, estimate: Any, gains: Any, speed: float, climb: float, descent: float
 ) -> tuple[float, float, float]:
@@ -42,7 +42,7 @@ def velocity_towards(
     return scale * dx, scale * dy, math.copysign(vz, dz)
 
 
-@inline_kernel
+@inner_kernel
 def track_velocity(pilot: Any, estimate: Any, gains: Any, tx: float, ty: float, tz: float) -> None:
     """Attitude and thrust setpoints that bring the velocity to (tx, ty, tz) m/s, map."""
     tick = gains.tick
@@ -94,7 +94,7 @@ def track_velocity(pilot: Any, estimate: Any, gains: Any, tx: float, ty: float, 
     _point_thrust(pilot, estimate, gains, ax, ay, az)
 
 
-@inline_kernel
+@inner_kernel
 def _point_thrust(pilot: Any, estimate: Any, gains: Any, ax: float, ay: float, az: float) -> None:
     """Attitude whose z axis lies along (ax, ay, az), az > 0, with the heading setpoint; thrust."""
     size = math.sqrt(ax * ax + ay * ay + az * az)
@@ -135,7 +135,7 @@ def _point_thrust(pilot: Any, estimate: Any, gains: Any, ax: float, ay: float, a
     pilot.thrust = min(max(gains.mass * along, gains.least_thrust), gains.most_thrust)
 
 
-@inline_kernel
+@inner_kernel
 def heading_of(estimate: Any) -> tuple[float, float]:
     """Cosine and sine of the present heading; (0, 0) where the x axis points straight up."""
     x, y, z, w = (
@@ -151,7 +151,7 @@ def heading_of(estimate: Any) -> tuple[float, float]:
     return c / n, s / n
 
 
-@inline_kernel
+@inner_kernel
 def turn_heading(pilot: Any, estimate: Any, gains: Any) -> None:
     """Move the heading setpoint by its rate, or towards its target; set the rate fed forward."""
     c, s = pilot.heading[0], pilot.heading[1]

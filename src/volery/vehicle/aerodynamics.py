@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.compiled import inline_kernel
 from volery.vehicle.airframe import MAX_FEET, MAX_ROTORS, Airframe
+from volery.vehicle.compiled import inner_kernel
 
 Array = NDArray[np.float64]
 
@@ -37,8 +37,9 @@ MAX_CONTACTS = MAX_FEET + MAX_ROTORS + 2
 
 PLANT = np.dtype(
     [
-        ("mass", "f8"),
-        ("inertia", "f8", 3),
+        ("inverse_mass", "f8"),
+        ("inverse_inertia", "f8", 3),
+        ("gyroscopic", "f8", 3),  # (Izz - Iyy) / Ixx and so on around
         ("drag", "f8", 3),
         ("rotors", "i8"),
         ("rotor_position", "f8", (MAX_ROTORS, 3)),
@@ -68,8 +69,10 @@ def plant_of(airframe: Airframe, dt: float) -> NDArray[np.void]:
     """The (1,) `PLANT` row of an airframe stepped by `dt` s."""
     row = np.zeros(1, PLANT)
     body, rotors, ground = airframe.body, airframe.rotors, airframe.ground
-    row["mass"] = body.mass_kg
-    row["inertia"] = body.inertia_kg_m2
+    inertia = np.array(body.inertia_kg_m2)
+    row["inverse_mass"] = 1.0 / body.mass_kg
+    row["inverse_inertia"] = 1.0 / inertia
+    row["gyroscopic"] = (np.roll(inertia, 1) - np.roll(inertia, -1)) / inertia
     row["drag"] = 0.5 * AIR_DENSITY * np.array(body.drag_area_m2)
     count = len(rotors.places)
     row["rotors"] = count
@@ -107,11 +110,11 @@ def contact_points(airframe: Airframe) -> Array:
     return np.array(points)
 
 
-@inline_kernel
+@inner_kernel
 def air_wrench(
+    body: Any,
     plant: Any,
-    rotor_speed: Array,
-    reference: Array,
+    command: Any,
     vx: float,
     vy: float,
     vz: float,
@@ -119,26 +122,23 @@ def air_wrench(
     oy: float,
     oz: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """Force and torque of the air at mid-step, FLU; `rotor_speed` is moved on by a whole step.
+    """Force and torque of the air at mid-step, FLU; the rotors' speeds move on by a whole step.
 
-    plant: a `PLANT` record. rotor_speed, reference: (MAX_ROTORS,) rad/s. (vx, vy, vz) m/s: velocity
-    of the centre of mass through the air, (ox, oy, oz) rad/s: body rates, both FLU and at mid-step.
+    body: a record with `rotor_speed`. plant: a `PLANT`. command: a record with `rotor_reference`,
+    rad/s. (vx, vy, vz) m/s: velocity of the centre of mass through the air, (ox, oy, oz) rad/s:
+    body rates, both FLU and at mid-step.
     Returns (fx, fy, fz, tx, ty, tz) in N and N m.
     """
-    speed = math.sqrt(vx * vx + vy * vy + vz * vz)
-    fx = -plant.drag[0] * speed * vx
-    fy = -plant.drag[1] * speed * vy
-    fz = -plant.drag[2] * speed * vz
-    tx = ty = tz = 0.0
+    fx = fy = fz = tx = ty = tz = 0.0
     for r in range(plant.rotors):
-        wanted = reference[r]
-        lead = rotor_speed[r] - wanted
+        wanted = command.rotor_reference[r]
+        lead = body.rotor_speed[r] - wanted
         if lead < 0.0:
             w = wanted + lead * plant.rise_half
-            rotor_speed[r] = wanted + lead * plant.rise
+            body.rotor_speed[r] = wanted + lead * plant.rise
         else:
             w = wanted + lead * plant.fall_half
-            rotor_speed[r] = wanted + lead * plant.fall
+            body.rotor_speed[r] = wanted + lead * plant.fall
         px, py, pz = (
             plant.rotor_position[r, 0],
             plant.rotor_position[r, 1],
@@ -165,4 +165,8 @@ def air_wrench(
         tx += py * gz - pz * gy - reaction * ax - rolling * hx
         ty += pz * gx - px * gz - reaction * ay - rolling * hy
         tz += px * gy - py * gx - reaction * az - rolling * hz
+    speed = math.sqrt(vx * vx + vy * vy + vz * vz)
+    fx -= plant.drag[0] * speed * vx
+    fy -= plant.drag[1] * speed * vy
+    fz -= plant.drag[2] * speed * vz
     return fx, fy, fz, tx, ty, tz

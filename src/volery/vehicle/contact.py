@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
-from volery.core.compiled import inline_kernel
 from volery.vehicle.aerodynamics import MAX_CONTACTS
 from volery.vehicle.airframe import Airframe
+from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.rigid import matrix_of
 from volery.world.terrain import Terrain, TerrainGrid, terrain_height, terrain_normal
 
 Array = NDArray[np.float64]
@@ -67,8 +68,8 @@ def standing_pose(airframe: Airframe, terrain: Terrain, x: float, y: float, yaw:
     return np.concatenate([[x, y, z], attitude])
 
 
-@inline_kernel
-def resolve_contact(
+@inner_kernel
+def resolve_contact(  # noqa: PLR0915
     body: Any, plant: Any, grid: TerrainGrid, bounce: bool, scratch: Array, dt: float
 ) -> float:
     """Change the body's velocity and rates so that nothing goes below the ground.
@@ -77,29 +78,20 @@ def resolve_contact(
     scratch: `SCRATCH_SHAPE`. Returns the greatest speed of approach (m/s, along the normal), or -1
     where nothing touches.
     """
-    qx, qy, qz, qw = body.attitude[0], body.attitude[1], body.attitude[2], body.attitude[3]
-    r00, r01, r02 = (
-        1.0 - 2.0 * (qy * qy + qz * qz),
-        2.0 * (qx * qy - qz * qw),
-        2.0 * (qx * qz + qy * qw),
-    )
-    r10, r11, r12 = (
-        2.0 * (qx * qy + qz * qw),
-        1.0 - 2.0 * (qx * qx + qz * qz),
-        2.0 * (qy * qz - qx * qw),
-    )
-    r20, r21, r22 = (
-        2.0 * (qx * qz - qy * qw),
-        2.0 * (qy * qz + qx * qw),
-        1.0 - 2.0 * (qx * qx + qy * qy),
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = matrix_of(
+        body.attitude[0], body.attitude[1], body.attitude[2], body.attitude[3]
     )
     vx, vy, vz = body.velocity_map[0], body.velocity_map[1], body.velocity_map[2]
     ux = r00 * vx + r10 * vy + r20 * vz
     uy = r01 * vx + r11 * vy + r21 * vz
     uz = r02 * vx + r12 * vy + r22 * vz
     ox, oy, oz = body.omega_body[0], body.omega_body[1], body.omega_body[2]
-    light = 1.0 / plant.mass
-    jx, jy, jz = 1.0 / plant.inertia[0], 1.0 / plant.inertia[1], 1.0 / plant.inertia[2]
+    light = plant.inverse_mass
+    jx, jy, jz = (
+        plant.inverse_inertia[0],
+        plant.inverse_inertia[1],
+        plant.inverse_inertia[2],
+    )
 
     active = 0
     approach = -1.0
@@ -193,7 +185,7 @@ def resolve_contact(
     return approach
 
 
-@inline_kernel
+@inner_kernel
 def classify_touch(
     body: Any, plant: Any, approach: float, speed: float, step: int, dt: float, bounce: bool
 ) -> int:

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.compiled import inline_kernel
 from volery.vehicle.aerodynamics import air_wrench
 from volery.vehicle.airframe import GRAVITY
+from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.contact import NO_TOUCH, classify_touch, resolve_contact
+from volery.vehicle.rigid import matrix_of, nudged, turned
 from volery.world.terrain import TerrainGrid, terrain_height
 
 Array = NDArray[np.float64]
@@ -33,14 +34,76 @@ _WRECK_DAMPING_S = 0.15
 """s: time constant with which a wreck on the ground loses its motion (modelling choice)."""
 
 
-@inline_kernel
-def step_body(
+@inner_kernel
+def accelerate(
+    body: Any, plant: Any, command: Any, wind_x: float, wind_y: float, wind_z: float, dt: float
+) -> None:
+    """Rotors, air and gravity: take velocity and rates of a `BODY` to the end of the step.
+
+    command: a record with `rotor_reference`, rad/s, held over the step. wind: m/s, map.
+    """
+    half = 0.5 * dt
+    vx, vy, vz = body.velocity_map[0], body.velocity_map[1], body.velocity_map[2]
+    ox, oy, oz = body.omega_body[0], body.omega_body[1], body.omega_body[2]
+
+    # mid-step, extrapolated
+    mx = ox + half * body.free_angular_acceleration[0]
+    my = oy + half * body.free_angular_acceleration[1]
+    mz = oz + half * body.free_angular_acceleration[2]
+    ax = vx + half * body.free_acceleration[0] - wind_x
+    ay = vy + half * body.free_acceleration[1] - wind_y
+    az = vz + half * body.free_acceleration[2] - wind_z
+    quarter = 0.5 * half
+    x, y, z, w = nudged(
+        body.attitude[0],
+        body.attitude[1],
+        body.attitude[2],
+        body.attitude[3],
+        quarter * mx,
+        quarter * my,
+        quarter * mz,
+    )
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = matrix_of(x, y, z, w)
+    fx, fy, fz, tx, ty, tz = air_wrench(
+        body,
+        plant,
+        command,
+        r00 * ax + r10 * ay + r20 * az,
+        r01 * ax + r11 * ay + r21 * az,
+        r02 * ax + r12 * ay + r22 * az,
+        mx,
+        my,
+        mz,
+    )
+    light = plant.inverse_mass
+    ax = (r00 * fx + r01 * fy + r02 * fz) * light
+    ay = (r10 * fx + r11 * fy + r12 * fz) * light
+    az = (r20 * fx + r21 * fy + r22 * fz) * light - GRAVITY
+    bx = tx * plant.inverse_inertia[0] - plant.gyroscopic[0] * my * mz
+    by = ty * plant.inverse_inertia[1] - plant.gyroscopic[1] * mz * mx
+    bz = tz * plant.inverse_inertia[2] - plant.gyroscopic[2] * mx * my
+    _store(body.free_acceleration, ax, ay, az)
+    _store(body.free_angular_acceleration, bx, by, bz)
+    _store(body.acceleration_map, ax, ay, az)
+    _store(body.angular_acceleration_body, bx, by, bz)
+    _store(body.velocity_map, vx + dt * ax, vy + dt * ay, vz + dt * az)
+    _store(body.omega_body, ox + dt * bx, oy + dt * by, oz + dt * bz)
+    body.on_ground = False
+
+
+@inner_kernel
+def near_ground(body: Any, dt: float) -> bool:
+    """Whether the ground must be looked at in this step."""
+    vx, vy, vz = body.velocity_map[0], body.velocity_map[1], body.velocity_map[2]
+    travel = (abs(vx) + abs(vy) + abs(vz)) * dt  # no less than the way flown, without a root
+    return bool(body.ground_budget < _GROUND_MARGIN + travel)
+
+
+@inner_kernel
+def meet_ground(
     body: Any,
     plant: Any,
-    reference: Array,
-    wind_x: float,
-    wind_y: float,
-    wind_z: float,
+    command: Any,
     grid: TerrainGrid,
     steepest: float,
     bounce: bool,
@@ -48,158 +111,84 @@ def step_body(
     step: int,
     dt: float,
 ) -> int:
-    """Move one `BODY` on by `dt` s; returns `NO_TOUCH`, `TOUCH_DOWN` or `IMPACT`.
+    """Look at the ground, and let it stop the body; `NO_TOUCH`, `TOUCH_DOWN` or `IMPACT`.
 
-    reference: (MAX_ROTORS,) rad/s, held over the step. wind: m/s, map. steepest: cosine of the
-    terrain's steepest slope. step: number of the step that ends here.
+    steepest: cosine of the terrain's steepest slope. step: number of the step that ends here.
     """
+    height = body.position_map[2] - terrain_height(grid, body.position_map[0], body.position_map[1])
+    body.ground_budget = height * steepest - plant.contact_radius
+    if not near_ground(body, dt):
+        return NO_TOUCH
+    vx, vy, vz = body.velocity_map[0], body.velocity_map[1], body.velocity_map[2]
+    ox, oy, oz = body.omega_body[0], body.omega_body[1], body.omega_body[2]
+    speed = _speed(body)
+    approach = resolve_contact(body, plant, grid, bounce, scratch, dt)
+    if approach < 0.0:
+        return NO_TOUCH
+    body.on_ground = True
+    keep = 1.0 - dt / _WRECK_DAMPING_S if body.crashed else 1.0
+    for k in range(3):
+        body.velocity_map[k] *= keep
+        body.omega_body[k] *= keep
+    body.acceleration_map[0] += (body.velocity_map[0] - vx) / dt
+    body.acceleration_map[1] += (body.velocity_map[1] - vy) / dt
+    body.acceleration_map[2] += (body.velocity_map[2] - vz) / dt
+    body.angular_acceleration_body[0] += (body.omega_body[0] - ox) / dt
+    body.angular_acceleration_body[1] += (body.omega_body[1] - oy) / dt
+    body.angular_acceleration_body[2] += (body.omega_body[2] - oz) / dt
+    _rest(body, plant, command, dt)
+    return classify_touch(body, plant, approach, speed, step, dt, bounce)
+
+
+@inner_kernel
+def carry(body: Any, dt: float) -> None:
+    """Take position and attitude to the end of the step, and count the way against the budgets.
+
+    They go with the mean of the old and the new velocity; on the ground with the new one, which is
+    the one that the contact allows.
+    """
+    back = 0.0 if body.on_ground else 0.5 * dt
+    for k in range(3):
+        body.position_map[k] += dt * (body.velocity_map[k] - back * body.free_acceleration[k])
     half = 0.5 * dt
-    position, velocity, attitude, omega = (
-        body.position_map,
-        body.velocity_map,
-        body.attitude,
-        body.omega_body,
+    x, y, z, w = turned(
+        body.attitude[0],
+        body.attitude[1],
+        body.attitude[2],
+        body.attitude[3],
+        half * (body.omega_body[0] - back * body.free_angular_acceleration[0]),
+        half * (body.omega_body[1] - back * body.free_angular_acceleration[1]),
+        half * (body.omega_body[2] - back * body.free_angular_acceleration[2]),
     )
-    vx0, vy0, vz0 = velocity[0], velocity[1], velocity[2]
-    ox0, oy0, oz0 = omega[0], omega[1], omega[2]
-    qx, qy, qz, qw = attitude[0], attitude[1], attitude[2], attitude[3]
-
-    # mid-step, extrapolated
-    ox = ox0 + half * body.free_angular_acceleration[0]
-    oy = oy0 + half * body.free_angular_acceleration[1]
-    oz = oz0 + half * body.free_angular_acceleration[2]
-    ax = vx0 + half * body.free_acceleration[0] - wind_x
-    ay = vy0 + half * body.free_acceleration[1] - wind_y
-    az = vz0 + half * body.free_acceleration[2] - wind_z
-    mx, my, mz, mw = _turned(qx, qy, qz, qw, 0.5 * half * ox, 0.5 * half * oy, 0.5 * half * oz)
-    r00, r01, r02 = (
-        1.0 - 2.0 * (my * my + mz * mz),
-        2.0 * (mx * my - mz * mw),
-        2.0 * (mx * mz + my * mw),
-    )
-    r10, r11, r12 = (
-        2.0 * (mx * my + mz * mw),
-        1.0 - 2.0 * (mx * mx + mz * mz),
-        2.0 * (my * mz - mx * mw),
-    )
-    r20, r21, r22 = (
-        2.0 * (mx * mz - my * mw),
-        2.0 * (my * mz + mx * mw),
-        1.0 - 2.0 * (mx * mx + my * my),
-    )
-    fx, fy, fz, tx, ty, tz = air_wrench(
-        plant,
-        body.rotor_speed,
-        reference,
-        r00 * ax + r10 * ay + r20 * az,
-        r01 * ax + r11 * ay + r21 * az,
-        r02 * ax + r12 * ay + r22 * az,
-        ox,
-        oy,
-        oz,
-    )
-    light = 1.0 / plant.mass
-    ax = (r00 * fx + r01 * fy + r02 * fz) * light
-    ay = (r10 * fx + r11 * fy + r12 * fz) * light
-    az = (r20 * fx + r21 * fy + r22 * fz) * light - GRAVITY
-    ix, iy, iz = plant.inertia[0], plant.inertia[1], plant.inertia[2]
-    bx = (tx - (iz - iy) * oy * oz) / ix
-    by = (ty - (ix - iz) * oz * ox) / iy
-    bz = (tz - (iy - ix) * ox * oy) / iz
-    body.free_acceleration[0], body.free_acceleration[1], body.free_acceleration[2] = ax, ay, az
-    body.free_angular_acceleration[0] = bx
-    body.free_angular_acceleration[1] = by
-    body.free_angular_acceleration[2] = bz
-    velocity[0], velocity[1], velocity[2] = vx0 + dt * ax, vy0 + dt * ay, vz0 + dt * az
-    omega[0], omega[1], omega[2] = ox0 + dt * bx, oy0 + dt * by, oz0 + dt * bz
-    speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
-
-    # the ground, looked up only when it may be within reach
-    touch = NO_TOUCH
-    lag = half
-    travel = speed * dt
+    body.attitude[0], body.attitude[1], body.attitude[2], body.attitude[3] = x, y, z, w
+    travel = dt * _speed(body)
     body.ground_budget -= travel
-    if body.ground_budget < travel + _GROUND_MARGIN:
-        height = position[2] - terrain_height(grid, position[0], position[1])
-        body.ground_budget = height * steepest - plant.contact_radius
-        if body.ground_budget < travel + _GROUND_MARGIN:
-            approach = resolve_contact(body, plant, grid, bounce, scratch, dt)
-            body.on_ground = approach >= 0.0
-            if body.on_ground:
-                lag = dt
-                touch = classify_touch(body, plant, approach, speed, step, dt, bounce)
-                if body.crashed:
-                    keep = 1.0 - dt / _WRECK_DAMPING_S
-                    for k in range(3):
-                        velocity[k] *= keep
-                        omega[k] *= keep
-                ax, ay, az = (
-                    (velocity[0] - vx0) / dt,
-                    (velocity[1] - vy0) / dt,
-                    (velocity[2] - vz0) / dt,
-                )
-                bx, by, bz = (omega[0] - ox0) / dt, (omega[1] - oy0) / dt, (omega[2] - oz0) / dt
-                speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
-                travel = speed * dt
-                _rest(body, plant, reference, speed, dt)
-        else:
-            body.on_ground = False
-    else:
-        body.on_ground = False
-
-    body.acceleration_map[0], body.acceleration_map[1], body.acceleration_map[2] = ax, ay, az
-    body.angular_acceleration_body[0] = bx
-    body.angular_acceleration_body[1] = by
-    body.angular_acceleration_body[2] = bz
-    ease = dt - lag  # mean of old and new velocity in the air, the new one on the ground
-    position[0] += lag * velocity[0] + ease * vx0
-    position[1] += lag * velocity[1] + ease * vy0
-    position[2] += lag * velocity[2] + ease * vz0
-    attitude[0], attitude[1], attitude[2], attitude[3] = _turned(
-        qx,
-        qy,
-        qz,
-        qw,
-        0.5 * (lag * omega[0] + ease * ox0),
-        0.5 * (lag * omega[1] + ease * oy0),
-        0.5 * (lag * omega[2] + ease * oz0),
-    )
     body.contact_budget -= travel
     body.separation_budget -= travel
-    return touch
 
 
-@inline_kernel
-def _turned(
-    qx: float, qy: float, qz: float, qw: float, hx: float, hy: float, hz: float
-) -> tuple[float, float, float, float]:
-    """Attitude turned by the body-frame rotation vector 2 h: q exp(h), by its series in |h|.
-
-    The series errs by |h|^6/5040 (1e-12 at 100 rad/s and 1 kHz); one Newton step keeps the
-    quaternion of unit length.
-    """
-    s = hx * hx + hy * hy + hz * hz
-    c = 1.0 - s * (0.5 - s * (1.0 / 24.0))
-    f = 1.0 - s * (1.0 / 6.0 - s * (1.0 / 120.0))
-    hx *= f
-    hy *= f
-    hz *= f
-    x = qw * hx + qx * c + qy * hz - qz * hy
-    y = qw * hy - qx * hz + qy * c + qz * hx
-    z = qw * hz + qx * hy - qy * hx + qz * c
-    w = qw * c - qx * hx - qy * hy - qz * hz
-    n = 1.5 - 0.5 * (x * x + y * y + z * z + w * w)
-    return x * n, y * n, z * n, w * n
+@inner_kernel
+def _speed(body: Any) -> float:
+    vx, vy, vz = body.velocity_map[0], body.velocity_map[1], body.velocity_map[2]
+    return math.sqrt(vx * vx + vy * vy + vz * vz)
 
 
-@inline_kernel
-def _rest(body: Any, plant: Any, reference: Array, speed: float, dt: float) -> None:
+@inner_kernel
+def _store(vector: Array, x: float, y: float, z: float) -> None:
+    vector[0] = x
+    vector[1] = y
+    vector[2] = z
+
+
+@inner_kernel
+def _rest(body: Any, plant: Any, command: Any, dt: float) -> None:
     """Put a body to sleep that has lain still, rotors stopped, for a while."""
-    still = speed < _STILL_SPEED
+    still = True
     for k in range(3):
+        still = still and abs(body.velocity_map[k]) < _STILL_SPEED
         still = still and abs(body.omega_body[k]) < _STILL_SPEED
     for r in range(plant.rotors):
-        still = still and reference[r] == 0.0
+        still = still and command.rotor_reference[r] == 0.0
     body.still_steps = body.still_steps + 1 if still else 0
     if body.still_steps * dt >= _STILL_S:
         body.asleep = True
