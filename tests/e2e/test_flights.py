@@ -94,14 +94,14 @@ def test_two_uavs_that_meet_crash_into_each_other(simulate, flat_data):
     flat_data["types"]["f450"] = {}
     flat_data["uavs"] = [
         {"type": "f450", "position_m": [0.0, 0.0, 20.0]},
-        {"type": "f450", "position_m": [30.0, 0.0, 20.0]},
+        {"type": "f450", "position_m": [6.0, 0.0, 20.0]},
     ]
     simulation = simulate(flat_data)
     state = simulation._fleet.state
     state.velocity_map[:, 0] = [25.0, -25.0]
     for uav in simulation.uavs.values():
         uav.command_rotor_speeds(np.full(4, 770.0))
-    simulation.run(1.5)
+    simulation.run(0.5)
     hits = [e for e in simulation.events if e.kind is EventKind.COLLISION]
     assert {(e.uav, e.partner) for e in hits[:2]} == {("uav1", "uav2"), ("uav2", "uav1")}
     assert hits[0].speed_m_s == pytest.approx(50.0, abs=10.0)

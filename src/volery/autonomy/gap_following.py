@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 
 _PERIOD_S = 0.05
 _SONAR_MEMORY_S = 0.5
+_LEAST_CLIMB_M = 1.0
 _STUCK_AFTER_S = 8.0
 _STUCK_PROGRESS_M = 2.0
 _DETOUR_S = 5.0
@@ -152,7 +153,9 @@ class GapFollowing(Node):
 
     def _climb(self, pose: Pose) -> None:
         self._refit_ground(pose)
-        if pose.position[2] - self._home[2] > self._height - 0.5:
+        climbed = float(pose.position[2] - self._home[2])
+        has_stopped = climbed > _LEAST_CLIMB_M and abs(pose.velocity[2]) < 0.1
+        if has_stopped or climbed > self._height - 0.5:
             self._phase = Phase.FLY
 
     def _fly(self, pose: Pose) -> None:
