@@ -29,6 +29,7 @@ from volery.sensors.mount import Mount
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.embreex_fallback import EmbreexBackend
 from volery.world.scene import Scene
+from volery.world.scene_kernels import new_block, thread_block
 
 __all__ = [
     "LidarBatch",
@@ -37,6 +38,7 @@ __all__ = [
     "load_lidar",
     "make_batch",
     "sample_lidars",
+    "scan_rays",
     "stack_mounts",
 ]
 
@@ -243,19 +245,26 @@ def sample_lidars(
         for scan in range(len(ranges)):
             _scan_plainly(scene, model, batch, scan, history, (start, end), ranges[scan])
         return ranges
-    (workers or scene.workers).run(
-        scan_batch,
-        scene.handle,
-        model.constants,
-        batch,
-        history,
-        start,
-        end,
-        new_counter(),
-        ranges,
-        alone=ranges.size <= _FEW_BEAMS,
-    )
+    handle, constants, counter = scene.handle, model.constants, new_counter()
+
+    def work() -> None:
+        block = thread_block(model.beams, bodies)
+        memory = np.empty((2, block.instance.size), dtype=np.float32)
+        scan_batch(handle, constants, batch, history, start, end, counter, block, memory, ranges)
+
+    (workers or scene.workers).run(work, alone=ranges.size <= _FEW_BEAMS)
     return ranges
+
+
+def scan_rays(
+    model: LidarModel, batch: LidarBatch, scan: int, history: PoseHistory
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """One scan's beams as rays: origins and unit directions (beams, 3), map, and times, ns."""
+    rays = np.empty((6, model.beams), dtype=np.float32)
+    times = np.empty(model.beams, dtype=np.int64)
+    packets = new_block(model.beams, 0).rays
+    sweep_rays(model.constants, batch, scan, history, packets, rays, times)
+    return rays[:3].T.astype(np.float64), rays[3:].T.astype(np.float64), times
 
 
 def _scan_plainly(
@@ -271,10 +280,7 @@ def _scan_plainly(
     backend = scene.backend
     assert isinstance(backend, EmbreexBackend)
     beams = model.beams
-    rays = np.empty((6, beams), dtype=np.float32)
-    times = np.empty(beams, dtype=np.int64)
-    sweep_rays(model.constants, batch, scan, history, rays, times)
-    origins, directions = rays[:3].T.astype(np.float64), rays[3:].T.astype(np.float64)
+    origins, directions, times = scan_rays(model, batch, scan, history)
     out = (
         ranges,
         np.empty((beams, 3), np.float32),

@@ -17,8 +17,8 @@ from volery.core.rng import normal, uniform
 from volery.core.workers import fetch_add
 from volery.sensors.mount import Mount, sensor_attitude
 from volery.vehicle.pose_history import PoseHistory, pose_at
-from volery.world.embree import DIRECTION, FAR, LANES, NORMAL, ORIGIN, PACKET_ROWS
-from volery.world.scene_kernels import SceneHandle, cast_block, near_bodies, new_block
+from volery.world.embree import DIRECTION, FAR, LANES, NORMAL, ORIGIN
+from volery.world.scene_kernels import RayBlock, SceneHandle, cast_block, near_bodies
 
 _CURVE_MARGIN_M = 0.5
 """How far a sensor may stray in a sweep from the box of its first and last position."""
@@ -276,14 +276,17 @@ def scan_batch(
     bodies_start_ns: int,
     bodies_end_ns: int,
     counter: NDArray[np.int64],
+    block: RayBlock,
+    memory: NDArray[np.float32],
     ranges: NDArray[np.float32],
 ) -> None:
-    """Make whole scans, taken one by one from `counter`; `ranges` is (S, beams)."""
+    """Make whole scans, taken one by one from `counter`; `ranges` is (S, beams).
+
+    `block` holds a scan's rays, `memory` is (2, P * LANES).
+    """
     beams = lidar.cosine.shape[0]
-    block = new_block(beams, scene.bodies.scene.shape[0])
     rays, instance = block.rays, block.instance
-    cosine = np.zeros(rays.shape[0] * LANES, dtype=np.float32)
-    found = np.zeros(rays.shape[0] * LANES, dtype=np.float32)
+    found, cosine = memory[0], memory[1]
     interval = max(bodies_end_ns - bodies_start_ns, 1)
     while True:
         scan = fetch_add(counter.ctypes.data)
@@ -309,7 +312,8 @@ def scan_batch(
                 hit = instance[p, k] >= 0
                 found[p * LANES + k] = rays[p, FAR, k] if hit else np.float32(np.inf)
         out = ranges[scan]
-        out[:] = found[:beams]
+        for i in range(beams):
+            out[i] = found[i]
         measure(lidar, batch.key[scan], batch.scan_number[scan], cosine, out)
 
 
@@ -325,12 +329,12 @@ def sweep_rays(
     batch: LidarBatch,
     scan: int,
     history: PoseHistory,
+    packets: NDArray[np.float32],
     rays: NDArray[np.float32],
     times_ns: NDArray[np.int64],
 ) -> None:
     """Beams of one scan (6, beams) and when they see the others, for a caster in Python."""
     beams = lidar.cosine.shape[0]
-    packets = np.zeros(((beams + LANES - 1) // LANES, PACKET_ROWS, LANES), dtype=np.float32)
     aim_beams(lidar, batch, scan, history, packets)
     for i in range(beams):
         for j in range(3):

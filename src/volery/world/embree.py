@@ -26,7 +26,6 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from volery.core.compiled import inline_kernel, kernel
 from volery.core.errors import VoleryError
 from volery.world.mesh import Mesh
 
@@ -115,6 +114,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "rtcCommitGeometry": (None, (_P,)),
     "rtcAttachGeometryByID": (None, (_P, _P, _UINT)),
 }
+_SIGNATURES[_INTERSECT] = (None, (_P, _P, _P, _P))
 _CALLED_FROM_KERNELS = (_INTERSECT, _OCCLUDED, "rtcPointQuery")
 
 intersect_packet: Any = types.ExternalFunction(
@@ -273,40 +273,35 @@ class Device:
         self.check("rtcCommitScene")
 
 
-@inline_kernel
-def aligned_floats(count: int) -> NDArray[np.float32]:
-    """`count` zeroed floats that begin at a multiple of 64 bytes."""
-    raw = np.zeros(count + 16, dtype=np.float32)
-    start = (16 - (raw.ctypes.data >> 2) % 16) % 16
-    return raw[start : start + count]
+def aligned(shape: tuple[int, ...], kind: type = np.float32) -> NDArray[Any]:
+    """Zeros (32-bit numbers) that begin at a multiple of 64 bytes."""
+    count = int(np.prod(shape))
+    raw: NDArray[Any] = np.zeros(count + 16, dtype=kind)
+    start = (-raw.ctypes.data // 4) % 16
+    return raw[start : start + count].reshape(shape)
 
 
-@inline_kernel
 def coherent_arguments() -> NDArray[np.int32]:
     """Arguments for a packet of rays that run close together; 0 stands for the default ones."""
-    arguments = aligned_floats(ARGUMENT_WORDS).view(np.int32)
+    arguments = aligned((ARGUMENT_WORDS,), np.int32)
     arguments[FLAGS_WORD] = COHERENT
     arguments[FEATURES_WORD] = -1
     return arguments
 
 
-@kernel
 def _cast_one(scene: int, x: float, y: float) -> tuple[float, int, int]:
     """Distance, geometry and instance number of a ray downward from (x, y, 1)."""
-    packet = aligned_floats(PACKET_ROWS * LANES)
+    packet = aligned((PACKET_ROWS, LANES))
     words = packet.view(np.uint32)
-    valid = aligned_floats(LANES).view(np.int32)
+    valid = aligned((LANES,), np.int32)
     valid[0] = -1
-    packet[ORIGIN * LANES] = x
-    packet[(ORIGIN + 1) * LANES] = y
-    packet[(ORIGIN + 2) * LANES] = 1.0
-    packet[(DIRECTION + 2) * LANES] = -1.0
-    packet[FAR * LANES] = 10.0
-    words[MASK * LANES] = INVALID
-    words[GEOMETRY * LANES] = INVALID
-    words[INSTANCE * LANES] = INVALID
-    intersect_packet(valid.ctypes.data, scene, packet.ctypes.data, 0)
-    return packet[FAR * LANES], words[GEOMETRY * LANES], words[INSTANCE * LANES]
+    packet[ORIGIN : ORIGIN + 3, 0] = (x, y, 1.0)
+    packet[DIRECTION + 2, 0] = -1.0
+    packet[FAR, 0] = 10.0
+    words[[MASK, GEOMETRY, INSTANCE], 0] = INVALID
+    intersect = getattr(load(), _INTERSECT)
+    intersect(valid.ctypes.data, scene, packet.ctypes.data, None)
+    return float(packet[FAR, 0]), int(words[GEOMETRY, 0]), int(words[INSTANCE, 0])
 
 
 def self_test(device: Device) -> None:

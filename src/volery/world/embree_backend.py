@@ -9,9 +9,16 @@ from numpy.typing import NDArray
 
 from volery.core.workers import Workers, new_counter
 from volery.world import embree
-from volery.world.point_query import callback_address, nearest_points
+from volery.world.point_query import callback_address, nearest_points, new_query_memory
 from volery.world.scene_content import BodyShape, SceneContent
-from volery.world.scene_kernels import BodyTable, SceneHandle, cast_rays, find_occluded
+from volery.world.scene_kernels import (
+    CHUNK,
+    BodyTable,
+    SceneHandle,
+    cast_rays,
+    find_occluded,
+    thread_block,
+)
 
 FEW_RAYS = 5000
 """A batch up to this size is cast by the calling thread alone: waking another costs more."""
@@ -98,18 +105,13 @@ class EmbreeBackend:
         out: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32], NDArray[np.uint8]],
     ) -> None:
         """Fill distance, normal, instance, material."""
-        workers.run(
-            cast_rays,
-            handle,
-            origins,
-            directions,
-            reach,
-            exclude,
-            fraction,
-            new_counter(),
-            *out,
-            alone=len(origins) <= FEW_RAYS,
-        )
+        counter, bodies = new_counter(), len(handle.bodies.scene)
+
+        def work() -> None:
+            block = thread_block(CHUNK, bodies)
+            cast_rays(handle, origins, directions, reach, exclude, fraction, counter, block, *out)
+
+        workers.run(work, alone=len(origins) <= FEW_RAYS)
 
     def occluded(
         self,
@@ -122,17 +124,13 @@ class EmbreeBackend:
         out: NDArray[np.bool_],
     ) -> None:
         """Fill `out`."""
-        workers.run(
-            find_occluded,
-            handle,
-            origins,
-            targets,
-            exclude,
-            fraction,
-            new_counter(),
-            out,
-            alone=len(origins) <= FEW_RAYS,
-        )
+        counter, bodies = new_counter(), len(handle.bodies.scene)
+
+        def work() -> None:
+            block = thread_block(CHUNK, bodies)
+            find_occluded(handle, origins, targets, exclude, fraction, counter, block, out)
+
+        workers.run(work, alone=len(origins) <= FEW_RAYS)
 
     def clearance(
         self,
@@ -143,7 +141,8 @@ class EmbreeBackend:
     ) -> None:
         """Fill distance, nearest, instance."""
         scene = self._static if include_terrain else self._obstacles
-        nearest_points(scene, callback_address(), self._content.table, points, reach, *out)
+        table, memory = self._content.table, new_query_memory()
+        nearest_points(scene, callback_address(), table, points, reach, memory, *out)
 
     def close(self) -> None:
         """Give all handles back."""

@@ -29,7 +29,7 @@ from volery.world.embree import (
     QUERY_RADIUS,
     QUERY_WORD,
     USER_WORD,
-    aligned_floats,
+    aligned,
     point_query,
 )
 
@@ -58,6 +58,25 @@ class TriangleTable(NamedTuple):
     """(instances, 12) rows of the 3x4 matrix, map from instance."""
     bounds: NDArray[np.float64]
     """(instances, 6) lowest and highest corner in the map; empty instances: low > high."""
+
+
+class QueryMemory(NamedTuple):
+    """What Embree and the callback read and write during a query."""
+
+    query: NDArray[np.float32]
+    context: NDArray[np.uint32]
+    state: NDArray[np.float64]
+    user: NDArray[np.int64]
+
+
+def new_query_memory() -> QueryMemory:
+    """Memory for one thread's queries."""
+    return QueryMemory(
+        aligned((16,)),
+        aligned((CONTEXT_WORDS,), np.uint32),
+        np.zeros(_STATE_WORDS),
+        np.zeros(5, dtype=np.int64),
+    )
 
 
 @intrinsic
@@ -212,16 +231,13 @@ def nearest_points(
     table: TriangleTable,
     points: NDArray[np.float64],
     reach: float,
+    memory: QueryMemory,
     distance: NDArray[np.float64],
     nearest: NDArray[np.float64],
     instance: NDArray[np.int32],
 ) -> None:
     """Nearest point of the Embree scene to each point, if nearer than `reach`."""
-    query = aligned_floats(16)
-    context_floats = aligned_floats(CONTEXT_WORDS)
-    context = context_floats.view(np.uint32)
-    state = np.zeros(_STATE_WORDS)
-    user = np.zeros(5, dtype=np.int64)
+    query, context, state, user = memory
     user[0] = state.ctypes.data
     user[1] = table.vertices.ctypes.data
     user[2] = table.triangles.ctypes.data

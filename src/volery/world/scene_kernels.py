@@ -8,6 +8,7 @@ where it was at the ray's own time, and a UAV's own body is simply left out.
 
 from __future__ import annotations
 
+import threading
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,15 +27,16 @@ from volery.world.embree import (
     NORMAL,
     ORIGIN,
     PACKET_ROWS,
-    aligned_floats,
+    aligned,
     coherent_arguments,
     intersect_packet,
     occluded_packet,
 )
 
 _INVALID = np.uint32(INVALID)
-_CHUNK = 512
+CHUNK = 512
 """Rays of one piece of work; a multiple of LANES, so that packets do not depend on the threads."""
+_KEPT_BLOCKS = 8
 _TOGETHER_M, _TOGETHER_COSINE = 1.0, 0.9
 """Rays of a packet count as running close together up to this distance and angle."""
 _LEAST_COMPONENT = np.float32(1e-12)
@@ -110,28 +112,41 @@ class RayBlock(NamedTuple):
     """Embree's arguments for rays that run close together."""
 
 
-@kernel
 def new_block(rays: int, bodies: int) -> RayBlock:
     """Memory for `rays` rays in a scene with that many bodies."""
     packets = (rays + LANES - 1) // LANES
-    memory = aligned_floats(packets * PACKET_ROWS * LANES)
-    body_memory = aligned_floats(PACKET_ROWS * LANES)
-    block = RayBlock(
-        memory.reshape((packets, PACKET_ROWS, LANES)),
-        memory.view(np.uint32).reshape((packets, PACKET_ROWS, LANES)),
-        np.full((packets, LANES), -1, dtype=np.int32),
-        np.ones(packets),
-        np.zeros((packets, LANES), dtype=np.int32),
-        np.zeros((packets, LANES), dtype=np.uint8),
-        np.zeros(max(bodies, 1), dtype=np.int32),
-        aligned_floats(LANES).view(np.int32),
-        body_memory.reshape((PACKET_ROWS, LANES)),
-        body_memory.view(np.uint32).reshape((PACKET_ROWS, LANES)),
-        aligned_floats(LANES).view(np.int32),
-        coherent_arguments(),
+    memory = aligned((packets, PACKET_ROWS, LANES))
+    body_memory = aligned((PACKET_ROWS, LANES))
+    words, body_words = memory.view(np.uint32), body_memory.view(np.uint32)
+    words[:, MASK] = INVALID
+    body_words[MASK] = INVALID
+    return RayBlock(
+        rays=memory,
+        words=words,
+        skip=np.full((packets, LANES), -1, dtype=np.int32),
+        fraction=np.ones(packets),
+        instance=np.zeros((packets, LANES), dtype=np.int32),
+        material=np.zeros((packets, LANES), dtype=np.uint8),
+        near=np.zeros(max(bodies, 1), dtype=np.int32),
+        valid=aligned((LANES,), np.int32),
+        body_rays=body_memory,
+        body_words=body_words,
+        body_valid=aligned((LANES,), np.int32),
+        coherent=coherent_arguments(),
     )
-    block.words[:, MASK, :] = _INVALID
-    block.body_words[MASK, :] = _INVALID
+
+
+_own = threading.local()
+
+
+def thread_block(rays: int, bodies: int) -> RayBlock:
+    """The calling thread's block of that size, kept between calls."""
+    blocks: dict[tuple[int, int], RayBlock] = _own.__dict__.setdefault("blocks", {})
+    block = blocks.get((rays, bodies))
+    if block is None:
+        if len(blocks) >= _KEPT_BLOCKS:
+            blocks.clear()
+        block = blocks[rays, bodies] = new_block(rays, bodies)
     return block
 
 
@@ -379,21 +394,22 @@ def cast_rays(
     exclude: NDArray[np.int32],
     fraction: float,
     counter: NDArray[np.int64],
+    block: RayBlock,
     distance: NDArray[np.float32],
     normal: NDArray[np.float32],
     instance: NDArray[np.int32],
     material: NDArray[np.uint8],
 ) -> None:
-    """Cast rays in chunks taken from `counter`; `exclude` has one row, or one a ray."""
+    """Cast rays in chunks of CHUNK taken from `counter`; `exclude` has one row, or one a ray."""
     count = origins.shape[0]
-    block = new_block(_CHUNK, scene.bodies.scene.shape[0])
-    block.fraction[:] = fraction
+    for p in range(block.fraction.shape[0]):
+        block.fraction[p] = fraction
     rays = block.rays
     while True:
-        first = fetch_add(counter.ctypes.data) * _CHUNK
+        first = fetch_add(counter.ctypes.data) * CHUNK
         if first >= count:
             return
-        last = min(first + _CHUNK, count)
+        last = min(first + CHUNK, count)
         near_count = _near_chunk(scene, origins, first, last, reach, block.near)
         if near_count > 0:
             _load_skips(block, exclude, first, last)
@@ -476,17 +492,18 @@ def find_occluded(
     exclude: NDArray[np.int32],
     fraction: float,
     counter: NDArray[np.int64],
+    block: RayBlock,
     occluded: NDArray[np.bool_],
 ) -> None:
     """Whether anything lies between origins and targets, in chunks taken from `counter`."""
     count = origins.shape[0]
-    block = new_block(_CHUNK, scene.bodies.scene.shape[0])
-    block.fraction[:] = fraction
+    for p in range(block.fraction.shape[0]):
+        block.fraction[p] = fraction
     while True:
-        first = fetch_add(counter.ctypes.data) * _CHUNK
+        first = fetch_add(counter.ctypes.data) * CHUNK
         if first >= count:
             return
-        last = min(first + _CHUNK, count)
+        last = min(first + CHUNK, count)
         longest = 0.0
         for i in range(first, last):
             squared = 0.0
