@@ -26,6 +26,7 @@ from volery.runtime.node_loading import start_node
 from volery.runtime.placement import Start, place_uavs
 from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors
 from volery.runtime.uav import Uav
+from volery.runtime.warm_up import compile_kernels
 from volery.runtime.worlds import build_forest, build_terrain
 from volery.scenario.schema import Scenario
 from volery.sensors.mount import Mount
@@ -76,6 +77,7 @@ class Simulation:
     def __init__(self, scenario: Scenario, *, threads: int = 2) -> None:
         if threads < 1:
             raise ScenarioError(f"threads must be at least 1 (found {threads})")
+        compile_kernels()
         self.scenario = scenario
         self.terrain = build_terrain(scenario)
         self.forest = build_forest(scenario, self.terrain)
@@ -93,12 +95,13 @@ class Simulation:
         self.mounts: Mapping[str, Mount] = MappingProxyType(
             {scan_topic(f.id): f.mount for f in fitted if f.spec.kind == "lidar"}
         )
+        self._banks = build_banks(scenario, fitted, self._fleet, self.scene)
         self._engine = Engine(
             self._fleet,
             self.scene,
             self.terrain,
             np.array(scenario.world.wind.velocity_m_s),
-            build_banks(scenario, fitted, self._fleet, self.scene),
+            self._banks,
             names,
             self,
             crash_on_contact=scenario.physics.on_contact == "crash",
@@ -169,6 +172,11 @@ class Simulation:
                 on_progress(Progress(self.time_s - start_s, left, now - wall_start))
             if ended:
                 break
+
+    def measure_once(self) -> None:
+        """Let every sensor measure now, without publishing: compiles what they need."""
+        for bank in self._banks:
+            bank.sample(0, 0, self._fleet)
 
     def close(self) -> None:
         """Give threads and scene memory back."""
