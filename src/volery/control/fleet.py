@@ -138,6 +138,8 @@ class Fleet:
         for i, start in enumerate(modes):
             if start is FlightMode.HOLD:
                 self._start_in_air(i)
+            else:
+                self._bodies["last_contact_step"][i] = 0
 
     def __len__(self) -> int:
         """Number of UAVs."""
@@ -256,8 +258,9 @@ class Fleet:
         time-out, then the UAV brakes and holds its place. Beyond the airframe's limits it flies at
         the limit.
         """
+        rate = checked("yaw rate", yaw_rate, (), 100.0)
         self._command_velocity(i, velocity, in_heading=True)
-        self._turn(i, checked("yaw rate", yaw_rate, (), 100.0))
+        self._turn(i, rate)
 
     def command_velocity_map(
         self, i: int, velocity: ArrayLike, yaw_rate: float = 0.0, *, yaw: float | None = None
@@ -403,6 +406,8 @@ class Fleet:
         return float(checked_within("thrust", thrust, (), most))
 
     def _wake(self, i: int) -> None:
+        if self._bodies["on_ground"][i] or self._bodies["asleep"][i]:
+            self._bodies["last_contact_step"][i] = self.step  # it stands: no new touch
         self._bodies["asleep"][i] = False
         self._bodies["still_steps"][i] = 0
         self._bodies["ground_budget"][i] = 0.0

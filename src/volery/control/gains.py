@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.vehicle.airframe import (
+    GRAVITY,
     MAX_ROTORS,
     Airframe,
     allocation_matrix,
@@ -39,6 +40,7 @@ GAINS = np.dtype(
         ("full_thrust", "f8"),
         ("inverse_thrust_constant", "f8"),
         ("rate", "f8", 3),
+        ("rate_drag", "f8", 3),
         ("rate_integral", "f8", 3),
         ("rate_integral_limit", "f8", 3),
         ("attitude", "f8"),
@@ -47,7 +49,10 @@ GAINS = np.dtype(
         ("yaw_rate_limit", "f8"),
         ("velocity", "f8"),
         ("velocity_integral", "f8"),
-        ("velocity_integral_limit", "f8"),
+        ("vertical", "f8"),
+        ("vertical_integral", "f8"),
+        ("integral_limit", "f8"),
+        ("drag", "f8"),
         ("position", "f8"),
         ("brake", "f8"),
         ("acceleration", "f8"),
@@ -73,7 +78,7 @@ def tick_steps_of(dt: float) -> int:
     return max(1, round(GUIDANCE_PERIOD_S / dt))
 
 
-def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:
+def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:  # noqa: PLR0915
     """The (1,) `GAINS` row of an airframe stepped by `dt` s."""
     row = np.zeros(1, GAINS)
     rotors, limits, wish = airframe.rotors, airframe.limits, airframe.control
@@ -88,6 +93,7 @@ def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:
     attitude = wish.attitude or rate / 3.0
     yaw = wish.yaw or yaw_rate / 4.0
     velocity = wish.velocity or attitude / 3.0
+    vertical = wish.vertical or rate / 5.0
     position = wish.position or velocity / 2.4
 
     row["rotors"] = count
@@ -100,26 +106,26 @@ def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:
     row["inverse_thrust_constant"] = 1.0 / rotors.thrust_n_s2
     bandwidths = np.array([rate, rate, yaw_rate])
     row["rate"] = bandwidths
-    row["rate_integral"] = 0.1 * bandwidths**2
-    # a third of what the rotors can turn about each axis in hover
-    authority = np.min(
-        np.minimum(trim, airframe.max_rotor_thrust - trim)[:, None]
-        / np.maximum(np.abs(allocation[:, 1:]), 1e-12),
-        axis=0,
-    )
-    row["rate_integral_limit"] = authority / inertia / 3.0
+    row["rate_integral"] = np.array([0.1, 0.1, 0.03]) * bandwidths**2
+    row["rate_integral_limit"] = 0.8 * _authority(airframe) / inertia
     row["attitude"] = attitude
     row["yaw"] = yaw
     row["rate_limit"] = math.radians(limits.rate_deg_s)
     row["yaw_rate_limit"] = math.radians(limits.yaw_rate_deg_s)
     row["velocity"] = velocity
     row["velocity_integral"] = 0.25 * velocity**2
-    row["velocity_integral_limit"] = 8.0
+    row["vertical"] = vertical
+    row["vertical_integral"] = 0.25 * vertical**2
+    row["integral_limit"] = 0.8 * GRAVITY
+    # in-plane drag of the rotors in hover, 1/s: known from the airframe, so fed forward
+    drags = rotors.drag_n_s2_m * np.sqrt(trim / rotors.thrust_n_s2)
+    row["drag"] = drags.sum() / airframe.body.mass_kg
+    row["rate_drag"] = _rate_drag(airframe, drags) / inertia
     row["position"] = position
     row["brake"] = 0.6 * limits.acceleration_m_s2
     row["acceleration"] = limits.acceleration_m_s2
     row["climb_acceleration"] = min(
-        limits.acceleration_m_s2, 0.6 * (_THRUST_RESERVE * most / airframe.body.mass_kg - 9.80665)
+        limits.acceleration_m_s2, 0.6 * (_THRUST_RESERVE * most / airframe.body.mass_kg - GRAVITY)
     )
     row["tilt_tangent"] = math.tan(math.radians(limits.tilt_deg))
     row["least_thrust"] = _LEAST_THRUST * airframe.weight
@@ -132,3 +138,21 @@ def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:
     row["tick_steps"] = tick_steps_of(dt)
     row["tick"] = tick_steps_of(dt) * dt
     return row
+
+
+def _rate_drag(airframe: Airframe, drags: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Torque (3,) against each body axis per rad/s about it, from the rotors' in-plane drag."""
+    torque = np.zeros(3)
+    for place, drag in zip(airframe.rotors.places, drags, strict=True):
+        arm, axis = np.array(place.position_m), np.array(place.axis)
+        moved = np.cross(np.eye(3), arm)  # row k: velocity of the hub for 1 rad/s about axis k
+        across = moved - np.outer(moved @ axis, axis)
+        torque += drag * np.cross(arm, across).diagonal()
+    return torque
+
+
+def _authority(airframe: Airframe) -> NDArray[np.float64]:
+    """Torque (3,) about each axis that is left to the rotors in hover, N m."""
+    trim, allocation = hover_thrusts(airframe), np.abs(allocation_matrix(airframe)[:, 1:])
+    room = np.minimum(trim, airframe.max_rotor_thrust - trim)
+    return np.asarray((room[:, None] / np.maximum(allocation, 1e-12)).min(axis=0))

@@ -27,6 +27,7 @@ def mix(gains: Any, thrust: float, tx: float, ty: float, tz: float, pilot: Any) 
         )
         pilot.rotor_reference[r] = math.sqrt(max(f, 0.0) * gains.inverse_thrust_constant)
         fits = fits and low <= f <= high
+    pilot.saturated = not fits
     if not fits:
         _share(gains, thrust, tx, ty, tz, pilot)
 

@@ -3,7 +3,8 @@
 The attitude error is split into tilt (the shortest turn that aligns the thrust axis) and the turn
 about it, so that a large yaw error never spoils the tilt (D. Brescianini, R. D'Andrea, "Tilt-
 prioritized quadrocopter attitude control", 2018). Rates are held by a proportional-integral law
-on angular acceleration with the gyroscopic torque fed forward.
+on angular acceleration; the gyroscopic torque and the rotors' drag are fed forward, and integrals
+do not grow while a rotor is at its limit.
 """
 
 from __future__ import annotations
@@ -42,11 +43,13 @@ def hold_rates(pilot: Any, estimate: Any, gains: Any, dt: float) -> None:
 @inner_kernel
 def _angular_acceleration(pilot: Any, gains: Any, axis: int, rate: float, dt: float) -> float:
     error = pilot.rates[axis] - rate
-    limit = gains.rate_integral_limit[axis]
-    integral = pilot.rate_integral[axis] + gains.rate_integral[axis] * error * dt
-    integral = min(max(integral, -limit), limit)
-    pilot.rate_integral[axis] = integral
-    wanted: float = gains.rate[axis] * error + integral
+    integral = pilot.rate_integral[axis]
+    if not (pilot.saturated and error * integral > 0.0):
+        limit = gains.rate_integral_limit[axis]
+        integral += gains.rate_integral[axis] * error * dt
+        integral = min(max(integral, -limit), limit)
+        pilot.rate_integral[axis] = integral
+    wanted: float = gains.rate[axis] * error + integral + gains.rate_drag[axis] * pilot.rates[axis]
     return wanted
 
 

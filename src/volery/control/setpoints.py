@@ -48,6 +48,8 @@ PILOT = np.dtype(
         ("velocity_in_heading", "?"),  # velocity_target turns with the vehicle's heading
         ("braking", "?"),  # HOLD and LAND: stop first, then lock the place
         ("turning", "?"),  # heading follows yaw_rate_target instead of heading_target
+        ("saturated", "?"),  # the rotors could not give the torque wanted last
+        ("spare", "u1", 4),  # no hidden padding: equal states are equal bytes
         ("home", "f8", 3),  # m, map: where the last take-off began
         ("return_height", "f8"),  # m, map
         ("position_target", "f8", 3),  # m, map

@@ -1,8 +1,9 @@
 """The outer layers, run at guidance ticks: position to velocity to acceleration to attitude.
 
 Speeds towards a place follow a braking profile (proportional near the goal, the square root of
-the distance farther out), setpoints move no faster than the acceleration limit and their change is
-fed forward, and a proportional-integral law turns velocity errors into accelerations. Height has
+the distance farther out). Setpoints move no faster than the acceleration limit; their change and
+the rotors' drag at hover speed are fed forward (M. Faessler et al., arXiv 1712.02402), and a
+proportional-integral law turns velocity errors into accelerations. Height has
 priority: where thrust or tilt are at their limits, the horizontal acceleration gives way, and
 integrals stop where they would push further into a limit.
 """
@@ -69,9 +70,9 @@ def track_velocity(pilot: Any, estimate: Any, gains: Any, tx: float, ty: float, 
         pilot.velocity_integral[1],
         pilot.velocity_integral[2],
     )
-    ax = k * ex + ix + dx / tick
-    ay = k * ey + iy + dy / tick
-    az = k * ez + iz + dz / tick + GRAVITY
+    ax = k * ex + ix + dx / tick + gains.drag * sx
+    ay = k * ey + iy + dy / tick + gains.drag * sy
+    az = gains.vertical * ez + iz + dz / tick + GRAVITY
 
     # height first
     least, most = gains.least_thrust / gains.mass, gains.most_thrust / gains.mass
@@ -85,11 +86,12 @@ def track_velocity(pilot: Any, estimate: Any, gains: Any, tx: float, ty: float, 
         ax *= reach / size
         ay *= reach / size
     gain = gains.velocity_integral * tick
-    bound = gains.velocity_integral_limit
+    bound = gains.integral_limit
     if free_xy:
         pilot.velocity_integral[0] = min(max(ix + gain * ex, -bound), bound)
         pilot.velocity_integral[1] = min(max(iy + gain * ey, -bound), bound)
     if free_z:
+        gain = gains.vertical_integral * tick
         pilot.velocity_integral[2] = min(max(iz + gain * ez, -bound), bound)
     _point_thrust(pilot, estimate, gains, ax, ay, az)
 
@@ -164,10 +166,10 @@ def turn_heading(pilot: Any, estimate: Any, gains: Any) -> None:
             step = 0.0
     else:
         gc, gs = pilot.heading_target[0], pilot.heading_target[1]
-        step = c * gs - s * gc
+        step = c * gs - s * gc  # the sine of the angle left
         if c * gc + s * gs < 0.0:
-            step = math.copysign(most, step)
-        step = min(max(step, -most), most)
+            step = math.copysign(1.0, step)
+        step = min(max(gains.yaw * gains.tick * step, -most), most)
     # (1 - t^2, 2 t) / (1 + t^2) with t = step / 2: a turn by step, up to step^3 / 12
     t = 0.5 * step
     d = 1.0 / (1.0 + t * t)

@@ -118,6 +118,7 @@ class Bandwidths(_Table):
     attitude: Positive | None = None
     yaw: Positive | None = None
     velocity: Positive | None = None
+    vertical: Positive | None = None
     position: Positive | None = None
 
 

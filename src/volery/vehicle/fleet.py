@@ -30,6 +30,7 @@ BODY = np.dtype(
         ("crashed", "?"),
         ("on_ground", "?"),
         ("asleep", "?"),
+        ("spare", "u1", 5),  # no hidden padding: equal states are equal bytes
         ("rotor_speed", "f8", MAX_ROTORS),
     ],
     align=True,

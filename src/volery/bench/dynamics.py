@@ -1,0 +1,52 @@
+"""Plant and inner control alone: hovering F450s, one kernel call a slice, no sensors.
+
+The slices are those of the engine: five steps between two IMU samples for one UAV, with Python's
+share of the call included; longer ones for a thousand, where it does not count.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+
+import numpy as np
+
+from volery.control.fleet import Fleet
+from volery.core import rotations
+from volery.vehicle.airframe import load_airframe
+from volery.world.terrain import Terrain
+
+_SLICE = 5
+_ROUNDS = 15
+
+
+def measure() -> dict[str, float]:
+    """Medians over `_ROUNDS`: ns a drone-step at N = 1000, us a step at N = 1."""
+    many, one = _fleet(1000), _fleet(1)
+    terrain = Terrain.flat(4000.0, 0.0, (-2000.0, -2000.0)).grid
+    for fleet in (many, one):
+        fleet.advance(200, terrain)
+    large, small = [], []
+    for _ in range(_ROUNDS):
+        start = time.perf_counter()
+        many.advance(50, terrain)
+        large.append((time.perf_counter() - start) / (50 * len(many)))
+        start = time.perf_counter()
+        for _ in range(400):
+            one.advance(_SLICE, terrain)
+        small.append((time.perf_counter() - start) / (400 * _SLICE))
+    return {
+        "ns_per_drone_step_n1000": 1e9 * statistics.median(large),
+        "us_per_step_n1": 1e6 * statistics.median(small),
+    }
+
+
+def _fleet(count: int) -> Fleet:
+    """UAVs on the way to a place 20 m away, so that every layer of control works."""
+    side = np.arange(count)
+    place = np.column_stack([2.0 * (side % 40), 2.0 * (side // 40), np.full(count, 30.0)])
+    attitude = rotations.from_rpy(np.zeros(count), 0.0, 0.01 * side)
+    fleet = Fleet([load_airframe("f450")] * count, place, attitude)
+    for i in range(count):
+        fleet.command_position(i, place[i] + [20.0, 0.0, 5.0], yaw=0.5)
+    return fleet
