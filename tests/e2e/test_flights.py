@@ -73,7 +73,7 @@ def test_flying_into_a_tree_at_speed(simulate, wood_data, on_contact):
     # Straight at the thickest trunk, 25 m/s, from 10 m away.
     forest = simulation.forest
     trunk = forest.position_map[np.argmax(forest.dbh_m)]
-    state.position_map[0] = trunk + [-10.0, 0.0, 1.2]
+    state.position_map[0] = trunk + np.array([-10.0, 0.0, 1.2])
     state.velocity_map[0] = [25.0, 0.0, 0.0]
     state.contact_budget[0] = 0.0
     uav.command_rotor_speeds(np.full(4, 770.0))

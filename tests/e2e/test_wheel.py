@@ -46,7 +46,6 @@ def test_wheel_in_a_clean_environment(tmp_path):
         [str(python), "-c", FLY], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     assert flown.stdout.startswith("584 ")
-    listed = subprocess.run(
-        [str(python.parent / "volery"), "list"], cwd=tmp_path, capture_output=True, text=True
-    )
+    command = [str(python.parent / "volery"), "list"]
+    listed = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert "forest_survey" in listed.stdout

@@ -77,6 +77,7 @@ class SonarBank:
         map_from_sensor = rotations.multiply(attitude, self._body_from_sensor)
         origin = fleet.state.position_map[rows] + rotations.rotate(attitude, self._position_body)
         directions = rotations.rotate(map_from_sensor[:, None, :], self._cone[None, :, :])
+        self._scene.move_bodies(fleet.state.position_map, fleet.state.attitude)
         hits = self._scene.cast(
             np.repeat(origin, rays, axis=0),
             directions.reshape(-1, 3),
