@@ -71,9 +71,8 @@ class Collisions:
         used_up = np.flatnonzero(state.contact_budget <= 0.0)
         if len(used_up):
             self._resolve_solids(used_up, time_ns)
-        if len(self._names) > 1:
-            for i in np.flatnonzero(state.separation_budget <= 0.0):
-                self._resolve_others(int(i), time_ns)
+        for i in np.flatnonzero(state.separation_budget <= 0.0):
+            self._resolve_others(int(i), time_ns)
 
     # ----------------------------------------------------------------------- trees and buildings
 
