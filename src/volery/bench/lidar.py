@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 
 from volery.sensors.lidar import (
     LidarBatch,
-    load_lidar,
     make_batch,
     sample_lidars,
     scan_rays,
     stack_mounts,
 )
+from volery.sensors.lidar_model import load_lidar
 from volery.sensors.mount import make_mount
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.forest import Forest, procedural_forest

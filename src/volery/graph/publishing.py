@@ -138,13 +138,13 @@ class GraphPublisher:
             publisher.publish(
                 LaserScan(
                     header(scans.stamp_ns, laser_frame(sensor)),
-                    model.angle_min_rad,
-                    model.angle_max_rad,
+                    model.scan.angle_min_rad,
+                    model.scan.angle_max_rad,
                     model.angle_increment_rad,
                     model.time_increment_s,
-                    1.0 / model.rate_hz,
-                    model.range_min_m,
-                    model.range_max_m,
+                    1.0 / model.scan.rate_hz,
+                    model.range.min_m,
+                    model.range.max_m,
                     scans.ranges[i],
                     _NO_INTENSITIES,
                 )

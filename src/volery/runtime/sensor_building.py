@@ -20,8 +20,8 @@ from volery.runtime.placement import Start
 from volery.scenario import schema
 from volery.sensors.imu import ImuBank, load_imu_model
 from volery.sensors.joints import JointBank
-from volery.sensors.lidar import load_lidar
 from volery.sensors.lidar_bank import LidarBank
+from volery.sensors.lidar_model import load_lidar
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.odometry import GroundTruthBank, OdometryBank, load_odometry_model
 from volery.sensors.samples import SensorId
@@ -92,10 +92,10 @@ class _Builder:
         return by_kind[group[0].spec.kind](group)
 
     def _lidar(self, group: list[Fitted]) -> SensorBank:
-        model = load_lidar(group[0].spec.model)
+        model = load_lidar(group[0].spec.model, self._folder)
         return LidarBank(
             model,
-            Schedule.from_hz(model.rate_hz, _phase_ns(group)),
+            Schedule.from_hz(model.scan.rate_hz, _phase_ns(group)),
             _ids(group),
             tuple(s.mount for s in group),
             _keys(group),

@@ -1,8 +1,8 @@
-"""Compiles all kernels at the first start, on two cores: dynamics here, sensors in a helper process.
+"""Compiles all kernels at the first start: dynamics here, the sensors' in a helper process.
 
-numba compiles one function at a time in a process, so a second process halves the wait. What it
-compiles reaches this one through the cache on disk; a marker there tells later starts that nothing
-is left to do.
+On two cores the wait is halved: numba compiles one function at a time in a process. What the helper
+compiles reaches this process through the cache on disk; a marker there tells later starts that
+nothing is left to do.
 
     python -m volery.runtime.warm_up
 
@@ -34,9 +34,7 @@ _EVERY_SENSOR = {
             ]
         }
     },
-    "uavs": [
-        {"type": "all", "count": 2, "position_m": [0.0, 0.0], "last_position_m": [3.0, 0.0]}
-    ],
+    "uavs": [{"type": "all", "count": 2, "position_m": [0.0, 0.0], "last_position_m": [3.0, 0.0]}],
 }
 
 

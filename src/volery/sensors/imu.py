@@ -12,23 +12,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat
+from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core import rng
 from volery.core.clock import NS_PER_S, Schedule
-from volery.scenario.data_files import find_data_file, load_data_file
 from volery.sensors.inertial_kernels import feel_motion
+from volery.sensors.model import SensorModel, load_model
 from volery.sensors.samples import ImuReadings, SensorId, owned
 
 Array = NDArray[np.float64]
-_MODELS = Path(__file__).parent / "models"
 
 
-class ImuModel(BaseModel):
+class ImuModel(SensorModel):
     """Noise of an IMU; see the data files in `models/`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     name: str
     gyro_noise_density_rad_s_sqrt_hz: NonNegativeFloat
@@ -43,7 +40,7 @@ class ImuModel(BaseModel):
 
 def load_imu_model(name: str, folder: Path | None = None) -> ImuModel:
     """Model by shipped name or `.toml` path."""
-    return load_data_file(find_data_file(name, _MODELS, "IMU model", folder), ImuModel)
+    return load_model(ImuModel, "IMU", name, folder)
 
 
 class ImuBank:

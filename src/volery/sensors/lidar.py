@@ -1,30 +1,23 @@
-"""Scanning range finders: a model read from a data file, and batches of scans over a scene."""
+"""Batches of LIDAR scans over a scene; `lidar_model` tells what a scanner is."""
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from functools import cached_property
-from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from volery.core.clock import ns_from_s
-from volery.core.errors import DataFileError
 from volery.core.workers import Workers, new_counter
 from volery.sensors.lidar_kernels import (
     LidarBatch,
-    LidarConstants,
     MountTable,
     measure_scan,
     poses_at,
     scan_batch,
     sweep_rays,
 )
+from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.embreex_fallback import EmbreexBackend
@@ -33,9 +26,7 @@ from volery.world.scene_kernels import new_block, thread_block
 
 __all__ = [
     "LidarBatch",
-    "LidarModel",
     "MountTable",
-    "load_lidar",
     "make_batch",
     "sample_lidars",
     "scan_rays",
@@ -44,137 +35,6 @@ __all__ = [
 
 _FEW_BEAMS = 5000
 """A batch up to this size is swept by the calling thread alone."""
-
-
-@dataclass(frozen=True)
-class LidarModel:
-    """A planar scanner; where the numbers come from stands in its data file."""
-
-    name: str
-    beams: int
-    angle_min_rad: float
-    angle_max_rad: float
-    rate_hz: float
-    sweep_duration_s: float
-    """From the first beam to the last; the rest of a turn is blind."""
-    range_min_m: float
-    range_max_m: float
-    range_resolution_m: float
-    noise_floor_m: float
-    noise_slope: float
-    noise_offset_m: float
-    dropout_far: float
-    dropout_grazing: float
-    mixed_pixels_divergence_rad: float
-    mixed_pixels_least_jump_m: float
-    mixed_pixels_pulse_length_m: float
-    mixed_pixels_first_echo_share: float
-    noise: bool = True
-    """Without noise a range is the exact distance: nothing is quantised, lost or mixed."""
-
-    @property
-    def angle_increment_rad(self) -> float:
-        """Angle from a beam to the next."""
-        return (self.angle_max_rad - self.angle_min_rad) / (self.beams - 1)
-
-    @property
-    def time_increment_s(self) -> float:
-        """Time from a beam to the next."""
-        return self.sweep_duration_s / (self.beams - 1)
-
-    @property
-    def sweep_duration_ns(self) -> int:
-        """`sweep_duration_s` on the simulation's clock."""
-        return ns_from_s(self.sweep_duration_s)
-
-    @cached_property
-    def angles(self) -> NDArray[np.float64]:
-        """(beams,) angle of each beam about the sensor's z axis, rad."""
-        return np.linspace(self.angle_min_rad, self.angle_max_rad, self.beams)
-
-    @cached_property
-    def constants(self) -> LidarConstants:
-        """The model as kernels take it."""
-        return LidarConstants(
-            cosine=np.cos(self.angles),
-            sine=np.sin(self.angles),
-            sweep_ns=self.sweep_duration_ns,
-            range_min=self.range_min_m,
-            range_max=self.range_max_m,
-            resolution=self.range_resolution_m,
-            noise_floor=self.noise_floor_m,
-            noise_slope=self.noise_slope,
-            noise_offset=self.noise_offset_m,
-            dropout_far=self.dropout_far,
-            dropout_grazing=self.dropout_grazing,
-            half_footprint=0.5 * self.mixed_pixels_divergence_rad / self.angle_increment_rad,
-            least_jump=self.mixed_pixels_least_jump_m,
-            pulse_length=self.mixed_pixels_pulse_length_m,
-            first_echo_share=self.mixed_pixels_first_echo_share,
-            noise=self.noise,
-        )
-
-    def without_noise(self) -> LidarModel:
-        """The same scanner with exact ranges."""
-        return replace(self, noise=False)
-
-
-def load_lidar(model: str | Path = "utm_30lx") -> LidarModel:
-    """Read a model that ships with Volery by name, or a TOML file by path.
-
-    Raises DataFileError naming file and key for what is missing, unknown or out of range.
-    """
-    shipped = files("volery.sensors") / "models" / f"{model}.toml"
-    source = shipped if isinstance(model, str) and shipped.is_file() else Path(model)
-    try:
-        data = tomllib.loads(source.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataFileError(f"cannot read the LIDAR model {model}: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise DataFileError(f"{source}: not TOML: {error}") from error
-    flat: dict[str, Any] = {}
-    for key, value in data.items():
-        inner = value if isinstance(value, dict) else {"": value}
-        # [scan] beams -> beams; [noise] floor_m -> noise_floor_m
-        prefix = f"{key}_" if key != "scan" else ""
-        flat.update({(prefix + name).rstrip("_"): v for name, v in inner.items()})
-    return _checked(flat, str(source))
-
-
-def _checked(flat: dict[str, Any], source: str) -> LidarModel:
-    known = {field.name: field.type for field in fields(LidarModel) if field.name != "noise"}
-    for name in flat:
-        if name not in known:
-            raise DataFileError(f"{source}: unknown key {name}")
-    for name, kind in known.items():
-        if name not in flat:
-            raise DataFileError(f"{source}: {name} is missing")
-        value = flat[name]
-        if kind == "str":
-            flat[name] = str(value)
-        elif isinstance(value, bool) or not isinstance(value, int | float):
-            raise DataFileError(f"{source}: {name} must be a number, not {value!r}")
-        elif not np.isfinite(value) or (value < 0 and not name.startswith("angle")):
-            raise DataFileError(f"{source}: {name} must be finite and not negative, not {value}")
-        else:
-            flat[name] = int(value) if kind == "int" else float(value)
-    model = LidarModel(**flat)
-    rules = (
-        (model.beams >= 2, "beams must be at least 2"),
-        (model.angle_max_rad > model.angle_min_rad, "angle_max_rad must exceed angle_min_rad"),
-        (model.rate_hz > 0.0, "rate_hz must be positive"),
-        (
-            0.0 < model.sweep_duration_s <= 1.0 / max(model.rate_hz, 1e-9),
-            "sweep_duration_s must be positive and fit in one turn",
-        ),
-        (0.0 <= model.range_min_m < model.range_max_m, "range min_m must be below max_m"),
-        (model.range_resolution_m > 0.0, "range resolution_m must be positive"),
-        (max(model.dropout_far, model.dropout_grazing) <= 1.0, "dropout shares go up to 1"),
-    )
-    for fine, sentence in rules:
-        if not fine:
-            raise DataFileError(f"{source}: {sentence}")
-    return model
 
 
 def stack_mounts(mounts: Sequence[Mount]) -> MountTable:
@@ -293,7 +153,7 @@ def _scan_plainly(
         scene.workers,
         origins,
         directions,
-        model.range_max_m,
+        model.range.max_m,
         np.array([batch.uav[scan]], dtype=np.int32),
         fraction,
         out,

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
-from volery.sensors.lidar import LidarModel, make_batch, sample_lidars, stack_mounts
+from volery.sensors.lidar import make_batch, sample_lidars, stack_mounts
+from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
 from volery.sensors.samples import LidarScans, SensorId
 from volery.world.scene import Scene

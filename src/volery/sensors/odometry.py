@@ -7,24 +7,21 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, NonNegativeFloat
+from pydantic import NonNegativeFloat
 
 from volery.control.fleet import Fleet
 from volery.core import rng, rotations
 from volery.core.clock import Schedule
-from volery.scenario.data_files import find_data_file, load_data_file
 from volery.sensors.inertial_kernels import body_twists
+from volery.sensors.model import SensorModel, load_model
 from volery.sensors.samples import OdometryReadings, SensorId, owned
 
 Array = NDArray[np.float64]
-_MODELS = Path(__file__).parent / "models"
 _NUMBERS_A_SAMPLE = 10
 
 
-class OdometryModel(BaseModel):
+class OdometryModel(SensorModel):
     """Drift and noise; see the data files in `models/`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     name: str
     horizontal_drift_m_sqrt_m: NonNegativeFloat
@@ -36,7 +33,7 @@ class OdometryModel(BaseModel):
 
 def load_odometry_model(name: str, folder: Path | None = None) -> OdometryModel:
     """Model by shipped name or `.toml` path."""
-    return load_data_file(find_data_file(name, _MODELS, "odometry model", folder), OdometryModel)
+    return load_model(OdometryModel, "odometry", name, folder)
 
 
 class OdometryBank:

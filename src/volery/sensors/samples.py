@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.sensors.lidar import LidarModel
+from volery.sensors.lidar_model import LidarModel
 
 Array = NDArray[np.float64]
 

@@ -7,25 +7,22 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core import rng, rotations
 from volery.core.clock import Schedule
-from volery.scenario.data_files import find_data_file, load_data_file
+from volery.sensors.model import SensorModel, load_model
 from volery.sensors.samples import RangeReadings, SensorId, owned
 from volery.world.scene import Scene
 
 Array = NDArray[np.float64]
-_MODELS = Path(__file__).parent / "models"
 _RINGS = ((0.0, 1), (0.5, 6), (1.0, 12))
 """Rays of the cone: share of the half angle and number of rays on that ring."""
 
 
-class SonarModel(BaseModel):
+class SonarModel(SensorModel):
     """Reach, cone and noise; see the data files in `models/`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     name: str
     range_min_m: NonNegativeFloat
@@ -37,7 +34,7 @@ class SonarModel(BaseModel):
 
 def load_sonar_model(name: str, folder: Path | None = None) -> SonarModel:
     """Model by shipped name or `.toml` path."""
-    return load_data_file(find_data_file(name, _MODELS, "sonar model", folder), SonarModel)
+    return load_model(SonarModel, "sonar", name, folder)
 
 
 class SonarBank:

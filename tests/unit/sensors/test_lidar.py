@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,8 @@ from scene_samples import cylinder, drone_shape, small_forest, wall
 from volery.core import rotations
 from volery.core.errors import DataFileError
 from volery.core.rng import stream_key
-from volery.sensors.lidar import load_lidar, make_batch, sample_lidars, stack_mounts
+from volery.sensors.lidar import make_batch, sample_lidars, stack_mounts
+from volery.sensors.lidar_model import load_lidar
 from volery.sensors.mount import make_mount, nodding_angle_at
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.materials import Material
@@ -27,6 +27,7 @@ DT_NS = 1_000_000
 LEVEL = stack_mounts([make_mount()])
 MODEL = load_lidar()
 EXACT = MODEL.without_noise()
+NO_SPREAD = {"floor_m": 1e-9, "slope": 0.0, "offset_m": 0.0}
 
 
 def standing(position=(0.0, 0.0, 0.0), yaw=0.0):
@@ -54,7 +55,7 @@ def test_the_model_is_the_utm_30lx():
     assert MODEL.angle_increment_rad == pytest.approx(np.radians(0.25))
     assert MODEL.time_increment_s == pytest.approx(1.7361e-5, rel=1e-4)
     assert MODEL.sweep_duration_ns == 18_750_000
-    assert (MODEL.range_min_m, MODEL.range_max_m) == (0.1, 30.0)
+    assert (MODEL.range.min_m, MODEL.range.max_m) == (0.1, 30.0)
     np.testing.assert_allclose(np.degrees(MODEL.angles[[0, 540, -1]]), [-135, 0, 135], atol=1e-9)
 
 
@@ -168,7 +169,7 @@ def test_a_passing_uav_is_seen_where_it_was():
 
 
 def test_noise_has_the_spread_of_the_formula_and_whole_millimetres():
-    model = replace(MODEL, dropout_far=0.0, dropout_grazing=0.0)
+    model = MODEL.changed(dropout={"far": 0.0, "grazing": 0.0})
     for distance in (2.0, 28.0):
         scene = one_solid(cylinder(distance, 4.0, 4001, z=-2.0))
         truth = scan(scene)[0].astype(float)
@@ -193,8 +194,8 @@ def test_dropouts_follow_range_and_incidence():
         angle = np.degrees(np.abs(EXACT.angles))
         beams = (angle >= low) & (angle < high)
         grazing = 1.0 - np.cos(EXACT.angles[beams])
-        keep = (1 - MODEL.dropout_far * (truth[beams] / 30.0) ** 2) * (
-            1 - MODEL.dropout_grazing * grazing**4
+        keep = (1 - MODEL.dropout.far * (truth[beams] / 30.0) ** 2) * (
+            1 - MODEL.dropout.grazing * grazing**4
         )
         lost = np.isposinf(ranges[:, beams]).mean()
         assert lost == pytest.approx(1.0 - keep.mean(), abs=0.004)
@@ -211,8 +212,8 @@ def _step(near, far):
 
 
 def test_mixed_pixels_lie_between_near_and_far_as_often_as_the_footprint_is_wide():
-    model = replace(MODEL, noise_floor_m=1e-9, noise_slope=0.0, noise_offset_m=0.0)
-    model = replace(model, dropout_far=0.0, dropout_grazing=0.0)
+    model = MODEL.changed(noise=NO_SPREAD)
+    model = model.changed(dropout={"far": 0.0, "grazing": 0.0})
     scene = Scene(None, None, solids=_step(5.0, 6.0))
     scans = 4000
     batch = make_batch(np.zeros(scans, int), 0, 0, 3, np.arange(scans), LEVEL)
@@ -221,7 +222,7 @@ def test_mixed_pixels_lie_between_near_and_far_as_often_as_the_footprint_is_wide
     edge = int(np.flatnonzero(np.diff(truth[500:580]) < -0.5)[0]) + 500
     pair = ranges[:, edge : edge + 2]
     mixed = (pair > 5.001 * 1.0001) & (pair < 5.999)
-    footprint = MODEL.mixed_pixels_divergence_rad / MODEL.angle_increment_rad
+    footprint = MODEL.mixed_pixels.divergence_rad / MODEL.angle_increment_rad
     assert mixed.sum() / scans == pytest.approx(footprint, abs=0.03)
     # The far beam is mixed with shares up to a half, uniformly: it ends in the upper half.
     far = ranges[:, edge][mixed[:, 0]]
@@ -233,7 +234,7 @@ def test_mixed_pixels_lie_between_near_and_far_as_often_as_the_footprint_is_wide
 
 
 def test_echoes_farther_apart_than_a_pulse_do_not_mix():
-    model = replace(MODEL, noise_floor_m=1e-9, noise_slope=0.0, noise_offset_m=0.0)
+    model = MODEL.changed(noise=NO_SPREAD)
     scene = Scene(None, None, solids=_step(5.0, 9.0))
     batch = make_batch(np.zeros(500, int), 0, 0, 3, np.arange(500), LEVEL)
     ranges = sample_lidars(scene, model, batch, standing(yaw=np.radians(0.125)))[:, 520:560]
@@ -288,14 +289,14 @@ def test_noise_differs_between_scans_and_streams():
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("beams = 1081", "beams = 1", "beams must be at least 2"),
-        ("beams = 1081", "beems = 1081", "unknown key beems"),
-        ("max_m = 30.0", "max_m = nan", "range_max_m must be finite"),
-        ("max_m = 30.0", "", "range_max_m is missing"),
+        ("beams = 1081", "beams = 1", "scan.beams': Input should be greater"),
+        ("beams = 1081", "beems = 1081", "unknown key 'scan.beems'; did you mean 'beams'"),
+        ("max_m = 30.0", "max_m = nan", "range.max_m': Input should be a finite"),
+        ("max_m = 30.0", "", "'range.max_m' is missing"),
         ("max_m = 30.0", "max_m = 0.01", "min_m must be below max_m"),
-        ("rate_hz = 40.0", 'rate_hz = "fast"', "rate_hz must be a number"),
+        ("rate_hz = 40.0", 'rate_hz = "fast"', "scan.rate_hz': Input should be a valid number"),
         ("rate_hz = 40.0", "rate_hz = 400.0", "fit in one turn"),
-        ("[scan]", "[scan", "not TOML"),
+        ("[scan]", "[scan", "not valid TOML"),
     ],
 )
 def test_a_broken_model_file_is_refused(tmp_path, old, new, message):

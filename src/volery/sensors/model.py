@@ -1,0 +1,29 @@
+"""Sensor models: data files in `models/`, or a user's own beside the scenario."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel, ConfigDict
+
+from volery.scenario.data_files import find_data_file, load_data_file
+
+_SHIPPED = Path(__file__).parent / "models"
+
+
+class SensorModel(BaseModel):
+    """Numbers of a sensor as its data file states them; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Model = TypeVar("Model", bound=SensorModel)
+
+
+def load_model(kind: type[Model], what: str, name: str | Path, folder: Path | None) -> Model:
+    """Model by shipped name or `.toml` path, also beside the scenario in `folder`.
+
+    `what` names the kind of sensor in errors. Raises `DataFileError` naming file and key.
+    """
+    return load_data_file(find_data_file(str(name), _SHIPPED, f"{what} model", folder), kind)
