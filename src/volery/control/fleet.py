@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.control.flight_modes import FlightMode
-from volery.control.gains import gains_of, tick_steps_of
+from volery.control.gains import ATTITUDE_PERIOD_S, GUIDANCE_PERIOD_S, gains_of, steps_of
 from volery.control.setpoints import (
     MAX_COORDINATE,
     PILOT,
@@ -119,7 +119,10 @@ class Fleet:
         self._dt_ns = int(dt_ns)
         self._dt = dt_ns / NS_PER_S
         self._bounce = on_contact == "bounce"
-        self._tick_steps = tick_steps_of(self._dt)
+        self._periods = (
+            steps_of(GUIDANCE_PERIOD_S, self._dt),
+            steps_of(ATTITUDE_PERIOD_S, self._dt),
+        )
         self._models, rows = _model_table(self.airframes, self._dt)
         self._uavs = np.zeros(count, UAV)
         self._uavs["body"] = new_bodies(position, attitude)
@@ -182,7 +185,7 @@ class Fleet:
                 self._events,
                 self.step,
                 steps - done,
-                self._tick_steps,
+                *self._periods,
                 self._dt,
                 self._bounce,
             )

@@ -20,8 +20,10 @@ from volery.vehicle.airframe import (
     hover_thrusts,
 )
 
-GUIDANCE_PERIOD_S = 0.004
-"""Flight modes, position, velocity and attitude run at 250 Hz, rates at every step."""
+GUIDANCE_PERIOD_S = 0.008
+"""Flight modes, position and velocity run at 125 Hz ..."""
+ATTITUDE_PERIOD_S = 0.004
+"""... attitude at 250 Hz, rates at every step."""
 _THRUST_RESERVE = 0.9
 """Share of the full thrust that guidance may ask for; the rest steers."""
 _LEAST_THRUST = 0.15
@@ -65,17 +67,19 @@ GAINS = np.dtype(
         ("descent", "f8"),
         ("take_off", "f8"),
         ("landing", "f8"),
+        ("least_acceleration", "f8"),
+        ("most_acceleration", "f8"),
         ("tick", "f8"),
-        ("tick_steps", "i8"),
+        ("inverse_tick", "f8"),
     ],
     align=True,
 )
 """One airframe's control as kernels read it: SI, FLU."""
 
 
-def tick_steps_of(dt: float) -> int:
-    """Physics steps a guidance tick."""
-    return max(1, round(GUIDANCE_PERIOD_S / dt))
+def steps_of(period: float, dt: float) -> int:
+    """Physics steps of `dt` s in a period of a control loop."""
+    return max(1, round(period / dt))
 
 
 def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:  # noqa: PLR0915
@@ -135,8 +139,10 @@ def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:  # noqa: PLR091
     row["descent"] = limits.descent_m_s
     row["take_off"] = limits.take_off_m_s
     row["landing"] = limits.landing_m_s
-    row["tick_steps"] = tick_steps_of(dt)
-    row["tick"] = tick_steps_of(dt) * dt
+    row["tick"] = steps_of(GUIDANCE_PERIOD_S, dt) * dt
+    row["inverse_tick"] = 1.0 / row["tick"]
+    row["least_acceleration"] = row["least_thrust"] / airframe.body.mass_kg
+    row["most_acceleration"] = row["most_thrust"] / airframe.body.mass_kg
     return row
 
 

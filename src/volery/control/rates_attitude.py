@@ -1,4 +1,4 @@
-"""The inner layers: attitude to body rates at guidance ticks, rates to rotor speeds at each step.
+"""The inner layers: attitude to body rates at 250 Hz, rates to rotor speeds at each step.
 
 The attitude error is split into tilt (the shortest turn that aligns the thrust axis) and the turn
 about it, so that a large yaw error never spoils the tilt (D. Brescianini, R. D'Andrea, "Tilt-
@@ -76,9 +76,10 @@ def hold_attitude(pilot: Any, estimate: Any, gains: Any) -> None:
     # error = tilt * turn about z; n = cos(tilt / 2)
     n = math.sqrt(ez * ez + ew * ew)
     if n > 1e-6:
-        k = 2.0 * gains.attitude / n
-        px, py = k * (ew * ex - ez * ey), k * (ez * ex + ew * ey)
-        turn = 2.0 * gains.yaw * ez / n
+        k = 2.0 / n
+        px = k * gains.attitude * (ew * ex - ez * ey)
+        py = k * gains.attitude * (ez * ex + ew * ey)
+        turn = k * gains.yaw * ez
         if ew < 0.0:
             turn = -turn
     else:  # upside down: any way round is as short

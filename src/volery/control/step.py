@@ -43,7 +43,7 @@ EVENTS_A_STEP = 3
 
 
 @fused_kernel
-def advance_fleet(
+def advance_fleet(  # noqa: PLR0912
     uavs: NDArray[np.void],
     models: NDArray[np.void],
     heights: Array,
@@ -59,7 +59,8 @@ def advance_fleet(
     events: NDArray[np.void],
     step: int,
     steps: int,
-    tick_steps: int,
+    guidance_steps: int,
+    attitude_steps: int,
     dt: float,
     bounce: bool,
 ) -> tuple[int, int, bool]:
@@ -76,7 +77,8 @@ def advance_fleet(
     spent = False
     done = 0
     while done < steps and not spent and written + EVENTS_A_STEP * count <= events.shape[0]:
-        tick = step % tick_steps == 0
+        guiding = step % guidance_steps == 0
+        turning = step % attitude_steps == 0
         row = (step + 1) % rows
         for i in range(count):
             body = uavs[i].body
@@ -89,8 +91,9 @@ def advance_fleet(
                 gains = models[uavs[i].model].gains
                 estimate = body  # what control knows of the motion: for now, the truth
                 mode = pilot.mode
-                if tick:
+                if guiding:
                     guide(pilot, estimate, gains, step)
+                if turning:
                     hold_attitude(pilot, estimate, gains)
                 hold_rates(pilot, estimate, gains, dt)
                 accelerate(body, plant, pilot, wind_x, wind_y, wind_z, dt)

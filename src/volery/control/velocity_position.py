@@ -46,15 +46,16 @@ def velocity_towards(
 @inner_kernel
 def track_velocity(pilot: Any, estimate: Any, gains: Any, tx: float, ty: float, tz: float) -> None:
     """Attitude and thrust setpoints that bring the velocity to (tx, ty, tz) m/s, map."""
-    tick = gains.tick
+    tick, rate = gains.tick, gains.inverse_tick
     # move the setpoint towards its target
     sx, sy, sz = pilot.velocity[0], pilot.velocity[1], pilot.velocity[2]
     dx, dy = tx - sx, ty - sy
     size = math.sqrt(dx * dx + dy * dy)
     most = gains.acceleration * tick
     if size > most:
-        dx *= most / size
-        dy *= most / size
+        share = most / size
+        dx *= share
+        dy *= share
     most = gains.climb_acceleration * tick
     dz = min(max(tz - sz, -most), most)
     sx, sy, sz = sx + dx, sy + dy, sz + dz
@@ -70,12 +71,12 @@ def track_velocity(pilot: Any, estimate: Any, gains: Any, tx: float, ty: float, 
         pilot.velocity_integral[1],
         pilot.velocity_integral[2],
     )
-    ax = k * ex + ix + dx / tick + gains.drag * sx
-    ay = k * ey + iy + dy / tick + gains.drag * sy
-    az = gains.vertical * ez + iz + dz / tick + GRAVITY
+    ax = k * ex + ix + dx * rate + gains.drag * sx
+    ay = k * ey + iy + dy * rate + gains.drag * sy
+    az = gains.vertical * ez + iz + dz * rate + GRAVITY
 
     # height first
-    least, most = gains.least_thrust / gains.mass, gains.most_thrust / gains.mass
+    least, most = gains.least_acceleration, gains.most_acceleration
     free_z = (az < most or ez < 0.0) and (az > least or ez > 0.0)
     az = min(max(az, least), most)
     reach = min(gains.tilt_tangent * az, math.sqrt(max(most * most - az * az, 0.0)))
@@ -83,8 +84,9 @@ def track_velocity(pilot: Any, estimate: Any, gains: Any, tx: float, ty: float, 
     free_xy = True
     if size > reach:
         free_xy = ax * ex + ay * ey < 0.0
-        ax *= reach / size
-        ay *= reach / size
+        share = reach / size
+        ax *= share
+        ay *= share
     gain = gains.velocity_integral * tick
     bound = gains.integral_limit
     if free_xy:
@@ -99,19 +101,19 @@ def track_velocity(pilot: Any, estimate: Any, gains: Any, tx: float, ty: float, 
 @inner_kernel
 def _point_thrust(pilot: Any, estimate: Any, gains: Any, ax: float, ay: float, az: float) -> None:
     """Attitude whose z axis lies along (ax, ay, az), az > 0, with the heading setpoint; thrust."""
-    size = math.sqrt(ax * ax + ay * ay + az * az)
-    zx, zy, zz = ax / size, ay / size, az / size
+    k = 1.0 / math.sqrt(ax * ax + ay * ay + az * az)
+    zx, zy, zz = ax * k, ay * k, az * k
     # shortest turn that takes the map's z to (zx, zy, zz)
-    n = math.sqrt(2.0 * (1.0 + zz))
-    px, py, pw = -zy / n, zx / n, 0.5 * n
+    k = 1.0 / math.sqrt(2.0 * (1.0 + zz))
+    px, py, pw = -zy * k, zx * k, (1.0 + zz) * k
     # turn about z after which the x axis, seen from above, points along the heading
-    m = 1.0 / (1.0 + zz)
+    m = 2.0 * k * k
     c, s = pilot.heading[0], pilot.heading[1]
     cy = (1.0 - zy * zy * m) * c + zx * zy * m * s
     sy = zx * zy * m * c + (1.0 - zx * zx * m) * s
-    length = math.sqrt(cy * cy + sy * sy)
-    cy /= length
-    sy /= length
+    k = 1.0 / math.sqrt(cy * cy + sy * sy)
+    cy *= k
+    sy *= k
     if cy >= 0.0:
         hw = math.sqrt(0.5 * (1.0 + cy))
         hz = 0.5 * sy / hw
@@ -170,9 +172,9 @@ def turn_heading(pilot: Any, estimate: Any, gains: Any) -> None:
         if c * gc + s * gs < 0.0:
             step = math.copysign(1.0, step)
         step = min(max(gains.yaw * gains.tick * step, -most), most)
-    # (1 - t^2, 2 t) / (1 + t^2) with t = step / 2: a turn by step, up to step^3 / 12
-    t = 0.5 * step
-    d = 1.0 / (1.0 + t * t)
-    cs, sn = (1.0 - t * t) * d, 2.0 * t * d
-    pilot.heading[0], pilot.heading[1] = c * cs - s * sn, s * cs + c * sn
-    pilot.yaw_rate = step / gains.tick
+    # a turn by the small angle `step`, up to step^3 / 6, kept to unit length by a Newton step
+    turn = 1.0 - 0.5 * step * step
+    c, s = c * turn - s * step, s * turn + c * step
+    n = 1.5 - 0.5 * (c * c + s * s)
+    pilot.heading[0], pilot.heading[1] = n * c, n * s
+    pilot.yaw_rate = step * gains.inverse_tick

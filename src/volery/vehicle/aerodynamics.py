@@ -42,6 +42,7 @@ PLANT = np.dtype(
         ("gyroscopic", "f8", 3),  # (Izz - Iyy) / Ixx and so on around
         ("drag", "f8", 3),
         ("rotors", "i8"),
+        ("upright", "i8"),
         ("rotor_position", "f8", (MAX_ROTORS, 3)),
         ("rotor_axis", "f8", (MAX_ROTORS, 3)),
         ("spin", "f8", MAX_ROTORS),
@@ -76,6 +77,7 @@ def plant_of(airframe: Airframe, dt: float) -> NDArray[np.void]:
     row["drag"] = 0.5 * AIR_DENSITY * np.array(body.drag_area_m2)
     count = len(rotors.places)
     row["rotors"] = count
+    row["upright"] = all(place.axis == (0.0, 0.0, 1.0) for place in rotors.places)
     row["rotor_position"][0, :count] = [place.position_m for place in rotors.places]
     row["rotor_axis"][0, :count] = [place.axis for place in rotors.places]
     row["spin"][0, :count] = [1.0 if p.direction == "ccw" else -1.0 for p in rotors.places]
@@ -129,16 +131,50 @@ def air_wrench(
     body rates, both FLU and at mid-step.
     Returns (fx, fy, fz, tx, ty, tz) in N and N m.
     """
+    if plant.upright:
+        fx, fy, fz, tx, ty, tz = _upright_rotors(body, plant, command, vx, vy, vz, ox, oy, oz)
+    else:
+        fx, fy, fz, tx, ty, tz = _leaning_rotors(body, plant, command, vx, vy, vz, ox, oy, oz)
+    speed = math.sqrt(vx * vx + vy * vy + vz * vz)
+    fx -= plant.drag[0] * speed * vx
+    fy -= plant.drag[1] * speed * vy
+    fz -= plant.drag[2] * speed * vz
+    return fx, fy, fz, tx, ty, tz
+
+
+@inner_kernel
+def _speed_at_mid_step(body: Any, plant: Any, command: Any, r: int) -> float:
+    """Speed of rotor `r` half a step on, rad/s; its speed in `body` moves on by a whole step."""
+    wanted = command.rotor_reference[r]
+    lead = body.rotor_speed[r] - wanted
+    rising = lead < 0.0
+    body.rotor_speed[r] = wanted + lead * (plant.rise if rising else plant.fall)
+    half: float = wanted + lead * (plant.rise_half if rising else plant.fall_half)
+    return half
+
+
+@inner_kernel
+def _leaning_rotors(
+    body: Any,
+    plant: Any,
+    command: Any,
+    vx: float,
+    vy: float,
+    vz: float,
+    ox: float,
+    oy: float,
+    oz: float,
+) -> tuple[float, float, float, float, float, float]:
+    """Force and torque of rotors with any axes."""
+    lift, loss, roll, twist = (
+        plant.thrust_constant,
+        plant.rotor_drag,
+        plant.rolling,
+        plant.torque_constant,
+    )
     fx = fy = fz = tx = ty = tz = 0.0
     for r in range(plant.rotors):
-        wanted = command.rotor_reference[r]
-        lead = body.rotor_speed[r] - wanted
-        if lead < 0.0:
-            w = wanted + lead * plant.rise_half
-            body.rotor_speed[r] = wanted + lead * plant.rise
-        else:
-            w = wanted + lead * plant.fall_half
-            body.rotor_speed[r] = wanted + lead * plant.fall
+        w = _speed_at_mid_step(body, plant, command, r)
         px, py, pz = (
             plant.rotor_position[r, 0],
             plant.rotor_position[r, 1],
@@ -152,21 +188,59 @@ def air_wrench(
         hx -= along * ax
         hy -= along * ay
         hz -= along * az
-        thrust = plant.thrust_constant * w * w * max(1.0 - abs(along) * _INVERSE_INFLOW, 0.0)
-        drag = w * plant.rotor_drag
-        gx = thrust * ax - drag * hx
-        gy = thrust * ay - drag * hy
-        gz = thrust * az - drag * hz
-        reaction = plant.spin[r] * thrust * plant.torque_constant
-        rolling = plant.spin[r] * w * plant.rolling
+        thrust = lift * w * w * max(1.0 - abs(along) * _INVERSE_INFLOW, 0.0)
+        gx = thrust * ax - loss * w * hx
+        gy = thrust * ay - loss * w * hy
+        gz = thrust * az - loss * w * hz
+        reaction = plant.spin[r] * twist * thrust
+        rolling = plant.spin[r] * roll * w
         fx += gx
         fy += gy
         fz += gz
         tx += py * gz - pz * gy - reaction * ax - rolling * hx
         ty += pz * gx - px * gz - reaction * ay - rolling * hy
         tz += px * gy - py * gx - reaction * az - rolling * hz
-    speed = math.sqrt(vx * vx + vy * vy + vz * vz)
-    fx -= plant.drag[0] * speed * vx
-    fy -= plant.drag[1] * speed * vy
-    fz -= plant.drag[2] * speed * vz
+    return fx, fy, fz, tx, ty, tz
+
+
+@inner_kernel
+def _upright_rotors(
+    body: Any,
+    plant: Any,
+    command: Any,
+    vx: float,
+    vy: float,
+    vz: float,
+    ox: float,
+    oy: float,
+    oz: float,
+) -> tuple[float, float, float, float, float, float]:
+    """`_leaning_rotors` where every axis is the body's z, at half its cost."""
+    lift, loss, roll, twist = (
+        plant.thrust_constant,
+        plant.rotor_drag,
+        plant.rolling,
+        plant.torque_constant,
+    )
+    fx = fy = fz = tx = ty = tz = 0.0
+    for r in range(plant.rotors):
+        w = _speed_at_mid_step(body, plant, command, r)
+        px, py, pz = (
+            plant.rotor_position[r, 0],
+            plant.rotor_position[r, 1],
+            plant.rotor_position[r, 2],
+        )
+        hx = vx + oy * pz - oz * py
+        hy = vy + oz * px - ox * pz
+        along = vz + ox * py - oy * px
+        thrust = lift * w * w * max(1.0 - abs(along) * _INVERSE_INFLOW, 0.0)
+        gx = -loss * w * hx
+        gy = -loss * w * hy
+        rolling = plant.spin[r] * roll * w
+        fx += gx
+        fy += gy
+        fz += thrust
+        tx += py * thrust - pz * gy - rolling * hx
+        ty += pz * gx - px * thrust - rolling * hy
+        tz += px * gy - py * gx - plant.spin[r] * twist * thrust
     return fx, fy, fz, tx, ty, tz

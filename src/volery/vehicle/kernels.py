@@ -147,10 +147,10 @@ def carry(body: Any, dt: float) -> None:
     They go with the mean of the old and the new velocity; on the ground with the new one, which is
     the one that the contact allows.
     """
-    back = 0.0 if body.on_ground else 0.5 * dt
-    for k in range(3):
-        body.position_map[k] += dt * (body.velocity_map[k] - back * body.free_acceleration[k])
     half = 0.5 * dt
+    back = 0.0 if body.on_ground else half
+    vx, vy, vz = body.velocity_map[0], body.velocity_map[1], body.velocity_map[2]
+    travel = dt * math.sqrt(vx * vx + vy * vy + vz * vz)
     x, y, z, w = turned(
         body.attitude[0],
         body.attitude[1],
@@ -160,8 +160,13 @@ def carry(body: Any, dt: float) -> None:
         half * (body.omega_body[1] - back * body.free_angular_acceleration[1]),
         half * (body.omega_body[2] - back * body.free_angular_acceleration[2]),
     )
+    vx -= back * body.free_acceleration[0]
+    vy -= back * body.free_acceleration[1]
+    vz -= back * body.free_acceleration[2]
+    body.position_map[0] += dt * vx
+    body.position_map[1] += dt * vy
+    body.position_map[2] += dt * vz
     body.attitude[0], body.attitude[1], body.attitude[2], body.attitude[3] = x, y, z, w
-    travel = dt * _speed(body)
     body.ground_budget -= travel
     body.contact_budget -= travel
     body.separation_budget -= travel
