@@ -23,6 +23,7 @@ from volery.control.velocity_position import (
     velocity_towards,
 )
 from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.rigid import three
 
 
 class FlightMode(IntEnum):
@@ -88,11 +89,7 @@ def guide(pilot: Any, estimate: Any, gains: Any, step: int) -> None:
     if pilot.mode == VELOCITY and step >= pilot.deadline_step:
         pilot.mode = HOLD
         pilot.braking = True
-    vx, vy, vz = (
-        estimate.velocity_map[0],
-        estimate.velocity_map[1],
-        estimate.velocity_map[2],
-    )
+    vx, vy, vz = three(estimate.velocity_map)
     if pilot.mode != VELOCITY:
         pilot.turning = False
         slow = vx * vx + vy * vy + (0.0 if pilot.mode == LAND else vz * vz)
@@ -104,7 +101,7 @@ def guide(pilot: Any, estimate: Any, gains: Any, step: int) -> None:
 
     tx = ty = tz = 0.0
     if pilot.mode == VELOCITY:
-        tx, ty, tz = pilot.velocity_target[0], pilot.velocity_target[1], pilot.velocity_target[2]
+        tx, ty, tz = three(pilot.velocity_target)
         if pilot.velocity_in_heading:
             c, s = heading_of(estimate)
             tx, ty = c * tx - s * ty, s * tx + c * ty
@@ -138,11 +135,7 @@ def _change_mode(pilot: Any, estimate: Any) -> None:
     dx = pilot.position_target[0] - estimate.position_map[0]
     dy = pilot.position_target[1] - estimate.position_map[1]
     dz = pilot.position_target[2] - estimate.position_map[2]
-    vx, vy, vz = (
-        estimate.velocity_map[0],
-        estimate.velocity_map[1],
-        estimate.velocity_map[2],
-    )
+    vx, vy, vz = three(estimate.velocity_map)
     near = dx * dx + dy * dy + dz * dz < _ARRIVED_M**2
     slow = vx * vx + vy * vy + vz * vz < _ARRIVED_M_S**2
     if not (near and slow):

@@ -15,6 +15,7 @@ from typing import Any
 from volery.control.mixer import mix
 from volery.control.setpoints import ControlLevel
 from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.rigid import four, three
 
 _STOPPED = int(ControlLevel.STOPPED)
 _ROTORS = int(ControlLevel.ROTORS)
@@ -32,8 +33,8 @@ def hold_rates(pilot: Any, estimate: Any, gains: Any, dt: float) -> None:
             for r in range(gains.rotors):
                 pilot.rotor_reference[r] = 0.0
         return
-    ox, oy, oz = estimate.omega_body[0], estimate.omega_body[1], estimate.omega_body[2]
-    ix, iy, iz = gains.inertia[0], gains.inertia[1], gains.inertia[2]
+    ox, oy, oz = three(estimate.omega_body)
+    ix, iy, iz = three(gains.inertia)
     tx = ix * _angular_acceleration(pilot, gains, 0, ox, dt) + (iz - iy) * oy * oz
     ty = iy * _angular_acceleration(pilot, gains, 1, oy, dt) + (ix - iz) * oz * ox
     tz = iz * _angular_acceleration(pilot, gains, 2, oz, dt) + (iy - ix) * ox * oy
@@ -61,13 +62,8 @@ def hold_attitude(pilot: Any, estimate: Any, gains: Any) -> None:
     """
     if pilot.level < _ATTITUDE:
         return
-    x, y, z, w = (
-        estimate.attitude[0],
-        estimate.attitude[1],
-        estimate.attitude[2],
-        estimate.attitude[3],
-    )
-    sx, sy, sz, sw = pilot.attitude[0], pilot.attitude[1], pilot.attitude[2], pilot.attitude[3]
+    x, y, z, w = four(estimate.attitude)
+    sx, sy, sz, sw = four(pilot.attitude)
     # error = conjugate(present) * wanted
     ex = w * sx - x * sw - y * sz + z * sy
     ey = w * sy + x * sz - y * sw - z * sx

@@ -15,6 +15,7 @@ from typing import Any
 
 from volery.vehicle.airframe import GRAVITY
 from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.rigid import four, three
 
 
 @inner_kernel
@@ -48,7 +49,7 @@ def track_velocity(pilot: Any, estimate: Any, gains: Any, tx: float, ty: float, 
     """Attitude and thrust setpoints that bring the velocity to (tx, ty, tz) m/s, map."""
     tick, rate = gains.tick, gains.inverse_tick
     # move the setpoint towards its target
-    sx, sy, sz = pilot.velocity[0], pilot.velocity[1], pilot.velocity[2]
+    sx, sy, sz = three(pilot.velocity)
     dx, dy = tx - sx, ty - sy
     size = math.sqrt(dx * dx + dy * dy)
     most = gains.acceleration * tick
@@ -66,11 +67,7 @@ def track_velocity(pilot: Any, estimate: Any, gains: Any, tx: float, ty: float, 
     ey = sy - estimate.velocity_map[1]
     ez = sz - estimate.velocity_map[2]
     k = gains.velocity
-    ix, iy, iz = (
-        pilot.velocity_integral[0],
-        pilot.velocity_integral[1],
-        pilot.velocity_integral[2],
-    )
+    ix, iy, iz = three(pilot.velocity_integral)
     ax = k * ex + ix + dx * rate + gains.drag * sx
     ay = k * ey + iy + dy * rate + gains.drag * sy
     az = gains.vertical * ez + iz + dz * rate + GRAVITY
@@ -125,12 +122,7 @@ def _point_thrust(pilot: Any, estimate: Any, gains: Any, ax: float, ay: float, a
     pilot.attitude[2] = pw * hz
     pilot.attitude[3] = pw * hw
     # thrust: the part of the wanted acceleration that the present thrust axis can give
-    qx, qy, qz, qw = (
-        estimate.attitude[0],
-        estimate.attitude[1],
-        estimate.attitude[2],
-        estimate.attitude[3],
-    )
+    qx, qy, qz, qw = four(estimate.attitude)
     along = (
         ax * 2.0 * (qx * qz + qy * qw)
         + ay * 2.0 * (qy * qz - qx * qw)
@@ -142,12 +134,7 @@ def _point_thrust(pilot: Any, estimate: Any, gains: Any, ax: float, ay: float, a
 @inner_kernel
 def heading_of(estimate: Any) -> tuple[float, float]:
     """Cosine and sine of the present heading; (0, 0) where the x axis points straight up."""
-    x, y, z, w = (
-        estimate.attitude[0],
-        estimate.attitude[1],
-        estimate.attitude[2],
-        estimate.attitude[3],
-    )
+    x, y, z, w = four(estimate.attitude)
     c, s = 1.0 - 2.0 * (y * y + z * z), 2.0 * (w * z + x * y)
     n = math.sqrt(c * c + s * s)
     if n < 1e-6:

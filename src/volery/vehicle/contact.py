@@ -19,12 +19,12 @@ from volery.core import rotations
 from volery.vehicle.aerodynamics import MAX_CONTACTS
 from volery.vehicle.airframe import Airframe
 from volery.vehicle.compiled import inner_kernel
-from volery.vehicle.rigid import matrix_of
+from volery.vehicle.rigid import matrix_of, three
 from volery.world.terrain import Terrain, TerrainGrid, terrain_height, terrain_normal
 
 Array = NDArray[np.float64]
 
-SCRATCH_SHAPE = (MAX_CONTACTS, 13)
+SCRATCH_SHAPE = (MAX_CONTACTS, 12)
 SWEEPS = 24
 """At most; sweeps end when no velocity changes by more than `_SETTLED`."""
 _SETTLED = 1e-7
@@ -81,17 +81,13 @@ def resolve_contact(  # noqa: PLR0915
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = matrix_of(
         body.attitude[0], body.attitude[1], body.attitude[2], body.attitude[3]
     )
-    vx, vy, vz = body.velocity_map[0], body.velocity_map[1], body.velocity_map[2]
+    vx, vy, vz = three(body.velocity_map)
     ux = r00 * vx + r10 * vy + r20 * vz
     uy = r01 * vx + r11 * vy + r21 * vz
     uz = r02 * vx + r12 * vy + r22 * vz
-    ox, oy, oz = body.omega_body[0], body.omega_body[1], body.omega_body[2]
+    ox, oy, oz = three(body.omega_body)
     light = plant.inverse_mass
-    jx, jy, jz = (
-        plant.inverse_inertia[0],
-        plant.inverse_inertia[1],
-        plant.inverse_inertia[2],
-    )
+    jx, jy, jz = three(plant.inverse_inertia)
 
     active = 0
     approach = -1.0
@@ -134,7 +130,7 @@ def resolve_contact(  # noqa: PLR0915
         change = 0.0
         for k in range(active):
             row = scratch[k]
-            px, py, pz = row[0], row[1], row[2]
+            px, py, pz = three(row)
             bx, by, bz = row[3], row[4], row[5]
             # along the normal: never pulling
             sx, sy, sz = ux + oy * pz - oz * py, uy + oz * px - ox * pz, uz + ox * py - oy * px

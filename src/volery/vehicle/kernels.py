@@ -19,7 +19,7 @@ from volery.vehicle.aerodynamics import air_wrench
 from volery.vehicle.airframe import GRAVITY
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.contact import NO_TOUCH, classify_touch, resolve_contact
-from volery.vehicle.rigid import matrix_of, nudged, turned
+from volery.vehicle.rigid import matrix_of, nudged, three, turned
 from volery.world.terrain import TerrainGrid, terrain_height
 
 Array = NDArray[np.float64]
@@ -43,9 +43,8 @@ def accelerate(
     command: a record with `rotor_reference`, rad/s, held over the step. wind: m/s, map.
     """
     half = 0.5 * dt
-    vx, vy, vz = body.velocity_map[0], body.velocity_map[1], body.velocity_map[2]
-    ox, oy, oz = body.omega_body[0], body.omega_body[1], body.omega_body[2]
-
+    vx, vy, vz = three(body.velocity_map)
+    ox, oy, oz = three(body.omega_body)
     # mid-step, extrapolated
     mx = ox + half * body.free_angular_acceleration[0]
     my = oy + half * body.free_angular_acceleration[1]
@@ -94,7 +93,7 @@ def accelerate(
 @inner_kernel
 def near_ground(body: Any, dt: float) -> bool:
     """Whether the ground must be looked at in this step."""
-    vx, vy, vz = body.velocity_map[0], body.velocity_map[1], body.velocity_map[2]
+    vx, vy, vz = three(body.velocity_map)
     travel = (abs(vx) + abs(vy) + abs(vz)) * dt  # no less than the way flown, without a root
     return bool(body.ground_budget < _GROUND_MARGIN + travel)
 
@@ -119,8 +118,8 @@ def meet_ground(
     body.ground_budget = height * steepest - plant.contact_radius
     if not near_ground(body, dt):
         return NO_TOUCH
-    vx, vy, vz = body.velocity_map[0], body.velocity_map[1], body.velocity_map[2]
-    ox, oy, oz = body.omega_body[0], body.omega_body[1], body.omega_body[2]
+    vx, vy, vz = three(body.velocity_map)
+    ox, oy, oz = three(body.omega_body)
     speed = _speed(body)
     approach = resolve_contact(body, plant, grid, bounce, scratch, dt)
     if approach < 0.0:
@@ -149,7 +148,7 @@ def carry(body: Any, dt: float) -> None:
     """
     half = 0.5 * dt
     back = 0.0 if body.on_ground else half
-    vx, vy, vz = body.velocity_map[0], body.velocity_map[1], body.velocity_map[2]
+    vx, vy, vz = three(body.velocity_map)
     travel = dt * math.sqrt(vx * vx + vy * vy + vz * vz)
     x, y, z, w = turned(
         body.attitude[0],
@@ -174,7 +173,7 @@ def carry(body: Any, dt: float) -> None:
 
 @inner_kernel
 def _speed(body: Any) -> float:
-    vx, vy, vz = body.velocity_map[0], body.velocity_map[1], body.velocity_map[2]
+    vx, vy, vz = three(body.velocity_map)
     return math.sqrt(vx * vx + vy * vy + vz * vz)
 
 

@@ -2,7 +2,24 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from volery.vehicle.compiled import inner_kernel
+
+Array = NDArray[np.float64]
+
+
+@inner_kernel
+def three(vector: Array) -> tuple[float, float, float]:
+    """The numbers of a (3,) vector."""
+    return vector[0], vector[1], vector[2]
+
+
+@inner_kernel
+def four(quaternion: Array) -> tuple[float, float, float, float]:
+    """The numbers of a (4,) quaternion."""
+    return quaternion[0], quaternion[1], quaternion[2], quaternion[3]
 
 
 @inner_kernel

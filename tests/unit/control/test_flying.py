@@ -74,7 +74,7 @@ def test_velocity_times_out():
     fleet.command_velocity_body(0, (3, 0, 0))
     fleet.advance(499, FLAT.grid)
     assert fleet.mode(0) is FlightMode.VELOCITY
-    fleet.advance(5, FLAT.grid)
+    fleet.advance(9, FLAT.grid)  # within a guidance tick
     assert fleet.mode(0) is FlightMode.HOLD
     track(fleet, 6.0)
     place = fleet.state.position_map[0].copy()
