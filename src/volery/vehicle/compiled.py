@@ -23,7 +23,18 @@ def fused_kernel(function: F) -> F:
 
 
 def inner_kernel(function: F) -> F:
-    """Compile a part of a fused kernel; Python cannot call it."""
-    return compiled._decorate(
+    """Compile a part of a fused kernel; a call from Python raises TypeError."""
+    part: Any = compiled._decorate(
         function, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS
     )
+
+    def refuse(*_arguments: Any, **_keywords: Any) -> None:
+        raise TypeError(f"{function.__name__} is a part of a kernel; only kernels can call it")
+
+    part._compile_for_args = refuse
+    part._insert = _ignore  # no entry point for Python, which would be null
+    return part  # type: ignore[no-any-return]
+
+
+def _ignore(*_arguments: Any, **_keywords: Any) -> None:
+    """Do nothing."""

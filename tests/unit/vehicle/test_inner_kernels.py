@@ -1,0 +1,28 @@
+import numpy as np
+import pytest
+
+from volery.core import rotations
+from volery.vehicle.compiled import fused_kernel
+from volery.vehicle.rigid import matrix_of, turned
+
+
+@fused_kernel
+def _matrix_and_turn(q, h):
+    return matrix_of(q[0], q[1], q[2], q[3]), turned(q[0], q[1], q[2], q[3], h[0], h[1], h[2])
+
+
+def test_rigid_body_words_agree_with_the_rotations():
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        q = rotations.normalize(rng.normal(size=4))
+        h = rng.normal(size=3) * 0.02
+        matrix, after = _matrix_and_turn(q, h)
+        np.testing.assert_allclose(np.reshape(matrix, (3, 3)), rotations.matrix(q), atol=1e-14)
+        wanted = rotations.multiply(q, rotations.exponential(2.0 * h))
+        np.testing.assert_allclose(after, wanted, atol=1e-11)
+
+
+def test_parts_refuse_python_before_and_after_compilation():
+    _matrix_and_turn(np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3))
+    with pytest.raises(TypeError, match="only kernels can call it"):
+        matrix_of(0.0, 0.0, 0.0, 1.0)
