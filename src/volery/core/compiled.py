@@ -88,24 +88,47 @@ def cache_dir() -> Path:
     return folder
 
 
-def kernel(function: F) -> F:
+def kernel(function: F, **options: Any) -> F:
     """Compile `function` at its first call, without Python's lock, cached on disk.
 
     Division follows numpy (no ZeroDivisionError): a kernel checks its denominators itself.
+    `options` are numba's, such as fastmath.
     """
-    return _decorate(function, error_model="numpy", nogil=True)
+    return _decorate(function, **options)
 
 
 def inline_kernel(function: F) -> F:
-    """Compile a small helper that other kernels call; LLVM inlines it."""
-    return _decorate(function, error_model="numpy", nogil=True)
+    """Compile a small helper that both kernels and Python call; LLVM inlines it."""
+    return _decorate(function)
+
+
+def inner_kernel(function: F, **options: Any) -> F:
+    """Compile a part that only kernels call; a call from Python raises TypeError.
+
+    Without an entry from Python, whose code for a few dozen arrays outweighs a small function, it
+    compiles in a fraction of the time.
+    """
+    part: Any = _decorate(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
+
+    def refuse(*_arguments: Any, **_keywords: Any) -> None:
+        raise TypeError(f"{function.__name__} is a part of a kernel; only kernels can call it")
+
+    part._compile_for_args = refuse
+    part._insert = _ignore  # the entry point that numba would register is null
+    return part  # type: ignore[no-any-return]
+
+
+def _ignore(*_arguments: Any, **_keywords: Any) -> None:
+    """Do nothing."""
 
 
 def _decorate(function: F, **options: Any) -> F:
     saved = _CONFIG.CACHE_DIR
     _CONFIG.CACHE_DIR = str(cache_dir())
     try:
-        compiled: F = numba.njit(cache=True, **options)(function)
+        compiled: F = numba.njit(cache=True, error_model="numpy", nogil=True, **options)(
+            function
+        )
     finally:
         _CONFIG.CACHE_DIR = saved
     return compiled

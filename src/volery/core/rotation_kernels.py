@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from volery.core.compiled import inline_kernel
+from volery.core.compiled import inner_kernel
 
 Vector = tuple[float, float, float]
 
 
-@inline_kernel
+@inner_kernel
 def rotate_vector(
     qx: float, qy: float, qz: float, qw: float, vx: float, vy: float, vz: float
 ) -> Vector:
@@ -22,7 +22,7 @@ def rotate_vector(
     )
 
 
-@inline_kernel
+@inner_kernel
 def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Vector:
     """Cross product a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

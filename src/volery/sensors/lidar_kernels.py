@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.compiled import inline_kernel, kernel
+from volery.core.compiled import inner_kernel, kernel
 from volery.core.rng import normal, uniform
 from volery.core.workers import fetch_add
 from volery.sensors.mount import Mount, sensor_attitude
@@ -77,7 +77,7 @@ class LidarConstants(NamedTuple):
     noise: bool
 
 
-@inline_kernel
+@inner_kernel
 def sensor_frame(
     batch: LidarBatch, scan: int, history: PoseHistory, time_ns: int
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
@@ -120,13 +120,13 @@ def sensor_frame(
     )
 
 
-@inline_kernel
+@inner_kernel
 def beam_time_ns(lidar: LidarConstants, beam: int) -> int:
     """Time of a beam after the first one."""
     return int((lidar.sweep_ns * beam) // (lidar.cosine.shape[0] - 1))
 
 
-@inline_kernel
+@inner_kernel
 def aim_beams(
     lidar: LidarConstants,
     batch: LidarBatch,
@@ -167,7 +167,7 @@ def aim_beams(
         a = b
 
 
-@inline_kernel
+@inner_kernel
 def _dropped(lidar: LidarConstants, distance: float, cosine: float, draw: float) -> bool:
     """Whether the echo is lost; the formula stands in the model's data file."""
     far = distance / lidar.range_max
@@ -176,7 +176,7 @@ def _dropped(lidar: LidarConstants, distance: float, cosine: float, draw: float)
     return bool(draw > kept)
 
 
-@inline_kernel
+@inner_kernel
 def _beyond_edge(lidar: LidarConstants, distance: float, neighbour: float, gap: float) -> float:
     """Range of a beam whose axis passes an edge at `gap` (in beam spacings) towards `neighbour`.
 
@@ -193,12 +193,12 @@ def _beyond_edge(lidar: LidarConstants, distance: float, neighbour: float, gap: 
     return distance
 
 
-@inline_kernel
+@inner_kernel
 def _is_edge(lidar: LidarConstants, a: float, b: float) -> bool:
     return bool(np.isfinite(a) and np.isfinite(b) and abs(a - b) > lidar.least_jump)
 
 
-@inline_kernel
+@inner_kernel
 def measure(
     lidar: LidarConstants,
     key: np.uint64,
@@ -236,7 +236,7 @@ def measure(
         before = true
 
 
-@inline_kernel
+@inner_kernel
 def _near_scan(
     scene: SceneHandle,
     lidar: LidarConstants,
@@ -317,7 +317,7 @@ def scan_batch(
         measure(lidar, batch.key[scan], batch.scan_number[scan], cosine, out)
 
 
-@inline_kernel
+@inner_kernel
 def _middle(packet: int, beams: int) -> int:
     """The beam at whose time a packet sees the other UAVs."""
     return min(packet * LANES + LANES // 2, beams - 1)

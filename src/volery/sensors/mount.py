@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from volery.core.compiled import inline_kernel, kernel
+from volery.core.compiled import inner_kernel, kernel
 
 _NS = 1e-9
 _TWO_PI = 2.0 * math.pi
@@ -66,7 +66,7 @@ def make_mount(
     )
 
 
-@inline_kernel
+@inner_kernel
 def nodding_angle(mount: Mount, time_ns: int) -> float:
     """Angle about the sensor's y axis at a time, rad."""
     if mount.period_s <= 0.0:
@@ -78,7 +78,7 @@ def nodding_angle(mount: Mount, time_ns: int) -> float:
     return angle
 
 
-@inline_kernel
+@inner_kernel
 def sensor_attitude(mount: Mount, time_ns: int) -> tuple[float, float, float, float]:
     """Quaternion, body from sensor, at a time."""
     x, y, z, w = (

@@ -17,7 +17,7 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from volery.core.compiled import cache_dir, inline_kernel, kernel
+from volery.core.compiled import cache_dir, inner_kernel, kernel
 from volery.world.embree import (
     CONTEXT_INSTANCE,
     CONTEXT_INSTANCE_PRIMITIVE,
@@ -92,7 +92,7 @@ def _make_pointer(_context: Any, _address: Any) -> Any:
 _pointer: Any = _make_pointer
 
 
-@inline_kernel
+@inner_kernel
 def _nearest_on_triangle(
     point: tuple[float, float, float],
     a: tuple[float, float, float],
@@ -140,7 +140,7 @@ def _nearest_on_triangle(
     return a[0] + v * abx + w * acx, a[1] + v * aby + w * acy, a[2] + v * abz + w * acz
 
 
-@inline_kernel
+@inner_kernel
 def _corner(
     vertices: NDArray[np.float32], row: int, m: NDArray[np.float64]
 ) -> tuple[float, float, float]:
@@ -153,7 +153,7 @@ def _corner(
     )
 
 
-@inline_kernel
+@inner_kernel
 def _try_triangle(
     state: NDArray[np.float64],
     vertices_address: int,

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.compiled import inline_kernel, kernel
+from volery.core.compiled import inner_kernel, kernel
 from volery.core.workers import fetch_add
 from volery.world.embree import (
     DIRECTION,
@@ -150,7 +150,7 @@ def thread_block(rays: int, bodies: int) -> RayBlock:
     return block
 
 
-@inline_kernel
+@inner_kernel
 def body_pose(
     bodies: BodyTable, row: int, fraction: float
 ) -> tuple[float, float, float, float, float, float, float]:
@@ -177,7 +177,7 @@ def body_pose(
     )
 
 
-@inline_kernel
+@inner_kernel
 def near_bodies(
     bodies: BodyTable,
     low: tuple[float, float, float],
@@ -200,7 +200,7 @@ def near_bodies(
     return count
 
 
-@inline_kernel
+@inner_kernel
 def _may_touch(
     rays: NDArray[np.float32], lanes: int, x: float, y: float, z: float, radius: float
 ) -> bool:
@@ -225,7 +225,7 @@ def _may_touch(
     return bool(away - along * along <= slack * slack)
 
 
-@inline_kernel
+@inner_kernel
 def _rotation(
     qx: float, qy: float, qz: float, qw: float
 ) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
@@ -237,7 +237,7 @@ def _rotation(
     )
 
 
-@inline_kernel
+@inner_kernel
 def _into_body(block: RayBlock, p: int, lanes: int, row: int, pose: tuple[float, ...]) -> None:
     """Fill the body-frame packet; lanes that do not see this body stay masked."""
     x, y, z, qx, qy, qz, qw = pose
@@ -254,7 +254,7 @@ def _into_body(block: RayBlock, p: int, lanes: int, row: int, pose: tuple[float,
         block.body_valid[k] = -1 if k < lanes and block.skip[p, k] != row else 0
 
 
-@inline_kernel
+@inner_kernel
 def _cast_at_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: int) -> None:
     """Let one body shorten the rays of packet `p`."""
     bodies = scene.bodies
@@ -279,13 +279,13 @@ def _cast_at_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: 
         block.material[p, k] = bodies.material[row, part]
 
 
-@inline_kernel
+@inner_kernel
 def _settled(component: Any) -> Any:
     """A component of a direction, zero where it is next to nothing."""
     return component if abs(component) >= _LEAST_COMPONENT else np.float32(0.0)
 
 
-@inline_kernel
+@inner_kernel
 def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], reach: float) -> None:
     """Set the rows of a packet that a cast changes."""
     for k in range(LANES):
@@ -297,7 +297,7 @@ def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], reach: flo
             rays[j, k] = _settled(rays[j, k])
 
 
-@inline_kernel
+@inner_kernel
 def _together(rays: NDArray[np.float32], lanes: int) -> bool:
     """Whether first and last ray of a packet run close together."""
     last = lanes - 1
@@ -308,7 +308,7 @@ def _together(rays: NDArray[np.float32], lanes: int) -> bool:
     return bool(apart < _TOGETHER_M and along > _TOGETHER_COSINE)
 
 
-@kernel
+@inner_kernel
 def cast_block(
     scene: SceneHandle, block: RayBlock, count: int, reach: float, near_count: int
 ) -> None:
@@ -358,7 +358,7 @@ def cast_block(
             _cast_at_body(scene, block, p, lanes, block.near[n])
 
 
-@inline_kernel
+@inner_kernel
 def _near_chunk(
     scene: SceneHandle,
     origins: NDArray[np.float64],
@@ -378,7 +378,7 @@ def _near_chunk(
     return near_bodies(scene.bodies, (x0, y0, z0), (x1, y1, z1), reach, near)
 
 
-@inline_kernel
+@inner_kernel
 def _load_skips(block: RayBlock, exclude: NDArray[np.int32], first: int, last: int) -> None:
     for i in range(first, last):
         row = exclude[i] if exclude.shape[0] > 1 else exclude[0]
@@ -442,7 +442,7 @@ def cast_rays(
                 normal[i, 2] = z * scale if hit else np.float32(0.0)
 
 
-@inline_kernel
+@inner_kernel
 def _aim(
     block: RayBlock,
     origins: NDArray[np.float64],
@@ -467,7 +467,7 @@ def _aim(
         valid[k] = -1 if k < lanes and length > _SHORT_OF_TARGET_M else 0
 
 
-@inline_kernel
+@inner_kernel
 def _hide_behind_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: int) -> None:
     """Mark, by FAR = -inf, the lanes that meet a body."""
     pose = body_pose(scene.bodies, row, block.fraction[p])
