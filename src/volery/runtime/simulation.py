@@ -173,11 +173,6 @@ class Simulation:
             if ended:
                 break
 
-    def measure_once(self) -> None:
-        """Let every sensor measure now, without publishing: compiles what they need."""
-        for bank in self._banks:
-            bank.sample(0, 0, self._fleet)
-
     def close(self) -> None:
         """Give threads and scene memory back."""
         self.scene.close()

@@ -15,27 +15,26 @@ import os
 import subprocess
 import sys
 
+import numpy as np
+
 from volery.control.fleet import Fleet
+from volery.core import rotations
+from volery.core.clock import Schedule
 from volery.core.compiled import cache_dir
+from volery.sensors.imu import ImuBank, load_imu_model
+from volery.sensors.joints import JointBank
+from volery.sensors.lidar_bank import LidarBank
+from volery.sensors.lidar_model import load_lidar
+from volery.sensors.mount import make_mount
+from volery.sensors.odometry import GroundTruthBank
+from volery.sensors.samples import SensorId
+from volery.sensors.sonar import SonarBank, load_sonar_model
 from volery.vehicle.airframe import load_airframe
+from volery.vehicle.body_shape import body_shape
+from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
 _IS_HELPER = "VOLERY_COMPILES_SENSORS"
-_EVERY_SENSOR = {
-    "name": "warm_up",
-    "types": {
-        "all": {
-            "sensors": [
-                {"kind": "lidar", "name": "nodding", "nodding": {}},
-                {"kind": "imu"},
-                {"kind": "sonar", "rpy_deg": [0.0, 90.0, 0.0]},
-                {"kind": "odometry"},
-                {"kind": "ground_truth"},
-            ]
-        }
-    },
-    "uavs": [{"type": "all", "count": 2, "position_m": [0.0, 0.0], "last_position_m": [3.0, 0.0]}],
-}
 
 
 def kernels_are_compiled() -> bool:
@@ -48,14 +47,14 @@ def compile_kernels() -> None:
     if kernels_are_compiled() or os.environ.get(_IS_HELPER):
         return
     helper = subprocess.Popen(
-        [sys.executable, "-m", __name__],
+        [sys.executable, "-c", "from volery.runtime import warm_up; warm_up.compile_sensors()"],
         env={**os.environ, _IS_HELPER: "1"},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
     try:
-        _compile_dynamics()
+        compile_dynamics()
         # A helper that failed costs time, nothing else: the kernels compile when they are called.
         if helper.wait() == 0:
             (cache_dir() / "complete").touch()
@@ -64,23 +63,40 @@ def compile_kernels() -> None:
         helper.wait()
 
 
-def _compile_dynamics() -> None:
-    fleet = Fleet([load_airframe("f450")], [[0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0, 1.0]])
-    fleet.advance(0, Terrain.flat(extent_m=10.0).grid)
+def compile_dynamics() -> None:
+    """Compile the fused step and the look around that contacts need."""
+    terrain = Terrain.flat(extent_m=10.0)
+    _fleet().advance(0, terrain.grid)
+    scene = Scene(terrain, None)
+    scene.clearance(np.zeros((1, 3)), 1.0, include_terrain=False)
+    scene.close()
 
 
-def _compile_sensors() -> None:
-    """Let every kind of sensor measure once, without the dynamics."""
-    from volery.runtime.simulation import Simulation
-    from volery.scenario.load import parse_scenario
+def compile_sensors() -> None:
+    """Let two sensors of every kind measure once."""
+    fleet = _fleet()
+    scene = Scene(Terrain.flat(extent_m=10.0), None)
+    scene.set_bodies([body_shape(fleet.airframes[0])], [0, 0])
+    sensors = tuple(SensorId(row, f"uav{row + 1}", "sensor") for row in range(2))
+    schedule, mounts = Schedule.from_hz(40.0), 2 * (make_mount(amplitude_rad=0.5, period_s=2.0),)
+    place, turn = np.zeros((2, 3)), np.tile(rotations.IDENTITY, (2, 1))
+    keys = np.zeros(2, dtype=np.uint64)
+    for bank in (
+        LidarBank(load_lidar(), schedule, sensors, mounts, keys, scene),
+        SonarBank(load_sonar_model("downward_sonar"), schedule, sensors, place, turn, keys, scene),
+        ImuBank(load_imu_model("adis16448"), schedule, sensors, place, turn, keys),
+        GroundTruthBank(schedule, sensors),
+        JointBank(sensors, mounts),
+    ):
+        bank.sample(0, 0, fleet)
+    scene.close()
 
-    scenario = parse_scenario(_EVERY_SENSOR, where="warm-up")
-    with Simulation(scenario, threads=1) as simulation:
-        simulation.measure_once()
+
+def _fleet() -> Fleet:
+    """Two UAVs: views of a single one would have another memory layout, and another kernel."""
+    places = [[0.0, 0.0, 1.0], [3.0, 0.0, 1.0]]
+    return Fleet([load_airframe("f450")] * 2, places, np.tile(rotations.IDENTITY, (2, 1)))
 
 
 if __name__ == "__main__":
-    if os.environ.get(_IS_HELPER):
-        _compile_sensors()
-    else:
-        compile_kernels()
+    compile_kernels()
