@@ -14,6 +14,7 @@ form; open3d's call knows no reach. One thread each, taking turns, medians.
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import statistics
 import time
@@ -187,9 +188,8 @@ def _embreex_call(whole: Mesh, origins: Array, directions: Array) -> Callable[[]
 
 
 def _open3d_call(whole: Mesh, origins: Array, directions: Array) -> Callable[[], object]:
-    import open3d
-
-    scene: Any = open3d.t.geometry.RaycastingScene(nthreads=1)
+    open3d: Any = importlib.import_module("open3d")
+    scene = open3d.t.geometry.RaycastingScene(nthreads=1)
     scene.add_triangles(
         open3d.core.Tensor(whole.vertices.copy()), open3d.core.Tensor(whole.triangles.copy())
     )

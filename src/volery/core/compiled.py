@@ -126,9 +126,7 @@ def _decorate(function: F, **options: Any) -> F:
     saved = _CONFIG.CACHE_DIR
     _CONFIG.CACHE_DIR = str(cache_dir())
     try:
-        compiled: F = numba.njit(cache=True, error_model="numpy", nogil=True, **options)(
-            function
-        )
+        compiled: F = numba.njit(cache=True, error_model="numpy", nogil=True, **options)(function)
     finally:
         _CONFIG.CACHE_DIR = saved
     return compiled
