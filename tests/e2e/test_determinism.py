@@ -58,3 +58,62 @@ def test_an_added_uav_changes_nobody_elses_noise(simulate, flat_data):
 def test_digest_must_be_asked_for(simulate, flat_data):
     with pytest.raises(CommandError, match="enable_digest"):
         simulate(flat_data).digest()
+
+
+BARE = {
+    "name": "bare",
+    "duration_s": 60.0,
+    "ends_when": "all_landed",
+    "types": {"f450": {"flight": {"take_off_altitude_m": 1.0}}},
+    "uavs": [
+        {"type": "f450", "position_m": [0.0, 0.0], "on_start": "take_off"},
+        {"type": "f450", "position_m": [3.0, 0.0], "on_start": "take_off"},
+        {"type": "f450", "position_m": [9.0, 0.0, 3.0]},
+    ],
+}
+
+
+def land_all(simulation):
+    for name in ("uav1", "uav2"):
+        simulation.uavs[name].land()
+
+
+@pytest.mark.parametrize("piece", [0.001, 0.004, 0.1])
+def test_events_without_sensors_do_not_depend_on_slices(simulate, piece):
+    """Nothing but events ends a tick here: take-offs, landings and a fall."""
+
+    def fly(size):
+        simulation = simulate(BARE)
+        simulation.enable_digest()
+        simulation.uavs["uav3"].command_rotor_speeds([0.0] * 4)
+        while simulation.time_ns < 4_000_000_000:
+            simulation.run(size)
+        land_all(simulation)
+        while simulation.time_ns < 9_000_000_000:
+            simulation.run(size)
+        assert len(simulation.events) >= 6
+        return simulation.digest()
+
+    assert fly(piece) == fly(0.5)
+
+
+def test_the_end_of_a_run_does_not_depend_on_speed(simulate):
+    def end(speed, first=0.0):
+        simulation = simulate(BARE)
+        simulation.enable_digest()
+        simulation.uavs["uav3"].command_rotor_speeds([0.0] * 4)
+        simulation.run(first)
+        simulation.run(3.0 - first)
+        land_all(simulation)
+        simulation.run(speed=speed)
+        assert simulation.finished
+        return simulation.time_ns, simulation.digest()
+
+    assert end(None) == end(7.0) == end(31.0, first=0.03)
+
+
+def test_parts_of_steps_are_owed(simulate, flat_data):
+    simulation = simulate(flat_data)
+    for _ in range(10):
+        simulation.run(0.0004)
+    assert simulation.time_ns == 4_000_000

@@ -103,6 +103,8 @@ class GapFollowing(Node):
         self._pose = Pose.from_odometry(message)
 
     def _on_joint(self, message: JointState) -> None:
+        if message.name[0] != "laser_nodding":
+            return
         stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
         self._joint = (stamp, float(message.position[0]), float(message.velocity[0]))
 

@@ -128,6 +128,9 @@ class _Flight:
             except RecordingError as error:
                 code, trouble = USER_ERROR, "The log could not be written"
                 complain(str(error))
+            except VoleryError as error:
+                code, trouble = USER_ERROR, "The flight ended with an error"
+                complain(str(error))
             finally:
                 self._wall_s = time.perf_counter() - start
                 closed = self._close_log()

@@ -87,7 +87,7 @@ class Fleet:
     airframes: one a UAV. position_map: (N, 3) m. attitude: (N, 4) unit quaternions, map from body.
     dt_ns: physics step. on_contact: what an impact does, "crash" (rotors stop, it falls and rests)
     or "bounce" (it rebounds and flies on). mode: `HOLD` starts in the air with rotors turning,
-    `LANDED` on the ground with rotors stopped; one for all or one a UAV.
+    `LANDED` on the ground with rotors stopped; one for all or one a UAV. names: for messages.
 
     Rows are numbered from 0. After `advance` the state belongs to time `step * dt_ns`.
     """
@@ -101,6 +101,7 @@ class Fleet:
         dt_ns: int = 1_000_000,
         on_contact: Literal["crash", "bounce"] = "crash",
         mode: FlightMode | Sequence[FlightMode] = FlightMode.HOLD,
+        names: Sequence[str] | None = None,
     ) -> None:
         count = len(airframes)
         if count == 0:
@@ -115,6 +116,7 @@ class Fleet:
             raise CommandError("a UAV starts in HOLD or LANDED, one mode for all or one for each")
 
         self.airframes = tuple(airframes)
+        self.names = tuple(names or (f"UAV {i}" for i in range(count)))
         self.step = 0
         self._dt_ns = int(dt_ns)
         self._dt = dt_ns / NS_PER_S
@@ -161,12 +163,18 @@ class Fleet:
     # ---------------------------------------------------------------------------------- time
 
     def advance(
-        self, steps: int, terrain: TerrainGrid, wind_map: Sequence[float] | Array = (0.0, 0.0, 0.0)
+        self,
+        steps: int,
+        terrain: TerrainGrid,
+        wind_map: Sequence[float] | Array = (0.0, 0.0, 0.0),
+        *,
+        event_ends: bool = False,
     ) -> int:
         """Run up to `steps` physics steps; returns how many were done.
 
         Fewer are done, all of them whole, when some UAV has used up its `contact_budget` or
-        `separation_budget`. `advance(0, ...)` compiles the step. wind_map: (3,) m/s.
+        `separation_budget`, or, with `event_ends`, when something happened. `advance(0, ...)`
+        compiles the step. wind_map: (3,) m/s.
         """
         if terrain is not self._grid or self._ground is None:
             self._ground = self._ground_of(terrain)
@@ -188,12 +196,13 @@ class Fleet:
                 *self._periods,
                 self._dt,
                 self._bounce,
+                event_ends,
             )
             self.step += more
             done += more
             if written:
                 self._drained += [_event(row) for row in self._events[:written]]
-            if spent or done >= steps:
+            if spent or done >= steps or (event_ends and written):
                 return done
 
     def drain_events(self) -> list[FleetEvent]:
@@ -293,7 +302,7 @@ class Fleet:
             raise CommandError(f"take-off altitude = {altitude_m} m is not a height above ground")
         self._refuse_wreck(i)
         if self.mode(i) is not FlightMode.LANDED:
-            raise CommandError(f"UAV {i} cannot take off: it flies ({self.mode(i).name})")
+            raise CommandError(f"{self.names[i]} cannot take off: it flies ({self.mode(i).name})")
         place = self._bodies["position_map"][i].copy()
         self._pilots["home"][i] = place
         pilot = self._enter_guided(i, FlightMode.TAKE_OFF, from_ground=True)
@@ -401,7 +410,7 @@ class Fleet:
         if not 0 <= i < len(self):
             raise CommandError(f"there is no UAV {i}; rows 0 to {len(self) - 1} exist")
         if self._bodies["crashed"][i]:
-            raise CommandError(f"UAV {i} has crashed")
+            raise CommandError(f"{self.names[i]} has crashed")
 
     def _checked_thrust(self, i: int, thrust: float) -> float:
         airframe = self.airframes[i]
@@ -425,7 +434,7 @@ class Fleet:
     def _enter_guided(self, i: int, mode: FlightMode, *, from_ground: bool = False) -> Any:
         self._refuse_wreck(i)
         if self.mode(i) is FlightMode.LANDED and not from_ground:
-            raise CommandError(f"UAV {i} stands on the ground; it must take off first")
+            raise CommandError(f"{self.names[i]} stands on the ground; it must take off first")
         self._wake(i)
         pilot: Any = self._pilots[i]
         if pilot["level"] != ControlLevel.GUIDED:

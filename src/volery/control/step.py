@@ -63,11 +63,13 @@ def advance_fleet(  # noqa: PLR0912
     attitude_steps: int,
     dt: float,
     bounce: bool,
+    event_ends: bool,
 ) -> tuple[int, int, bool]:
     """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
 
-    Ends early after a step in which a budget ran out or the events' buffer grew full. Returns the
-    steps done, the events written, and whether a budget ran out.
+    Ends early after a step in which a budget ran out, the events' buffer grew full or, with
+    `event_ends`, anything was noted. Returns the steps done, the events written, and whether a
+    budget ran out.
     """
     grid = TerrainGrid(heights, origin_x, origin_y, spacing)
     scratch = np.empty(SCRATCH_SHAPE)
@@ -76,7 +78,8 @@ def advance_fleet(  # noqa: PLR0912
     written = 0
     spent = False
     done = 0
-    while done < steps and not spent and written + EVENTS_A_STEP * count <= events.shape[0]:
+    room = events.shape[0] - EVENTS_A_STEP * count
+    while done < steps and not spent and written <= (0 if event_ends else room):
         guiding = step % guidance_steps == 0
         turning = step % attitude_steps == 0
         row = (step + 1) % rows

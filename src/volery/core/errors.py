@@ -25,5 +25,9 @@ class GraphError(VoleryError):
     """A topic, service or message does not fit: wrong type, unknown name, invalid rate."""
 
 
+class NodeError(VoleryError):
+    """A node failed while it ran; the message names node, cause and simulated time."""
+
+
 class CommandError(VoleryError):
     """A command is refused: not finite, out of range, or impossible in the present mode."""

@@ -60,7 +60,7 @@ class Collisions:
         self._response = response
         self._emit = emit
         self._radius = np.array([a.body.collision_radius_m for a in fleet.airframes])
-        self._touching_solid = np.zeros(len(names), dtype=bool)
+        self._touched_solid = np.full(len(names), -1)
         self._touching_uav = np.zeros((len(names), len(names)), dtype=bool)
         fleet.state.contact_budget[:] = 0.0
         fleet.state.separation_budget[:] = 0.0
@@ -74,7 +74,7 @@ class Collisions:
         for i in np.flatnonzero(state.separation_budget <= 0.0):
             self._resolve_others(int(i), time_ns)
 
-    # ----------------------------------------------------------------------- trees and buildings
+    # ----------------------------------------------------------------------- trees and solids
 
     def _resolve_solids(self, rows: NDArray[np.int64], time_ns: int) -> None:
         state = self._fleet.state
@@ -87,14 +87,14 @@ class Collisions:
                 away = state.position_map[i] - found.nearest[k]
                 self._touch_solid(int(i), away, int(found.instance[k]), time_ns)
             elif gaps[k] > _RELEASE_M:
-                self._touching_solid[i] = False
+                self._touched_solid[i] = -1
         state.contact_budget[rows] = np.maximum(gaps, _LEAST_BUDGET_M)
 
     def _touch_solid(self, i: int, away: Array, instance: int, time_ns: int) -> None:
         normal = _unit(away)
         approach = -float(normal @ self._fleet.state.velocity_map[i])
-        if not self._touching_solid[i]:
-            self._touching_solid[i] = True
+        if self._touched_solid[i] != instance:
+            self._touched_solid[i] = instance
             self._report(i, approach, self._scene.instance_name(instance), time_ns)
         if approach > 0.0:
             self._fleet.strike(i, normal, self._response.restitution, _FRICTION)

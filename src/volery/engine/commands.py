@@ -7,8 +7,6 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
-from volery.core.errors import VoleryError
-
 
 class Inbox:
     """What outside clients want done. Any thread may post; the engine's thread works it off.
@@ -30,7 +28,9 @@ class Inbox:
         """Call everything that waits, in the order of arrival."""
         for _ in range(len(self._waiting)):
             action, future = self._waiting.popleft()
+            if not future.set_running_or_notify_cancel():
+                continue
             try:
                 future.set_result(action())
-            except VoleryError as error:
+            except Exception as error:  # the sender's business, not the engine's
                 future.set_exception(error)

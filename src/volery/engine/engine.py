@@ -108,9 +108,15 @@ class Engine:
         schedule = Schedule(Fraction(NS_PER_S, period_ns), self.time_ns)
         self.timer_agenda.add(callback, schedule, after_step=self.fleet.step)
 
-    def advance_to(self, step: int) -> None:
-        """Run ticks until `step` is reached and everything due there has fired."""
+    def advance_to(self, step: int, *, until: Callable[[], bool] | None = None) -> None:
+        """Run ticks until `step` is reached and everything due there has fired.
+
+        `until` is asked after each tick and ends the run there: the answer must follow from the
+        simulated world alone, so that the end does not depend on how a run is sliced.
+        """
         while self.fleet.step < step or self._due_step() <= self.fleet.step:
+            if until is not None and until():
+                return
             horizon = max(min(step, self._due_step()), self.fleet.step)
             self._run_tick(Tick(min(horizon, self.fleet.step + _MOST_STEPS_A_TICK)))
 

@@ -8,6 +8,7 @@ from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
 
 _SLICE_S = 0.005
+_LONGEST_SLEEP_S = 0.05
 
 
 class Pacer:
@@ -31,13 +32,17 @@ class Pacer:
             return None
         return max(1, round(_SLICE_S * self._speed * NS_PER_S))
 
-    def wait(self, time_ns: int) -> None:
-        """Sleep until wall time has caught up with simulated time `time_ns`."""
+    def wait(self, time_ns: int) -> bool:
+        """Sleep towards the wall time of `time_ns`, at most a moment; whether more is to be waited.
+
+        The moments let a caller tell its progress, and a user stop, in very slow runs.
+        """
         if self._speed is None:
-            return
+            return False
         due = self._wall_start + (time_ns - self._sim_start_ns) / NS_PER_S / self._speed
         ahead = due - time.perf_counter()
         if ahead > 0.0:
-            time.sleep(ahead)
+            time.sleep(min(ahead, _LONGEST_SLEEP_S))
         elif ahead < -self._SLACK_S:
             self._wall_start -= ahead + self._SLACK_S
+        return ahead > _LONGEST_SLEEP_S

@@ -30,16 +30,16 @@ def take_commands(engine: Engine, _tick: Tick) -> None:
 
 
 def advance_vehicles(engine: Engine, tick: Tick) -> None:
-    """Control and dynamics, fused, up to the horizon or to a UAV that must look around."""
+    """Control and dynamics, fused, up to the horizon, an event or a UAV that must look around."""
     first = engine.fleet.step
     steps = tick.horizon_step - first
     if steps > 0:
-        engine.fleet.advance(steps, engine.terrain, engine.wind_map)
+        engine.fleet.advance(steps, engine.terrain, engine.wind_map, event_ends=True)
         engine.sink.advanced(first + 1, engine.fleet.step)
 
 
 def resolve_contacts(engine: Engine, _tick: Tick) -> None:
-    """Touches of trees, buildings and other UAVs; fresh distances for those that need them."""
+    """Touches of trees, solids and other UAVs; fresh distances for those that need them."""
     engine.collisions.resolve(engine.time_ns)
 
 

@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any, Protocol
 
-from volery.core.errors import GraphError
+from volery.core.errors import GraphError, NodeError, VoleryError
 from volery.graph.graph import Graph, Publisher, Subscription, check_period
 from volery.graph.messages import Published, message_type
 
@@ -118,14 +118,14 @@ class Node:
         _check_depth(qos)
 
         def receive(published: Published) -> None:
-            callback(published.message)
+            self._guarded(lambda: callback(published.message), f"message on {published.topic}")
 
         return self._context.graph.subscribe(self.resolve(topic), receive, msg_type)
 
     def create_timer(self, period_s: float, callback: Callable[[], None]) -> None:
         """Call `callback` each `period_s` of simulated time."""
         check_period(period_s)
-        self._context.timers.every(period_s, callback)
+        self._context.timers.every(period_s, lambda: self._guarded(callback, "timer"))
 
     def create_service(
         self, srv_type: str, service: str, callback: Callable[[Any, Any], Any]
@@ -161,6 +161,19 @@ class Node:
             raise GraphError(f"node {self._name}: parameter '{name}' is not declared") from None
 
     # ----------------------------------------------------------------------------------- helpers
+
+    def _guarded(self, callback: Callable[[], None], occasion: str) -> None:
+        """Call back; a failure becomes a `NodeError` that tells whose it was."""
+        try:
+            callback()
+        except VoleryError:
+            raise
+        except Exception as error:
+            at = f"{self._context.now_ns() / 1e9:.3f} s"
+            raise NodeError(
+                f"node {self.get_namespace()}/{self._name} failed at {at} in its {occasion}: "
+                f"{type(error).__name__}: {error}"
+            ) from error
 
     def resolve(self, name: str) -> str:
         """Absolute name of a topic or service."""

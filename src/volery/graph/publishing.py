@@ -111,7 +111,9 @@ class GraphPublisher:
             self._static.append(_mount_transform(base, f"{sensor.uav_name}/{sensor.name}", mount))
 
     def publish(self, samples: Samples) -> None:
-        """Queue the messages of one batch of samples."""
+        """Queue the messages of one batch of samples; before the first, the fixed transforms."""
+        if not self._static_sent:
+            self._publish_static()
         self._by_kind[type(samples)](samples)
 
     def publish_event(self, event: Event) -> None:
@@ -120,11 +122,13 @@ class GraphPublisher:
             self._events.publish(String(json.dumps(asdict(event))))
 
     def publish_clock(self, time_ns: int) -> None:
-        """Queue `/clock`, and the static transforms once."""
+        """Queue `/clock`."""
         if self._clock.wanted:
             self._clock.publish(Clock(time_from_ns(time_ns)))
-        if not self._static_sent and self._static and self._tf_static.wanted:
-            self._static_sent = True
+
+    def _publish_static(self) -> None:
+        self._static_sent = True
+        if self._static and self._tf_static.wanted:
             self._tf_static.publish(TFMessage(list(self._static)))
 
     # ---------------------------------------------------------------------------------- by kind

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from volery.control.flight_modes import FlightMode
 from volery.core.errors import CommandError
 from volery.graph.graph import Graph
 from volery.graph.messages import Published, Twist, message_type
@@ -16,16 +17,19 @@ _TRIGGER = "std_srvs/srv/Trigger"
 def open_commands(graph: Graph, uav: Uav) -> None:
     """Listen to `/uavN/cmd_vel` and offer take_off, hold, land and return_home for one UAV.
 
-    A Twist is taken in the level heading frame; numbers that are not finite are ignored, as a
-    refused command on a topic has nobody to tell. Services answer with `success` and a reason.
+    A Twist is taken in the level heading frame. During take-off and on the ground it is ignored,
+    and so is one that is no velocity: a refused command on a topic has nobody to tell. Services
+    answer with `success` and a reason.
     """
     response_type = message_type(f"{_TRIGGER}_Response")
 
     def on_twist(published: Published) -> None:
+        if uav.mode is FlightMode.TAKE_OFF:
+            return
         linear, angular = published.message.linear, published.message.angular
         try:
             uav.command_velocity([linear.x, linear.y, linear.z], angular.z)
-        except CommandError:
+        except (CommandError, AttributeError):
             return
 
     def serve(action: Callable[[], None]) -> Callable[[Any], Any]:

@@ -1,4 +1,8 @@
-"""A fingerprint of a run: SHA-256 over all states and all sensor messages."""
+"""A fingerprint of a run: SHA-256 over all states and all messages.
+
+Poses are taken in after every physics step, all other states of the plant and the flight mode each
+time `add_states` is called, which must be on a grid of simulated time.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +10,13 @@ import hashlib
 
 import numpy as np
 
+from volery.control.fleet import Fleet
 from volery.graph.messages import Published
 from volery.vehicle.pose_history import PoseHistory
 
 
 class Digest:
-    """Takes in the pose of every UAV after every physics step, and every message's CDR bytes."""
+    """Takes in states and the CDR bytes of messages."""
 
     def __init__(self) -> None:
         self._hash = hashlib.sha256()
@@ -22,6 +27,12 @@ class Digest:
         for row in rows:
             self._hash.update(history.position[row].tobytes())
             self._hash.update(history.attitude[row].tobytes())
+
+    def add_states(self, fleet: Fleet) -> None:
+        """Take in velocities, rates, rotor speeds, contacts, modes and the like as they are."""
+        for array in fleet.state:
+            self._hash.update(np.ascontiguousarray(array).tobytes())
+        self._hash.update(bytes(int(fleet.mode(i)) for i in range(len(fleet))))
 
     def add_message(self, published: Published) -> None:
         """Take in a message with its topic and time."""

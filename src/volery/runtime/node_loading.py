@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 import importlib
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
-from volery.core.errors import GraphError, ScenarioError
+from volery.core.errors import ScenarioError
 from volery.graph.node import Context, Node
 from volery.scenario.schema import NodeEntry
 
 
-def start_node(entry: NodeEntry, context: Context, namespace: str, where: str) -> Node:
-    """Import and construct a node. Raises `ScenarioError` naming the key in the scenario."""
-    node_class = _find_class(entry.node, where)
+def start_node(
+    entry: NodeEntry, context: Context, namespace: str, where: str, folder: Path | None
+) -> Node:
+    """Import and construct a node. Raises `ScenarioError` naming the key in the scenario.
+
+    Modules are also looked for in the scenario's `folder` and in the working folder.
+    """
+    with _also_from(folder or Path(), Path()):
+        node_class = _find_class(entry.node, where)
     try:
         node: Node = node_class(
             context=context, namespace=namespace, parameter_overrides=entry.parameters
         )
-    except (GraphError, TypeError, ValueError) as error:
+    except Exception as error:
         raise ScenarioError(f"{where}: node '{entry.node}' does not start: {error}") from error
     unused = node.unused_overrides()
     if unused:
@@ -28,12 +38,26 @@ def start_node(entry: NodeEntry, context: Context, namespace: str, where: str) -
     return node
 
 
+@contextmanager
+def _also_from(*folders: Path) -> Iterator[None]:
+    """Let imports find modules in these folders, after the installed ones."""
+    added = [str(folder.resolve()) for folder in folders]
+    sys.path.extend(added)
+    try:
+        yield
+    finally:
+        for folder in added:
+            sys.path.remove(folder)
+
+
 def _find_class(path: str, where: str) -> type[Any]:
     module_name, class_name = path.split(":")
     try:
-        found = getattr(importlib.import_module(module_name), class_name)
-    except ImportError as error:
+        module = importlib.import_module(module_name)
+    except Exception as error:
         raise ScenarioError(f"{where}: node '{path}' cannot be imported: {error}") from error
+    try:
+        found = getattr(module, class_name)
     except AttributeError:
         raise ScenarioError(
             f"{where}: module '{module_name}' has no class '{class_name}'"

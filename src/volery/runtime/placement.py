@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 _SEARCH_STEP_M = 1.0
 _SEARCH_RADIUS_M = 30.0
 _ROOM_TO_STAND_M = 1.5
+_SINK_M = 0.002
+"""Height above the ground at which a UAV is put down."""
 _CLIMB_LOOKS = 4
 """Heights at which `nearest_free` wants room, from the ground to the take-off altitude."""
 
@@ -89,7 +91,7 @@ def _standing(xy: Array, airframe: Airframe, terrain: Terrain) -> Array:
         float(terrain.height(xy[0] + foot[0], xy[1] + foot[1])) - foot[2]
         for foot in airframe.ground.feet_m
     )
-    return np.array([xy[0], xy[1], z + 0.002])
+    return np.array([xy[0], xy[1], z + _SINK_M])
 
 
 def _nearest_free(
@@ -131,11 +133,17 @@ def _check(
     where: str,
 ) -> None:
     at = f"position_m ({place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f})"
-    ground = float(terrain.height(place[0], place[1]))
-    if place[2] < ground:
+    x0, y0, x1, y1 = terrain.bounds
+    if not (x0 <= place[0] <= x1 and y0 <= place[1] <= y1):
         raise PlacementError(
-            f"{where}: {at} lies {ground - place[2]:.2f} m under the ground; "
-            f"z must be at least {_standing(place[:2], airframe, terrain)[2]:.2f} there"
+            f"{where}: {at} lies beyond the terrain, which reaches from ({x0:g}, {y0:g}) to "
+            f"({x1:g}, {y1:g}) m"
+        )
+    standing = float(_standing(place[:2], airframe, terrain)[2])
+    if place[2] < standing - _SINK_M:
+        raise PlacementError(
+            f"{where}: {at} lies {standing - place[2]:.2f} m under the ground or with its feet in "
+            f"it; z must be at least {standing:.2f} there"
         )
     radius = airframe.body.collision_radius_m
     look = scene.clearance(place[None], radius, include_terrain=False)

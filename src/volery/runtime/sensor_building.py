@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.clock import Schedule, ns_from_s
+from volery.core.errors import DataFileError
 from volery.core.rng import stream_key
 from volery.engine.engine import SensorBank
 from volery.runtime.placement import Start
@@ -43,7 +44,7 @@ class Fitted:
         """Sensors with equal keys are sampled together."""
         spec = self.spec
         rate, model = getattr(spec, "rate_hz", None), getattr(spec, "model", None)
-        return (spec.kind, model, rate, spec.phase_s, spec.noise)
+        return (spec.kind, model, rate, spec.phase_s, getattr(spec, "noise", None))
 
 
 def fit_sensors(scenario: schema.Scenario, starts: Sequence[Start]) -> list[Fitted]:
@@ -77,6 +78,7 @@ def build_banks(
 
 class _Builder:
     def __init__(self, scenario: schema.Scenario, fleet: Fleet, scene: Scene) -> None:
+        self._scenario = scenario.name
         self._folder = scenario.folder
         self._fleet = fleet
         self._scene = scene
@@ -89,7 +91,11 @@ class _Builder:
             "odometry": self._odometry,
             "ground_truth": self._ground_truth,
         }
-        return by_kind[group[0].spec.kind](group)
+        try:
+            return by_kind[group[0].spec.kind](group)
+        except DataFileError as error:
+            name = group[0].id.name
+            raise DataFileError(f"{self._scenario}: sensor '{name}': {error}") from None
 
     def _lidar(self, group: list[Fitted]) -> SensorBank:
         model = load_lidar(group[0].spec.model, self._folder)
@@ -122,6 +128,8 @@ class _Builder:
 
 
 def _mount(spec: Any) -> Mount:
+    if not hasattr(spec, "position_m"):
+        return make_mount()
     roll, pitch, yaw = (math.radians(angle) for angle in spec.rpy_deg)
     attitude = rotations.from_rpy(roll, pitch, yaw)
     nodding: schema.Nodding | None = getattr(spec, "nodding", None)

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.core.clock import ns_from_s, s_from_ns
-from volery.core.errors import CommandError, ScenarioError
+from volery.core.errors import CommandError, DataFileError, ScenarioError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.engine.pacing import Pacer
@@ -43,6 +45,7 @@ from volery.vehicle.body_shape import body_shape
 from volery.world.scene import Scene
 
 _CLOCK_PERIOD_S = 0.01
+_DIGEST_PERIOD_S = 0.01
 _PROGRESS_PERIOD_S = 0.1
 _RESULT_OF = {
     "lidar": LidarScans,
@@ -82,6 +85,8 @@ class Simulation:
         self.terrain = build_terrain(scenario)
         self.forest = build_forest(scenario, self.terrain)
         self.scene = Scene(self.terrain, self.forest, threads=threads)
+        self._closed = False
+        self._owed_ns = 0
         self._digest: Digest | None = None
         self._events: list[Event] = []
 
@@ -132,10 +137,11 @@ class Simulation:
         """Whether the scenario's end has come: its duration, or all UAVs down again."""
         if self.time_s >= self.scenario.duration_s:
             return True
-        return self.scenario.ends_when == "all_landed" and self._all_landed()
+        return self._has_ended()
 
     def step(self, steps: int = 1) -> None:
         """Advance by physics steps (1 ms each unless the scenario says otherwise)."""
+        self._check_open()
         if steps < 0:
             raise CommandError(f"steps must not be negative, not {steps}")
         self._engine.advance_to(self._fleet.step + steps)
@@ -150,32 +156,47 @@ class Simulation:
         """Advance by `seconds`, or to the scenario's end.
 
         `speed` is a factor of real time, None runs as fast as possible. `on_progress` is called
-        about ten times a second of wall time.
+        about ten times a second of wall time. Parts of a physics step are owed to the next call, so
+        that many short runs come as far as a long one.
         """
+        self._check_open()
         if seconds is not None and not (math.isfinite(seconds) and seconds >= 0.0):
             raise CommandError(f"seconds must be finite and not negative, not {seconds}")
         left = self.scenario.duration_s - self.time_s if seconds is None else seconds
         start_s, start_ns = self.time_s, self.time_ns
-        end_step = self._fleet.step + math.ceil(ns_from_s(max(left, 0.0)) / self._fleet.dt_ns)
+        end_step = self._fleet.step + self._whole_steps(left, seconds is None)
+        until = self._has_ended if seconds is None else None
         pacer = Pacer(speed, start_ns)
         slice_steps = _slice_steps(pacer.slice_ns(), self._fleet.dt_ns)
         wall_start = time.perf_counter()
         told = wall_start
         while self._fleet.step < end_step:
-            self._engine.advance_to(min(end_step, self._fleet.step + slice_steps))
-            pacer.wait(self.time_ns)
-            now = time.perf_counter()
-            ended = seconds is None and self.finished
+            self._engine.advance_to(min(end_step, self._fleet.step + slice_steps), until=until)
+            ended = until is not None and until()
             last = ended or self._fleet.step >= end_step
-            if on_progress is not None and (now - told >= _PROGRESS_PERIOD_S or last):
-                told = now
-                on_progress(Progress(self.time_s - start_s, left, now - wall_start))
+            waiting = True
+            while waiting:
+                waiting = pacer.wait(self.time_ns)
+                now = time.perf_counter()
+                if on_progress is not None and (now - told >= _PROGRESS_PERIOD_S or last):
+                    told = now
+                    on_progress(Progress(self.time_s - start_s, left, now - wall_start))
             if ended:
                 break
 
+    def post(self, action: Callable[[], Any]) -> Future[Any]:
+        """Have `action()` called by the simulation's thread before its next tick.
+
+        The only call that other threads may make while the simulation runs; the future holds the
+        action's result or error.
+        """
+        return self._engine.inbox.post(action)
+
     def close(self) -> None:
-        """Give threads and scene memory back."""
-        self.scene.close()
+        """Give threads and scene memory back; nothing can be simulated afterwards."""
+        if not self._closed:
+            self._closed = True
+            self.scene.close()
 
     def __enter__(self) -> Simulation:
         return self
@@ -203,8 +224,9 @@ class Simulation:
     def enable_digest(self) -> None:
         """Fingerprint all states and messages from now on; call before the first step."""
         if self._digest is None:
-            self._digest = Digest()
-            self.graph.subscribe_all(self._digest.add_message)
+            digest = self._digest = Digest()
+            self.graph.subscribe_all(digest.add_message)
+            self._engine.every(_DIGEST_PERIOD_S, lambda: digest.add_states(self._fleet))
 
     def digest(self) -> str:
         """SHA-256 over all states and sensor messages since `enable_digest`."""
@@ -235,10 +257,13 @@ class Simulation:
     # ----------------------------------------------------------------------------------- building
 
     def _place(self) -> tuple[Start, ...]:
-        airframes: dict[str, Airframe] = {
-            name: load_airframe(kind.airframe, self.scenario.folder)
-            for name, kind in self.scenario.types.items()
-        }
+        airframes: dict[str, Airframe] = {}
+        for name, kind in self.scenario.types.items():
+            try:
+                airframes[name] = load_airframe(kind.airframe, self.scenario.folder)
+            except DataFileError as error:
+                key = f"{self.scenario.name}: types.{name}.airframe"
+                raise DataFileError(f"{key}: {error}") from None
         return place_uavs(self.scenario, airframes, self.scene, self.terrain)
 
     def _open_graph(self, starts: tuple[Start, ...]) -> None:
@@ -253,10 +278,24 @@ class Simulation:
         for start in starts:
             for k, entry in enumerate(self.scenario.types[start.type_name].nodes):
                 where = f"{self.scenario.name}: types.{start.type_name}.nodes[{k}]"
-                self.nodes.append(start_node(entry, context, f"/{start.name}", where))
+                self.nodes.append(
+                    start_node(entry, context, f"/{start.name}", where, self.scenario.folder)
+                )
 
-    def _all_landed(self) -> bool:
-        """Whether every UAV has flown and is down for good."""
+    def _check_open(self) -> None:
+        if self._closed:
+            raise CommandError("the simulation is closed; make a new one")
+
+    def _whole_steps(self, seconds: float, to_the_end: bool) -> int:
+        if to_the_end:
+            return math.ceil(ns_from_s(max(seconds, 0.0)) / self._fleet.dt_ns)
+        steps, self._owed_ns = divmod(self._owed_ns + ns_from_s(seconds), self._fleet.dt_ns)
+        return steps
+
+    def _has_ended(self) -> bool:
+        """Whether every UAV has flown and is down for good, where the scenario ends with that."""
+        if self.scenario.ends_when != "all_landed":
+            return False
         modes = [uav.mode for uav in self.uavs.values()]
         flown = {e.uav for e in self._events}
         return all(
@@ -272,6 +311,7 @@ def _make_fleet(scenario: Scenario, starts: tuple[Start, ...]) -> Fleet:
         np.array([start.attitude for start in starts]),
         dt_ns=1_000_000_000 // scenario.physics.rate_hz,
         on_contact=scenario.physics.on_contact,
+        names=[start.name for start in starts],
         mode=[FlightMode.LANDED if start.on_ground else FlightMode.HOLD for start in starts],
     )
 

@@ -64,7 +64,7 @@ def describe_validation_error(
 
 
 def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
-    key = _key(fault["loc"], data)
+    key = _key(fault["loc"], data, keep_last=fault["type"] == "missing")
     message = str(fault["msg"]).removeprefix("Value error, ")
     if fault["type"] == "extra_forbidden":
         allowed = _sibling_keys(model, fault["loc"])
@@ -80,11 +80,11 @@ def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
     return f"key '{key}': {message}{shown}"
 
 
-def _key(location: tuple[int | str, ...], data: Any) -> str:
+def _key(location: tuple[int | str, ...], data: Any, *, keep_last: bool) -> str:
     key = ""
     for position, part in enumerate(location):
         is_key = isinstance(part, int) or (isinstance(data, dict) and part in data)
-        if not is_key and position < len(location) - 1:
+        if not is_key and not (keep_last and position == len(location) - 1):
             continue  # the name of a union branch
         if isinstance(data, dict):
             data = data.get(part)

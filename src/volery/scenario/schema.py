@@ -29,7 +29,7 @@ class _Data(BaseModel):
 
 
 class FlatTerrain(_Data):
-    """Level ground."""
+    """Level ground from -extent_m to extent_m in x and y."""
 
     kind: Literal["flat"] = "flat"
     extent_m: Positive = 500.0
@@ -114,15 +114,18 @@ class Nodding(_Data):
 
 
 class _Sensor(_Data):
-    name: Name
+    phase_s: NonNegative = 0.0
+    """Time of the first measurement."""
+
+
+class _Mounted(_Sensor):
     position_m: Vector3 = (0.0, 0.0, 0.0)
     """Place of the sensor frame in the body, FLU."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
-    phase_s: NonNegative = 0.0
     noise: bool = True
 
 
-class LidarSensor(_Sensor):
+class LidarSensor(_Mounted):
     """A scanning range finder of a named model."""
 
     kind: Literal["lidar"]
@@ -131,7 +134,7 @@ class LidarSensor(_Sensor):
     nodding: Nodding | None = None
 
 
-class ImuSensor(_Sensor):
+class ImuSensor(_Mounted):
     """Accelerometer and gyroscope of a named model."""
 
     kind: Literal["imu"]
@@ -140,7 +143,7 @@ class ImuSensor(_Sensor):
     rate_hz: Rate = 200.0
 
 
-class SonarSensor(_Sensor):
+class SonarSensor(_Mounted):
     """Ultrasonic range finder looking down."""
 
     kind: Literal["sonar"]
@@ -153,7 +156,8 @@ class OdometrySensor(_Sensor):
     """Pose and velocity as an odometry source gives them: true motion plus a stated drift."""
 
     kind: Literal["odometry"]
-    name: Name = "odom"
+    name: Literal["odom"] = "odom"
+    noise: bool = True
     model: str = "visual_inertial"
     rate_hz: Rate = 50.0
 
@@ -162,7 +166,7 @@ class GroundTruthSensor(_Sensor):
     """The true state, for reports and checks; autonomy must not read it."""
 
     kind: Literal["ground_truth"]
-    name: Name = "ground_truth"
+    name: Literal["ground_truth"] = "ground_truth"
     rate_hz: Rate = 50.0
 
 
@@ -170,6 +174,21 @@ Sensor = Annotated[
     LidarSensor | ImuSensor | SonarSensor | OdometrySensor | GroundTruthSensor,
     Field(discriminator="kind"),
 ]
+
+
+_TAKEN_NAMES = (
+    "base_link",
+    "cmd_vel",
+    "goal_pose",
+    "ground_truth",
+    "hold",
+    "joint_states",
+    "land",
+    "odom",
+    "return_home",
+    "take_off",
+)
+"""Frames, topics and services of a UAV that no sensor may take."""
 
 
 class Flight(_Data):
@@ -204,6 +223,13 @@ class UavType(_Data):
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise ValueError(f"sensor names must differ; used twice: {', '.join(twice)}")
+        for sensor in self.sensors:
+            taken = sensor.name in _TAKEN_NAMES or sensor.name.startswith("laser")
+            if isinstance(sensor, ImuSensor | SonarSensor) and taken:
+                raise ValueError(
+                    f"'{sensor.name}' is no name for a sensor of kind {sensor.kind}: names that "
+                    f"begin with laser are taken, and {', '.join(_TAKEN_NAMES)}"
+                )
         return self
 
 

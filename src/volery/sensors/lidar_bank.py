@@ -7,11 +7,15 @@ from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
+from volery.core.errors import DataFileError
 from volery.sensors.lidar import make_batch, sample_lidars, stack_mounts
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
 from volery.sensors.samples import LidarScans, SensorId
+from volery.vehicle.pose_history import KEPT_NS
 from volery.world.scene import Scene
+
+_LONGEST_SWEEP_NS = KEPT_NS - 10_000_000
 
 
 class LidarBank:
@@ -32,6 +36,11 @@ class LidarBank:
         keys: NDArray[np.uint64] | None,
         scene: Scene,
     ) -> None:
+        if model.sweep_duration_ns > _LONGEST_SWEEP_NS:
+            raise DataFileError(
+                f"LIDAR model '{model.name}': scan.sweep_duration_s may be "
+                f"{_LONGEST_SWEEP_NS / 1e9} s at most, not {model.scan.sweep_duration_s}"
+            )
         self.schedule = schedule
         self.sensors = sensors
         self.lag_ns = model.sweep_duration_ns

@@ -39,12 +39,14 @@ def load_odometry_model(name: str, folder: Path | None = None) -> OdometryModel:
 class OdometryBank:
     """All odometry sources of one model, rate and phase.
 
-    The pose error is a random walk over the distance flown; the odometry frame coincides with the
-    map at the start. `keys` (S,) are the noise streams, or None for perfect odometry.
+    Each step of the way is added as the source sees it: turned by its yaw error so far, plus a
+    random part. Both errors are random walks over the distance flown; the odometry frame coincides
+    with the map at the start. `keys` (S,) are the noise streams, or None for perfect odometry.
     """
 
     name = "odometry"
     lag_ns = 0
+    _KEPT = ("_position_odom", "_yaw_error", "_flown", "_last_position")
 
     def __init__(
         self,
@@ -61,31 +63,37 @@ class OdometryBank:
         horizontal, vertical = model.horizontal_drift_m_sqrt_m, model.vertical_drift_m_sqrt_m
         self._drift = np.array([horizontal, horizontal, vertical, model.yaw_drift_rad_sqrt_m])
         self._twist_noise = np.repeat([model.velocity_noise_m_s, model.rate_noise_rad_s], 3)
-        self._error = np.zeros((len(sensors), 4))
+        self._position_odom = fleet.state.position_map[self._rows].copy()
+        self._yaw_error = np.zeros(len(sensors))
         self._flown = np.zeros(len(sensors))
-        self._last_position = fleet.state.position_map[self._rows].copy()
+        self._last_position = self._position_odom.copy()
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometryReadings:
         """Reading number k (counted from 0) of all sources of the bank."""
         position = fleet.state.position_map[self._rows]
         attitude = fleet.state.attitude[self._rows]
-        moved = np.linalg.norm(position - self._last_position, axis=1)
+        way = position - self._last_position
+        moved = np.sqrt((way * way).sum(axis=1))
         self._last_position = position.copy()
         self._flown += moved
+        self._position_odom += rotations.rotate(self._yaw_turn(), way)
         twist = _twist_body(fleet, self._rows)
         variance = np.zeros((len(self._rows), 6))
         if self._keys is not None:
             noise = np.empty((len(self._rows), _NUMBERS_A_SAMPLE))
             rng.fill_normal(self._keys, _NUMBERS_A_SAMPLE * k, noise)
-            self._error += np.sqrt(moved)[:, None] * self._drift * noise[:, :4]
+            walk = np.sqrt(moved)[:, None] * self._drift * noise[:, :4]
+            self._position_odom += walk[:, :3]
+            self._yaw_error += walk[:, 3]
             twist += self._twist_noise * noise[:, 4:]
             variance[:, [0, 1, 2, 5]] = self._flown[:, None] * self._drift**2
-        yaw_error = rotations.exponential(self._error[:, 3:] * np.array([0.0, 0.0, 1.0]))
+            # What the yaw error does to a straight way, in whichever direction it led.
+            variance[:, :2] += (self._drift[3] ** 2 * self._flown**3 / 3.0)[:, None]
         return OdometryReadings(
             self.sensors,
             time_ns,
-            owned(position + self._error[:, :3]),
-            owned(rotations.multiply(yaw_error, attitude)),
+            owned(self._position_odom.copy()),
+            owned(rotations.multiply(self._yaw_turn(), attitude)),
             owned(twist[:, :3].copy()),
             owned(twist[:, 3:].copy()),
             owned(variance),
@@ -95,14 +103,16 @@ class OdometryBank:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        kept = {"error": self._error, "flown": self._flown, "last_position": self._last_position}
-        return {name: array.copy() for name, array in kept.items()}
+        return {name: getattr(self, name).copy() for name in self._KEPT}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        self._error = np.array(state["error"])
-        self._flown = np.array(state["flown"])
-        self._last_position = np.array(state["last_position"])
+        for name in self._KEPT:
+            setattr(self, name, np.array(state[name]))
+
+    def _yaw_turn(self) -> Array:
+        zero = np.zeros_like(self._yaw_error)
+        return rotations.from_rpy(zero, zero, self._yaw_error)
 
 
 class GroundTruthBank:

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from volery.core.compiled import inline_kernel
 
-DEFAULT_LENGTH = 64
-"""Rows kept: 64 ms at 1 kHz, more than two turns of a 40 Hz LIDAR."""
+KEPT_NS = 128_000_000
+"""How far back it reaches: a whole turn of a 10 Hz scanner and more."""
+LEAST_LENGTH = 64
 
 
 class PoseHistory(NamedTuple):
@@ -28,10 +29,9 @@ class PoseHistory(NamedTuple):
     """Length of a physics step."""
 
 
-def new_history(
-    position: ArrayLike, attitude: ArrayLike, dt_ns: int, length: int = DEFAULT_LENGTH
-) -> PoseHistory:
+def new_history(position: ArrayLike, attitude: ArrayLike, dt_ns: int) -> PoseHistory:
     """History of a fleet that has stood still at `position` (N, 3), `attitude` (N, 4) so far."""
+    length = max(LEAST_LENGTH, -(-KEPT_NS // dt_ns))
     p = np.asarray(position, dtype=np.float64)
     q = np.asarray(attitude, dtype=np.float64)
     return PoseHistory(

@@ -70,3 +70,34 @@ def test_nodes_that_do_not_start(simulate, flat_data, node, parameters, words):
     with pytest.raises(ScenarioError, match=r"types\.f450\.nodes\[0\]") as caught:
         simulate(flat_data)
     assert words in str(caught.value)
+
+
+def test_feet_in_the_ground_and_places_beyond_the_terrain(simulate, flat_data):
+    flat_data["uavs"] = [{"type": "f450", "position_m": [0.0, 0.0, 0.05]}]
+    with pytest.raises(PlacementError, match="feet"):
+        simulate(flat_data)
+    flat_data["uavs"] = [{"type": "f450", "position_m": [9000.0, 0.0]}]
+    with pytest.raises(PlacementError, match="beyond the terrain"):
+        simulate(flat_data)
+
+
+def test_the_ground_reaches_around_the_origin(simulate, flat_data):
+    flat_data["uavs"] = [{"type": "f450", "position_m": [-40.0, -40.0]}]
+    simulation = simulate(flat_data)
+    hits = simulation.scene.cast([[-40.0, -40.0, 5.0]], [[0.0, 0.0, -1.0]], 30.0)
+    assert hits.distance[0] == pytest.approx(5.0)
+
+
+def test_trees_beyond_the_terrain_or_none_at_all(simulate, flat_data, tmp_path):
+    trees = tmp_path / "trees.csv"
+    trees.write_text("x_m,y_m\n5000,5\n")
+    forest = {"kind": "inventory", "file": str(trees), "species": "broadleaf"}
+    flat_data["world"] = {"forest": forest}
+    with pytest.raises(ScenarioError, match=r"world\.forest: 1 trees stand beyond"):
+        simulate(flat_data)
+    forest["region_m"] = [0, 0, 10, 10]
+    with pytest.raises(ScenarioError, match="no tree there"):
+        simulate(flat_data)
+    forest["species"] = "brodleaf"
+    with pytest.raises(ScenarioError, match=r"flat: world\.forest: .*broadleaf"):
+        simulate(flat_data)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import volery
-from volery.core.errors import CommandError, ScenarioError
-from volery.graph.messages import typestore
+from volery.core.errors import CommandError, ScenarioError, VoleryError
+from volery.graph.messages import Twist, Vector3, typestore
 
 
 def collect(simulation, seconds):
@@ -108,3 +108,90 @@ def test_the_package_names_its_entrances():
     assert {"Scenario", "Simulation", "load_scenario"} <= set(volery.__all__)
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = volery.nothing
+
+
+def test_a_closed_simulation_says_so(simulate, flat_data):
+    simulation = simulate(flat_data)
+    simulation.close()
+    simulation.close()
+    with pytest.raises(CommandError, match="closed"):
+        simulation.run(0.1)
+    with pytest.raises(CommandError, match="closed"):
+        simulation.step()
+
+
+def test_other_threads_post_their_commands(simulate, flat_data):
+    simulation = simulate(flat_data)
+    uav = simulation.uavs["uav1"]
+    done = simulation.post(lambda: uav.take_off(2.0))
+    refused = simulation.post(lambda: uav.take_off(2.0))
+    broken = simulation.post(lambda: 1 / 0)
+    cancelled = simulation.post(uav.land)
+    assert cancelled.cancel()
+    assert not done.done()
+    simulation.run(1.0)
+    assert done.result() is None
+    assert isinstance(refused.exception(), CommandError)
+    assert isinstance(broken.exception(), ZeroDivisionError)
+    assert uav.position_map[2] > 0.3
+
+
+def test_velocities_do_not_cut_a_take_off_short(simulate, flat_data):
+    flat_data["uavs"][0]["on_start"] = "take_off"
+    simulation = simulate(flat_data)
+    twist = simulation.graph.advertise("/uav1/cmd_vel", Twist)
+    for _ in range(50):
+        twist.publish(Twist(Vector3(0.5, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)))
+        twist.publish(Twist(None, None))
+        simulation.run(0.1)
+    assert simulation.uavs["uav1"].position_map[2] > 2.0
+
+
+def fall_past_a_lidar(simulate, rate_hz):
+    """Scans of a LIDAR whose beams sweep the ground while its UAV falls."""
+    data = {
+        "name": "fall",
+        "physics": {"rate_hz": rate_hz},
+        "types": {"f450": {"sensors": [{"kind": "lidar", "rpy_deg": [0, 90, 0], "noise": False}]}},
+        "uavs": [{"type": "f450", "position_m": [0.0, 0.0, 15.0]}],
+    }
+    simulation = simulate(data)
+    simulation.uavs["uav1"].command_rotor_speeds([0.0] * 4)
+    scans = []
+    simulation.graph.subscribe(
+        "/uav1/laser/horizontal/scan", lambda m: scans.append(m.message.ranges)
+    )
+    simulation.run(0.6)
+    return np.array(scans)
+
+
+def test_every_physics_rate_leaves_the_sweep_its_poses(simulate):
+    reference = fall_past_a_lidar(simulate, 1000)
+    beams = slice(300, 780)  # those that meet the ground near by
+    assert np.isfinite(reference[:, beams]).all()
+    for rate_hz in (500, 4000):
+        scans = fall_past_a_lidar(simulate, rate_hz)
+        np.testing.assert_allclose(scans[:, beams], reference[:, beams], atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("where", "words"),
+    [("constructor", "does not start"), ("timer", "in its timer"), ("message", "message on")],
+)
+def test_a_failing_node_is_named(simulate, flat_data, tmp_path, monkeypatch, where, words):
+    (tmp_path / f"bad_{where}.py").write_text(
+        "from volery.graph.messages import Range\n"
+        "from volery.graph.node import Node\n"
+        "class Bad(Node):\n"
+        "    def __init__(self, **options):\n"
+        "        super().__init__('bad', **options)\n"
+        f"        if '{where}' == 'constructor': {{}}['x']\n"
+        "        self.create_timer(0.1, self.tick)\n"
+        "        self.create_subscription(Range, 'range', self.hear, 1)\n"
+        f"    def tick(self):\n        if '{where}' == 'timer': 1 / 0\n"
+        f"    def hear(self, _):\n        if '{where}' == 'message': 1 / 0\n"
+    )
+    monkeypatch.chdir(tmp_path)  # the working folder is searched for modules
+    flat_data["types"]["f450"]["nodes"] = [{"node": f"bad_{where}:Bad"}]
+    with pytest.raises(VoleryError, match=words):
+        simulate(flat_data).run(0.2)

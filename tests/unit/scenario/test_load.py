@@ -59,6 +59,28 @@ def broken(path, value):
             ["uavs[0]", "last_position_m is needed"],
         ),
         ({"name": "a"}, ["types", "uavs", "missing"]),
+        (
+            broken(["types", "t", "sensors"], [{"kind": "imu", "name": "cmd_vel"}]),
+            ["types.t", "'cmd_vel' is no name", "joint_states"],
+        ),
+        (
+            broken(["types", "t", "sensors"], [{"kind": "odometry", "name": "vio"}]),
+            ["types.t.sensors[0].name", "'odom'"],
+        ),
+        (
+            broken(
+                ["world"],
+                {
+                    "forest": {
+                        "kind": "inventory",
+                        "file": "a",
+                        "species": "b",
+                        "region_m": [5, 0, 0, 5],
+                    }
+                },
+            ),
+            ["key 'world.forest'", "region_m must be"],
+        ),
     ],
 )
 def test_one_clear_message(data, words):
