@@ -123,7 +123,7 @@ def sensor_frame(
 @inner_kernel
 def beam_time_ns(lidar: LidarConstants, beam: int) -> int:
     """Time of a beam after the first one."""
-    return int((lidar.sweep_ns * beam) // (lidar.cosine.shape[0] - 1))
+    return int(lidar.sweep_ns * beam / (lidar.cosine.shape[0] - 1))
 
 
 @inner_kernel

@@ -87,7 +87,10 @@ def sensor_attitude(mount: Mount, time_ns: int) -> tuple[float, float, float, fl
         mount.attitude_body[2],
         mount.attitude_body[3],
     )
-    half = 0.5 * nodding_angle(mount, time_ns)
+    angle = nodding_angle(mount, time_ns)
+    if angle == 0.0:
+        return x, y, z, w
+    half = 0.5 * angle
     s, c = np.sin(half), np.cos(half)
     return x * c - z * s, y * c + w * s, z * c + x * s, w * c - y * s
 

@@ -64,10 +64,12 @@ def pose_at(
     error against the great arc is below 1e-9 rad for the millisecond of a step.
     """
     length = history.position.shape[0]
-    step = max(time_ns, 0) // history.dt_ns
-    f = (max(time_ns, 0) - step * history.dt_ns) / history.dt_ns
-    a = step % length
-    b = a if f == 0.0 else (step + 1) % length
+    # By floating point, which is exact here: whole-number divisions cost more than all the rest.
+    steps = max(time_ns, 0) / history.dt_ns
+    step = np.floor(steps)
+    f = steps - step
+    a = int(step - length * np.floor(step / length))
+    b = a if f == 0.0 else (a + 1 if a + 1 < length else 0)
     p, q = history.position, history.attitude
     g = 1.0 - f
     x = g * p[a, uav, 0] + f * p[b, uav, 0]
