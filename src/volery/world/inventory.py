@@ -81,8 +81,9 @@ def read_inventory(path: str | Path) -> Inventory:
             numbers.append(values)
             names.append(name)
     if faults:
-        more = len(faults) - _SHOWN_FAULTS
-        shown = "; ".join(faults[:_SHOWN_FAULTS]) + (f"; and {more} more" if more > 0 else "")
+        shown = "; ".join(faults[:_SHOWN_FAULTS])
+        others = [fault.split(":")[0].removeprefix("row ") for fault in faults[_SHOWN_FAULTS:]]
+        shown += f"; and rows {', '.join(others)}" if others else ""
         plural = "row" if len(faults) == 1 else "rows"
         raise DataFileError(f"inventory {path} has {len(faults)} bad {plural}: {shown}")
     table = np.array(numbers, dtype=np.float64).reshape(-1, 4)
