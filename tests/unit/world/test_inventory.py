@@ -62,7 +62,9 @@ def test_every_bad_row_is_listed_in_one_error(tmp_path):
 
 
 def test_beyond_twenty_bad_rows_only_their_numbers_are_told(tmp_path):
-    with pytest.raises(DataFileError, match=r"has 50 bad rows: row 2: .*row 21: .*; and rows 22, 23, .*, 51$"):
+    with pytest.raises(
+        DataFileError, match=r"has 50 bad rows: row 2: .*row 21: .*; and rows 22, 23, .*, 51$"
+    ):
         read_inventory(write(tmp_path, "x_m,y_m\n" + "a,b\n" * 50))
 
 
