@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -49,6 +51,26 @@ def test_the_volery_commands_exist():
     ).stdout
     for command in named:
         assert command in helped
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_the_volery_commands_run_as_they_stand(tmp_path):
+    lines = "\n".join(blocks("sh")).splitlines()
+    commands = [line.split("#")[0].split() for line in lines if line.startswith("volery ")]
+    assert len(commands) >= 7
+    for command in commands:
+        done = subprocess.run(
+            [sys.executable, "-m", "volery.cli", *command[1:]],
+            check=False,
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, f"{' '.join(command)}\n{done.stdout}{done.stderr}"
+        assert done.stdout.strip()
+    assert (tmp_path / "flight.mcap").exists()
+    assert (tmp_path / "report" / "index.html").exists()
 
 
 def test_links_lead_somewhere():
