@@ -21,6 +21,7 @@ from volery.autonomy.ground_plane import GroundPlane
 from volery.autonomy.obstacle_memory import ObstacleMemory
 from volery.autonomy.scan_points import Pose, ScanProjector
 from volery.core import rotations
+from volery.core.kept import keep, put_back
 from volery.graph.messages import JointState, LaserScan, Odometry, Range, String, Twist, Vector3
 from volery.graph.node import Node
 
@@ -32,6 +33,23 @@ _LEAST_CLIMB_M = 1.0
 _STUCK_AFTER_S = 8.0
 _STUCK_PROGRESS_M = 2.0
 _DETOUR_S = 5.0
+_STATE = (
+    "_phase",
+    "_pose",
+    "_home",
+    "_next_waypoint",
+    "_joint",
+    "_range",
+    "_ground",
+    "_obstacles",
+    "_low_obstacles",
+    "_last_heading",
+    "_progress",
+    "_detour",
+    "_detours",
+    "_settle_at",
+)
+"""Everything that changes in flight."""
 
 
 class Phase(StrEnum):
@@ -96,6 +114,14 @@ class GapFollowing(Node):
         self._take_off = self.create_client("std_srvs/srv/Trigger", "take_off")
         self._land = self.create_client("std_srvs/srv/Trigger", "land")
         self.create_timer(_PERIOD_S, self._on_timer)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return keep(self, _STATE)
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self, state)
 
     # ------------------------------------------------------------------------------ what it sees
 

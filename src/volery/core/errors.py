@@ -31,3 +31,11 @@ class NodeError(VoleryError):
 
 class CommandError(VoleryError):
     """A command is refused: not finite, out of range, or impossible in the present mode."""
+
+
+class SnapshotError(VoleryError):
+    """A state cannot be kept or taken back: something in the run does not offer its state."""
+
+
+class PartnerError(VoleryError):
+    """A lock-step partner did not answer in time, or spoke out of turn."""

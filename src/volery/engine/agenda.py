@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from volery.core.clock import Schedule
 
@@ -68,6 +68,20 @@ class Agenda(Generic[What]):
             entry.due_step = self._step_of(entry)
             heapq.heapreplace(self._heap, entry)
         return due
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {"added": self._added, "k": {entry.order: entry.k for entry in self._heap}}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state; what was added since then is dropped."""
+        counts: dict[int, int] = state["k"]
+        self._added = state["added"]
+        self._heap = [entry for entry in self._heap if entry.order in counts]
+        for entry in self._heap:
+            entry.k = counts[entry.order]
+            entry.due_step = self._step_of(entry)
+        heapq.heapify(self._heap)
 
     def _step_of(self, entry: _Entry[What]) -> int:
         instant = entry.schedule.instant_ns(entry.k) + entry.lag_ns

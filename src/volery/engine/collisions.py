@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +74,15 @@ class Collisions:
             self._resolve_solids(used_up, time_ns)
         for i in np.flatnonzero(state.separation_budget <= 0.0):
             self._resolve_others(int(i), time_ns)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps beside the fleet's own budgets: who touches what."""
+        return {"solid": self._touched_solid.copy(), "uav": self._touching_uav.copy()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._touched_solid[...] = state["solid"]
+        self._touching_uav[...] = state["uav"]
 
     # ----------------------------------------------------------------------- trees and solids
 

@@ -16,8 +16,10 @@ from volery.engine import flight_log
 from volery.engine.agenda import Agenda
 from volery.engine.collisions import BOUNCE, CRASH, Collisions
 from volery.engine.commands import Inbox
+from volery.engine.deadlines import Deadlines
 from volery.engine.events import Event
-from volery.engine.stages import STAGES, Tick
+from volery.engine.partners import Partner
+from volery.engine.stages import STAGES, Tick, take_commands
 from volery.sensors.samples import Samples, SensorId
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
@@ -86,15 +88,20 @@ class Engine:
         self.wind_map = wind_map
         self.sink = sink
         self.inbox = Inbox()
+        self.stands = True
+        """Whether nothing is half done: states may be kept and taken back."""
         self.dt_ns = fleet.dt_ns
         self._new_events: list[Event] = []
         self._names = names
         response = CRASH if crash_on_contact else BOUNCE
         self.collisions = Collisions(fleet, scene, names, response, self._new_events.append)
+        self.banks = tuple(banks)
         self.sensor_agenda: Agenda[SensorBank] = Agenda(self.dt_ns)
         for bank in banks:
             self.sensor_agenda.add(bank, bank.schedule, lag_ns=bank.lag_ns)
         self.timer_agenda: Agenda[Callable[[], Any]] = Agenda(self.dt_ns)
+        self.partner_agenda: Agenda[Partner] = Agenda(self.dt_ns)
+        self.deadlines = Deadlines(self.dt_ns)
         self.stage_seconds = {stage.__name__: 0.0 for stage in STAGES}
 
     @property
@@ -104,9 +111,15 @@ class Engine:
 
     def every(self, period_s: float, callback: Callable[[], Any]) -> None:
         """Call `callback` each period of simulated time, first after one period."""
-        period_ns = ns_from_s(period_s)
-        schedule = Schedule(Fraction(NS_PER_S, period_ns), self.time_ns)
-        self.timer_agenda.add(callback, schedule, after_step=self.fleet.step)
+        self.timer_agenda.add(callback, self._from_now(period_s), after_step=self.fleet.step)
+
+    def at(self, time_ns: int, action: Callable[[], Any]) -> None:
+        """Call `action` once, at `time_ns` of simulated time or at once if that has passed."""
+        self.deadlines.add(max(time_ns, self.time_ns), action)
+
+    def wait_for(self, partner: Partner, period_s: float) -> None:
+        """Meet `partner` each period of simulated time, first after one period."""
+        self.partner_agenda.add(partner, self._from_now(period_s), after_step=self.fleet.step)
 
     def advance_to(self, step: int, *, until: Callable[[], bool] | None = None) -> None:
         """Run ticks until `step` is reached and everything due there has fired.
@@ -117,8 +130,12 @@ class Engine:
         while self.fleet.step < step or self._due_step() <= self.fleet.step:
             if until is not None and until():
                 return
-            horizon = max(min(step, self._due_step()), self.fleet.step)
-            self._run_tick(Tick(min(horizon, self.fleet.step + _MOST_STEPS_A_TICK)))
+            self._run_tick(Tick(step))
+
+    def horizon(self, step: int) -> int:
+        """How far a tick may go that shall not pass `step`."""
+        now = self.fleet.step
+        return min(max(min(step, self._due_step()), now), now + _MOST_STEPS_A_TICK)
 
     def collect_events(self) -> list[Event]:
         """Events since the last call, oldest first."""
@@ -127,14 +144,54 @@ class Engine:
         self._new_events.clear()
         return events
 
+    # ------------------------------------------------------------------------------ snapshot
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that changes in fleet, collisions, sensors and what is due; between ticks."""
+        return {
+            "fleet": self.fleet.get_state(),
+            "collisions": self.collisions.get_state(),
+            "banks": [_state(bank) for bank in self.banks],
+            "due": [part.get_state() for part in self._due],
+            "new_events": list(self._new_events),
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state of this engine."""
+        self.fleet.set_state(state["fleet"])
+        self.collisions.set_state(state["collisions"])
+        for bank, kept in zip(self.banks, state["banks"], strict=True):
+            if kept is not None:
+                bank.set_state(kept)
+        for part, kept in zip(self._due, state["due"], strict=True):
+            part.set_state(kept)
+        self._new_events[:] = state["new_events"]
+
+    # -------------------------------------------------------------------------------- inside
+
+    @property
+    def _due(self) -> tuple[Agenda[Any] | Deadlines, ...]:
+        return self.sensor_agenda, self.timer_agenda, self.partner_agenda, self.deadlines
+
+    def _from_now(self, period_s: float) -> Schedule:
+        return Schedule(Fraction(NS_PER_S, ns_from_s(period_s)), self.time_ns)
+
     def _due_step(self) -> int:
-        steps = (self.sensor_agenda.next_step(), self.timer_agenda.next_step())
+        steps = (part.next_step() for part in self._due)
         return min((s for s in steps if s is not None), default=1 << 62)
 
     def _run_tick(self, tick: Tick) -> None:
         before = time.perf_counter()
-        for stage in STAGES:
-            stage(self, tick)
-            after = time.perf_counter()
-            self.stage_seconds[stage.__name__] += after - before
-            before = after
+        try:
+            for stage in STAGES:
+                self.stands = stage is take_commands
+                stage(self, tick)
+                after = time.perf_counter()
+                self.stage_seconds[stage.__name__] += after - before
+                before = after
+        finally:
+            self.stands = True
+
+
+def _state(bank):  # TEMP
+    return bank.get_state() if hasattr(bank, "get_state") else None

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from volery.engine.partners import meet
+
 if TYPE_CHECKING:
     from volery.engine.engine import Engine
 
@@ -20,19 +22,22 @@ Stage: TypeAlias = "Callable[[Engine, Tick], None]"
 class Tick:
     """What the stages of one tick share."""
 
-    horizon_step: int
-    """Step that the tick may reach at most: the end of the run's slice or the next firing."""
+    last_step: int
+    """Step at which the run ends; the tick ends earlier where something is due."""
 
 
 def take_commands(engine: Engine, _tick: Tick) -> None:
-    """Do what other threads have posted since the last tick, in the order of arrival."""
+    """Do what other threads have posted since the last tick, in the order of arrival.
+
+    Nothing is half done here, so that an action may take the simulation back to an earlier state.
+    """
     engine.inbox.work_off()
 
 
 def advance_vehicles(engine: Engine, tick: Tick) -> None:
     """Control and dynamics, fused, up to the horizon, an event or a UAV that must look around."""
     first = engine.fleet.step
-    steps = tick.horizon_step - first
+    steps = engine.horizon(tick.last_step) - first
     if steps > 0:
         engine.fleet.advance(steps, engine.terrain, engine.wind_map, event_ends=True)
         engine.sink.advanced(first + 1, engine.fleet.step)
@@ -59,8 +64,19 @@ def raise_events(engine: Engine, _tick: Tick) -> None:
 def publish(engine: Engine, _tick: Tick) -> None:
     """Hand out what was measured, then let due timers speak; nodes answer with commands."""
     engine.sink.deliver()
+    while (action := engine.deadlines.pop_due(engine.fleet.step)) is not None:
+        action()
+        engine.sink.deliver()
     for due in engine.timer_agenda.pop_due(engine.fleet.step):
         due.what()
+        engine.sink.deliver()
+
+
+def meet_partners(engine: Engine, _tick: Tick) -> None:
+    """Wait for the lock-step partners whose instant has come, and do what they ask."""
+    due = engine.partner_agenda.pop_due(engine.fleet.step)
+    if due:
+        meet([entry.what for entry in due], engine.time_ns)
         engine.sink.deliver()
 
 
@@ -71,4 +87,5 @@ STAGES: tuple[Stage, ...] = (
     sample_sensors,
     raise_events,
     publish,
+    meet_partners,
 )

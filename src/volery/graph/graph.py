@@ -144,6 +144,19 @@ class Graph:
             for callback in tuple(topic.callbacks):
                 callback(published)
 
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps: undelivered messages, and how many each topic has seen."""
+        return {
+            "queue": list(self._queue),
+            "messages": {name: topic.messages for name, topic in self._topics.items()},
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state; topics, subscribers and services stay as they are."""
+        self._queue = deque(state["queue"])
+        for name, topic in self._topics.items():
+            topic.messages = state["messages"].get(name, 0)
+
     def _topic(self, name: str, msgtype: str | type[Any]) -> _Topic:
         wanted = msgtype if isinstance(msgtype, str) else type_name(msgtype)
         _check_name(name)

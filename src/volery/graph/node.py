@@ -16,28 +16,35 @@ names that start with `~/` belong to the node.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 from volery.core.errors import GraphError, NodeError, VoleryError
+from volery.graph.client import Client
 from volery.graph.graph import Graph, Publisher, Subscription, check_period
 from volery.graph.messages import Published, message_type
+from volery.graph.thinking import Deferring, DelayedPublisher, Thinker
 
 
-class Timers(Protocol):
+class Timers(Deferring, Protocol):
     """Whoever can call back at simulated times."""
 
     def every(self, period_s: float, callback: Callable[[], None]) -> None:
         """Call `callback` each period, first after one period."""
 
 
+@dataclass(frozen=True)
 class Context:
-    """What a node stands on: a graph, a clock, timers."""
+    """What a node stands on: a graph, timers, a clock, and the simulated time it takes to think.
 
-    def __init__(self, graph: Graph, timers: Timers, now_ns: Callable[[], int]) -> None:
-        self.graph = graph
-        self.timers = timers
-        self.now_ns = now_ns
+    With `latency_ns` above 0 the node's callbacks run on a worker and what they publish is
+    released that much later; see `graph.thinking`.
+    """
+
+    graph: Graph
+    timers: Timers
+    now_ns: Callable[[], int]
+    latency_ns: int = 0
 
 
 class Clock:
@@ -59,22 +66,6 @@ class Parameter:
         self.value = value
 
 
-class Client:
-    """Calls one service."""
-
-    def __init__(self, graph: Graph, service: str) -> None:
-        self._graph = graph
-        self.service = service
-
-    def service_is_ready(self) -> bool:
-        """Whether somebody offers the service."""
-        return self._graph.has_service(self.service)
-
-    def call(self, request: Any | None = None) -> Any:
-        """Call and return the response; inside the simulation it comes at once."""
-        return self._graph.call(self.service, request)
-
-
 class Node:
     """Base of all nodes. Subclasses accept `**options` and pass them on."""
 
@@ -91,6 +82,11 @@ class Node:
         self._context = context
         self._overrides = dict(parameter_overrides or {})
         self._parameters: dict[str, Parameter] = {}
+        self._thinker = (
+            Thinker(node_name, context.latency_ns, context.timers, context.now_ns)
+            if context.latency_ns
+            else None
+        )
 
     # ------------------------------------------------------------------------------ the contract
 
@@ -104,12 +100,13 @@ class Node:
 
     def get_clock(self) -> Clock:
         """The clock that stamps are compared with."""
-        return Clock(self._context.now_ns)
+        return Clock(self._now_ns)
 
     def create_publisher(self, msg_type: type[Any], topic: str, qos: int = 10) -> Publisher:
         """Publish `msg_type` on `topic`; `qos` is the queue depth of outside subscribers."""
         _check_depth(qos)
-        return self._context.graph.advertise(self.resolve(topic), msg_type)
+        publisher = self._context.graph.advertise(self.resolve(topic), msg_type)
+        return publisher if self._thinker is None else DelayedPublisher(publisher, self._thinker)
 
     def create_subscription(
         self, msg_type: type[Any], topic: str, callback: Callable[[Any], None], qos: int = 10
@@ -118,30 +115,32 @@ class Node:
         _check_depth(qos)
 
         def receive(published: Published) -> None:
-            self._guarded(lambda: callback(published.message), f"message on {published.topic}")
+            self._run(lambda: callback(published.message), f"message on {published.topic}")
 
         return self._context.graph.subscribe(self.resolve(topic), receive, msg_type)
 
     def create_timer(self, period_s: float, callback: Callable[[], None]) -> None:
         """Call `callback` each `period_s` of simulated time."""
         check_period(period_s)
-        self._context.timers.every(period_s, lambda: self._guarded(callback, "timer"))
+        self._context.timers.every(period_s, lambda: self._run(callback, "timer"))
 
     def create_service(
         self, srv_type: str, service: str, callback: Callable[[Any, Any], Any]
     ) -> None:
-        """Offer a service: `callback(request, response)` returns the response."""
+        """Offer a service: `callback(request, response)` returns the response, at once."""
         response_type = message_type(f"{srv_type}_Response")
 
         def handle(request: Any) -> Any:
-            return callback(request, _blank(response_type))
+            if self._thinker is None:
+                return callback(request, _blank(response_type))
+            return self._thinker.think(lambda: callback(request, _blank(response_type))).result()
 
         self._context.graph.offer(self.resolve(service), srv_type, handle)
 
     def create_client(self, srv_type: str, service: str) -> Client:
         """Client of a service of type `srv_type`, e.g. `std_srvs/srv/Trigger`."""
         message_type(f"{srv_type}_Request")
-        return Client(self._context.graph, self.resolve(service))
+        return Client(self._context.graph, self.resolve(service), self._thinker)
 
     def declare_parameter(self, name: str, default: Any) -> Parameter:
         """Declare a parameter; an override given at start wins over the default."""
@@ -160,7 +159,26 @@ class Node:
         except KeyError:
             raise GraphError(f"node {self._name}: parameter '{name}' is not declared") from None
 
+    def destroy_node(self) -> None:
+        """Give back what the node holds; nothing of it runs afterwards."""
+        if self._thinker is not None:
+            self._thinker.close()
+
     # ----------------------------------------------------------------------------------- helpers
+
+    def join(self) -> None:
+        """Wait until no callback of the node is running."""
+        if self._thinker is not None:
+            self._thinker.join()
+
+    def _now_ns(self) -> int:
+        return self._context.now_ns() if self._thinker is None else self._thinker.now_ns()
+
+    def _run(self, callback: Callable[[], None], occasion: str) -> None:
+        if self._thinker is None:
+            self._guarded(callback, occasion)
+        else:
+            self._thinker.think(lambda: self._guarded(callback, occasion))
 
     def _guarded(self, callback: Callable[[], None], occasion: str) -> None:
         """Call back; a failure becomes a `NodeError` that tells whose it was."""
@@ -169,7 +187,7 @@ class Node:
         except VoleryError:
             raise
         except Exception as error:
-            at = f"{self._context.now_ns() / 1e9:.3f} s"
+            at = f"{self._now_ns() / 1e9:.3f} s"
             raise NodeError(
                 f"node {self.get_namespace()}/{self._name} failed at {at} in its {occasion}: "
                 f"{type(error).__name__}: {error}"

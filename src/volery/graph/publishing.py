@@ -116,6 +116,14 @@ class GraphPublisher:
             self._publish_static()
         self._by_kind[type(samples)](samples)
 
+    def get_state(self) -> bool:
+        """What a snapshot keeps."""
+        return self._static_sent
+
+    def set_state(self, state: bool) -> None:
+        """Go back to a kept state."""
+        self._static_sent = state
+
     def publish_event(self, event: Event) -> None:
         """Queue an event as JSON text on `/events`."""
         if self._events.wanted:

@@ -7,6 +7,7 @@ time `add_states` is called, which must be on a grid of simulated time.
 from __future__ import annotations
 
 import hashlib
+from typing import Any
 
 import numpy as np
 
@@ -38,6 +39,14 @@ class Digest:
         """Take in a message with its topic and time."""
         self._hash.update(f"{published.topic} {published.time_ns}".encode())
         self._hash.update(published.cdr)
+
+    def get_state(self) -> Any:
+        """What a snapshot keeps."""
+        return self._hash.copy()
+
+    def set_state(self, state: Any) -> None:
+        """Go back to a kept state; None is that before anything was taken in."""
+        self._hash = hashlib.sha256() if state is None else state.copy()
 
     def hexdigest(self) -> str:
         """Digest of what was taken in so far."""

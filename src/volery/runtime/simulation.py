@@ -8,17 +8,18 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.core.clock import ns_from_s, s_from_ns
-from volery.core.errors import CommandError, DataFileError, ScenarioError
+from volery.core.errors import CommandError, DataFileError, ScenarioError, SnapshotError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.engine.pacing import Pacer
+from volery.engine.partners import Partner
 from volery.graph.graph import Graph
 from volery.graph.node import Context, Node
 from volery.graph.publishing import GraphPublisher, scan_topic
@@ -27,6 +28,13 @@ from volery.runtime.digest import Digest
 from volery.runtime.node_loading import start_node
 from volery.runtime.placement import Start, place_uavs
 from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors
+from volery.runtime.snapshot import (
+    Snapshot,
+    check_nodes,
+    check_partners,
+    keep_nodes,
+    put_back_nodes,
+)
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
 from volery.runtime.worlds import build_forest, build_terrain
@@ -118,7 +126,9 @@ class Simulation:
             }
         )
         self.nodes: list[Node] = []
+        self._partners: list[Partner] = []
         self._open_graph(starts)
+        self._start_state = self._state()
 
     # -------------------------------------------------------------------------------------- time
 
@@ -192,10 +202,36 @@ class Simulation:
         """
         return self._engine.inbox.post(action)
 
+    def add_partner(
+        self,
+        name: str,
+        *,
+        period_s: float,
+        timeout_s: float = 10.0,
+        on_timeout: Literal["stop", "leave"] = "stop",
+    ) -> Partner:
+        """Wait for an outside program each `period_s` of simulated time; see `engine.partners`.
+
+        `timeout_s` is wall time; a partner that lets more pass ends the run with `PartnerError`, or
+        is waited for no more.
+        """
+        self._check_open()
+        for value, what in ((period_s, "period_s"), (timeout_s, "timeout_s")):
+            if not (math.isfinite(value) and value > 0.0):
+                raise CommandError(f"{what} must be finite and positive, not {value}")
+        partner = Partner(name, timeout_s, on_timeout)
+        self._partners.append(partner)
+        self._engine.wait_for(partner, period_s)
+        return partner
+
     def close(self) -> None:
         """Give threads and scene memory back; nothing can be simulated afterwards."""
         if not self._closed:
             self._closed = True
+            for partner in self._partners:
+                partner.leave()
+            for node in self.nodes:
+                node.destroy_node()
             self.scene.close()
 
     def __enter__(self) -> Simulation:
@@ -203,6 +239,65 @@ class Simulation:
 
     def __exit__(self, *_exception: object) -> None:
         self.close()
+
+    # ------------------------------------------------------------------------------------ snapshots
+
+    def snapshot(self) -> Snapshot:
+        """The present state, for `restore`.
+
+        Raises `SnapshotError` where a node or a lock-step partner does not offer its state, and in
+        the middle of a tick: nodes and timers ask for one through `post`.
+        """
+        self._check_standing("a snapshot")
+        return Snapshot(self.time_ns, id(self), self._state())
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back, or forward, to a state of this simulation: what follows is the same again."""
+        self._check_standing("to restore a state")
+        if snapshot.owner != id(self):
+            raise SnapshotError("the snapshot is of another simulation")
+        self._put_back(snapshot.state)
+
+    def reset(self, seed: int | None = None) -> None:
+        """Go back to the start, with the scenario's seed or another one.
+
+        All that follows is what a fresh simulation does, but for the world: terrain and trees stay
+        as they are (a scenario's `world.seed` fixes them apart from all other randomness).
+        """
+        self._check_standing("a reset")
+        self._put_back(self._start_state)
+        self._seed_streams(self.scenario.seed if seed is None else seed)
+
+    def _seed_streams(self, seed: int) -> None:
+        pass  # TEMP
+
+    def _state(self) -> dict[str, Any]:
+        return {
+            "engine": self._engine.get_state(),
+            "graph": self.graph.get_state(),
+            "publisher": self._publisher.get_state(),
+            "nodes": keep_nodes(self.nodes),
+            "digest": None if self._digest is None else self._digest.get_state(),
+            "events": list(self._events),
+            "owed_ns": self._owed_ns,
+        }
+
+    def _put_back(self, state: dict[str, Any]) -> None:
+        put_back_nodes(self.nodes, state["nodes"])
+        self._engine.set_state(state["engine"])
+        self.graph.set_state(state["graph"])
+        self._publisher.set_state(state["publisher"])
+        if self._digest is not None:
+            self._digest.set_state(state["digest"])
+        self._events[:] = state["events"]
+        self._owed_ns = state["owed_ns"]
+
+    def _check_standing(self, what: str) -> None:
+        self._check_open()
+        check_nodes(self.nodes, what)
+        check_partners(self._partners, what)
+        if not self._engine.stands:
+            raise SnapshotError(f"{what} is not possible in the middle of a tick; use post()")
 
     # -------------------------------------------------------------------------------- what is known
 
@@ -224,9 +319,8 @@ class Simulation:
     def enable_digest(self) -> None:
         """Fingerprint all states and messages from now on; call before the first step."""
         if self._digest is None:
-            digest = self._digest = Digest()
-            self.graph.subscribe_all(digest.add_message)
-            self._engine.every(_DIGEST_PERIOD_S, lambda: digest.add_states(self._fleet))
+            self._digest = Digest()
+            self.graph.subscribe_all(self._digest.add_message)
 
     def digest(self) -> str:
         """SHA-256 over all states and sensor messages since `enable_digest`."""
@@ -268,19 +362,25 @@ class Simulation:
 
     def _open_graph(self, starts: tuple[Start, ...]) -> None:
         self._engine.every(_CLOCK_PERIOD_S, lambda: self._publisher.publish_clock(self.time_ns))
+        self._engine.every(_DIGEST_PERIOD_S, self._take_fingerprint)
         for row, (start, uav) in enumerate(zip(starts, self.uavs.values(), strict=True)):
             kind = self.scenario.types[start.type_name]
             self._fleet.set_command_timeout(kind.flight.command_timeout_s, row)
             open_commands(self.graph, uav)
             if start.takes_off:
                 uav.take_off()
-        context = Context(self.graph, self._engine, lambda: self.time_ns)
         for start in starts:
             for k, entry in enumerate(self.scenario.types[start.type_name].nodes):
                 where = f"{self.scenario.name}: types.{start.type_name}.nodes[{k}]"
+                latency_ns = ns_from_s(entry.latency_s)
+                context = Context(self.graph, self._engine, lambda: self.time_ns, latency_ns)
                 self.nodes.append(
                     start_node(entry, context, f"/{start.name}", where, self.scenario.folder)
                 )
+
+    def _take_fingerprint(self) -> None:
+        if self._digest is not None:
+            self._digest.add_states(self._fleet)
 
     def _check_open(self) -> None:
         if self._closed:

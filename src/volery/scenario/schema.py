@@ -207,6 +207,8 @@ class NodeEntry(_Data):
     node: Annotated[str, Field(pattern=r"^[\w.]+:\w+$")]
     """`module:Class` with the node contract of `volery.graph.node`."""
     parameters: dict[str, Any] = {}
+    latency_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
+    """Simulated time from a callback's input to its output; above 0 the node runs on a worker."""
 
 
 class UavType(_Data):

@@ -1,0 +1,29 @@
+"""Keeping the state of plain objects for a snapshot."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable
+from typing import Any, Protocol, runtime_checkable
+
+
+def keep(owner: object, names: Iterable[str]) -> dict[str, Any]:
+    """Deep copies of the attributes `names` of `owner`."""
+    return copy.deepcopy({name: getattr(owner, name) for name in names})
+
+
+def put_back(owner: object, state: dict[str, Any]) -> None:
+    """Set the attributes of `owner` to copies of what `keep` kept."""
+    for name, value in copy.deepcopy(state).items():
+        setattr(owner, name, value)
+
+
+@runtime_checkable
+class KeepsState(Protocol):
+    """Whatever can be kept in a snapshot."""
+
+    def get_state(self) -> Any:
+        """Everything that changes, as plain data."""
+
+    def set_state(self, state: Any) -> None:
+        """Go back to a kept state."""

@@ -1,0 +1,116 @@
+"""Lock-step partners: outside programs that the simulation waits for.
+
+A partner meets the engine at each instant of its period: the engine stands still until the partner
+has answered, and applies what it answered before the next physics step. So a run with partners is
+as reproducible as they are. Who lets the engine wait longer than the agreed time ends the run with
+an error, or, where that was agreed, is left behind.
+
+    partner = simulation.add_partner("pilot", period_s=0.02, timeout_s=5.0)
+
+    # in the partner's thread
+    while (time_ns := partner.wait()) is not None:
+        partner.reply(lambda: uav.command_velocity([1.0, 0.0, 0.0]))
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
+
+from volery.core.errors import PartnerError
+
+Action = Callable[[], Any]
+
+
+class Partner:
+    """One partner; `wait`, `reply` and `leave` belong to its own thread."""
+
+    def __init__(self, name: str, timeout_s: float, on_timeout: Literal["stop", "leave"]) -> None:
+        self.name = name
+        self.timeout_s = timeout_s
+        self._on_timeout = on_timeout
+        self._changed = threading.Condition()
+        self._meeting_ns: int | None = None
+        self._actions: tuple[Action, ...] | None = None
+        self._left = False
+
+    @property
+    def has_left(self) -> bool:
+        """Whether the engine waits for it no more."""
+        return self._left
+
+    # ------------------------------------------------------------------------ the partner's thread
+
+    def wait(self, timeout_s: float | None = None) -> int | None:
+        """Wait for the next meeting; its simulated time, or None when there will be none.
+
+        Raises `PartnerError` when the engine does not come within `timeout_s` of wall time.
+        """
+        with self._changed:
+            came = self._changed.wait_for(
+                lambda: self._left or (self._meeting_ns is not None and self._actions is None),
+                timeout_s,
+            )
+            if not came:
+                raise PartnerError(f"{self.name}: no meeting within {timeout_s} s of wall time")
+            return None if self._left else self._meeting_ns
+
+    def reply(self, *actions: Action) -> None:
+        """Let the engine go on, after it has called `actions` in its own thread, in order."""
+        with self._changed:
+            if self._left:
+                return
+            if self._meeting_ns is None or self._actions is not None:
+                raise PartnerError(f"{self.name}: there is no meeting to reply to; wait() first")
+            self._actions = actions
+            self._changed.notify_all()
+
+    def leave(self) -> None:
+        """Be waited for no more."""
+        with self._changed:
+            self._left = True
+            self._changed.notify_all()
+
+    # ------------------------------------------------------------------------- the engine's thread
+
+    def call(self, time_ns: int) -> None:
+        """Begin the meeting at `time_ns`."""
+        with self._changed:
+            self._meeting_ns, self._actions = time_ns, None
+            self._changed.notify_all()
+
+    def collect(self, deadline: float) -> tuple[Action, ...]:
+        """Actions replied; none from a partner that has left. `deadline`: on `time.monotonic`.
+
+        Raises `PartnerError` at the deadline, unless the partner agreed to be left behind.
+        """
+        with self._changed:
+            came = self._changed.wait_for(
+                lambda: self._left or self._actions is not None,
+                max(deadline - time.monotonic(), 0.0),
+            )
+            meeting_ns, self._meeting_ns = self._meeting_ns, None
+            actions, self._actions = self._actions or (), None
+            if came:
+                return actions
+            self._left = True
+            self._changed.notify_all()
+        if self._on_timeout == "leave" or meeting_ns is None:
+            return ()
+        raise PartnerError(
+            f"partner '{self.name}' did not answer within {self.timeout_s} s of wall time at "
+            f"{meeting_ns / 1e9:.3f} s"
+        )
+
+
+def meet(partners: Sequence[Partner], time_ns: int) -> None:
+    """Meet all `partners` at once; apply their replies in the order given."""
+    start = time.monotonic()
+    waited_for = [partner for partner in partners if not partner.has_left]
+    for partner in waited_for:
+        partner.call(time_ns)
+    for partner in waited_for:
+        for action in partner.collect(start + partner.timeout_s):
+            action()

@@ -1,0 +1,70 @@
+"""A kept state of a simulation, to which it can go back exactly."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from volery.core.clock import s_from_ns
+from volery.core.errors import SnapshotError
+from volery.core.kept import KeepsState
+from volery.engine.partners import Partner
+from volery.graph.node import Node
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """State of one simulation at `time_ns`; only that simulation can go back to it.
+
+    It holds plants and controllers, sensors and their noise, wind, contacts, faults, what is due
+    when, undelivered messages, the fingerprint, events and the state of every node. Outside it are
+    log files, and outside programs, which see the clock jump.
+    """
+
+    time_ns: int
+    owner: int
+    state: dict[str, Any]
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time of the state."""
+        return s_from_ns(self.time_ns)
+
+
+def keep_nodes(nodes: Sequence[Node]) -> list[Any]:
+    """States of all nodes; None of one that does not offer it."""
+    for node in nodes:
+        node.join()
+    return [
+        copy.deepcopy(node.get_state()) if isinstance(node, KeepsState) else None for node in nodes
+    ]
+
+
+def put_back_nodes(nodes: Sequence[Node], states: Sequence[Any]) -> None:
+    """Give all nodes back what `keep_nodes` kept."""
+    for node, state in zip(nodes, states, strict=True):
+        node.join()
+        if isinstance(node, KeepsState):
+            node.set_state(copy.deepcopy(state))
+
+
+def check_nodes(nodes: Sequence[Node], what: str) -> None:
+    """Refuse `what` where a node cannot take part in it."""
+    for node in nodes:
+        if not isinstance(node, KeepsState):
+            raise SnapshotError(
+                f"{what} is not possible: node {node.get_namespace()}/{node.get_name()} offers no "
+                "get_state() and set_state(state)"
+            )
+
+
+def check_partners(partners: Sequence[Partner], what: str) -> None:
+    """Refuse `what` while an outside program takes part whose state nobody can keep."""
+    for partner in partners:
+        if not partner.has_left:
+            raise SnapshotError(
+                f"{what} is not possible: the state of lock-step partner '{partner.name}' is its "
+                "own; it must leave first"
+            )

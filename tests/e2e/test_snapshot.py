@@ -1,0 +1,144 @@
+"""Going back to a kept state, and to the start, is exact to the bit."""
+
+import pytest
+
+from volery.core.errors import SnapshotError
+from volery.graph.messages import Odometry, String
+from volery.graph.node import Node
+
+
+class Forgetful(Node):
+    """Counts odometry, and does not offer its count."""
+
+    def __init__(self, **options):
+        super().__init__("forgetful", **options)
+        self.count = 0
+        self.create_subscription(Odometry, "odom", self.on_odometry)
+
+    def on_odometry(self, _message):
+        self.count += 1
+
+
+def flown(simulation, seconds):
+    simulation.run(seconds)
+    return simulation.digest()
+
+
+def test_restored_flight_repeats_itself(simulate, wood_data):
+    wood_data["duration_s"] = 30.0
+    simulation = simulate(wood_data)
+    simulation.enable_digest()
+    simulation.run(6.0037)
+    kept = simulation.snapshot()
+    first = flown(simulation, 4.0)
+    events = simulation.events
+    simulation.restore(kept)
+    assert simulation.time_ns == kept.time_ns
+    assert flown(simulation, 4.0) == first
+    assert simulation.events == events
+
+    later = simulation.snapshot()
+    beyond = flown(simulation, 1.0)
+    simulation.restore(kept)
+    simulation.run(0.5)
+    simulation.restore(later)
+    assert flown(simulation, 1.0) == beyond
+
+
+def test_states_kept_do_not_change_with_the_flight(simulate, wood_data):
+    simulation = simulate(wood_data)
+    simulation.enable_digest()
+    simulation.run(1.0)
+    kept = simulation.snapshot()
+    ends = set()
+    for _ in range(3):
+        simulation.restore(kept)
+        ends.add(flown(simulation, 2.0))
+    assert len(ends) == 1
+
+
+def test_reset_is_a_fresh_start(simulate, wood_data):
+    fresh = simulate(wood_data)
+    fresh.enable_digest()
+    expected = flown(fresh, 5.0)
+    used = simulate(wood_data)
+    used.enable_digest()
+    used.run(7.0013)
+    used.reset()
+    assert used.time_ns == 0
+    assert used.events == ()
+    assert flown(used, 5.0) == expected
+
+
+def test_reset_brings_a_wreck_back(simulate, flat_data):
+    simulation = simulate(flat_data)
+    uav = simulation.uavs["uav1"]
+    uav.take_off(5.0)
+    simulation.run(5.0)
+    uav.command_rotor_speeds([0.0] * 4)
+    simulation.run(2.0)
+    assert uav.crashed
+    simulation.reset()
+    uav.take_off(3.0)
+    simulation.run(6.0)
+    assert not uav.crashed
+    assert uav.position_map[2] == pytest.approx(3.1, abs=0.3)
+
+
+def test_node_that_keeps_no_state_is_named(simulate, flat_data):
+    flat_data["types"]["f450"]["nodes"] = [{"node": f"{__name__}:Forgetful"}]
+    simulation = simulate(flat_data)
+    simulation.run(0.1)
+    with pytest.raises(SnapshotError, match="/uav1/forgetful offers no get_state"):
+        simulation.snapshot()
+    with pytest.raises(SnapshotError, match="/uav1/forgetful"):
+        simulation.reset()
+
+
+def test_snapshot_of_another_simulation_is_refused(simulate, flat_data):
+    one, other = simulate(flat_data), simulate(flat_data)
+    with pytest.raises(SnapshotError, match="another simulation"):
+        other.restore(one.snapshot())
+
+
+def test_posted_restore_takes_the_run_back(simulate, flat_data):
+    simulation = simulate(flat_data)
+    simulation.enable_digest()
+    simulation.uavs["uav1"].take_off(2.0)
+    simulation.run(1.0)
+    kept = simulation.snapshot()
+    simulation.run(1.3)
+    done = simulation.post(lambda: simulation.restore(kept))
+    simulation.step(1)  # to 2.301 s once more
+    assert done.done()
+    posted = simulation.digest()
+    simulation.restore(kept)
+    assert flown(simulation, 1.301) == posted
+
+
+def test_no_snapshot_in_the_middle_of_a_tick(simulate, flat_data):
+    simulation = simulate(flat_data)
+    trouble = []
+
+    def on_odometry(_published):
+        try:
+            simulation.snapshot()
+        except SnapshotError as error:
+            trouble.append(str(error))
+
+    simulation.graph.subscribe("/uav1/odom", on_odometry)
+    simulation.run(0.05)
+    assert "middle of a tick" in trouble[0]
+
+
+def test_undelivered_messages_are_kept(simulate, flat_data):
+    simulation = simulate(flat_data)
+    heard = []
+    publisher = simulation.graph.advertise("/note", String)
+    simulation.graph.subscribe("/note", lambda published: heard.append(published.message.data))
+    publisher.publish(String("waiting"))
+    kept = simulation.snapshot()
+    simulation.run(0.01)
+    simulation.restore(kept)
+    simulation.run(0.01)
+    assert heard == ["waiting", "waiting"]
