@@ -56,7 +56,7 @@ def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
             resolve(forest.file, scenario.folder, SHIPPED_DATA),
             region=forest.region_m,
             species=forest.species,
-            seed=scenario.seed,
+            seed=scenario.world_seed,
             terrain=terrain,
         )
     if isinstance(forest, ProceduralForest):
@@ -65,7 +65,7 @@ def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
             trees=forest.trees,
             minimum_spacing_m=forest.minimum_spacing_m,
             species=forest.species,
-            seed=scenario.seed,
+            seed=scenario.world_seed,
             terrain=terrain,
         )
     return None

@@ -11,6 +11,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
+from volery.scenario.faults import Fault
+
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
@@ -96,6 +98,8 @@ class Wind(_Data):
 class World(_Data):
     """Ground, trees, air."""
 
+    seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
+    """Seed of the trees alone; None: the scenario's seed grows them too."""
     terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
     forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
     wind: Wind = Wind()
@@ -277,6 +281,7 @@ class Scenario(_Data):
     world: World = World()
     types: Annotated[dict[Name, UavType], Field(min_length=1)]
     uavs: Annotated[tuple[UavGroup, ...], Field(min_length=1)]
+    faults: tuple[Fault, ...] = ()
 
     _folder: Path | None = PrivateAttr(default=None)
 
@@ -293,6 +298,11 @@ class Scenario(_Data):
         if 1_000_000_000 % self.physics.rate_hz:
             raise ValueError("physics.rate_hz must divide 1e9, e.g. 200, 250, 400, 500, 1000")
         return self
+
+    @property
+    def world_seed(self) -> int:
+        """Seed that grows the world."""
+        return self.seed if self.world.seed is None else self.world.seed
 
     @property
     def folder(self) -> Path | None:

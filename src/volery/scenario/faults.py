@@ -1,0 +1,110 @@
+"""What goes wrong in a run: faults as timed entries of a scenario, or injected while it runs."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+
+from volery.core.errors import CommandError
+
+Vector3 = tuple[float, float, float]
+NonNegative = Annotated[float, Field(ge=0.0)]
+
+
+class _Fault(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    at_s: NonNegative = 0.0
+    """Simulated time at which it begins; one that has passed means at once."""
+
+
+class _UavFault(_Fault):
+    """A fault of one UAV."""
+
+    uav: str
+    """Its name, such as `uav1`."""
+
+
+class _Passing(_UavFault):
+    """A fault that may end by itself."""
+
+    until_s: NonNegative | None = None
+    """Simulated time at which all is well again; None: it stays."""
+
+    @model_validator(mode="after")
+    def _ends_after_it_begins(self) -> Self:
+        if self.until_s is not None and self.until_s <= self.at_s:
+            raise ValueError(f"until_s = {self.until_s} must be later than at_s = {self.at_s}")
+        return self
+
+
+class MotorFault(_Passing):
+    """A rotor gives part of its thrust, or none."""
+
+    kind: Literal["motor"]
+    rotor: Annotated[int, Field(ge=0)]
+    """Number of the rotor in the airframe's file, from 0."""
+    thrust_factor: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """Share of its thrust that is left; 0 stops it."""
+
+
+class SensorFault(_Passing):
+    """A sensor is silent, repeats itself, or measures wrong."""
+
+    kind: Literal["sensor"]
+    sensor: str
+    """Name of the sensor, such as `imu`."""
+    effect: Literal["dropped", "stuck", "biased"]
+    bias: Annotated[tuple[float, ...], Field(min_length=1)] | None = None
+    """What a biased sensor adds: a number for each that it measures, in their units."""
+
+    @model_validator(mode="after")
+    def _bias_belongs_to_biased(self) -> Self:
+        if (self.effect == "biased") != (self.bias is not None):
+            raise ValueError('bias is needed for effect = "biased", and only there')
+        return self
+
+
+class GnssFault(_Passing):
+    """No satellites are received."""
+
+    kind: Literal["gnss_loss"]
+
+
+class GustFault(_Fault):
+    """A 1-cosine gust that reaches all places at once."""
+
+    kind: Literal["gust"]
+    velocity_m_s: Vector3
+    """Wind added at its height, map."""
+    rise_s: Annotated[float, Field(ge=0.01, le=60.0)] = 0.5
+    """Time from nothing to the full gust, and back."""
+    hold_s: Annotated[float, Field(ge=0.0, le=600.0)] = 1.0
+    """Time at full strength."""
+
+
+class DisplacementFault(_UavFault):
+    """A UAV is somewhere else from one step to the next."""
+
+    kind: Literal["displacement"]
+    offset_m: Vector3
+    """Added to its position, map."""
+
+
+Fault: TypeAlias = Annotated[
+    MotorFault | SensorFault | GnssFault | GustFault | DisplacementFault,
+    Field(discriminator="kind"),
+]
+
+_ADAPTER: TypeAdapter[Fault] = TypeAdapter(Fault)
+
+
+def parse_fault(data: dict[str, Any]) -> Fault:
+    """Fault from plain data, as in a scenario. `CommandError` says what is wrong with it."""
+    try:
+        return _ADAPTER.validate_python(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise CommandError(f"fault: {place}: {first['msg']}") from None
