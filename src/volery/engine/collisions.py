@@ -45,7 +45,11 @@ BOUNCE = Bounce(restitution=0.5, crashes=False)
 
 
 class Collisions:
-    """Keeps the fleet's distance budgets filled and turns touches into events and impulses."""
+    """Keeps the fleet's distance budgets filled and turns touches into events and impulses.
+
+    The fleet may hold several independent copies of a scenario, one after the other in its rows;
+    UAVs meet those of their own copy only.
+    """
 
     def __init__(
         self,
@@ -54,6 +58,8 @@ class Collisions:
         names: tuple[str, ...],
         response: Bounce,
         emit: Callable[[Event], None],
+        *,
+        copies: int = 1,
     ) -> None:
         self._fleet = fleet
         self._scene = scene
@@ -62,7 +68,9 @@ class Collisions:
         self._emit = emit
         self._radius = np.array([a.body.collision_radius_m for a in fleet.airframes])
         self._touched_solid = np.full(len(names), -1)
-        self._touching_uav = np.zeros((len(names), len(names)), dtype=bool)
+        self._crew = len(names) // copies
+        self._touching_uav = np.zeros((len(names), self._crew), dtype=bool)
+        """Who touches whom (row, place of the other in the copy)."""
         fleet.state.contact_budget[:] = 0.0
         fleet.state.separation_budget[:] = 0.0
 
@@ -78,6 +86,13 @@ class Collisions:
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps beside the fleet's own budgets: who touches what."""
         return {"solid": self._touched_solid.copy(), "uav": self._touching_uav.copy()}
+
+    def forget(self, rows: NDArray[np.int64]) -> None:
+        """Take the UAVs of whole copies as new: they touch nothing, and look around at once."""
+        self._touched_solid[rows] = -1
+        self._touching_uav[rows] = False
+        self._fleet.state.contact_budget[rows] = 0.0
+        self._fleet.state.separation_budget[rows] = 0.0
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
@@ -112,31 +127,41 @@ class Collisions:
     # --------------------------------------------------------------------------------- other UAVs
 
     def _resolve_others(self, i: int, time_ns: int) -> None:
-        """Share the distance to each other UAV between the two of them."""
+        """Share the distance to each other UAV of the copy between the two of them."""
+        crew = self._crew_of(i)
+        own = i - crew.start
         state = self._fleet.state
-        apart = state.position_map[i] - state.position_map
-        gaps = np.sqrt((apart * apart).sum(axis=1)) - self._radius - self._radius[i]
-        gaps[i] = np.inf
+        apart = state.position_map[i] - state.position_map[crew]
+        gaps = np.sqrt((apart * apart).sum(axis=1)) - self._radius[crew] - self._radius[i]
+        gaps[own] = np.inf
         for j in np.flatnonzero(gaps <= 0.0):
-            self._touch_uav(i, int(j), apart[j], time_ns)
+            self._touch_uav(i, crew.start + int(j), apart[j], time_ns)
         released = gaps > _RELEASE_M
-        self._touching_uav[i, released] = False
-        self._touching_uav[released, i] = False
+        touching = self._touching_uav[crew]
+        touching[own, released] = False
+        touching[released, own] = False
         half = np.maximum(0.5 * gaps, 0.5 * _LEAST_BUDGET_M)
-        state.separation_budget[i] = half.min()
-        others = np.arange(len(gaps)) != i
-        state.separation_budget[others] = np.minimum(state.separation_budget[others], half[others])
+        budget = state.separation_budget[crew]
+        others = np.arange(len(gaps)) != own
+        budget[others] = np.minimum(budget[others], half[others])
+        budget[own] = half.min()
 
     def _touch_uav(self, i: int, j: int, apart: Array, time_ns: int) -> None:
         state = self._fleet.state
         normal = _unit(apart)
         approach = -float(normal @ (state.velocity_map[i] - state.velocity_map[j]))
-        if not self._touching_uav[i, j]:
-            self._touching_uav[i, j] = self._touching_uav[j, i] = True
+        first = self._crew_of(i).start
+        if not self._touching_uav[i, j - first]:
+            self._touching_uav[i, j - first] = self._touching_uav[j, i - first] = True
             self._report(i, approach, self._names[j], time_ns)
             self._report(j, approach, self._names[i], time_ns)
         if approach > 0.0:
             self._fleet.strike_pair(i, j, normal, self._response.restitution, _FRICTION)
+
+    def _crew_of(self, i: int) -> slice:
+        """Rows of the copy that UAV `i` belongs to."""
+        first = i - i % self._crew
+        return slice(first, first + self._crew)
 
     def _report(self, i: int, speed: float, partner: str, time_ns: int) -> None:
         x, y, z = self._fleet.state.position_map[i].tolist()

@@ -81,6 +81,7 @@ class Engine:
         sink: Sink,
         *,
         crash_on_contact: bool,
+        copies: int = 1,
     ) -> None:
         self.fleet = fleet
         self.scene = scene
@@ -94,7 +95,9 @@ class Engine:
         self._new_events: list[Event] = []
         self._names = names
         response = CRASH if crash_on_contact else BOUNCE
-        self.collisions = Collisions(fleet, scene, names, response, self._new_events.append)
+        self.collisions = Collisions(
+            fleet, scene, names, response, self._new_events.append, copies=copies
+        )
         self.banks = tuple(banks)
         self.sensor_agenda: Agenda[SensorBank] = Agenda(self.dt_ns)
         for bank in banks:
