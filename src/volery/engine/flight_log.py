@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from volery.control.fleet import Fleet, FleetEvent, FleetEventKind
+from volery.control.fleet import Fleet
+from volery.control.fleet_events import FleetEvent, FleetEventKind
 from volery.control.flight_modes import FlightMode
 from volery.engine.events import Event, EventKind
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from flights import F450, FLAT, LEVEL, in_air, on_ground, ring, track
 
-from volery.control.fleet import Fleet, FleetEventKind
+from volery.control.fleet import Fleet
+from volery.control.fleet_events import FleetEventKind
 from volery.control.flight_modes import FlightMode
 from volery.control.setpoints import PILOT
 from volery.control.step import UAV

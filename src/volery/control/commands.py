@@ -1,0 +1,223 @@
+"""The commands of a fleet: checked, then written into the rows that the compiled step reads."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.control.flight_modes import FlightMode
+from volery.control.setpoints import (
+    MAX_COORDINATE,
+    ControlLevel,
+    checked,
+    checked_attitude,
+    checked_within,
+)
+from volery.core import rotations
+from volery.core.errors import CommandError
+from volery.vehicle.airframe import Airframe
+
+Array = NDArray[np.float64]
+
+DEFAULT_RETURN_HEIGHT_M = 10.0
+
+
+class FleetCommands:
+    """What UAVs can be told; `Fleet` adds time and state.
+
+    airframes, names: one a UAV. uavs: (N,) rows of `step.UAV`. dt: physics step, s. A command acts
+    from the next step; one that is refused changes nothing.
+    """
+
+    def __init__(
+        self,
+        airframes: tuple[Airframe, ...],
+        names: tuple[str, ...],
+        uavs: NDArray[np.void],
+        dt: float,
+    ) -> None:
+        self.airframes = airframes
+        self.names = names
+        self.step = 0
+        self._dt = dt
+        self._uavs = uavs
+        self._bodies: NDArray[np.void] = uavs["body"]
+        self._pilots: NDArray[np.void] = uavs["pilot"]
+
+    def __len__(self) -> int:
+        """Number of UAVs."""
+        return len(self._uavs)
+
+    def mode(self, i: int) -> FlightMode:
+        """Flight mode of UAV `i`."""
+        return FlightMode(int(self._pilots["mode"][i]))
+
+    def set_command_timeout(self, seconds: float, i: int | None = None) -> None:
+        """Time without a velocity command after which UAV `i` (None: all) holds; s, up to 60."""
+        if not 0.0 < seconds <= 60.0:
+            raise CommandError(f"time-out = {seconds} s is out of range; up to 60 s is allowed")
+        rows = slice(None) if i is None else i
+        self._pilots["timeout_steps"][rows] = max(1, round(seconds / self._dt))
+
+    def command_rotor_speeds(self, i: int, speeds: ArrayLike) -> None:
+        """Turn the rotors of UAV `i` at `speeds` (R,) rad/s."""
+        self._refuse_wreck(i)
+        rotors = self.airframes[i].rotors
+        shape = (len(rotors.places),)
+        speeds = checked_within("rotor speeds", speeds, shape, rotors.max_speed_rad_s)
+        pilot = self._enter_low_level(i, ControlLevel.ROTORS)
+        pilot["rotor_reference"][: len(speeds)] = speeds
+
+    def command_rates(self, i: int, omega_body: ArrayLike, thrust: float) -> None:
+        """Turn UAV `i` at `omega_body` (3,) rad/s, FLU, with `thrust` N along its z axis."""
+        self._refuse_wreck(i)
+        limit = 4.0 * math.radians(self.airframes[i].limits.rate_deg_s)
+        omega_body = checked("rates", omega_body, (3,), limit)
+        thrust = self._checked_thrust(i, thrust)
+        pilot = self._enter_low_level(i, ControlLevel.RATES)
+        pilot["rates"] = omega_body
+        pilot["thrust"] = thrust
+
+    def command_attitude(self, i: int, attitude: ArrayLike, thrust: float) -> None:
+        """Hold UAV `i` at `attitude` (4,), map from body, with `thrust` N along its z axis."""
+        self._refuse_wreck(i)
+        attitude = checked_attitude(attitude)
+        thrust = self._checked_thrust(i, thrust)
+        pilot = self._enter_low_level(i, ControlLevel.ATTITUDE)
+        pilot["attitude"] = attitude
+        pilot["thrust"] = thrust
+        pilot["yaw_rate"] = 0.0
+
+    def command_velocity_body(self, i: int, velocity: ArrayLike, yaw_rate: float = 0.0) -> None:
+        """Fly UAV `i` at `velocity` (3,) m/s in its level heading frame (x forward, y left, z up).
+
+        A ROS Twist: the velocity turns with the vehicle, yaw_rate is in rad/s. It holds until the
+        time-out, then the UAV brakes and holds its place. Beyond the airframe's limits it flies at
+        the limit.
+        """
+        rate = checked("yaw rate", yaw_rate, (), 100.0)
+        self._command_velocity(i, velocity, in_heading=True)
+        self._turn(i, rate)
+
+    def command_velocity_map(
+        self, i: int, velocity: ArrayLike, yaw_rate: float = 0.0, *, yaw: float | None = None
+    ) -> None:
+        """Fly UAV `i` at `velocity` (3,) m/s, map, turning at `yaw_rate` rad/s or to `yaw` rad."""
+        rate = checked("yaw rate", yaw_rate, (), 100.0)
+        angle = None if yaw is None else checked("yaw", yaw, (), 1e4)
+        self._command_velocity(i, velocity, in_heading=False)
+        if angle is None:
+            self._turn(i, rate)
+        else:
+            self._face(i, float(angle))
+
+    def command_position(self, i: int, position: ArrayLike, yaw: float | None = None) -> None:
+        """Fly UAV `i` to `position` (3,) m, map, with heading `yaw` rad (None: as it is); hold."""
+        position = checked("position", position, (3,), MAX_COORDINATE)
+        angle = None if yaw is None else float(checked("yaw", yaw, (), 1e4))
+        pilot = self._enter_guided(i, FlightMode.GO_TO)
+        pilot["position_target"] = position
+        pilot["braking"] = False
+        if angle is not None:
+            self._face(i, angle)
+
+    def take_off(self, i: int, altitude_m: float = 2.5) -> None:
+        """Let UAV `i`, landed, climb to `altitude_m` above its place and hold."""
+        if not (math.isfinite(altitude_m) and 0.0 < altitude_m <= MAX_COORDINATE):
+            raise CommandError(f"take-off altitude = {altitude_m} m is not a height above ground")
+        self._refuse_wreck(i)
+        if self.mode(i) is not FlightMode.LANDED:
+            raise CommandError(f"{self.names[i]} cannot take off: it flies ({self.mode(i).name})")
+        place = self._bodies["position_map"][i].copy()
+        self._pilots["home"][i] = place
+        pilot = self._enter_guided(i, FlightMode.TAKE_OFF, from_ground=True)
+        pilot["position_target"] = place + np.array([0.0, 0.0, altitude_m])
+        pilot["braking"] = False
+
+    def hold(self, i: int) -> None:
+        """Let UAV `i` stop and stay where it comes to rest."""
+        self._enter_guided(i, FlightMode.HOLD)["braking"] = True
+
+    def land(self, i: int) -> None:
+        """Let UAV `i` stop, descend straight down and stop its rotors on the ground."""
+        self._enter_guided(i, FlightMode.LAND)["braking"] = True
+
+    def return_home(self, i: int, height_m: float = DEFAULT_RETURN_HEIGHT_M) -> None:
+        """Let UAV `i` fly back at least `height_m` above its home, and land there."""
+        if not (math.isfinite(height_m) and 0.0 < height_m <= MAX_COORDINATE):
+            raise CommandError(f"return height = {height_m} m is not a height above home")
+        pilot = self._enter_guided(i, FlightMode.RETURN)
+        pilot["braking"] = True
+        pilot["phase"] = 0
+        pilot["return_height"] = max(
+            float(pilot["home"][2]) + height_m, float(self._bodies["position_map"][i, 2])
+        )
+
+    def set_home(self, i: int, position: ArrayLike) -> None:
+        """Place (3,) m, map, to which UAV `i` returns; else that of its last take-off."""
+        self._pilots["home"][i] = checked("home", position, (3,), MAX_COORDINATE)
+
+    # -------------------------------------------------------------------------------- inside
+
+    def _refuse_wreck(self, i: int) -> None:
+        if not 0 <= i < len(self):
+            raise CommandError(f"there is no UAV {i}; rows 0 to {len(self) - 1} exist")
+        if self._bodies["crashed"][i]:
+            raise CommandError(f"{self.names[i]} has crashed")
+
+    def _checked_thrust(self, i: int, thrust: float) -> float:
+        airframe = self.airframes[i]
+        most = len(airframe.rotors.places) * airframe.max_rotor_thrust
+        return float(checked_within("thrust", thrust, (), most))
+
+    def _wake(self, i: int) -> None:
+        if self._bodies["on_ground"][i] or self._bodies["asleep"][i]:
+            self._bodies["last_contact_step"][i] = self.step  # it stands: no new touch
+        self._bodies["asleep"][i] = False
+        self._bodies["still_steps"][i] = 0
+        self._bodies["ground_budget"][i] = 0.0
+
+    def _enter_low_level(self, i: int, level: ControlLevel) -> Any:
+        self._wake(i)
+        pilot: Any = self._pilots[i]
+        pilot["mode"] = FlightMode.LOW_LEVEL
+        pilot["level"] = level
+        return pilot
+
+    def _enter_guided(self, i: int, mode: FlightMode, *, from_ground: bool = False) -> Any:
+        self._refuse_wreck(i)
+        if self.mode(i) is FlightMode.LANDED and not from_ground:
+            raise CommandError(f"{self.names[i]} stands on the ground; it must take off first")
+        self._wake(i)
+        pilot: Any = self._pilots[i]
+        if pilot["level"] != ControlLevel.GUIDED:
+            body = self._bodies[i]
+            yaw = float(rotations.yaw_of(body["attitude"]))
+            pilot["level"] = ControlLevel.GUIDED
+            pilot["velocity"] = body["velocity_map"]
+            pilot["velocity_integral"] = 0.0
+            pilot["heading"] = pilot["heading_target"] = math.cos(yaw), math.sin(yaw)
+        if mode is not FlightMode.VELOCITY and pilot["turning"]:
+            pilot["heading_target"] = pilot["heading"]
+            pilot["turning"] = False
+        pilot["mode"] = mode
+        pilot["calm_ticks"] = 0
+        return pilot
+
+    def _command_velocity(self, i: int, velocity: ArrayLike, *, in_heading: bool) -> None:
+        velocity = checked("velocity", velocity, (3,), 1e3)
+        pilot = self._enter_guided(i, FlightMode.VELOCITY)
+        pilot["velocity_target"] = velocity
+        pilot["velocity_in_heading"] = in_heading
+        pilot["deadline_step"] = self.step + pilot["timeout_steps"]
+
+    def _turn(self, i: int, rate: Array) -> None:
+        self._pilots["turning"][i] = True
+        self._pilots["yaw_rate_target"][i] = rate
+
+    def _face(self, i: int, yaw: float) -> None:
+        self._pilots["turning"][i] = False
+        self._pilots["heading_target"][i] = math.cos(yaw), math.sin(yaw)

@@ -1,0 +1,67 @@
+"""Impulses between UAVs and what they touch, trees and each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.control.setpoints import checked
+from volery.core import rotations
+from volery.vehicle.airframe import Airframe
+from volery.vehicle.fleet import FleetState
+
+Array = NDArray[np.float64]
+
+
+def collide(
+    airframes: Sequence[Airframe],
+    state: FleetState,
+    i: int,
+    j: int | None,
+    normal_map: ArrayLike,
+    restitution: float,
+    friction: float,
+    point_map: ArrayLike | None,
+) -> float:
+    """Change the motion of UAV `i`, and of `j` where it is one, by an impulse; its size in N s.
+
+    normal_map: (3,) unit vector into `i`, out of `j` or of what stands fixed. point_map: (3,) m,
+    where they touch; without it the impulse goes through the centres of mass. Friction is
+    Coulomb's. Nothing happens, and 0 is returned, when the two part already.
+    """
+    normal = checked("normal", normal_map, (3,), 1.1)
+    normal = normal / np.linalg.norm(normal)
+    sides = [(i, 1.0)] if j is None else [(i, 1.0), (j, -1.0)]
+    velocity = np.zeros(3)
+    softness = np.zeros((3, 3))
+    spins: list[Array] = []
+    for row, sign in sides:
+        turn = rotations.matrix(state.attitude[row])
+        airframe = airframes[row]
+        lever = np.zeros(3)
+        if point_map is not None:
+            lever = np.asarray(point_map, dtype=np.float64) - state.position_map[row]
+        cross = np.cross(np.eye(3), lever)  # cross @ f = lever x f
+        inverse = turn @ np.diag(1.0 / np.array(airframe.body.inertia_kg_m2)) @ turn.T
+        spins.append(turn.T @ inverse @ cross)
+        softness += np.eye(3) / airframe.body.mass_kg - cross @ inverse @ cross
+        omega = turn @ state.omega_body[row]
+        velocity += sign * (state.velocity_map[row] + np.cross(omega, lever))
+    closing = -float(velocity @ normal)
+    if closing <= 0.0:
+        return 0.0
+    push = (1.0 + restitution) * closing / float(normal @ softness @ normal)
+    impulse = push * normal
+    across = velocity + closing * normal
+    slide = float(np.linalg.norm(across))
+    if slide > 1e-9:
+        along = across / slide
+        hold = min(friction * push, slide / float(along @ softness @ along))
+        impulse = impulse - hold * along
+    for (row, sign), spin in zip(sides, spins, strict=True):
+        mass = airframes[row].body.mass_kg
+        state.velocity_map[row] += sign * impulse / mass
+        state.omega_body[row] += sign * (spin @ impulse)
+    return float(np.linalg.norm(impulse))
