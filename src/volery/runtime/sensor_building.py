@@ -47,16 +47,22 @@ class Fitted:
         return (spec.kind, model, rate, spec.phase_s, getattr(spec, "noise", None))
 
 
-def fit_sensors(scenario: schema.Scenario, starts: Sequence[Start]) -> list[Fitted]:
-    """Every sensor of every UAV, in fleet order."""
+def fit_sensors(
+    scenario: schema.Scenario, starts: Sequence[Start], *, seed: int | None = None, row: int = 0
+) -> list[Fitted]:
+    """Every sensor of every UAV, in fleet order.
+
+    `seed`: of their noise (None: the scenario's). `row`: of the first UAV in the fleet.
+    """
+    seed = scenario.seed if seed is None else seed
     return [
         Fitted(
-            SensorId(row, start.name, spec.name),
+            SensorId(row + i, start.name, spec.name),
             spec,
             _mount(spec),
-            stream_key(scenario.seed, f"{start.name}/{spec.kind}/{spec.name}"),
+            stream_key(seed, f"{start.name}/{spec.kind}/{spec.name}"),
         )
-        for row, start in enumerate(starts)
+        for i, start in enumerate(starts)
         for spec in scenario.types[start.type_name].sensors
     ]
 

@@ -12,10 +12,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.core.clock import ns_from_s, s_from_ns
-from volery.core.errors import CommandError, DataFileError, ScenarioError, SnapshotError
+from volery.core.errors import CommandError, ScenarioError, SnapshotError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.engine.pacing import Pacer
@@ -23,10 +22,11 @@ from volery.engine.partners import Partner
 from volery.graph.graph import Graph
 from volery.graph.node import Context, Node
 from volery.graph.publishing import GraphPublisher, scan_topic
+from volery.runtime.building import add_bodies, build_fleet, place
 from volery.runtime.command_door import open_commands
 from volery.runtime.digest import Digest
 from volery.runtime.node_loading import start_node
-from volery.runtime.placement import Start, place_uavs
+from volery.runtime.placement import Start
 from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors
 from volery.runtime.snapshot import (
     Snapshot,
@@ -48,8 +48,6 @@ from volery.sensors.samples import (
     RangeReadings,
     Samples,
 )
-from volery.vehicle.airframe import Airframe, load_airframe
-from volery.vehicle.body_shape import body_shape
 from volery.world.scene import Scene
 
 _CLOCK_PERIOD_S = 0.01
@@ -98,10 +96,10 @@ class Simulation:
         self._digest: Digest | None = None
         self._events: list[Event] = []
 
-        starts = self._place()
-        self._fleet = _make_fleet(scenario, starts)
-        _add_bodies(self.scene, starts)
+        starts = place(scenario, self.scene, self.terrain)
         names = tuple(start.name for start in starts)
+        self._fleet = build_fleet(scenario, starts, names)
+        add_bodies(self.scene, starts)
         fitted = fit_sensors(scenario, starts)
         self.graph = Graph(lambda: self.time_ns)
         self._publisher = _make_publisher(self.graph, fitted)
@@ -350,22 +348,10 @@ class Simulation:
 
     # ----------------------------------------------------------------------------------- building
 
-    def _place(self) -> tuple[Start, ...]:
-        airframes: dict[str, Airframe] = {}
-        for name, kind in self.scenario.types.items():
-            try:
-                airframes[name] = load_airframe(kind.airframe, self.scenario.folder)
-            except DataFileError as error:
-                key = f"{self.scenario.name}: types.{name}.airframe"
-                raise DataFileError(f"{key}: {error}") from None
-        return place_uavs(self.scenario, airframes, self.scene, self.terrain)
-
     def _open_graph(self, starts: tuple[Start, ...]) -> None:
         self._engine.every(_CLOCK_PERIOD_S, lambda: self._publisher.publish_clock(self.time_ns))
         self._engine.every(_DIGEST_PERIOD_S, self._take_fingerprint)
-        for row, (start, uav) in enumerate(zip(starts, self.uavs.values(), strict=True)):
-            kind = self.scenario.types[start.type_name]
-            self._fleet.set_command_timeout(kind.flight.command_timeout_s, row)
+        for start, uav in zip(starts, self.uavs.values(), strict=True):
             open_commands(self.graph, uav)
             if start.takes_off:
                 uav.take_off()
@@ -402,27 +388,6 @@ class Simulation:
             mode is FlightMode.CRASHED or (mode is FlightMode.LANDED and name in flown)
             for name, mode in zip(self.uavs, modes, strict=True)
         )
-
-
-def _make_fleet(scenario: Scenario, starts: tuple[Start, ...]) -> Fleet:
-    return Fleet(
-        [start.airframe for start in starts],
-        np.array([start.position_map for start in starts]),
-        np.array([start.attitude for start in starts]),
-        dt_ns=1_000_000_000 // scenario.physics.rate_hz,
-        on_contact=scenario.physics.on_contact,
-        names=[start.name for start in starts],
-        mode=[FlightMode.LANDED if start.on_ground else FlightMode.HOLD for start in starts],
-    )
-
-
-def _add_bodies(scene: Scene, starts: tuple[Start, ...]) -> None:
-    kinds = {start.airframe.name: start.airframe for start in starts}
-    order = list(kinds)
-    scene.set_bodies(
-        [body_shape(airframe) for airframe in kinds.values()],
-        [order.index(start.airframe.name) for start in starts],
-    )
 
 
 def _make_publisher(graph: Graph, fitted: list[Fitted]) -> GraphPublisher:

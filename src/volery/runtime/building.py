@@ -1,0 +1,56 @@
+"""Fleet and bodies of a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from volery.control.fleet import Fleet
+from volery.control.flight_modes import FlightMode
+from volery.core.errors import DataFileError
+from volery.runtime.placement import Start, place_uavs
+from volery.scenario.schema import Scenario
+from volery.vehicle.airframe import Airframe, load_airframe
+from volery.vehicle.body_shape import body_shape
+from volery.world.scene import Scene
+from volery.world.terrain import Terrain
+
+
+def place(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[Start, ...]:
+    """Where every UAV starts. Raises `ScenarioError` for what cannot be."""
+    airframes: dict[str, Airframe] = {}
+    for name, kind in scenario.types.items():
+        try:
+            airframes[name] = load_airframe(kind.airframe, scenario.folder)
+        except DataFileError as error:
+            key = f"{scenario.name}: types.{name}.airframe"
+            raise DataFileError(f"{key}: {error}") from None
+    return place_uavs(scenario, airframes, scene, terrain)
+
+
+def build_fleet(scenario: Scenario, starts: Sequence[Start], names: Sequence[str]) -> Fleet:
+    """The UAVs at their places, `names` in messages."""
+    fleet = Fleet(
+        [start.airframe for start in starts],
+        np.array([start.position_map for start in starts]),
+        np.array([start.attitude for start in starts]),
+        dt_ns=1_000_000_000 // scenario.physics.rate_hz,
+        on_contact=scenario.physics.on_contact,
+        names=names,
+        mode=[FlightMode.LANDED if start.on_ground else FlightMode.HOLD for start in starts],
+    )
+    for row, start in enumerate(starts):
+        flight = scenario.types[start.type_name].flight
+        fleet.set_command_timeout(flight.command_timeout_s, row)
+    return fleet
+
+
+def add_bodies(scene: Scene, starts: Sequence[Start]) -> None:
+    """Make the UAVs' bodies visible to sensors."""
+    kinds = {start.airframe.name: start.airframe for start in starts}
+    order = list(kinds)
+    scene.set_bodies(
+        [body_shape(airframe) for airframe in kinds.values()],
+        [order.index(start.airframe.name) for start in starts],
+    )
