@@ -69,6 +69,16 @@ class Agenda(Generic[What]):
             heapq.heapreplace(self._heap, entry)
         return due
 
+    def next_after(self, what: What, step: int) -> tuple[int, bool]:
+        """Number of the next firing of `what`, or of its last one where that was at `step`.
+
+        The second value tells which: whether it has fired at `step`.
+        """
+        entry = next(entry for entry in self._heap if entry.what is what)
+        if entry.k and self._step_at(entry, entry.k - 1) == step:
+            return entry.k - 1, True
+        return entry.k, False
+
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
         return {"added": self._added, "k": {entry.order: entry.k for entry in self._heap}}
@@ -84,5 +94,7 @@ class Agenda(Generic[What]):
         heapq.heapify(self._heap)
 
     def _step_of(self, entry: _Entry[What]) -> int:
-        instant = entry.schedule.instant_ns(entry.k) + entry.lag_ns
-        return -(-instant // self._dt_ns)
+        return self._step_at(entry, entry.k)
+
+    def _step_at(self, entry: _Entry[What], k: int) -> int:
+        return -(-(entry.schedule.instant_ns(k) + entry.lag_ns) // self._dt_ns)

@@ -19,6 +19,7 @@ from volery.engine.commands import Inbox
 from volery.engine.deadlines import Deadlines
 from volery.engine.events import Event
 from volery.engine.partners import Partner
+from volery.engine.restart import Keys, restart_sensors
 from volery.engine.stages import STAGES, Tick, take_commands
 from volery.sensors.samples import Samples, SensorId
 from volery.world.scene import Scene
@@ -146,6 +147,12 @@ class Engine:
         events = sorted(self._new_events, key=lambda event: event.time_ns)
         self._new_events.clear()
         return events
+
+    def restart_sensors(
+        self, uavs: NDArray[np.int64], keys: Keys
+    ) -> list[tuple[Samples, NDArray[np.int64]]]:
+        """Put the sensors of `uavs` back to their start; see `engine.restart`."""
+        return restart_sensors(self.sensor_agenda, self.banks, self.fleet, uavs, keys)
 
     # ------------------------------------------------------------------------------ snapshot
 

@@ -7,6 +7,7 @@ where its library cannot be used, through embreex's public call (`embreex_fallba
 
 from __future__ import annotations
 
+import copy
 import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -89,6 +90,7 @@ class Scene:
         self._content = collect(terrain, forest, detail, self.solids)
         self.backend: EmbreeBackend | EmbreexBackend = _make_backend(self._content, backend)
         self._bodies = _no_bodies()
+        self._is_twin = False
 
     @property
     def moving_offset(self) -> int:
@@ -105,10 +107,22 @@ class Scene:
         """What compiled kernels need to cast in this scene; only while the scene is open."""
         return self.backend.handle(self._bodies)
 
+    def twin(self) -> Scene:
+        """The same static world with moving bodies of its own, for another thread.
+
+        It lives as long as this scene, and casts on the thread that asks.
+        """
+        twin = copy.copy(self)
+        twin.workers = Workers(1)
+        twin._bodies = _no_bodies()
+        twin._is_twin = True
+        return twin
+
     def close(self) -> None:
         """Give memory and threads back; the scene must not be asked anything afterwards."""
-        self.backend.close()
         self.workers.close()
+        if not self._is_twin:
+            self.backend.close()
 
     def instance_name(self, instance: int) -> str:
         """What an instance number stands for: "ground", "tree 17", a solid's name, "uav3"."""
