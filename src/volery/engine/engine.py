@@ -18,7 +18,9 @@ from volery.engine.collisions import BOUNCE, CRASH, Collisions
 from volery.engine.commands import Inbox
 from volery.engine.events import Event
 from volery.engine.stages import STAGES, Tick
-from volery.sensors.samples import Samples, SensorId
+from volery.sensors.bank import Bank
+from volery.sensors.faults import FaultTable
+from volery.sensors.samples import Samples
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
@@ -26,27 +28,16 @@ _MOST_STEPS_A_TICK = 50
 """The history of poses holds 64 steps; whoever reads along must not miss one."""
 
 
-class SensorBank(Protocol):
-    """All sensors of one kind, model, rate and phase: sampled together."""
+class SensorBank(Bank, Protocol):
+    """All sensors of one kind, model, rate and phase, as the engine drives them.
+
+    Besides what `Bank` explains (`sample`, `get_state`, `set_state`, `reset`), its sensors can
+    fail: `faults.set(row, kind, value)` takes effect at the next measurement.
+    """
 
     @property
-    def name(self) -> str:
-        """Kind of the sensors."""
-
-    @property
-    def schedule(self) -> Schedule:
-        """When they measure."""
-
-    @property
-    def lag_ns(self) -> int:
-        """How long after its instant a measurement is complete (a LIDAR's sweep)."""
-
-    @property
-    def sensors(self) -> tuple[SensorId, ...]:
-        """Which they are."""
-
-    def sample(self, k: int, time_ns: int, fleet: Fleet) -> Samples:
-        """Measurement number k."""
+    def faults(self) -> FaultTable:
+        """Faults of the sensors, row by row."""
 
 
 class Sink(Protocol):

@@ -9,21 +9,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
-Vector2 = tuple[float, float]
-Vector3 = tuple[float, float, float]
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
-Rate = Annotated[float, Field(gt=0.0, le=1000.0)]
-
-
-class _Data(BaseModel):
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, str_strip_whitespace=True
-    )
-
+from volery.scenario.base import Data as _Data
+from volery.scenario.base import MountedSensor as _Mounted
+from volery.scenario.base import Name, NonNegative, Positive, Rate, Vector2, Vector3
+from volery.scenario.base import SensorData as _Sensor
+from volery.scenario.base import check_rectangle as _check_rectangle
+from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
 
 # ------------------------------------------------------------------------------------------ world
 
@@ -76,11 +69,6 @@ class ProceduralForest(_Data):
         return self
 
 
-def _check_rectangle(region: tuple[float, float, float, float] | None) -> None:
-    if region is not None and not (region[0] < region[2] and region[1] < region[3]):
-        raise ValueError("region_m must be [x_min, y_min, x_max, y_max] with min < max")
-
-
 class Wind(_Data):
     """Steady wind, ENU."""
 
@@ -99,6 +87,11 @@ class World(_Data):
     terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
     forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
     wind: Wind = Wind()
+    origin: Origin = Origin()
+    magnetic_field: MagneticField = MagneticField()
+    gnss_denied: bool = False
+    """No satellite signals anywhere, for the whole run."""
+    gnss_denied_areas: tuple[DeniedArea, ...] = ()
 
 
 # ------------------------------------------------------------------------------- sensors and UAVs
@@ -111,18 +104,6 @@ class Nodding(_Data):
     period_s: Annotated[float, Field(ge=0.1, le=60.0)] = 2.0
     offset_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 0.0
     phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 0.0
-
-
-class _Sensor(_Data):
-    phase_s: NonNegative = 0.0
-    """Time of the first measurement."""
-
-
-class _Mounted(_Sensor):
-    position_m: Vector3 = (0.0, 0.0, 0.0)
-    """Place of the sensor frame in the body, FLU."""
-    rpy_deg: Vector3 = (0.0, 0.0, 0.0)
-    noise: bool = True
 
 
 class LidarSensor(_Mounted):
@@ -171,7 +152,7 @@ class GroundTruthSensor(_Sensor):
 
 
 Sensor = Annotated[
-    LidarSensor | ImuSensor | SonarSensor | OdometrySensor | GroundTruthSensor,
+    LidarSensor | ImuSensor | SonarSensor | OdometrySensor | GroundTruthSensor | NavigationSensor,
     Field(discriminator="kind"),
 ]
 
@@ -206,7 +187,7 @@ class NodeEntry(_Data):
 
     node: Annotated[str, Field(pattern=r"^[\w.]+:\w+$")]
     """`module:Class` with the node contract of `volery.graph.node`."""
-    parameters: dict[str, Any] = {}
+    parameters: dict[str, Any] = Field(default_factory=dict)
 
 
 class UavType(_Data):
@@ -220,12 +201,13 @@ class UavType(_Data):
     @model_validator(mode="after")
     def _sensor_names_are_unique(self) -> Self:
         names = [s.name for s in self.sensors]
+        names += [f"{s.name}_velocity" for s in self.sensors if s.kind == "gnss"]
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise ValueError(f"sensor names must differ; used twice: {', '.join(twice)}")
         for sensor in self.sensors:
             taken = sensor.name in _TAKEN_NAMES or sensor.name.startswith("laser")
-            if isinstance(sensor, ImuSensor | SonarSensor) and taken:
+            if sensor.kind not in ("lidar", "odometry", "ground_truth") and taken:
                 raise ValueError(
                     f"'{sensor.name}' is no name for a sensor of kind {sensor.kind}: names that "
                     f"begin with laser are taken, and {', '.join(_TAKEN_NAMES)}"
