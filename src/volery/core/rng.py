@@ -105,3 +105,13 @@ def fill_normal(keys: NDArray[np.uint64], counter: int, out: NDArray[np.float64]
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = normal(keys[i], counter + j)
+
+
+@kernel
+def fill_normal_rows(
+    keys: NDArray[np.uint64], counters: NDArray[np.int64], out: NDArray[np.float64]
+) -> None:
+    """As `fill_normal`, each row counted by itself: row i holds numbers counters[i].. ."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = normal(keys[i], counters[i] + j)

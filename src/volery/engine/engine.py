@@ -21,7 +21,9 @@ from volery.engine.events import Event
 from volery.engine.partners import Partner
 from volery.engine.restart import Keys, restart_sensors
 from volery.engine.stages import STAGES, Tick, take_commands
-from volery.sensors.samples import Samples, SensorId
+from volery.sensors.bank import Bank
+from volery.sensors.faults import FaultTable
+from volery.sensors.samples import Samples
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
@@ -29,27 +31,16 @@ _MOST_STEPS_A_TICK = 50
 """The history of poses holds 64 steps; whoever reads along must not miss one."""
 
 
-class SensorBank(Protocol):
-    """All sensors of one kind, model, rate and phase: sampled together."""
+class SensorBank(Bank, Protocol):
+    """All sensors of one kind, model, rate and phase, as the engine drives them.
+
+    Besides what `Bank` explains (`sample`, `get_state`, `set_state`, `reset`), its sensors can
+    fail: `faults.set(row, kind, value)` takes effect at the next measurement.
+    """
 
     @property
-    def name(self) -> str:
-        """Kind of the sensors."""
-
-    @property
-    def schedule(self) -> Schedule:
-        """When they measure."""
-
-    @property
-    def lag_ns(self) -> int:
-        """How long after its instant a measurement is complete (a LIDAR's sweep)."""
-
-    @property
-    def sensors(self) -> tuple[SensorId, ...]:
-        """Which they are."""
-
-    def sample(self, k: int, time_ns: int, fleet: Fleet) -> Samples:
-        """Measurement number k."""
+    def faults(self) -> FaultTable:
+        """Faults of the sensors, row by row."""
 
 
 class Sink(Protocol):
@@ -161,7 +152,7 @@ class Engine:
         return {
             "fleet": self.fleet.get_state(),
             "collisions": self.collisions.get_state(),
-            "banks": [_state(bank) for bank in self.banks],
+            "banks": [bank.get_state() for bank in self.banks],
             "due": [part.get_state() for part in self._due],
             "new_events": list(self._new_events),
         }
@@ -171,8 +162,7 @@ class Engine:
         self.fleet.set_state(state["fleet"])
         self.collisions.set_state(state["collisions"])
         for bank, kept in zip(self.banks, state["banks"], strict=True):
-            if kept is not None:
-                bank.set_state(kept)
+            bank.set_state(kept)
         for part, kept in zip(self._due, state["due"], strict=True):
             part.set_state(kept)
         self._new_events[:] = state["new_events"]
@@ -201,7 +191,3 @@ class Engine:
                 before = after
         finally:
             self.stands = True
-
-
-def _state(bank):  # TEMP
-    return bank.get_state() if hasattr(bank, "get_state") else None

@@ -37,6 +37,7 @@ from volery.graph.messages import (
     header,
     time_from_ns,
 )
+from volery.graph.navigation_messages import CHANNELS
 from volery.sensors.mount import Mount
 from volery.sensors.samples import (
     ImuReadings,
@@ -88,6 +89,7 @@ class GraphPublisher:
             RangeReadings: self._ranges,
             OdometryReadings: self._odometry,
             JointAngles: self._joints,
+            **dict.fromkeys(CHANNELS, self._by_channel),
         }
 
     def announce(self, sensor: SensorId, kind: type[Any], mount: Mount) -> None:
@@ -105,9 +107,12 @@ class GraphPublisher:
             if sensor.name == "odom":
                 self._static.append(_fixed_frame("map", f"{sensor.uav_name}/odom"))
         else:
-            self._advertise(
-                f"/{sensor.uav_name}/{sensor.name}", Imu if kind is ImuReadings else Range
-            )
+            if kind in CHANNELS:
+                for channel in CHANNELS[kind]:
+                    self._advertise(channel.topic(sensor), channel.message_class)
+            else:
+                message_class = Imu if kind is ImuReadings else Range
+                self._advertise(f"/{sensor.uav_name}/{sensor.name}", message_class)
             self._static.append(_mount_transform(base, f"{sensor.uav_name}/{sensor.name}", mount))
 
     def publish(self, samples: Samples) -> None:
@@ -261,6 +266,15 @@ class GraphPublisher:
                 )
         if transforms:
             self._tf.publish(TFMessage(transforms))
+
+    def _by_channel(self, samples: Any) -> None:
+        for channel in CHANNELS[type(samples)]:
+            for row, sensor in enumerate(samples.sensors):
+                publisher = self._publishers[channel.topic(sensor)]
+                if publisher.wanted:
+                    message = channel.message(samples, row)
+                    if message is not None:
+                        publisher.publish(message)
 
     def _advertise(self, topic: str, message_class: type[Any]) -> None:
         if topic not in self._publishers:

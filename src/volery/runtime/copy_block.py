@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from volery.control.gains import GUIDANCE_PERIOD_S
 from volery.core.clock import NS_PER_S, ns_from_s, s_from_ns
+from volery.core.errors import CommandError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.runtime.building import add_bodies, build_fleet
@@ -20,6 +21,7 @@ from volery.runtime.placement import Start
 from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors
 from volery.runtime.uav import Uav
 from volery.scenario.schema import Scenario
+from volery.sensors.bank import Bank
 from volery.sensors.samples import Samples
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain

@@ -17,17 +17,46 @@ from volery.core.clock import Schedule, ns_from_s
 from volery.core.errors import DataFileError
 from volery.core.rng import stream_key
 from volery.engine.engine import SensorBank
+from volery.runtime.navigation import denial, local_frame, magnetic_field_map
 from volery.runtime.placement import Start
 from volery.scenario import schema
+from volery.sensors.bank import Bank
+from volery.sensors.barometer import BarometerBank, load_barometer_model
+from volery.sensors.faults import FaultableBank
+from volery.sensors.gnss import GnssBank, load_gnss_model
 from volery.sensors.imu import ImuBank, load_imu_model
 from volery.sensors.joints import JointBank
 from volery.sensors.lidar_bank import LidarBank
 from volery.sensors.lidar_model import load_lidar
+from volery.sensors.magnetometer import MagnetometerBank, load_magnetometer_model
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.odometry import GroundTruthBank, OdometryBank, load_odometry_model
-from volery.sensors.samples import SensorId
+from volery.sensors.samples import (
+    GnssReadings,
+    ImuReadings,
+    JointAngles,
+    LidarScans,
+    MagneticReadings,
+    OdometryReadings,
+    PressureReadings,
+    RangeReadings,
+    Samples,
+    SensorId,
+)
 from volery.sensors.sonar import SonarBank, load_sonar_model
 from volery.world.scene import Scene
+
+RESULT_OF: dict[str, type[Samples]] = {
+    "lidar": LidarScans,
+    "imu": ImuReadings,
+    "sonar": RangeReadings,
+    "odometry": OdometryReadings,
+    "ground_truth": OdometryReadings,
+    "gnss": GnssReadings,
+    "barometer": PressureReadings,
+    "magnetometer": MagneticReadings,
+}
+"""What each kind of sensor measures."""
 
 
 @dataclass(frozen=True)
@@ -75,27 +104,35 @@ def build_banks(
     for sensor in fitted:
         groups[sensor.bank_key].append(sensor)
     builder = _Builder(scenario, fleet, scene)
-    banks = [builder.build(group) for group in groups.values()]
+    banks: list[SensorBank] = [
+        FaultableBank(builder.build(group), RESULT_OF[group[0].spec.kind].MEASURED)
+        for group in groups.values()
+    ]
     nodding = [sensor for sensor in fitted if sensor.mount.nods]
     if nodding:
-        banks.append(JointBank(tuple(s.id for s in nodding), tuple(s.mount for s in nodding)))
+        joints = JointBank(tuple(s.id for s in nodding), tuple(s.mount for s in nodding))
+        banks.append(FaultableBank(joints, JointAngles.MEASURED))
     return banks
 
 
 class _Builder:
     def __init__(self, scenario: schema.Scenario, fleet: Fleet, scene: Scene) -> None:
         self._scenario = scenario.name
+        self._world = scenario.world
         self._folder = scenario.folder
         self._fleet = fleet
         self._scene = scene
 
-    def build(self, group: list[Fitted]) -> SensorBank:
-        by_kind: dict[str, Callable[[list[Fitted]], SensorBank]] = {
+    def build(self, group: list[Fitted]) -> Bank:
+        by_kind: dict[str, Callable[[list[Fitted]], Bank]] = {
             "lidar": self._lidar,
             "imu": self._imu,
             "sonar": self._sonar,
             "odometry": self._odometry,
             "ground_truth": self._ground_truth,
+            "gnss": self._gnss,
+            "barometer": self._barometer,
+            "magnetometer": self._magnetometer,
         }
         try:
             return by_kind[group[0].spec.kind](group)
@@ -103,9 +140,9 @@ class _Builder:
             name = group[0].id.name
             raise DataFileError(f"{self._scenario}: sensor '{name}': {error}") from None
 
-    def _lidar(self, group: list[Fitted]) -> SensorBank:
+    def _lidar(self, group: list[Fitted]) -> Bank:
         model = load_lidar(group[0].spec.model, self._folder)
-        return LidarBank(
+        return LidarBank(  # type: ignore[return-value]  # has no state to keep or reset yet
             model,
             Schedule.from_hz(model.scan.rate_hz, _phase_ns(group)),
             _ids(group),
@@ -114,23 +151,48 @@ class _Builder:
             self._scene,
         )
 
-    def _imu(self, group: list[Fitted]) -> SensorBank:
+    def _imu(self, group: list[Fitted]) -> Bank:
         spec = group[0].spec
         model = load_imu_model(spec.model, self._folder)
         return ImuBank(model, _schedule(group), _ids(group), *_places(group), _keys(group))
 
-    def _sonar(self, group: list[Fitted]) -> SensorBank:
+    def _sonar(self, group: list[Fitted]) -> Bank:
         model = load_sonar_model(group[0].spec.model, self._folder)
         return SonarBank(
             model, _schedule(group), _ids(group), *_places(group), _keys(group), self._scene
         )
 
-    def _odometry(self, group: list[Fitted]) -> SensorBank:
+    def _odometry(self, group: list[Fitted]) -> Bank:
         model = load_odometry_model(group[0].spec.model, self._folder)
         return OdometryBank(model, _schedule(group), _ids(group), _keys(group), self._fleet)
 
-    def _ground_truth(self, group: list[Fitted]) -> SensorBank:
+    def _ground_truth(self, group: list[Fitted]) -> Bank:
         return GroundTruthBank(_schedule(group), _ids(group))
+
+    def _gnss(self, group: list[Fitted]) -> Bank:
+        model = load_gnss_model(group[0].spec.model, self._folder)
+        places, _ = _places(group)
+        return GnssBank(
+            model,
+            _schedule(group),
+            _ids(group),
+            places,
+            _keys(group),
+            local_frame(self._world),
+            denial(self._world),
+        )
+
+    def _barometer(self, group: list[Fitted]) -> Bank:
+        model = load_barometer_model(group[0].spec.model, self._folder)
+        places, _ = _places(group)
+        altitude = self._world.origin.altitude_m
+        return BarometerBank(model, _schedule(group), _ids(group), places, _keys(group), altitude)
+
+    def _magnetometer(self, group: list[Fitted]) -> Bank:
+        model = load_magnetometer_model(group[0].spec.model, self._folder)
+        _, turns = _places(group)
+        field = magnetic_field_map(self._world)
+        return MagnetometerBank(model, _schedule(group), _ids(group), turns, _keys(group), field)
 
 
 def _mount(spec: Any) -> Mount:

@@ -27,7 +27,7 @@ from volery.runtime.command_door import open_commands
 from volery.runtime.digest import Digest
 from volery.runtime.node_loading import start_node
 from volery.runtime.placement import Start
-from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors
+from volery.runtime.sensor_building import RESULT_OF, Fitted, build_banks, fit_sensors
 from volery.runtime.snapshot import (
     Snapshot,
     check_nodes,
@@ -40,26 +40,12 @@ from volery.runtime.warm_up import compile_kernels
 from volery.runtime.worlds import build_forest, build_terrain
 from volery.scenario.schema import Scenario
 from volery.sensors.mount import Mount
-from volery.sensors.samples import (
-    ImuReadings,
-    JointAngles,
-    LidarScans,
-    OdometryReadings,
-    RangeReadings,
-    Samples,
-)
+from volery.sensors.samples import JointAngles, Samples
 from volery.world.scene import Scene
 
 _CLOCK_PERIOD_S = 0.01
 _DIGEST_PERIOD_S = 0.01
 _PROGRESS_PERIOD_S = 0.1
-_RESULT_OF = {
-    "lidar": LidarScans,
-    "imu": ImuReadings,
-    "sonar": RangeReadings,
-    "odometry": OdometryReadings,
-    "ground_truth": OdometryReadings,
-}
 
 
 @dataclass(frozen=True)
@@ -393,7 +379,7 @@ class Simulation:
 def _make_publisher(graph: Graph, fitted: list[Fitted]) -> GraphPublisher:
     publisher = GraphPublisher(graph)
     for sensor in fitted:
-        publisher.announce(sensor.id, _RESULT_OF[sensor.spec.kind], sensor.mount)
+        publisher.announce(sensor.id, RESULT_OF[sensor.spec.kind], sensor.mount)
         if sensor.mount.nods:
             publisher.announce(sensor.id, JointAngles, sensor.mount)
     return publisher

@@ -21,6 +21,8 @@ from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.clock import Schedule
 from volery.core.compiled import cache_dir
+from volery.core.geodesy import LocalFrame
+from volery.sensors.gnss import GnssBank, load_gnss_model
 from volery.sensors.imu import ImuBank, load_imu_model
 from volery.sensors.joints import JointBank
 from volery.sensors.lidar_bank import LidarBank
@@ -86,6 +88,7 @@ def compile_sensors() -> None:
         SonarBank(load_sonar_model("downward_sonar"), schedule, sensors, place, turn, keys, scene),
         ImuBank(load_imu_model("adis16448"), schedule, sensors, place, turn, keys),
         GroundTruthBank(schedule, sensors),
+        GnssBank(load_gnss_model("gnss_m8"), schedule, sensors, place, keys, LocalFrame(0, 0, 0)),
         JointBank(sensors, mounts),
     ):
         bank.sample(0, 0, fleet)

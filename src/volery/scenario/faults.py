@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from volery.core.errors import CommandError
-
-Vector3 = tuple[float, float, float]
-NonNegative = Annotated[float, Field(ge=0.0)]
+from volery.scenario.base import Data, NonNegative, Vector3
 
 
-class _Fault(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
+class _Fault(Data):
     at_s: NonNegative = 0.0
     """Simulated time at which it begins; one that has passed means at once."""
 

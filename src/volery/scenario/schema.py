@@ -9,28 +9,27 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
+from volery.scenario.base import (
+    Data,
+    MountedSensor,
+    Name,
+    NonNegative,
+    Positive,
+    Rate,
+    SensorData,
+    Vector2,
+    Vector3,
+    check_rectangle,
+)
 from volery.scenario.faults import Fault
-
-Vector2 = tuple[float, float]
-Vector3 = tuple[float, float, float]
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
-Rate = Annotated[float, Field(gt=0.0, le=1000.0)]
-
-
-class _Data(BaseModel):
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, str_strip_whitespace=True
-    )
-
+from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
 
 # ------------------------------------------------------------------------------------------ world
 
 
-class FlatTerrain(_Data):
+class FlatTerrain(Data):
     """Level ground from -extent_m to extent_m in x and y."""
 
     kind: Literal["flat"] = "flat"
@@ -38,7 +37,7 @@ class FlatTerrain(_Data):
     height_m: float = 0.0
 
 
-class GridTerrain(_Data):
+class GridTerrain(Data):
     """A heightfield from a CSV grid: row k holds the elevations at y = k * spacing."""
 
     kind: Literal["grid"]
@@ -47,7 +46,7 @@ class GridTerrain(_Data):
     origin_m: Vector2 = (0.0, 0.0)
 
 
-class InventoryForest(_Data):
+class InventoryForest(Data):
     """Trees at surveyed places: CSV with `x_m,y_m[,dbh_cm,height_m,species]`."""
 
     kind: Literal["inventory"]
@@ -58,11 +57,11 @@ class InventoryForest(_Data):
 
     @model_validator(mode="after")
     def _region_is_a_rectangle(self) -> Self:
-        _check_rectangle(self.region_m)
+        check_rectangle(self.region_m)
         return self
 
 
-class ProceduralForest(_Data):
+class ProceduralForest(Data):
     """Trees thrown at random with a minimum spacing."""
 
     kind: Literal["procedural"]
@@ -74,16 +73,11 @@ class ProceduralForest(_Data):
 
     @model_validator(mode="after")
     def _region_is_a_rectangle(self) -> Self:
-        _check_rectangle(self.region_m)
+        check_rectangle(self.region_m)
         return self
 
 
-def _check_rectangle(region: tuple[float, float, float, float] | None) -> None:
-    if region is not None and not (region[0] < region[2] and region[1] < region[3]):
-        raise ValueError("region_m must be [x_min, y_min, x_max, y_max] with min < max")
-
-
-class Wind(_Data):
+class Wind(Data):
     """Steady wind, ENU."""
 
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
@@ -95,7 +89,7 @@ class Wind(_Data):
         return self
 
 
-class World(_Data):
+class World(Data):
     """Ground, trees, air."""
 
     seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
@@ -103,12 +97,17 @@ class World(_Data):
     terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
     forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
     wind: Wind = Wind()
+    origin: Origin = Origin()
+    magnetic_field: MagneticField = MagneticField()
+    gnss_denied: bool = False
+    """No satellite signals anywhere, for the whole run."""
+    gnss_denied_areas: tuple[DeniedArea, ...] = ()
 
 
 # ------------------------------------------------------------------------------- sensors and UAVs
 
 
-class Nodding(_Data):
+class Nodding(Data):
     """Sinusoidal tilt of a mount about the sensor's y axis (positive looks down)."""
 
     amplitude_deg: Annotated[float, Field(gt=0.0, le=90.0)] = 45.0
@@ -117,19 +116,7 @@ class Nodding(_Data):
     phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 0.0
 
 
-class _Sensor(_Data):
-    phase_s: NonNegative = 0.0
-    """Time of the first measurement."""
-
-
-class _Mounted(_Sensor):
-    position_m: Vector3 = (0.0, 0.0, 0.0)
-    """Place of the sensor frame in the body, FLU."""
-    rpy_deg: Vector3 = (0.0, 0.0, 0.0)
-    noise: bool = True
-
-
-class LidarSensor(_Mounted):
+class LidarSensor(MountedSensor):
     """A scanning range finder of a named model."""
 
     kind: Literal["lidar"]
@@ -138,7 +125,7 @@ class LidarSensor(_Mounted):
     nodding: Nodding | None = None
 
 
-class ImuSensor(_Mounted):
+class ImuSensor(MountedSensor):
     """Accelerometer and gyroscope of a named model."""
 
     kind: Literal["imu"]
@@ -147,7 +134,7 @@ class ImuSensor(_Mounted):
     rate_hz: Rate = 200.0
 
 
-class SonarSensor(_Mounted):
+class SonarSensor(MountedSensor):
     """Ultrasonic range finder looking down."""
 
     kind: Literal["sonar"]
@@ -156,7 +143,7 @@ class SonarSensor(_Mounted):
     rate_hz: Rate = 10.0
 
 
-class OdometrySensor(_Sensor):
+class OdometrySensor(SensorData):
     """Pose and velocity as an odometry source gives them: true motion plus a stated drift."""
 
     kind: Literal["odometry"]
@@ -166,7 +153,7 @@ class OdometrySensor(_Sensor):
     rate_hz: Rate = 50.0
 
 
-class GroundTruthSensor(_Sensor):
+class GroundTruthSensor(SensorData):
     """The true state, for reports and checks; autonomy must not read it."""
 
     kind: Literal["ground_truth"]
@@ -175,7 +162,7 @@ class GroundTruthSensor(_Sensor):
 
 
 Sensor = Annotated[
-    LidarSensor | ImuSensor | SonarSensor | OdometrySensor | GroundTruthSensor,
+    LidarSensor | ImuSensor | SonarSensor | OdometrySensor | GroundTruthSensor | NavigationSensor,
     Field(discriminator="kind"),
 ]
 
@@ -195,7 +182,7 @@ _TAKEN_NAMES = (
 """Frames, topics and services of a UAV that no sensor may take."""
 
 
-class Flight(_Data):
+class Flight(Data):
     """How the flight modes fly this type of UAV."""
 
     take_off_altitude_m: Annotated[float, Field(ge=0.3, le=500.0)] = 2.5
@@ -205,17 +192,17 @@ class Flight(_Data):
     """Without a new velocity command for this long the UAV holds its place."""
 
 
-class NodeEntry(_Data):
+class NodeEntry(Data):
     """A node that runs beside the UAV, inside the simulation, in lock step."""
 
     node: Annotated[str, Field(pattern=r"^[\w.]+:\w+$")]
     """`module:Class` with the node contract of `volery.graph.node`."""
-    parameters: dict[str, Any] = {}
+    parameters: dict[str, Any] = Field(default_factory=dict)
     latency_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     """Simulated time from a callback's input to its output; above 0 the node runs on a worker."""
 
 
-class UavType(_Data):
+class UavType(Data):
     """What a UAV is made of and what runs on it."""
 
     airframe: str = "f450"
@@ -226,12 +213,13 @@ class UavType(_Data):
     @model_validator(mode="after")
     def _sensor_names_are_unique(self) -> Self:
         names = [s.name for s in self.sensors]
+        names += [f"{s.name}_velocity" for s in self.sensors if s.kind == "gnss"]
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise ValueError(f"sensor names must differ; used twice: {', '.join(twice)}")
         for sensor in self.sensors:
             taken = sensor.name in _TAKEN_NAMES or sensor.name.startswith("laser")
-            if isinstance(sensor, ImuSensor | SonarSensor) and taken:
+            if sensor.kind not in ("lidar", "odometry", "ground_truth") and taken:
                 raise ValueError(
                     f"'{sensor.name}' is no name for a sensor of kind {sensor.kind}: names that "
                     f"begin with laser are taken, and {', '.join(_TAKEN_NAMES)}"
@@ -239,7 +227,7 @@ class UavType(_Data):
         return self
 
 
-class UavGroup(_Data):
+class UavGroup(Data):
     """One UAV, or `count` of them evenly spaced from `position_m` to `last_position_m`."""
 
     type: str
@@ -262,14 +250,14 @@ class UavGroup(_Data):
 # --------------------------------------------------------------------------------------- the whole
 
 
-class Physics(_Data):
+class Physics(Data):
     """The inner step and what a touch does."""
 
     rate_hz: Annotated[int, Field(ge=200, le=4000)] = 1000
     on_contact: Literal["crash", "bounce"] = "crash"
 
 
-class Scenario(_Data):
+class Scenario(Data):
     """Everything a run needs, as data."""
 
     name: Name

@@ -1,7 +1,8 @@
 """Inertial measurement units: discrete noise and bias model of PX4 and RotorS.
 
 White noise N / sqrt(dt); bias a first-order Gauss-Markov process with correlation time tau:
-b+ = exp(-dt/tau) b + sigma sqrt(tau/2 (1 - exp(-2 dt/tau))) n; a turn-on bias drawn once.
+b+ = exp(-dt/tau) b + sigma sqrt(tau/2 (1 - exp(-2 dt/tau))) n; a turn-on bias drawn once. A part
+may also warm up: a bias drawn once that dies away as exp(-t / time constant).
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
-from volery.core import rng
 from volery.core.clock import NS_PER_S, Schedule
+from volery.sensors.bank import rows_of, uav_rows
 from volery.sensors.inertial_kernels import feel_motion
 from volery.sensors.model import SensorModel, load_model
+from volery.sensors.noise import NoiseStreams, gauss_markov
 from volery.sensors.samples import ImuReadings, SensorId, owned
 
 Array = NDArray[np.float64]
@@ -36,6 +38,10 @@ class ImuModel(SensorModel):
     accel_random_walk_m_s3_sqrt_hz: NonNegativeFloat
     accel_bias_correlation_s: PositiveFloat
     accel_turn_on_bias_m_s2: NonNegativeFloat
+    gyro_warm_up_bias_rad_s: NonNegativeFloat = 0.0
+    """Standard deviation of the bias of a cold sensor, on top of the turn-on bias."""
+    accel_warm_up_bias_m_s2: NonNegativeFloat = 0.0
+    warm_up_time_constant_s: PositiveFloat = 60.0
 
 
 def load_imu_model(name: str, folder: Path | None = None) -> ImuModel:
@@ -65,19 +71,26 @@ class ImuBank:
         self.schedule = schedule
         self.sensors = sensors
         self._model = model
-        self._rows = np.array([s.uav for s in sensors])
+        self._rows = uav_rows(sensors)
         self._position_body = position_body
         self._body_from_sensor = attitude_body
-        self._keys = keys
-        self._bias = np.zeros((len(sensors), 6))
+        self._noise = NoiseStreams(keys, len(sensors), at_start=12, per_measurement=12)
         dt = schedule.period_ns / NS_PER_S
-        self._white = np.repeat(
-            [model.gyro_noise_density_rad_s_sqrt_hz, model.accel_noise_density_m_s2_sqrt_hz], 3
+        self._white = _axes(
+            model.gyro_noise_density_rad_s_sqrt_hz, model.accel_noise_density_m_s2_sqrt_hz
         ) / math.sqrt(dt)
-        self._decay, self._walk = _gauss_markov(model, dt)
-        if keys is not None:
-            turn_on = np.repeat([model.gyro_turn_on_bias_rad_s, model.accel_turn_on_bias_m_s2], 3)
-            self._bias = turn_on * _draw(keys, 0)
+        self._wander = gauss_markov(
+            _axes(model.gyro_random_walk_rad_s2_sqrt_hz, model.accel_random_walk_m_s3_sqrt_hz),
+            _axes(model.gyro_bias_correlation_s, model.accel_bias_correlation_s),
+            dt,
+        )
+        self._turn_on = _axes(model.gyro_turn_on_bias_rad_s, model.accel_turn_on_bias_m_s2)
+        self._cold = _axes(model.gyro_warm_up_bias_rad_s, model.accel_warm_up_bias_m_s2)
+        self._warm_up_s = model.warm_up_time_constant_s
+        self._bias = np.zeros((len(sensors), 6))
+        self._warm_up_bias = np.zeros((len(sensors), 6))
+        self._start_ns = np.zeros(len(sensors), np.int64)
+        self._switch_on(np.arange(len(sensors)), 0)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> ImuReadings:
         """Reading number k (counted from 0) of all sensors of the bank."""
@@ -93,10 +106,13 @@ class ImuBank:
             self._body_from_sensor,
             reading,
         )
-        if self._keys is not None:
-            noise = _draw(self._keys, 1 + 2 * k)
-            reading += self._bias + self._white * noise
-            self._bias = self._decay * self._bias + self._walk * _draw(self._keys, 2 + 2 * k)
+        if self._noise.enabled:
+            noise = self._noise.measurement(k)
+            reading += self._bias + self._white * noise[:, :6]
+            if self._cold.any():
+                age_s = (time_ns - self._start_ns) / NS_PER_S
+                reading += self._warm_up_bias * np.exp(-age_s / self._warm_up_s)[:, None]
+            self._bias = self._wander.decay * self._bias + self._wander.step * noise[:, 6:]
         return ImuReadings(
             self.sensors,
             time_ns,
@@ -108,23 +124,38 @@ class ImuBank:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return {"bias": self._bias.copy()}
+        return {
+            "noise": self._noise.get_state(),
+            "bias": self._bias.copy(),
+            "warm_up_bias": self._warm_up_bias.copy(),
+            "start_ns": self._start_ns.copy(),
+        }
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
+        self._noise.set_state(state["noise"])
         self._bias = np.array(state["bias"])
+        self._warm_up_bias = np.array(state["warm_up_bias"])
+        self._start_ns = np.array(state["start_ns"])
+
+    def reset(
+        self,
+        uavs: NDArray[np.int64] | None,
+        keys: NDArray[np.uint64] | None,
+        time_ns: int,
+        k: int,
+    ) -> None:
+        """Switch the sensors of some UAVs off and on again; see `Bank.reset`."""
+        rows = rows_of(self._rows, uavs)
+        self._noise.restart(rows, keys, k)
+        self._switch_on(rows, time_ns)
+
+    def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:
+        drawn = self._noise.start()[rows]
+        self._bias[rows] = self._turn_on * drawn[:, :6]
+        self._warm_up_bias[rows] = self._cold * drawn[:, 6:]
+        self._start_ns[rows] = time_ns
 
 
-def _gauss_markov(model: ImuModel, dt: float) -> tuple[Array, Array]:
-    tau = np.repeat([model.gyro_bias_correlation_s, model.accel_bias_correlation_s], 3)
-    walk = np.repeat(
-        [model.gyro_random_walk_rad_s2_sqrt_hz, model.accel_random_walk_m_s3_sqrt_hz], 3
-    )
-    decay = np.exp(-dt / tau)
-    return decay, walk * np.sqrt(tau / 2.0 * (1.0 - decay**2))
-
-
-def _draw(keys: NDArray[np.uint64], block: int) -> Array:
-    out = np.empty((len(keys), 6))
-    rng.fill_normal(keys, 6 * block, out)
-    return out
+def _axes(gyro: float, accel: float) -> Array:
+    return np.repeat([gyro, accel], 3)

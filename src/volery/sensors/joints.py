@@ -6,6 +6,7 @@ import numpy as np
 
 from volery.control.fleet import Fleet
 from volery.core.clock import NS_PER_S, Schedule
+from volery.sensors.bank import Memoryless
 from volery.sensors.mount import Mount, nodding_angle_at
 from volery.sensors.samples import JointAngles, SensorId, owned
 
@@ -13,7 +14,7 @@ _RATE_HZ = 80.0
 _DIFFERENCE_NS = 1_000_000
 
 
-class JointBank:
+class JointBank(Memoryless):
     """All nodding mounts, read out 80 times a second: at the start and in the middle of a turn."""
 
     name = "joints"

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat
 
 from volery.control.fleet import Fleet
-from volery.core import rng, rotations
+from volery.core import rotations
 from volery.core.clock import Schedule
+from volery.sensors.bank import Memoryless, rows_of, uav_rows
 from volery.sensors.inertial_kernels import body_twists
 from volery.sensors.model import SensorModel, load_model
+from volery.sensors.noise import NoiseStreams
 from volery.sensors.samples import OdometryReadings, SensorId, owned
 
 Array = NDArray[np.float64]
@@ -41,7 +43,8 @@ class OdometryBank:
 
     Each step of the way is added as the source sees it: turned by its yaw error so far, plus a
     random part. Both errors are random walks over the distance flown; the odometry frame coincides
-    with the map at the start. `keys` (S,) are the noise streams, or None for perfect odometry.
+    with the map at the start, and again at every reset. `keys` (S,) are the noise streams, or None
+    for perfect odometry.
     """
 
     name = "odometry"
@@ -58,8 +61,9 @@ class OdometryBank:
     ) -> None:
         self.schedule = schedule
         self.sensors = sensors
-        self._rows = np.array([s.uav for s in sensors])
-        self._keys = keys
+        self._rows = uav_rows(sensors)
+        self._fleet = fleet
+        self._noise = NoiseStreams(keys, len(sensors), per_measurement=_NUMBERS_A_SAMPLE)
         horizontal, vertical = model.horizontal_drift_m_sqrt_m, model.vertical_drift_m_sqrt_m
         self._drift = np.array([horizontal, horizontal, vertical, model.yaw_drift_rad_sqrt_m])
         self._twist_noise = np.repeat([model.velocity_noise_m_s, model.rate_noise_rad_s], 3)
@@ -79,9 +83,8 @@ class OdometryBank:
         self._position_odom += rotations.rotate(self._yaw_turn(), way)
         twist = _twist_body(fleet, self._rows)
         variance = np.zeros((len(self._rows), 6))
-        if self._keys is not None:
-            noise = np.empty((len(self._rows), _NUMBERS_A_SAMPLE))
-            rng.fill_normal(self._keys, _NUMBERS_A_SAMPLE * k, noise)
+        if self._noise.enabled:
+            noise = self._noise.measurement(k)
             walk = np.sqrt(moved)[:, None] * self._drift * noise[:, :4]
             self._position_odom += walk[:, :3]
             self._yaw_error += walk[:, 3]
@@ -103,19 +106,36 @@ class OdometryBank:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return {name: getattr(self, name).copy() for name in self._KEPT}
+        kept = {name.lstrip("_"): getattr(self, name).copy() for name in self._KEPT}
+        return {"noise": self._noise.get_state(), **kept}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
+        self._noise.set_state(state["noise"])
         for name in self._KEPT:
-            setattr(self, name, np.array(state[name]))
+            setattr(self, name, np.array(state[name.lstrip("_")]))
+
+    def reset(
+        self,
+        uavs: NDArray[np.int64] | None,
+        keys: NDArray[np.uint64] | None,
+        time_ns: int,  # noqa: ARG002
+        k: int,
+    ) -> None:
+        """Let the odometry of some UAVs begin where they are now; see `Bank.reset`."""
+        rows = rows_of(self._rows, uavs)
+        self._noise.restart(rows, keys, k)
+        self._yaw_error[rows] = 0.0
+        self._flown[rows] = 0.0
+        self._position_odom[rows] = self._fleet.state.position_map[self._rows[rows]]
+        self._last_position[rows] = self._position_odom[rows]
 
     def _yaw_turn(self) -> Array:
         zero = np.zeros_like(self._yaw_error)
         return rotations.from_rpy(zero, zero, self._yaw_error)
 
 
-class GroundTruthBank:
+class GroundTruthBank(Memoryless):
     """The true poses and twists."""
 
     name = "ground_truth"
@@ -124,7 +144,7 @@ class GroundTruthBank:
     def __init__(self, schedule: Schedule, sensors: tuple[SensorId, ...]) -> None:
         self.schedule = schedule
         self.sensors = sensors
-        self._rows = np.array([s.uav for s in sensors])
+        self._rows = uav_rows(sensors)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometryReadings:  # noqa: ARG002
         """The present state of all UAVs of the bank."""

@@ -1,16 +1,18 @@
 """What sensors measured, as batches: one object for all sensors of a bank at one instant.
 
 Row i of every array belongs to `sensors[i]`. Arrays are fresh, owned by the sample and read-only.
+`MEASURED` names what a biased sensor gets wrong, and how many numbers tell the error of one sensor.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.geodesy import LocalFrame
 from volery.sensors.lidar_model import LidarModel
 
 Array = NDArray[np.float64]
@@ -30,6 +32,8 @@ class SensorId:
 class LidarScans:
     """One sweep of each LIDAR of a bank."""
 
+    MEASURED: ClassVar[dict[str, int]] = {"ranges": 1}
+
     sensors: tuple[SensorId, ...]
     stamp_ns: int
     """Time of the first beam."""
@@ -41,6 +45,8 @@ class LidarScans:
 @dataclass(frozen=True)
 class ImuReadings:
     """Rates and specific forces in the sensors' frames."""
+
+    MEASURED: ClassVar[dict[str, int]] = {"angular_velocity": 3, "specific_force": 3}
 
     sensors: tuple[SensorId, ...]
     stamp_ns: int
@@ -56,6 +62,8 @@ class ImuReadings:
 class RangeReadings:
     """Distances of single-cone range finders."""
 
+    MEASURED: ClassVar[dict[str, int]] = {"ranges": 1}
+
     sensors: tuple[SensorId, ...]
     stamp_ns: int
     ranges: Array
@@ -68,6 +76,8 @@ class RangeReadings:
 @dataclass(frozen=True)
 class OdometryReadings:
     """Poses in the odometry frame and twists in the body."""
+
+    MEASURED: ClassVar[dict[str, int]] = {"position_odom": 3}
 
     sensors: tuple[SensorId, ...]
     stamp_ns: int
@@ -90,6 +100,8 @@ class OdometryReadings:
 class JointAngles:
     """Angles of nodding mounts; positive tilts the sensor downward."""
 
+    MEASURED: ClassVar[dict[str, int]] = {"angle": 1}
+
     sensors: tuple[SensorId, ...]
     stamp_ns: int
     angle: Array
@@ -98,7 +110,67 @@ class JointAngles:
     """(S,) rad/s."""
 
 
-Samples: TypeAlias = LidarScans | ImuReadings | RangeReadings | OdometryReadings | JointAngles
+@dataclass(frozen=True)
+class GnssReadings:
+    """Fixes of satellite navigation receivers: where and how fast their antennas were."""
+
+    MEASURED: ClassVar[dict[str, int]] = {"position_map": 3}
+
+    sensors: tuple[SensorId, ...]
+    stamp_ns: int
+    """Time of the position, before it was worked out and sent."""
+    frame: LocalFrame
+    """The map's place on the earth."""
+    has_fix: NDArray[np.bool_]
+    """(S,)."""
+    position_map: Array
+    """(S, 3) m; nan without a fix."""
+    velocity_map: Array
+    """(S, 3) m/s; nan without a fix."""
+    position_variance: Array
+    """(S, 3) m^2, east-north-up."""
+    velocity_variance: Array
+    """(S, 3) (m/s)^2, east-north-up."""
+
+
+@dataclass(frozen=True)
+class PressureReadings:
+    """Static pressure and temperature of the air at the sensors."""
+
+    MEASURED: ClassVar[dict[str, int]] = {"pressure": 1}
+
+    sensors: tuple[SensorId, ...]
+    stamp_ns: int
+    pressure: Array
+    """(S,) Pa."""
+    temperature: Array
+    """(S,) K."""
+    pressure_variance: float
+
+
+@dataclass(frozen=True)
+class MagneticReadings:
+    """Magnetic flux density in the sensors' frames."""
+
+    MEASURED: ClassVar[dict[str, int]] = {"field": 3}
+
+    sensors: tuple[SensorId, ...]
+    stamp_ns: int
+    field: Array
+    """(S, 3) T."""
+    field_variance: float
+
+
+Samples: TypeAlias = (
+    LidarScans
+    | ImuReadings
+    | RangeReadings
+    | OdometryReadings
+    | JointAngles
+    | GnssReadings
+    | PressureReadings
+    | MagneticReadings
+)
 
 
 def owned(array: NDArray[Any]) -> NDArray[Any]:

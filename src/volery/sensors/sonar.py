@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
-from volery.core import rng, rotations
+from volery.core import rotations
 from volery.core.clock import Schedule
+from volery.sensors.bank import rows_of, uav_rows
 from volery.sensors.model import SensorModel, load_model
+from volery.sensors.noise import NoiseStreams
 from volery.sensors.samples import RangeReadings, SensorId, owned
 from volery.world.scene import Scene
 
@@ -61,10 +64,10 @@ class SonarBank:
         self.sensors = sensors
         self._model = model
         self._scene = scene
-        self._rows = np.array([s.uav for s in sensors])
+        self._rows = uav_rows(sensors)
         self._position_body = position_body
         self._body_from_sensor = attitude_body
-        self._keys = keys
+        self._noise = NoiseStreams(keys, len(sensors), per_measurement=1)
         self._cone = _cone_directions(math.radians(model.field_of_view_deg) / 2.0)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> RangeReadings:
@@ -82,10 +85,8 @@ class SonarBank:
             exclude=np.repeat(rows, rays),
         )
         nearest = hits.distance.reshape(-1, rays).min(axis=1).astype(np.float64)
-        if self._keys is not None:
-            noise = np.empty((len(rows), 1))
-            rng.fill_normal(self._keys, k, noise)
-            nearest += self._model.noise_m * noise[:, 0]
+        if self._noise.enabled:
+            nearest += self._model.noise_m * self._noise.measurement(k)[:, 0]
             step = self._model.resolution_m
             nearest = np.round(nearest / step) * step
         nearest[nearest > self._model.range_max_m] = np.inf
@@ -98,6 +99,24 @@ class SonarBank:
             self._model.range_min_m,
             self._model.range_max_m,
         )
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {"noise": self._noise.get_state()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._noise.set_state(state["noise"])
+
+    def reset(
+        self,
+        uavs: NDArray[np.int64] | None,
+        keys: NDArray[np.uint64] | None,
+        time_ns: int,  # noqa: ARG002
+        k: int,
+    ) -> None:
+        """Give the sensors of some UAVs fresh noise; see `Bank.reset`."""
+        self._noise.restart(rows_of(self._rows, uavs), keys, k)
 
 
 def _cone_directions(half_angle: float) -> Array:

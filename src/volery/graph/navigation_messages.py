@@ -1,0 +1,124 @@
+"""Messages of navigation sensors: one sensor's row of a batch as a ROS message."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.graph.messages import (
+    FluidPressure,
+    MagneticField,
+    NavSatFix,
+    NavSatStatus,
+    Temperature,
+    Twist,
+    TwistWithCovariance,
+    TwistWithCovarianceStamped,
+    Vector3,
+    header,
+)
+from volery.sensors.samples import GnssReadings, MagneticReadings, PressureReadings, SensorId
+
+Array = NDArray[np.float64]
+
+_ZERO_CELSIUS_K = 273.15
+_NOT_MEASURED = -1.0
+"""Variance of a quantity that the message holds and the sensor does not know (sensor_msgs/Imu)."""
+
+
+class Channel(NamedTuple):
+    """One of the topics of a sensor: `/UAV/SENSOR` and a suffix."""
+
+    suffix: str
+    message_class: type[Any]
+    message: Callable[[Any, int], Any]
+    """(samples, row) -> message, or None where there is nothing to tell."""
+
+    def topic(self, sensor: SensorId) -> str:
+        """Name of the topic."""
+        return f"/{sensor.uav_name}/{sensor.name}{self.suffix}"
+
+
+def fix(readings: GnssReadings, row: int) -> NavSatFix:
+    """Position; without a fix it is nan and its covariance unknown."""
+    latitude, longitude, altitude = readings.frame.geodetic_from_enu(readings.position_map[row])
+    has_fix = bool(readings.has_fix[row])
+    status = NavSatStatus.STATUS_FIX if has_fix else NavSatStatus.STATUS_NO_FIX
+    variance = readings.position_variance[row] if has_fix else np.zeros(3)
+    return NavSatFix(
+        header(readings.stamp_ns, _frame(readings.sensors[row])),
+        # The stubs of the type store name another release's status here.
+        NavSatStatus(status, NavSatStatus.SERVICE_GPS),  # type: ignore[arg-type]
+        float(np.degrees(latitude)),
+        float(np.degrees(longitude)),
+        float(altitude),
+        _read_only(np.diag(variance).reshape(9)),
+        NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN if has_fix else NavSatFix.COVARIANCE_TYPE_UNKNOWN,
+    )
+
+
+def fix_velocity(readings: GnssReadings, row: int) -> TwistWithCovarianceStamped | None:
+    """Velocity along the map's axes; None without a fix."""
+    if not readings.has_fix[row]:
+        return None
+    variance = np.concatenate([readings.velocity_variance[row], np.full(3, _NOT_MEASURED)])
+    return TwistWithCovarianceStamped(
+        header(readings.stamp_ns, "map"),
+        TwistWithCovariance(
+            Twist(Vector3(*readings.velocity_map[row].tolist()), Vector3(0.0, 0.0, 0.0)),
+            _read_only(np.diag(variance).reshape(36)),
+        ),
+    )
+
+
+def pressure(readings: PressureReadings, row: int) -> FluidPressure:
+    """Static pressure, Pa."""
+    return FluidPressure(
+        header(readings.stamp_ns, _frame(readings.sensors[row])),
+        float(readings.pressure[row]),
+        readings.pressure_variance,
+    )
+
+
+def temperature(readings: PressureReadings, row: int) -> Temperature:
+    """Temperature of the air, degrees Celsius."""
+    return Temperature(
+        header(readings.stamp_ns, _frame(readings.sensors[row])),
+        float(readings.temperature[row]) - _ZERO_CELSIUS_K,
+        0.0,
+    )
+
+
+def magnetic_field(readings: MagneticReadings, row: int) -> MagneticField:
+    """Flux density in the sensor's frame, T."""
+    return MagneticField(
+        header(readings.stamp_ns, _frame(readings.sensors[row])),
+        Vector3(*readings.field[row].tolist()),
+        _read_only(np.diag([readings.field_variance] * 3).reshape(9)),
+    )
+
+
+CHANNELS: dict[type[Any], tuple[Channel, ...]] = {
+    GnssReadings: (
+        Channel("", NavSatFix, fix),
+        Channel("_velocity", TwistWithCovarianceStamped, fix_velocity),
+    ),
+    PressureReadings: (
+        Channel("", FluidPressure, pressure),
+        Channel("/temperature", Temperature, temperature),
+    ),
+    MagneticReadings: (Channel("", MagneticField, magnetic_field),),
+}
+"""Topics of each kind of samples."""
+
+
+def _frame(sensor: SensorId) -> str:
+    return f"{sensor.uav_name}/{sensor.name}"
+
+
+def _read_only(array: Array) -> Array:
+    array.flags.writeable = False
+    return array

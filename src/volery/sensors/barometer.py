@@ -1,0 +1,109 @@
+"""Barometers: pressure of the standard atmosphere at the sensor's altitude, noise and drift.
+
+The air lies in level layers over the map, as its gravity does: the altitude above sea level is that
+of the scenario's origin plus z.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import NonNegativeFloat, PositiveFloat
+
+from volery.control.fleet import Fleet
+from volery.core import atmosphere, rotations
+from volery.core.clock import NS_PER_S, Schedule
+from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.model import SensorModel, load_model
+from volery.sensors.noise import NoiseStreams, gauss_markov_of_sigma
+from volery.sensors.samples import PressureReadings, SensorId, owned
+
+Array = NDArray[np.float64]
+
+
+class BarometerModel(SensorModel):
+    """Noise and drift; see the data files in `models/`."""
+
+    name: str
+    noise_pa: NonNegativeFloat
+    drift_pa: NonNegativeFloat
+    """Standard deviation of the drift in the long run."""
+    drift_correlation_s: PositiveFloat
+
+
+def load_barometer_model(name: str, folder: Path | None = None) -> BarometerModel:
+    """Model by shipped name or `.toml` path."""
+    return load_model(BarometerModel, "barometer", name, folder)
+
+
+class BarometerBank:
+    """All barometers of one model, rate and phase.
+
+    `position_body` (S, 3) m places each sensor in its body (FLU); `keys` (S,) are the noise
+    streams, or None for sensors without noise; `origin_altitude_m` is the map's height above sea
+    level.
+    """
+
+    name = "barometer"
+    lag_ns = 0
+
+    def __init__(
+        self,
+        model: BarometerModel,
+        schedule: Schedule,
+        sensors: tuple[SensorId, ...],
+        position_body: Array,
+        keys: NDArray[np.uint64] | None,
+        origin_altitude_m: float,
+    ) -> None:
+        self.schedule = schedule
+        self.sensors = sensors
+        self._model = model
+        self._rows = uav_rows(sensors)
+        self._position_body = position_body
+        self._origin_altitude = origin_altitude_m
+        self._noise = NoiseStreams(keys, len(sensors), at_start=1, per_measurement=2)
+        self._wander = gauss_markov_of_sigma(
+            model.drift_pa, model.drift_correlation_s, schedule.period_ns / NS_PER_S
+        )
+        self._drift = self._wander.sigma * self._noise.start()[:, 0]
+
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> PressureReadings:
+        """Reading number k (counted from 0) of all sensors of the bank."""
+        lever = rotations.rotate(fleet.state.attitude[self._rows], self._position_body)
+        z = fleet.state.position_map[self._rows, 2] + lever[:, 2]
+        pressure = atmosphere.pressure(self._origin_altitude + z)
+        noise = self._noise.measurement(k)
+        pressure += self._drift + self._model.noise_pa * noise[:, 0]
+        self._drift = self._wander.decay * self._drift + self._wander.step * noise[:, 1]
+        return PressureReadings(
+            self.sensors,
+            time_ns,
+            owned(pressure),
+            owned(atmosphere.temperature(self._origin_altitude + z)),
+            self._model.noise_pa**2 if self._noise.enabled else 0.0,
+        )
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {"noise": self._noise.get_state(), "drift": self._drift.copy()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._noise.set_state(state["noise"])
+        self._drift = np.array(state["drift"])
+
+    def reset(
+        self,
+        uavs: NDArray[np.int64] | None,
+        keys: NDArray[np.uint64] | None,
+        time_ns: int,  # noqa: ARG002
+        k: int,
+    ) -> None:
+        """Give the sensors of some UAVs fresh noise and drift; see `Bank.reset`."""
+        rows = rows_of(self._rows, uavs)
+        self._noise.restart(rows, keys, k)
+        self._drift[rows] = self._wander.sigma * self._noise.start()[rows, 0]

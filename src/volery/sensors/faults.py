@@ -1,0 +1,219 @@
+"""Broken sensors: one table of faults for each bank, applied to whatever it measured.
+
+A faulty sensor goes on measuring unseen, so that a fault changes no noise of later measurements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.control.fleet import Fleet
+from volery.core.clock import Schedule
+from volery.core.errors import CommandError
+from volery.sensors.bank import Bank, rows_of, uav_rows
+from volery.sensors.samples import Samples, SensorId, owned
+
+Array = NDArray[np.float64]
+Arrays = dict[str, Any]
+"""Quantities by name, each (S, ...): row i is sensor i's."""
+
+
+class FaultKind(IntEnum):
+    """How a sensor fails."""
+
+    NONE = 0
+    DROPPED = 1
+    """It sends nothing."""
+    STUCK = 2
+    """It sends its last measurement over and over, with new stamps."""
+    BIASED = 3
+    """A constant is added to what it measures."""
+
+
+class FaultTable:
+    """Faults of the S sensors of a bank, one at most for each.
+
+    `measured` names the quantities that a bias is added to and how many numbers it takes for each,
+    such as `{"ranges": 1}`: see `MEASURED` of the samples.
+    """
+
+    def __init__(self, sensors: tuple[SensorId, ...], measured: Mapping[str, int]) -> None:
+        self._sensors = sensors
+        self._measured = dict(measured)
+        self._kind = np.zeros(len(sensors), np.int64)
+        self._bias = np.zeros((len(sensors), sum(measured.values())))
+        self._known = np.zeros(len(sensors), np.bool_)
+        """Whether a sensor has measured since its start."""
+        self._last: Arrays = {}
+        """What left the table last, by name of the quantity; rows are sensors."""
+
+    def set(self, row: int, kind: FaultKind | str, value: ArrayLike | None = None) -> None:
+        """Let sensor `row` of the bank fail from its next measurement on.
+
+        `kind` may be a name: none, dropped, stuck, biased. A bias needs `value`: one number for
+        each that is measured (an IMU: three rates in rad/s, three forces in m/s^2), or a single one
+        for all of a sensor that measures one quantity. Raises `CommandError` for anything else.
+        """
+        if not 0 <= row < len(self._sensors):
+            raise CommandError(f"row {row} is no sensor of a bank of {len(self._sensors)}")
+        fault = _kind_of(kind)
+        if (fault is FaultKind.BIASED) != (value is not None):
+            raise CommandError(f"fault {fault.name.lower()}: a value belongs to biased, only there")
+        self._bias[row] = 0.0 if value is None else self._checked(value)
+        self._kind[row] = fault
+
+    def clear(self, row: int) -> None:
+        """Let sensor `row` work again."""
+        self.set(row, FaultKind.NONE)
+
+    def kind(self, row: int) -> FaultKind:
+        """Present fault of sensor `row`."""
+        return FaultKind(int(self._kind[row]))
+
+    def apply(self, samples: Samples) -> Samples:
+        """What the sensors send of what they measured."""
+        arrays = {n: v for n, v in vars(samples).items() if isinstance(v, np.ndarray)}
+        if self._kind.any():
+            changed = self._bias_of(arrays)
+            changed |= self._repeat({**arrays, **changed})
+            arrays |= changed
+            samples = replace(samples, **changed)
+        self._last = arrays
+        self._known[:] = True
+        dropped = self._kind == FaultKind.DROPPED
+        return _without(samples, arrays, dropped) if dropped.any() else samples
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {
+            "kind": self._kind.copy(),
+            "bias": self._bias.copy(),
+            "known": self._known.copy(),
+            "last": {name: array.copy() for name, array in self._last.items()},
+        }
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._kind = np.array(state["kind"])
+        self._bias = np.array(state["bias"])
+        self._known = np.array(state["known"])
+        self._last = {name: owned(np.array(array)) for name, array in state["last"].items()}
+
+    def reset(self, rows: NDArray[np.int64]) -> None:
+        """Mend the sensors `rows` and forget what they sent."""
+        self._kind[rows] = FaultKind.NONE
+        self._bias[rows] = 0.0
+        self._known[rows] = False
+
+    def _checked(self, value: ArrayLike) -> Array:
+        try:
+            bias = np.atleast_1d(np.asarray(value, dtype=np.float64))
+        except (TypeError, ValueError):
+            raise CommandError(f"fault biased: value must be numbers, not {value!r}") from None
+        numbers = self._bias.shape[1]
+        allowed = (1, numbers) if len(self._measured) == 1 else (numbers,)
+        if bias.ndim != 1 or len(bias) not in allowed or not np.isfinite(bias).all():
+            wanted = " or ".join(str(n) for n in sorted(set(allowed)))
+            what = ", ".join(f"{name} ({count})" for name, count in self._measured.items())
+            raise CommandError(
+                f"fault biased: value must be {wanted} finite numbers for {what}, not {value!r}"
+            )
+        return bias
+
+    def _bias_of(self, arrays: Arrays) -> Arrays:
+        """Measured quantities with the biases added; empty without a biased sensor."""
+        rows = np.flatnonzero(self._kind == FaultKind.BIASED)
+        changed: Arrays = {}
+        first = 0
+        for name, count in self._measured.items():
+            bias = self._bias[:, first : first + count]
+            first += count
+            if len(rows):
+                array = arrays[name].copy()
+                array[rows] += bias[rows, 0] if array.ndim == 1 else bias[rows]
+                changed[name] = owned(array)
+        return changed
+
+    def _repeat(self, arrays: Arrays) -> Arrays:
+        """All quantities with the stuck sensors' last ones; empty without a stuck sensor."""
+        rows = np.flatnonzero((self._kind == FaultKind.STUCK) & self._known)
+        changed: Arrays = {}
+        for name, array in arrays.items():
+            if len(rows):
+                mixed = array.copy()
+                mixed[rows] = self._last[name][rows]
+                changed[name] = owned(mixed)
+        return changed
+
+
+class FaultableBank:
+    """A bank whose sensors can fail; everything else is the inner bank's."""
+
+    def __init__(self, bank: Bank, measured: Mapping[str, int]) -> None:
+        self.bank = bank
+        self.faults = FaultTable(bank.sensors, measured)
+
+    @property
+    def name(self) -> str:
+        """Kind of the sensors."""
+        return self.bank.name
+
+    @property
+    def schedule(self) -> Schedule:
+        """When they measure."""
+        return self.bank.schedule
+
+    @property
+    def lag_ns(self) -> int:
+        """How long after its instant a measurement is known."""
+        return self.bank.lag_ns
+
+    @property
+    def sensors(self) -> tuple[SensorId, ...]:
+        """Which they are, row by row."""
+        return self.bank.sensors
+
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> Samples:
+        """Measurement number k, as the sensors send it."""
+        return self.faults.apply(self.bank.sample(k, time_ns, fleet))
+
+    def get_state(self) -> dict[str, Any]:
+        """State of the bank and its faults."""
+        return {"bank": self.bank.get_state(), "faults": self.faults.get_state()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self.bank.set_state(state["bank"])
+        self.faults.set_state(state["faults"])
+
+    def reset(
+        self,
+        uavs: NDArray[np.int64] | None,
+        keys: NDArray[np.uint64] | None,
+        time_ns: int,
+        k: int,
+    ) -> None:
+        """Put the sensors of some UAVs back to their start, without faults; see `Bank.reset`."""
+        self.bank.reset(uavs, keys, time_ns, k)
+        self.faults.reset(rows_of(uav_rows(self.sensors), uavs))
+
+
+def _kind_of(kind: FaultKind | str) -> FaultKind:
+    try:
+        return FaultKind[kind.upper()] if isinstance(kind, str) else FaultKind(kind)
+    except (KeyError, ValueError):
+        known = ", ".join(k.name.lower() for k in FaultKind)
+        raise CommandError(f"no sensor fault {kind!r}; known: {known}") from None
+
+
+def _without(samples: Samples, arrays: Arrays, dropped: NDArray[np.bool_]) -> Samples:
+    kept = np.flatnonzero(~dropped)
+    left: Arrays = {name: owned(array[kept]) for name, array in arrays.items()}
+    sensors = tuple(samples.sensors[i] for i in kept)
+    return replace(samples, sensors=sensors, **left)

@@ -1,0 +1,202 @@
+"""Satellite navigation receivers: late fixes with noise and drift, lost where signals are denied.
+
+White noise and a Gauss-Markov drift of the position, white noise of the velocity: the model of
+PX4's Gazebo classic. The drift goes on while a fix is lost.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import NonNegativeFloat, PositiveFloat
+
+from volery.control.fleet import Fleet
+from volery.core import rotations
+from volery.core.clock import NS_PER_S, Schedule, ns_from_s
+from volery.core.errors import CommandError, DataFileError
+from volery.core.geodesy import LocalFrame
+from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.denial import NOWHERE, Denial
+from volery.sensors.model import SensorModel, load_model
+from volery.sensors.noise import NoiseStreams, gauss_markov_of_sigma
+from volery.sensors.samples import GnssReadings, SensorId, owned
+from volery.vehicle.pose_history import KEPT_NS, PoseHistory, pose_at
+
+Array = NDArray[np.float64]
+
+FOREVER_NS = np.iinfo(np.int64).max
+_LONGEST_DELAY_NS = KEPT_NS - 6_000_000
+"""A fix looks back by the delay, up to one physics step and another for the velocity."""
+
+
+class GnssModel(SensorModel):
+    """Delay, noise and drift; see the data files in `models/`."""
+
+    name: str
+    delay_s: NonNegativeFloat
+    horizontal_noise_m: NonNegativeFloat
+    vertical_noise_m: NonNegativeFloat
+    horizontal_drift_m: NonNegativeFloat
+    """Standard deviation of the drift on each horizontal axis, in the long run."""
+    vertical_drift_m: NonNegativeFloat
+    drift_correlation_s: PositiveFloat
+    horizontal_velocity_noise_m_s: NonNegativeFloat
+    vertical_velocity_noise_m_s: NonNegativeFloat
+    reacquisition_s: NonNegativeFloat
+    """From the return of the signals to the next fix."""
+
+
+def load_gnss_model(name: str, folder: Path | None = None) -> GnssModel:
+    """Model by shipped name or `.toml` path."""
+    return load_model(GnssModel, "GNSS", name, folder)
+
+
+class GnssBank:
+    """All receivers of one model, rate and phase.
+
+    `position_body` (S, 3) m places each antenna in its body (FLU); `keys` (S,) are the noise
+    streams, or None for receivers without noise. A fix is sampled `lag_ns` after its instant, from
+    the poses that the fleet's history kept, and carries that instant.
+    """
+
+    name = "gnss"
+
+    def __init__(
+        self,
+        model: GnssModel,
+        schedule: Schedule,
+        sensors: tuple[SensorId, ...],
+        position_body: Array,
+        keys: NDArray[np.uint64] | None,
+        frame: LocalFrame,
+        denial: Denial = NOWHERE,
+    ) -> None:
+        self.schedule = schedule
+        self.sensors = sensors
+        self.lag_ns = ns_from_s(model.delay_s)
+        if self.lag_ns > _LONGEST_DELAY_NS:
+            raise DataFileError(
+                f"GNSS model '{model.name}': delay_s may be {_LONGEST_DELAY_NS / NS_PER_S} s at "
+                f"most, not {model.delay_s}"
+            )
+        self._frame = frame
+        self._denial = denial
+        self._rows = uav_rows(sensors)
+        self._lever_body = position_body
+        self._reacquisition_ns = ns_from_s(model.reacquisition_s)
+        self._noise = NoiseStreams(keys, len(sensors), at_start=3, per_measurement=9)
+        self._white = _east_north_up(model.horizontal_noise_m, model.vertical_noise_m)
+        self._velocity_noise = _east_north_up(
+            model.horizontal_velocity_noise_m_s, model.vertical_velocity_noise_m_s
+        )
+        self._wander = gauss_markov_of_sigma(
+            _east_north_up(model.horizontal_drift_m, model.vertical_drift_m),
+            model.drift_correlation_s,
+            schedule.period_ns / NS_PER_S,
+        )
+        self._drift = self._wander.sigma * self._noise.start()
+        self._fix_from_ns = np.zeros(len(sensors), np.int64)
+        self._denied_from_ns = np.full(len(sensors), FOREVER_NS)
+        self._denied_until_ns = np.full(len(sensors), FOREVER_NS)
+
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> GnssReadings:
+        """Fix number k (counted from 0) of all receivers of the bank, as of `time_ns`."""
+        position, velocity = _antennas(fleet.history, self._rows, self._lever_body, time_ns)
+        has_fix = self._acquire(time_ns, position)
+        noise = self._noise.measurement(k)
+        position += self._drift + self._white * noise[:, :3]
+        velocity += self._velocity_noise * noise[:, 3:6]
+        self._drift = self._wander.decay * self._drift + self._wander.step * noise[:, 6:]
+        position[~has_fix] = np.nan
+        velocity[~has_fix] = np.nan
+        known = 1.0 if self._noise.enabled else 0.0
+        shape = position.shape
+        return GnssReadings(
+            self.sensors,
+            time_ns,
+            self._frame,
+            owned(has_fix),
+            owned(position),
+            owned(velocity),
+            owned(np.full(shape, known * (self._wander.sigma**2 + self._white**2))),
+            owned(np.full(shape, known * self._velocity_noise**2)),
+        )
+
+    def deny(self, uav: int, since_ns: int, until_ns: int = FOREVER_NS) -> None:
+        """Take the signals from a UAV (a row of the fleet) for fixes of since_ns <= t < until_ns.
+
+        A fix comes again the reacquisition time after the last denied instant. A second call
+        replaces the first. Raises `CommandError` where the UAV has no receiver here.
+        """
+        rows = rows_of(self._rows, np.array([uav]))
+        if not len(rows):
+            raise CommandError(f"UAV row {uav} has no GNSS receiver in this bank")
+        if not since_ns < until_ns:
+            raise CommandError(f"a denial must end after it begins, not {since_ns}..{until_ns} ns")
+        self._denied_from_ns[rows] = since_ns
+        self._denied_until_ns[rows] = until_ns
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {
+            "noise": self._noise.get_state(),
+            "drift": self._drift.copy(),
+            "fix_from_ns": self._fix_from_ns.copy(),
+            "denied_from_ns": self._denied_from_ns.copy(),
+            "denied_until_ns": self._denied_until_ns.copy(),
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._noise.set_state(state["noise"])
+        self._drift = np.array(state["drift"])
+        self._fix_from_ns = np.array(state["fix_from_ns"])
+        self._denied_from_ns = np.array(state["denied_from_ns"])
+        self._denied_until_ns = np.array(state["denied_until_ns"])
+
+    def reset(
+        self,
+        uavs: NDArray[np.int64] | None,
+        keys: NDArray[np.uint64] | None,
+        time_ns: int,  # noqa: ARG002
+        k: int,
+    ) -> None:
+        """Start the receivers of some UAVs anew, with a fix at once; see `Bank.reset`."""
+        rows = rows_of(self._rows, uavs)
+        self._noise.restart(rows, keys, k)
+        self._drift[rows] = (self._wander.sigma * self._noise.start())[rows]
+        self._fix_from_ns[rows] = 0
+        self._denied_from_ns[rows] = FOREVER_NS
+        self._denied_until_ns[rows] = FOREVER_NS
+
+    def _acquire(self, time_ns: int, position: Array) -> NDArray[np.bool_]:
+        """Who has a fix at `time_ns`, with antennas at `position` (S, 3); notes who lost it."""
+        denied = self._denial.covers(position)
+        denied |= (self._denied_from_ns <= time_ns) & (time_ns < self._denied_until_ns)
+        self._fix_from_ns[denied] = time_ns + self._reacquisition_ns
+        return np.asarray(~denied & (time_ns >= self._fix_from_ns))
+
+
+def _antennas(
+    history: PoseHistory, rows: NDArray[np.int64], lever_body: Array, time_ns: int
+) -> tuple[Array, Array]:
+    """Places (S, 3) m and velocities (S, 3) m/s of antennas, the mean over a physics step."""
+    before_ns = max(time_ns - history.dt_ns, 0)
+    now = _places(history, rows, lever_body, time_ns)
+    before = _places(history, rows, lever_body, before_ns)
+    elapsed_s = max(time_ns - before_ns, 1) / NS_PER_S
+    return now, (now - before) / elapsed_s
+
+
+def _places(
+    history: PoseHistory, rows: NDArray[np.int64], lever_body: Array, time_ns: int
+) -> Array:
+    poses = np.array([pose_at(history, row, time_ns) for row in rows])
+    return poses[:, :3] + rotations.rotate(poses[:, 3:], lever_body)
+
+
+def _east_north_up(horizontal: float, vertical: float) -> Array:
+    return np.array([horizontal, horizontal, vertical])

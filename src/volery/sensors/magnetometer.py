@@ -1,0 +1,110 @@
+"""Magnetometers: the earth's field seen from the sensor, iron, noise and a wandering bias."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import NonNegativeFloat, PositiveFloat
+
+from volery.control.fleet import Fleet
+from volery.core import rotations
+from volery.core.clock import NS_PER_S, Schedule
+from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.model import SensorModel, load_model
+from volery.sensors.noise import NoiseStreams, gauss_markov
+from volery.sensors.samples import MagneticReadings, SensorId, owned
+
+Array = NDArray[np.float64]
+Row = tuple[float, float, float]
+
+
+class MagnetometerModel(SensorModel):
+    """Iron and noise; see the data files in `models/`."""
+
+    name: str
+    noise_density_t_sqrt_hz: NonNegativeFloat
+    random_walk_t_s_sqrt_hz: NonNegativeFloat
+    bias_correlation_s: PositiveFloat
+    hard_iron_t: Row = (0.0, 0.0, 0.0)
+    """Field of magnetised parts, in the sensor's frame."""
+    soft_iron: tuple[Row, Row, Row] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    """Matrix by which magnetisable parts distort the outer field, in the sensor's frame."""
+
+
+def load_magnetometer_model(name: str, folder: Path | None = None) -> MagnetometerModel:
+    """Model by shipped name or `.toml` path."""
+    return load_model(MagnetometerModel, "magnetometer", name, folder)
+
+
+class MagnetometerBank:
+    """All magnetometers of one model, rate and phase.
+
+    `attitude_body` (S, 4) turns each sensor frame against its body (FLU); `keys` (S,) are the noise
+    streams, or None for sensors without noise; `field_map` (3,) T is the field over the whole map.
+    """
+
+    name = "magnetometer"
+    lag_ns = 0
+
+    def __init__(
+        self,
+        model: MagnetometerModel,
+        schedule: Schedule,
+        sensors: tuple[SensorId, ...],
+        attitude_body: Array,
+        keys: NDArray[np.uint64] | None,
+        field_map: Array,
+    ) -> None:
+        self.schedule = schedule
+        self.sensors = sensors
+        self._rows = uav_rows(sensors)
+        self._body_from_sensor = attitude_body
+        self._field_map = field_map
+        self._hard_iron = np.array(model.hard_iron_t)
+        self._soft_iron = np.array(model.soft_iron)
+        self._noise = NoiseStreams(keys, len(sensors), per_measurement=6)
+        dt = schedule.period_ns / NS_PER_S
+        self._white = model.noise_density_t_sqrt_hz / math.sqrt(dt)
+        self._wander = gauss_markov(model.random_walk_t_s_sqrt_hz, model.bias_correlation_s, dt)
+        self._bias = np.zeros((len(sensors), 3))
+
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> MagneticReadings:
+        """Reading number k (counted from 0) of all sensors of the bank."""
+        attitude = fleet.state.attitude[self._rows]
+        map_from_sensor = rotations.multiply(attitude, self._body_from_sensor)
+        outer = rotations.rotate(rotations.conjugate(map_from_sensor), self._field_map)
+        field = outer @ self._soft_iron.T + self._hard_iron
+        noise = self._noise.measurement(k)
+        field += self._bias + self._white * noise[:, :3]
+        self._bias = self._wander.decay * self._bias + self._wander.step * noise[:, 3:]
+        return MagneticReadings(
+            self.sensors,
+            time_ns,
+            owned(field),
+            self._white**2 if self._noise.enabled else 0.0,
+        )
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {"noise": self._noise.get_state(), "bias": self._bias.copy()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._noise.set_state(state["noise"])
+        self._bias = np.array(state["bias"])
+
+    def reset(
+        self,
+        uavs: NDArray[np.int64] | None,
+        keys: NDArray[np.uint64] | None,
+        time_ns: int,  # noqa: ARG002
+        k: int,
+    ) -> None:
+        """Give the sensors of some UAVs fresh noise, without a bias; see `Bank.reset`."""
+        rows = rows_of(self._rows, uavs)
+        self._noise.restart(rows, keys, k)
+        self._bias[rows] = 0.0

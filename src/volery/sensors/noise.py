@@ -1,0 +1,97 @@
+"""Noise of a bank's sensors: numbered draws from named streams, and slowly wandering biases."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.core import rng
+
+Array = NDArray[np.float64]
+
+
+class NoiseStreams:
+    """Normal numbers of S sensors, each counted from its own start.
+
+    Row i draws from stream `keys[i]`: first `at_start` numbers for what is settled when the sensor
+    is switched on, then `per_measurement` for each measurement. What measurement k draws follows
+    from its key and from how many measurements lie between it and the sensor's start, not from
+    other rows or earlier calls. Without `keys` all numbers are zero.
+    """
+
+    def __init__(
+        self,
+        keys: NDArray[np.uint64] | None,
+        sensors: int,
+        *,
+        at_start: int = 0,
+        per_measurement: int,
+    ) -> None:
+        self.enabled = keys is not None
+        self._keys = np.zeros(sensors, np.uint64) if keys is None else np.array(keys, np.uint64)
+        self._first_k = np.zeros(sensors, np.int64)
+        self._at_start = at_start
+        self._per_measurement = per_measurement
+
+    def start(self) -> Array:
+        """Numbers settled at the start, (S, at_start)."""
+        return self._draw(np.zeros_like(self._first_k), self._at_start)
+
+    def measurement(self, k: int) -> Array:
+        """Numbers of measurement k, (S, per_measurement)."""
+        since_start = k - self._first_k
+        return self._draw(
+            self._at_start + self._per_measurement * since_start, self._per_measurement
+        )
+
+    def restart(self, rows: NDArray[np.int64], keys: NDArray[np.uint64] | None, k: int) -> None:
+        """Let `rows` (R,) draw at measurement k as a fresh sensor does at its first one.
+
+        `keys` (R,) are their streams from now on; None keeps the present ones.
+        """
+        self._first_k[rows] = k
+        if keys is not None:
+            self._keys[rows] = keys
+
+    def get_state(self) -> dict[str, Any]:
+        """Keys and starts."""
+        return {"keys": self._keys.copy(), "first_k": self._first_k.copy()}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._keys = np.array(state["keys"], np.uint64)
+        self._first_k = np.array(state["first_k"], np.int64)
+
+    def _draw(self, counters: NDArray[np.int64], numbers: int) -> Array:
+        out = np.zeros((len(self._keys), numbers))
+        if self.enabled:
+            rng.fill_normal_rows(self._keys, counters, out)
+        return out
+
+
+class GaussMarkov(NamedTuple):
+    """A first-order Gauss-Markov process in steps: b+ = decay b + step n, n standard normal."""
+
+    decay: Array
+    step: Array
+    sigma: Array
+    """Standard deviation in the long run."""
+
+
+def gauss_markov(walk: ArrayLike, correlation_s: ArrayLike, dt_s: float) -> GaussMarkov:
+    """Process driven by white noise of density `walk` (unit/s/sqrt(Hz)), exact at steps of `dt_s`.
+
+    b+ = exp(-dt/tau) b + walk sqrt(tau/2 (1 - exp(-2 dt/tau))) n, as PX4 and RotorS have it.
+    """
+    tau = np.asarray(correlation_s, dtype=np.float64)
+    decay = np.exp(-dt_s / tau)
+    sigma = np.asarray(walk, dtype=np.float64) * np.sqrt(tau / 2.0)
+    return GaussMarkov(decay, np.asarray(sigma * np.sqrt(1.0 - decay**2)), sigma)
+
+
+def gauss_markov_of_sigma(sigma: ArrayLike, correlation_s: float, dt_s: float) -> GaussMarkov:
+    """Process of a stated standard deviation in the long run."""
+    return gauss_markov(np.asarray(sigma) * np.sqrt(2.0 / correlation_s), correlation_s, dt_s)
