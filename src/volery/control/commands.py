@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.control.flight_modes import FlightMode
+from volery.control.segment_store import SegmentStore
 from volery.control.setpoints import (
     MAX_COORDINATE,
     ControlLevel,
@@ -16,6 +17,7 @@ from volery.control.setpoints import (
     checked_attitude,
     checked_within,
 )
+from volery.control.trajectory import Trajectory
 from volery.core import rotations
 from volery.core.errors import CommandError
 from volery.vehicle.airframe import Airframe
@@ -46,6 +48,7 @@ class FleetCommands:
         self._uavs = uavs
         self._bodies: NDArray[np.void] = uavs["body"]
         self._pilots: NDArray[np.void] = uavs["pilot"]
+        self._paths = SegmentStore(self._pilots)
 
     def __len__(self) -> int:
         """Number of UAVs."""
@@ -56,7 +59,10 @@ class FleetCommands:
         return FlightMode(int(self._pilots["mode"][i]))
 
     def set_command_timeout(self, seconds: float, i: int | None = None) -> None:
-        """Time without a velocity command after which UAV `i` (None: all) holds; s, up to 60."""
+        """Time without a velocity or trajectory setpoint after which UAV `i` (None: all) holds.
+
+        s, up to 60.
+        """
         if not 0.0 < seconds <= 60.0:
             raise CommandError(f"time-out = {seconds} s is out of range; up to 60 s is allowed")
         rows = slice(None) if i is None else i
@@ -123,6 +129,58 @@ class FleetCommands:
         pilot["braking"] = False
         if angle is not None:
             self._face(i, angle)
+
+    def command_setpoint(
+        self,
+        i: int,
+        position: ArrayLike,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        acceleration: ArrayLike = (0.0, 0.0, 0.0),
+        yaw: float | None = None,
+        yaw_rate: float = 0.0,
+    ) -> None:
+        """Have UAV `i` at `position` (3,) m now, moving with `velocity` and `acceleration`, map.
+
+        A point of a trajectory that someone else computes (m, m/s, m/s^2; yaw in rad, None: as it
+        is, turning at yaw_rate rad/s). It moves on by itself until the next one comes, or, after
+        the time-out, until the UAV holds. Far goals are for `command_position`.
+        """
+        position = checked("position", position, (3,), MAX_COORDINATE)
+        velocity = checked("velocity", velocity, (3,), 1e3)
+        acceleration = checked("acceleration", acceleration, (3,), 1e3)
+        angle = None if yaw is None else float(checked("yaw", yaw, (), 1e4))
+        rate = checked("yaw rate", yaw_rate, (), 100.0)
+        pilot = self._enter_guided(i, FlightMode.TRAJECTORY)
+        pilot["path_last"] = -1
+        pilot["start_step"] = self.step
+        pilot["deadline_step"] = self.step + pilot["timeout_steps"]
+        pilot["position_target"] = position
+        pilot["velocity_target"] = velocity
+        pilot["acceleration_target"] = acceleration
+        if angle is not None:
+            self._face(i, angle)
+            pilot["yaw_rate_target"] = rate
+        elif rate != 0.0:
+            self._turn(i, rate)
+        else:
+            pilot["yaw_rate_target"] = 0.0
+
+    def command_trajectory(self, i: int, trajectory: Trajectory) -> None:
+        """Fly UAV `i` along `trajectory` from now on, then hold.
+
+        Its times count from this step. One that begins later than at 0 s is reached from the
+        present motion by a segment of its own. Places are those of the map: a UAV that is
+        elsewhere approaches at about 1 m/s beside the motion asked for.
+        """
+        self._refuse_wreck(i)
+        body = self._bodies[i]
+        trajectory = trajectory.led_in_from(
+            body["position_map"], body["velocity_map"], float(rotations.yaw_of(body["attitude"]))
+        )
+        pilot = self._enter_guided(i, FlightMode.TRAJECTORY)
+        pilot["start_step"] = self.step
+        pilot["path_faces"] = trajectory.faces
+        self._paths.put(i, trajectory.segments)
 
     def take_off(self, i: int, altitude_m: float = 2.5) -> None:
         """Let UAV `i`, landed, climb to `altitude_m` above its place and hold."""
@@ -197,7 +255,9 @@ class FleetCommands:
             body = self._bodies[i]
             yaw = float(rotations.yaw_of(body["attitude"]))
             pilot["level"] = ControlLevel.GUIDED
+            pilot["position"] = body["position_map"]
             pilot["velocity"] = body["velocity_map"]
+            pilot["acceleration"] = 0.0
             pilot["velocity_integral"] = 0.0
             pilot["heading"] = pilot["heading_target"] = math.cos(yaw), math.sin(yaw)
         if mode is not FlightMode.VELOCITY and pilot["turning"]:

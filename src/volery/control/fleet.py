@@ -145,6 +145,7 @@ class Fleet(FleetCommands):
                 float(wx),
                 float(wy),
                 float(wz),
+                self._paths.rows,
                 self._events,
                 self.step,
                 steps - done,
@@ -228,6 +229,7 @@ class Fleet(FleetCommands):
             "position": self.history.position.copy(),
             "attitude": self.history.attitude.copy(),
             "step": self.step,
+            "paths": self._paths.get_state(),
             "events": list(self._drained),
         }
 
@@ -236,6 +238,7 @@ class Fleet(FleetCommands):
         self._uavs[...] = state["uavs"]
         self.history.position[...] = state["position"]
         self.history.attitude[...] = state["attitude"]
+        self._paths.set_state(state["paths"])
         self.step = state["step"]
         self._drained = list(state["events"])
 

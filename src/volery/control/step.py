@@ -56,6 +56,7 @@ def advance_fleet(  # noqa: PLR0912
     wind_x: float,
     wind_y: float,
     wind_z: float,
+    paths: Array,
     events: NDArray[np.void],
     step: int,
     steps: int,
@@ -67,6 +68,7 @@ def advance_fleet(  # noqa: PLR0912
 ) -> tuple[int, int, bool]:
     """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
 
+    paths: segments of trajectories, see `control.follow`.
     Ends early after a step in which a budget ran out, the events' buffer grew full or, with
     `event_ends`, anything was noted. Returns the steps done, the events written, and whether a
     budget ran out.
@@ -95,7 +97,7 @@ def advance_fleet(  # noqa: PLR0912
                 estimate = body  # what control knows of the motion: for now, the truth
                 mode = pilot.mode
                 if guiding:
-                    guide(pilot, estimate, gains, step)
+                    guide(pilot, estimate, gains, paths, step, dt)
                 if turning:
                     hold_attitude(pilot, estimate, gains)
                 hold_rates(pilot, estimate, gains, dt)
