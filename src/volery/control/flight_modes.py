@@ -110,7 +110,7 @@ def plan(
     pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float
 ) -> tuple[float, float, float]:
     """Change modes and move the reference on; returns the acceleration to feed forward."""
-    _end_what_ended(pilot, estimate, paths, step, dt)
+    _end_what_ended(pilot, estimate, gains, paths, step, dt)
     if pilot.mode == TRAJECTORY:
         if pilot.path_last >= 0:
             rate, fx, fy, fz = follow_path(pilot, gains, paths, step, dt)
@@ -145,7 +145,9 @@ def plan(
 
 
 @inner_kernel
-def _end_what_ended(pilot: Any, estimate: Any, paths: Any, step: int, dt: float) -> None:
+def _end_what_ended(
+    pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float
+) -> None:
     """Time-outs, trajectories that are flown, places that are reached."""
     following = pilot.mode == TRAJECTORY and pilot.path_last >= 0
     if following:
@@ -162,7 +164,7 @@ def _end_what_ended(pilot: Any, estimate: Any, paths: Any, step: int, dt: float)
     vx, vy, vz = three(estimate.velocity_map)
     slow = vx * vx + vy * vy + (0.0 if pilot.mode == LAND else vz * vz)
     if pilot.braking and slow < _STOPPED_M_S**2:
-        _lock_place(pilot, estimate)
+        _lock_place(pilot, estimate, gains)
     elif not pilot.braking:
         _change_mode(pilot, estimate)
 
