@@ -21,6 +21,9 @@ from volery.control.trajectory import Trajectory
 from volery.core import rotations
 from volery.core.errors import CommandError
 from volery.vehicle.airframe import Airframe
+from volery.vehicle.identified import IdentifiedModel
+from volery.vehicle.kinematic import Kinematic
+from volery.vehicle.plants import Plant, RigidBody
 
 Array = NDArray[np.float64]
 
@@ -30,18 +33,20 @@ DEFAULT_RETURN_HEIGHT_M = 10.0
 class FleetCommands:
     """What UAVs can be told; `Fleet` adds time and state.
 
-    airframes, names: one a UAV. uavs: (N,) rows of `step.UAV`. dt: physics step, s. A command acts
+    airframes, plants, names: one a UAV. uavs: (N,) rows of `step.UAV`. dt: physics step, s. A command acts
     from the next step; one that is refused changes nothing.
     """
 
     def __init__(
         self,
         airframes: tuple[Airframe, ...],
+        plants: tuple[Plant, ...],
         names: tuple[str, ...],
         uavs: NDArray[np.void],
         dt: float,
     ) -> None:
         self.airframes = airframes
+        self.plants = plants
         self.names = names
         self.step = 0
         self._dt = dt
@@ -70,7 +75,7 @@ class FleetCommands:
 
     def command_rotor_speeds(self, i: int, speeds: ArrayLike) -> None:
         """Turn the rotors of UAV `i` at `speeds` (R,) rad/s."""
-        self._refuse_wreck(i)
+        self._refuse_plants(i, "rotor speeds", IdentifiedModel, Kinematic)
         rotors = self.airframes[i].rotors
         shape = (len(rotors.places),)
         speeds = checked_within("rotor speeds", speeds, shape, rotors.max_speed_rad_s)
@@ -79,7 +84,7 @@ class FleetCommands:
 
     def command_rates(self, i: int, omega_body: ArrayLike, thrust: float) -> None:
         """Turn UAV `i` at `omega_body` (3,) rad/s, FLU, with `thrust` N along its z axis."""
-        self._refuse_wreck(i)
+        self._refuse_plants(i, "rates", IdentifiedModel, Kinematic)
         limit = 4.0 * math.radians(self.airframes[i].limits.rate_deg_s)
         omega_body = checked("rates", omega_body, (3,), limit)
         thrust = self._checked_thrust(i, thrust)
@@ -89,7 +94,7 @@ class FleetCommands:
 
     def command_attitude(self, i: int, attitude: ArrayLike, thrust: float) -> None:
         """Hold UAV `i` at `attitude` (4,), map from body, with `thrust` N along its z axis."""
-        self._refuse_wreck(i)
+        self._refuse_plants(i, "attitudes", Kinematic)
         attitude = checked_attitude(attitude)
         thrust = self._checked_thrust(i, thrust)
         pilot = self._enter_low_level(i, ControlLevel.ATTITUDE)
@@ -182,6 +187,30 @@ class FleetCommands:
         pilot["path_faces"] = trajectory.faces
         self._paths.put(i, trajectory.segments)
 
+    def command_pose(
+        self,
+        i: int,
+        position: ArrayLike,
+        attitude: ArrayLike,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        omega_body: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Put the kinematic UAV `i` at a pose (m, map; (4,) map from body) with the next step.
+
+        velocity: (3,) m/s, map, and omega_body: (3,) rad/s, FLU, are what its sensors feel; it
+        stays there until the next command.
+        """
+        self._refuse_plants(i, "poses", RigidBody, IdentifiedModel)
+        position = checked("position", position, (3,), MAX_COORDINATE)
+        attitude = checked_attitude(attitude)
+        velocity = checked("velocity", velocity, (3,), 1e3)
+        omega_body = checked("rates", omega_body, (3,), 1e3)
+        pilot = self._enter_low_level(i, ControlLevel.POSE)
+        pilot["position_target"] = position
+        pilot["attitude"] = attitude
+        pilot["velocity_target"] = velocity
+        pilot["rates"] = omega_body
+
     def take_off(self, i: int, altitude_m: float = 2.5) -> None:
         """Let UAV `i`, landed, climb to `altitude_m` above its place and hold."""
         if not (math.isfinite(altitude_m) and 0.0 < altitude_m <= MAX_COORDINATE):
@@ -225,6 +254,12 @@ class FleetCommands:
             raise CommandError(f"there is no UAV {i}; rows 0 to {len(self) - 1} exist")
         if self._bodies["crashed"][i]:
             raise CommandError(f"{self.names[i]} has crashed")
+
+    def _refuse_plants(self, i: int, what: str, *plants: type[Plant]) -> None:
+        self._refuse_wreck(i)
+        if isinstance(self.plants[i], plants):
+            kind = type(self.plants[i]).__name__
+            raise CommandError(f"{self.names[i]} takes no {what}: its plant is a {kind}")
 
     def _checked_thrust(self, i: int, thrust: float) -> float:
         airframe = self.airframes[i]

@@ -96,6 +96,7 @@ def guide(pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: floa
     """
     if pilot.level != _GUIDED:
         return
+    move_on(pilot, gains)
     fx, fy, fz = plan(pilot, estimate, gains, paths, step, dt)
     by_velocity = pilot.mode == VELOCITY or pilot.braking
     track(
@@ -109,7 +110,10 @@ def guide(pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: floa
 def plan(
     pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float
 ) -> tuple[float, float, float]:
-    """Change modes and move the reference on; returns the acceleration to feed forward."""
+    """Change modes and choose how the reference moves; the acceleration to feed forward.
+
+    The reference is that of this tick already.
+    """
     _end_what_ended(pilot, estimate, gains, paths, step, dt)
     if pilot.mode == TRAJECTORY:
         if pilot.path_last >= 0:
@@ -119,9 +123,8 @@ def plan(
         turn_heading(pilot, estimate, gains, rate)
         return fx, fy, fz
     turn_heading(pilot, estimate, gains, 0.0)
-    move_on(pilot, gains)
     if pilot.mode == VELOCITY:
-        tx, ty, tz = _wanted_velocity(pilot, estimate, gains)
+        tx, ty, tz = wanted_velocity(pilot, estimate, gains)
         steer_level(pilot, estimate, gains, tx, ty)
         steer_height(pilot, estimate, gains, tz)
     else:
@@ -170,7 +173,7 @@ def _end_what_ended(
 
 
 @inner_kernel
-def _wanted_velocity(pilot: Any, estimate: Any, gains: Any) -> tuple[float, float, float]:
+def wanted_velocity(pilot: Any, estimate: Any, gains: Any) -> tuple[float, float, float]:
     """The velocity commanded (m/s, map), within the airframe's limits."""
     tx, ty, tz = three(pilot.velocity_target)
     if pilot.velocity_in_heading:

@@ -35,6 +35,8 @@ class ControlLevel(IntEnum):
     """Attitude and thrust."""
     GUIDED = 4
     """Velocity, position, trajectory or a flight mode."""
+    POSE = 5
+    """Pose of a kinematic UAV, moved from outside."""
 
 
 PILOT = np.dtype(
