@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.control.flight_modes import FlightMode
+from volery.control.segment_store import SegmentStore
 from volery.control.setpoints import (
     MAX_COORDINATE,
     ControlLevel,
@@ -16,9 +17,13 @@ from volery.control.setpoints import (
     checked_attitude,
     checked_within,
 )
+from volery.control.trajectory import Trajectory
 from volery.core import rotations
 from volery.core.errors import CommandError
 from volery.vehicle.airframe import Airframe
+from volery.vehicle.identified import IdentifiedModel
+from volery.vehicle.kinematic import Kinematic
+from volery.vehicle.plants import Plant, RigidBody
 
 Array = NDArray[np.float64]
 
@@ -28,24 +33,27 @@ DEFAULT_RETURN_HEIGHT_M = 10.0
 class FleetCommands:
     """What UAVs can be told; `Fleet` adds time and state.
 
-    airframes, names: one a UAV. uavs: (N,) rows of `step.UAV`. dt: physics step, s. A command acts
+    airframes, plants, names: one a UAV. uavs: (N,) rows of `step.UAV`. dt: physics step, s. A command acts
     from the next step; one that is refused changes nothing.
     """
 
     def __init__(
         self,
         airframes: tuple[Airframe, ...],
+        plants: tuple[Plant, ...],
         names: tuple[str, ...],
         uavs: NDArray[np.void],
         dt: float,
     ) -> None:
         self.airframes = airframes
+        self.plants = plants
         self.names = names
         self.step = 0
         self._dt = dt
         self._uavs = uavs
         self._bodies: NDArray[np.void] = uavs["body"]
         self._pilots: NDArray[np.void] = uavs["pilot"]
+        self._paths = SegmentStore(self._pilots)
 
     def __len__(self) -> int:
         """Number of UAVs."""
@@ -56,7 +64,10 @@ class FleetCommands:
         return FlightMode(int(self._pilots["mode"][i]))
 
     def set_command_timeout(self, seconds: float, i: int | None = None) -> None:
-        """Time without a velocity command after which UAV `i` (None: all) holds; s, up to 60."""
+        """Time without a velocity or trajectory setpoint after which UAV `i` (None: all) holds.
+
+        s, up to 60.
+        """
         if not 0.0 < seconds <= 60.0:
             raise CommandError(f"time-out = {seconds} s is out of range; up to 60 s is allowed")
         rows = slice(None) if i is None else i
@@ -64,7 +75,7 @@ class FleetCommands:
 
     def command_rotor_speeds(self, i: int, speeds: ArrayLike) -> None:
         """Turn the rotors of UAV `i` at `speeds` (R,) rad/s."""
-        self._refuse_wreck(i)
+        self._refuse_plants(i, "rotor speeds", IdentifiedModel, Kinematic)
         rotors = self.airframes[i].rotors
         shape = (len(rotors.places),)
         speeds = checked_within("rotor speeds", speeds, shape, rotors.max_speed_rad_s)
@@ -73,7 +84,7 @@ class FleetCommands:
 
     def command_rates(self, i: int, omega_body: ArrayLike, thrust: float) -> None:
         """Turn UAV `i` at `omega_body` (3,) rad/s, FLU, with `thrust` N along its z axis."""
-        self._refuse_wreck(i)
+        self._refuse_plants(i, "rates", IdentifiedModel, Kinematic)
         limit = 4.0 * math.radians(self.airframes[i].limits.rate_deg_s)
         omega_body = checked("rates", omega_body, (3,), limit)
         thrust = self._checked_thrust(i, thrust)
@@ -83,7 +94,7 @@ class FleetCommands:
 
     def command_attitude(self, i: int, attitude: ArrayLike, thrust: float) -> None:
         """Hold UAV `i` at `attitude` (4,), map from body, with `thrust` N along its z axis."""
-        self._refuse_wreck(i)
+        self._refuse_plants(i, "attitudes", Kinematic)
         attitude = checked_attitude(attitude)
         thrust = self._checked_thrust(i, thrust)
         pilot = self._enter_low_level(i, ControlLevel.ATTITUDE)
@@ -123,6 +134,82 @@ class FleetCommands:
         pilot["braking"] = False
         if angle is not None:
             self._face(i, angle)
+
+    def command_setpoint(
+        self,
+        i: int,
+        position: ArrayLike,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        acceleration: ArrayLike = (0.0, 0.0, 0.0),
+        yaw: float | None = None,
+        yaw_rate: float = 0.0,
+    ) -> None:
+        """Have UAV `i` at `position` (3,) m now, moving with `velocity` and `acceleration`, map.
+
+        A point of a trajectory that someone else computes (m, m/s, m/s^2; yaw in rad, None: as it
+        is, turning at yaw_rate rad/s). It moves on by itself until the next one comes, or, after
+        the time-out, until the UAV holds. Far goals are for `command_position`.
+        """
+        position = checked("position", position, (3,), MAX_COORDINATE)
+        velocity = checked("velocity", velocity, (3,), 1e3)
+        acceleration = checked("acceleration", acceleration, (3,), 1e3)
+        angle = None if yaw is None else float(checked("yaw", yaw, (), 1e4))
+        rate = checked("yaw rate", yaw_rate, (), 100.0)
+        pilot = self._enter_guided(i, FlightMode.TRAJECTORY)
+        pilot["path_last"] = -1
+        pilot["start_step"] = self.step
+        pilot["deadline_step"] = self.step + pilot["timeout_steps"]
+        pilot["position_target"] = position
+        pilot["velocity_target"] = velocity
+        pilot["acceleration_target"] = acceleration
+        if angle is not None:
+            self._face(i, angle)
+            pilot["yaw_rate_target"] = rate
+        elif rate != 0.0:
+            self._turn(i, rate)
+        else:
+            pilot["yaw_rate_target"] = 0.0
+
+    def command_trajectory(self, i: int, trajectory: Trajectory) -> None:
+        """Fly UAV `i` along `trajectory` from now on, then hold.
+
+        Its times count from this step. One that begins later than at 0 s is reached from the
+        present motion by a segment of its own. Places are those of the map: a UAV that is
+        elsewhere approaches at about 1 m/s beside the motion asked for.
+        """
+        self._refuse_wreck(i)
+        body = self._bodies[i]
+        trajectory = trajectory.led_in_from(
+            body["position_map"], body["velocity_map"], float(rotations.yaw_of(body["attitude"]))
+        )
+        pilot = self._enter_guided(i, FlightMode.TRAJECTORY)
+        pilot["start_step"] = self.step
+        pilot["path_faces"] = trajectory.faces
+        self._paths.put(i, trajectory.segments)
+
+    def command_pose(
+        self,
+        i: int,
+        position: ArrayLike,
+        attitude: ArrayLike,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        omega_body: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Put the kinematic UAV `i` at a pose (m, map; (4,) map from body) with the next step.
+
+        velocity: (3,) m/s, map, and omega_body: (3,) rad/s, FLU, are what its sensors feel; it
+        stays there until the next command.
+        """
+        self._refuse_plants(i, "poses", RigidBody, IdentifiedModel)
+        position = checked("position", position, (3,), MAX_COORDINATE)
+        attitude = checked_attitude(attitude)
+        velocity = checked("velocity", velocity, (3,), 1e3)
+        omega_body = checked("rates", omega_body, (3,), 1e3)
+        pilot = self._enter_low_level(i, ControlLevel.POSE)
+        pilot["position_target"] = position
+        pilot["attitude"] = attitude
+        pilot["velocity_target"] = velocity
+        pilot["rates"] = omega_body
 
     def take_off(self, i: int, altitude_m: float = 2.5) -> None:
         """Let UAV `i`, landed, climb to `altitude_m` above its place and hold."""
@@ -168,6 +255,12 @@ class FleetCommands:
         if self._bodies["crashed"][i]:
             raise CommandError(f"{self.names[i]} has crashed")
 
+    def _refuse_plants(self, i: int, what: str, *plants: type[Plant]) -> None:
+        self._refuse_wreck(i)
+        if isinstance(self.plants[i], plants):
+            kind = type(self.plants[i]).__name__
+            raise CommandError(f"{self.names[i]} takes no {what}: its plant is a {kind}")
+
     def _checked_thrust(self, i: int, thrust: float) -> float:
         airframe = self.airframes[i]
         most = len(airframe.rotors.places) * airframe.max_rotor_thrust
@@ -197,7 +290,9 @@ class FleetCommands:
             body = self._bodies[i]
             yaw = float(rotations.yaw_of(body["attitude"]))
             pilot["level"] = ControlLevel.GUIDED
+            pilot["position"] = body["position_map"]
             pilot["velocity"] = body["velocity_map"]
+            pilot["acceleration"] = 0.0
             pilot["velocity_integral"] = 0.0
             pilot["heading"] = pilot["heading_target"] = math.cos(yaw), math.sin(yaw)
         if mode is not FlightMode.VELOCITY and pilot["turning"]:

@@ -18,7 +18,7 @@ from volery.control.commands import FleetCommands
 from volery.control.fleet_events import FleetEvent, event_of
 from volery.control.flight_modes import FlightMode
 from volery.control.gains import ATTITUDE_PERIOD_S, GUIDANCE_PERIOD_S, steps_of
-from volery.control.model_table import model_table
+from volery.control.model_table import model_table, new_references
 from volery.control.setpoints import (
     MAX_COORDINATE,
     PILOT,
@@ -33,6 +33,7 @@ from volery.core.errors import CommandError
 from volery.vehicle.airframe import Airframe, hover_thrusts
 from volery.vehicle.contact import steepest_cosine
 from volery.vehicle.fleet import FleetState, new_bodies, state_of
+from volery.vehicle.plants import Plant, RigidBody
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.terrain import TerrainGrid
 
@@ -50,6 +51,7 @@ class Fleet(FleetCommands):
     dt_ns: physics step. on_contact: what an impact does, "crash" (rotors stop, it falls and rests)
     or "bounce" (it rebounds and flies on). mode: `HOLD` starts in the air with rotors turning,
     `LANDED` on the ground with rotors stopped; one for all or one a UAV. names: for messages.
+    plants: what turns commands into motion (`vehicle.plants`), one for all or one a UAV.
 
     Rows are numbered from 0. After `advance` the state belongs to time `step * dt_ns`.
     """
@@ -64,6 +66,7 @@ class Fleet(FleetCommands):
         on_contact: Literal["crash", "bounce"] = "crash",
         mode: FlightMode | Sequence[FlightMode] = FlightMode.HOLD,
         names: Sequence[str] | None = None,
+        plants: Plant | Sequence[Plant] = RigidBody(),  # noqa: B008  (frozen)
     ) -> None:
         count = len(airframes)
         if count == 0:
@@ -77,14 +80,21 @@ class Fleet(FleetCommands):
         if len(modes) != count or not set(modes) <= {FlightMode.HOLD, FlightMode.LANDED}:
             raise CommandError("a UAV starts in HOLD or LANDED, one mode for all or one for each")
 
-        models, rows = model_table(airframes, dt_ns / NS_PER_S)
+        plants = tuple(plants) if isinstance(plants, Sequence) else (plants,) * count
+        if len(plants) != count:
+            raise CommandError(f"there are {len(plants)} plants for {count} UAVs")
+
+        models, rows = model_table(airframes, plants, dt_ns / NS_PER_S)
         uavs = np.zeros(count, UAV)
         uavs["body"] = new_bodies(position, attitude)
         uavs["pilot"] = new_pilots(attitude)
         uavs["model"] = rows
         names = tuple(names or (f"UAV {i}" for i in range(count)))
-        super().__init__(tuple(airframes), names, uavs, dt_ns / NS_PER_S)
+        super().__init__(tuple(airframes), plants, names, uavs, dt_ns / NS_PER_S)
         self._models = models
+        weight = np.array([airframe.weight for airframe in airframes])
+        flying = np.array([start is FlightMode.HOLD for start in modes])
+        self._references = new_references(models, attitude, weight * flying)
         self._dt_ns = int(dt_ns)
         self._bounce = on_contact == "bounce"
         self._periods = (
@@ -145,6 +155,8 @@ class Fleet(FleetCommands):
                 float(wx),
                 float(wy),
                 float(wz),
+                self._paths.rows,
+                self._references,
                 self._events,
                 self.step,
                 steps - done,
@@ -228,6 +240,8 @@ class Fleet(FleetCommands):
             "position": self.history.position.copy(),
             "attitude": self.history.attitude.copy(),
             "step": self.step,
+            "references": self._references.copy(),
+            "paths": self._paths.get_state(),
             "events": list(self._drained),
         }
 
@@ -236,6 +250,8 @@ class Fleet(FleetCommands):
         self._uavs[...] = state["uavs"]
         self.history.position[...] = state["position"]
         self.history.attitude[...] = state["attitude"]
+        self._references[...] = state["references"]
+        self._paths.set_state(state["paths"])
         self.step = state["step"]
         self._drained = list(state["events"])
 
@@ -247,6 +263,7 @@ class Fleet(FleetCommands):
         self._bodies["rotor_speed"][i, : len(trim)] = trim
         self._pilots["rotor_reference"][i, : len(trim)] = trim
         pilot = self._enter_guided(i, FlightMode.HOLD, from_ground=True)
+        pilot["thrust"] = airframe.weight
         pilot["position_target"] = self._bodies["position_map"][i]
         pilot["braking"] = False
 

@@ -6,6 +6,7 @@ not depend on how a run is sliced. ROS services and MAVLink ask for the same mod
     LANDED --take_off--> TAKE_OFF --arrived--> HOLD
     any flying mode --command--> GO_TO --arrived--> HOLD
                                  VELOCITY --no command for a while--> HOLD
+                                 TRAJECTORY --flown, or no setpoint for a while--> HOLD
                                  RETURN --climbed, over home, low--> LAND --on the ground--> LANDED
 """
 
@@ -15,13 +16,19 @@ import math
 from enum import IntEnum
 from typing import Any
 
-from volery.control.setpoints import ControlLevel
-from volery.control.velocity_position import (
-    heading_of,
-    track_velocity,
-    turn_heading,
-    velocity_towards,
+from volery.control.follow import follow_path, follow_setpoint, path_is_flown
+from volery.control.heading import heading_of, turn_heading
+from volery.control.outer_loop import track
+from volery.control.reference import (
+    brake_height,
+    brake_level,
+    lead_height,
+    lead_level,
+    move_on,
+    steer_height,
+    steer_level,
 )
+from volery.control.setpoints import ControlLevel
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.rigid import three
 
@@ -47,6 +54,8 @@ class FlightMode(IntEnum):
     """Follows rotor speeds, body rates or attitudes given from outside; has no time-out."""
     CRASHED = 8
     """Hit something; rotors stopped for good."""
+    TRAJECTORY = 9
+    """Follows a trajectory, or trajectory setpoints; holds when it is flown or when they cease."""
 
 
 LANDED = int(FlightMode.LANDED)
@@ -58,6 +67,7 @@ LAND = int(FlightMode.LAND)
 RETURN = int(FlightMode.RETURN)
 LOW_LEVEL = int(FlightMode.LOW_LEVEL)
 CRASHED = int(FlightMode.CRASHED)
+TRAJECTORY = int(FlightMode.TRAJECTORY)
 
 _STOPPED = int(ControlLevel.STOPPED)
 _GUIDED = int(ControlLevel.GUIDED)
@@ -78,53 +88,111 @@ CLIMBING, CROSSING, DESCENDING = 0, 1, 2
 
 
 @inner_kernel
-def guide(pilot: Any, estimate: Any, gains: Any, step: int) -> None:
-    """One guidance tick of a `PILOT`: mode changes, then velocity, attitude and thrust setpoints.
+def guide(pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float) -> None:
+    """One guidance tick of a `PILOT`: mode changes, the reference, attitude and thrust setpoints.
 
-    estimate: a record with `position_map`, `velocity_map`, `attitude`. step: the physics step that
-    begins now, for time-outs.
+    estimate: a record with `position_map`, `velocity_map`, `attitude`. paths: the segments of all
+    trajectories. step: the physics step that begins now, for times.
     """
     if pilot.level != _GUIDED:
         return
-    if pilot.mode == VELOCITY and step >= pilot.deadline_step:
-        pilot.mode = HOLD
-        pilot.braking = True
-    vx, vy, vz = three(estimate.velocity_map)
-    if pilot.mode != VELOCITY:
-        pilot.turning = False
-        slow = vx * vx + vy * vy + (0.0 if pilot.mode == LAND else vz * vz)
-        if pilot.braking and slow < _STOPPED_M_S**2:
-            _lock_place(pilot, estimate)
-        elif not pilot.braking:
-            _change_mode(pilot, estimate)
-    turn_heading(pilot, estimate, gains)
-
-    tx = ty = tz = 0.0
-    if pilot.mode == VELOCITY:
-        tx, ty, tz = three(pilot.velocity_target)
-        if pilot.velocity_in_heading:
-            c, s = heading_of(estimate)
-            tx, ty = c * tx - s * ty, s * tx + c * ty
-        size = math.sqrt(tx * tx + ty * ty)
-        if size > gains.speed:
-            tx *= gains.speed / size
-            ty *= gains.speed / size
-        tz = min(max(tz, -gains.descent), gains.climb)
-    elif not pilot.braking:
-        climb = gains.take_off if pilot.mode == TAKE_OFF else gains.climb
-        tx, ty, tz = velocity_towards(pilot, estimate, gains, gains.speed, climb, gains.descent)
+    move_on(pilot, gains)
+    fx, fy, fz = plan(pilot, estimate, gains, paths, step, dt)
+    by_velocity = pilot.mode == VELOCITY or pilot.braking
+    track(
+        pilot, estimate, gains, not by_velocity, not (by_velocity or pilot.mode == LAND), fx, fy, fz
+    )
     if pilot.mode == LAND:
-        tz = -gains.landing
-    track_velocity(pilot, estimate, gains, tx, ty, tz)
-    if pilot.mode == LAND:
-        _feel_ground(pilot, gains, vz)
+        _feel_ground(pilot, gains, estimate.velocity_map[2])
 
 
 @inner_kernel
-def _lock_place(pilot: Any, estimate: Any) -> None:
+def plan(
+    pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float
+) -> tuple[float, float, float]:
+    """Change modes and choose how the reference moves; the acceleration to feed forward.
+
+    The reference is that of this tick already.
+    """
+    _end_what_ended(pilot, estimate, gains, paths, step, dt)
+    if pilot.mode == TRAJECTORY:
+        if pilot.path_last >= 0:
+            rate, fx, fy, fz = follow_path(pilot, gains, paths, step, dt)
+        else:
+            rate, fx, fy, fz = follow_setpoint(pilot, gains, step, dt)
+        turn_heading(pilot, estimate, gains, rate)
+        return fx, fy, fz
+    turn_heading(pilot, estimate, gains, 0.0)
+    if pilot.mode == VELOCITY:
+        tx, ty, tz = wanted_velocity(pilot, estimate, gains)
+        steer_level(pilot, estimate, gains, tx, ty)
+        steer_height(pilot, estimate, gains, tz)
+    else:
+        if pilot.braking:
+            brake_level(pilot, estimate, gains)
+        else:
+            lead_level(pilot, estimate, gains, gains.speed)
+        if pilot.mode == LAND:
+            steer_height(pilot, estimate, gains, -gains.landing)
+        elif pilot.braking:
+            brake_height(pilot, estimate, gains)
+        else:
+            climb = gains.take_off if pilot.mode == TAKE_OFF else gains.climb
+            lead_height(pilot, estimate, gains, climb, gains.descent)
+    drag = gains.drag
+    return (
+        pilot.acceleration[0] + drag * pilot.velocity[0],
+        pilot.acceleration[1] + drag * pilot.velocity[1],
+        pilot.acceleration[2],
+    )
+
+
+@inner_kernel
+def _end_what_ended(
+    pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float
+) -> None:
+    """Time-outs, trajectories that are flown, places that are reached."""
+    following = pilot.mode == TRAJECTORY and pilot.path_last >= 0
+    if following:
+        if path_is_flown(pilot, paths, step, dt):
+            pilot.mode = HOLD
+    elif pilot.mode in (VELOCITY, TRAJECTORY) and step >= pilot.deadline_step:
+        pilot.mode = HOLD
+        pilot.braking = True
+    if pilot.mode in (VELOCITY, TRAJECTORY):
+        return
+    if pilot.turning:  # stop where it looks
+        pilot.turning = False
+        pilot.heading_target[0], pilot.heading_target[1] = pilot.heading[0], pilot.heading[1]
+    vx, vy, vz = three(estimate.velocity_map)
+    slow = vx * vx + vy * vy + (0.0 if pilot.mode == LAND else vz * vz)
+    if pilot.braking and slow < _STOPPED_M_S**2:
+        _lock_place(pilot, estimate, gains)
+    elif not pilot.braking:
+        _change_mode(pilot, estimate)
+
+
+@inner_kernel
+def wanted_velocity(pilot: Any, estimate: Any, gains: Any) -> tuple[float, float, float]:
+    """The velocity commanded (m/s, map), within the airframe's limits."""
+    tx, ty, tz = three(pilot.velocity_target)
+    if pilot.velocity_in_heading:
+        c, s = heading_of(estimate)
+        tx, ty = c * tx - s * ty, s * tx + c * ty
+    size = math.sqrt(tx * tx + ty * ty)
+    if size > gains.speed:
+        tx *= gains.speed / size
+        ty *= gains.speed / size
+    return tx, ty, min(max(tz, -gains.descent), gains.climb)
+
+
+@inner_kernel
+def _lock_place(pilot: Any, estimate: Any, gains: Any) -> None:
+    """Hold the place at which it will come to rest."""
     pilot.braking = False
     for k in range(3):
-        pilot.position_target[k] = estimate.position_map[k]
+        way = estimate.velocity_map[k] / gains.ease
+        pilot.position_target[k] = estimate.position_map[k] + way
     if pilot.mode == RETURN:
         pilot.position_target[2] = pilot.return_height
 
@@ -175,6 +243,7 @@ def stop(pilot: Any) -> None:
     pilot.braking = False
     for k in range(3):
         pilot.velocity[k] = 0.0
+        pilot.acceleration[k] = 0.0
         pilot.velocity_integral[k] = 0.0
         pilot.rates[k] = 0.0
         pilot.rate_integral[k] = 0.0

@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.control.rpt import height_gains, level_gains
 from volery.vehicle.airframe import (
     GRAVITY,
     MAX_ROTORS,
@@ -28,6 +29,8 @@ _THRUST_RESERVE = 0.9
 """Share of the full thrust that guidance may ask for; the rest steers."""
 _LEAST_THRUST = 0.15
 """Share of the weight that guidance keeps, so that attitude stays in hand."""
+_LEAST_INTEGRAL, _MOST_INTEGRAL = 0.3, 0.8
+"""Bounds of what the integrals may ask for, in g; a vehicle with much drag needs more."""
 _IDLE_SPEED = 0.1
 """Idle speed of a rotor, share of its hover speed."""
 
@@ -56,6 +59,16 @@ GAINS = np.dtype(
         ("integral_limit", "f8"),
         ("drag", "f8"),
         ("position", "f8"),
+        ("level_position", "f8"),
+        ("level_velocity", "f8"),
+        ("level_integral", "f8"),
+        ("height_position", "f8"),
+        ("height_velocity", "f8"),
+        ("height_integral", "f8"),
+        ("level_leash", "f8"),
+        ("height_leash", "f8"),
+        ("ease", "f8"),
+        ("lead", "f8"),
         ("brake", "f8"),
         ("acceleration", "f8"),
         ("climb_acceleration", "f8"),
@@ -120,17 +133,27 @@ def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:  # noqa: PLR091
     row["velocity_integral"] = 0.25 * velocity**2
     row["vertical"] = vertical
     row["vertical_integral"] = 0.25 * vertical**2
-    row["integral_limit"] = 0.8 * GRAVITY
     # in-plane drag of the rotors in hover, 1/s: known from the airframe, so fed forward
     drags = rotors.drag_n_s2_m * np.sqrt(trim / rotors.thrust_n_s2)
     row["drag"] = drags.sum() / airframe.body.mass_kg
     row["rate_drag"] = _rate_drag(airframe, drags) / inertia
+    # a steady wind as fast as the vehicle flies must be answered
+    wind = float(row["drag"][0]) * limits.speed_m_s
+    row["integral_limit"] = min(max(_LEAST_INTEGRAL * GRAVITY, wind), _MOST_INTEGRAL * GRAVITY)
     row["position"] = position
+    level, height = level_gains(wish.horizontal, attitude), height_gains(wish.height, rate)
+    for name, gain in level._asdict().items():
+        row[f"level_{name}"] = gain
+    for name, gain in height._asdict().items():
+        row[f"height_{name}"] = gain
+    row["ease"] = max(0.5 * attitude, 2.0 * position)
     row["brake"] = 0.6 * limits.acceleration_m_s2
     row["acceleration"] = limits.acceleration_m_s2
     row["climb_acceleration"] = min(
         limits.acceleration_m_s2, 0.6 * (_THRUST_RESERVE * most / airframe.body.mass_kg - GRAVITY)
     )
+    row["level_leash"] = row["acceleration"] / level.position
+    row["height_leash"] = row["climb_acceleration"] / height.position
     row["tilt_tangent"] = math.tan(math.radians(limits.tilt_deg))
     row["least_thrust"] = _LEAST_THRUST * airframe.weight
     row["most_thrust"] = _THRUST_RESERVE * most
@@ -141,6 +164,7 @@ def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:  # noqa: PLR091
     row["landing"] = limits.landing_m_s
     row["tick"] = steps_of(GUIDANCE_PERIOD_S, dt) * dt
     row["inverse_tick"] = 1.0 / row["tick"]
+    row["lead"] = 1.0 / attitude + row["tick"]
     row["least_acceleration"] = row["least_thrust"] / airframe.body.mass_kg
     row["most_acceleration"] = row["most_thrust"] / airframe.body.mass_kg
     return row

@@ -34,7 +34,9 @@ class ControlLevel(IntEnum):
     ATTITUDE = 3
     """Attitude and thrust."""
     GUIDED = 4
-    """Velocity, position or a flight mode."""
+    """Velocity, position, trajectory or a flight mode."""
+    POSE = 5
+    """Pose of a kinematic UAV, moved from outside."""
 
 
 PILOT = np.dtype(
@@ -43,22 +45,30 @@ PILOT = np.dtype(
         ("level", "i8"),  # ControlLevel
         ("phase", "i8"),  # of a flight mode that has several
         ("calm_ticks", "i8"),  # guidance ticks for which a condition of the mode has held
-        ("deadline_step", "i8"),  # a velocity command holds until this step
+        ("deadline_step", "i8"),  # a velocity or trajectory setpoint holds until this step
         ("timeout_steps", "i8"),  # ... and is renewed by this many
+        ("start_step", "i8"),  # when a trajectory or a trajectory setpoint began
+        ("path_first", "i8"),  # rows of the trajectory's segments; of none: 0, -1
+        ("path_last", "i8"),
+        ("path_row", "i8"),  # the segment flown now
         ("velocity_in_heading", "?"),  # velocity_target turns with the vehicle's heading
         ("braking", "?"),  # HOLD and LAND: stop first, then lock the place
         ("turning", "?"),  # heading follows yaw_rate_target instead of heading_target
         ("saturated", "?"),  # the rotors could not give the torque wanted last
-        ("spare", "u1", 4),  # no hidden padding: equal states are equal bytes
+        ("path_faces", "?"),  # the trajectory has headings
+        ("spare", "u1", 3),  # no hidden padding: equal states are equal bytes
         ("home", "f8", 3),  # m, map: where the last take-off began
         ("return_height", "f8"),  # m, map
         ("position_target", "f8", 3),  # m, map
         ("velocity_target", "f8", 3),  # m/s, map or heading frame
+        ("acceleration_target", "f8", 3),  # m/s^2, map
         ("heading_target", "f8", 2),  # cosine and sine
         ("yaw_rate_target", "f8"),  # rad/s
         ("heading", "f8", 2),  # setpoint moving towards its target, cosine and sine
-        ("velocity", "f8", 3),  # m/s, map: setpoint moving towards its target
-        ("velocity_integral", "f8", 3),  # m/s^2
+        ("position", "f8", 3),  # m, map: reference of the outer loop, moving towards its target
+        ("velocity", "f8", 3),  # m/s, map: likewise
+        ("acceleration", "f8", 3),  # m/s^2, map: likewise
+        ("velocity_integral", "f8", 3),  # m/s^2, map: answers what pushes steadily
         ("attitude", "f8", 4),  # map from body
         ("thrust", "f8"),  # N along the body's z
         ("yaw_rate", "f8"),  # rad/s, fed forward to the rates
@@ -74,6 +84,7 @@ PILOT = np.dtype(
 def new_pilots(attitude: Array) -> NDArray[np.void]:
     """Pilots (N,) of UAVs that stand still with `attitude` (N, 4)."""
     pilots = np.zeros(len(attitude), PILOT)
+    pilots["path_last"] = -1
     pilots["attitude"] = attitude
     x, y, z, w = attitude.T
     heading = np.stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (w * z + x * y)], axis=-1)

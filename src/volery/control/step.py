@@ -9,21 +9,34 @@ from numpy.typing import NDArray
 
 from volery.control.flight_modes import CRASHED, guide, stop
 from volery.control.gains import GAINS
+from volery.control.kinematic_flight import fly_kinematic
 from volery.control.rates_attitude import hold_attitude, hold_rates
-from volery.control.setpoints import PILOT
+from volery.control.setpoints import PILOT, ControlLevel
 from volery.vehicle.aerodynamics import PLANT
-from volery.vehicle.compiled import fused_kernel, inner_kernel
+from volery.vehicle.compiled import apart_kernel, fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
 from volery.vehicle.fleet import BODY
+from volery.vehicle.identified import IDENTIFIED, accelerate_identified
 from volery.vehicle.kernels import accelerate, carry, meet_ground, near_ground
+from volery.vehicle.kinematic import KINEMATIC
+from volery.vehicle.plants import KINEMATIC_MOTION, RIGID_BODY
 from volery.world.terrain import TerrainGrid
 
 Array = NDArray[np.float64]
 
 UAV = np.dtype([("body", BODY), ("pilot", PILOT), ("model", "i8")], align=True)
 """One UAV: its plant, its control, and the row of its airframe."""
-MODEL = np.dtype([("plant", PLANT), ("gains", GAINS)], align=True)
-"""One airframe."""
+MODEL = np.dtype(
+    [
+        ("plant", PLANT),
+        ("gains", GAINS),
+        ("identified", IDENTIFIED),
+        ("kinematic", KINEMATIC),
+        ("kind", "i8"),  # vehicle.plants: RIGID_BODY, IDENTIFIED_LOOPS, KINEMATIC_MOTION
+    ],
+    align=True,
+)
+"""One airframe with one plant."""
 
 EVENT = np.dtype(
     [
@@ -38,12 +51,13 @@ EVENT = np.dtype(
 )
 """One happening; `kind` is `TOUCH_DOWN`, `IMPACT` or `MODE_CHANGE`."""
 MODE_CHANGE = 3
+_STOPPED = int(ControlLevel.STOPPED)
 EVENTS_A_STEP = 3
 """At most, of one UAV."""
 
 
 @fused_kernel
-def advance_fleet(  # noqa: PLR0912
+def advance_fleet(  # noqa: PLR0912, PLR0915
     uavs: NDArray[np.void],
     models: NDArray[np.void],
     heights: Array,
@@ -56,6 +70,8 @@ def advance_fleet(  # noqa: PLR0912
     wind_x: float,
     wind_y: float,
     wind_z: float,
+    paths: Array,
+    references: Array,
     events: NDArray[np.void],
     step: int,
     steps: int,
@@ -66,6 +82,9 @@ def advance_fleet(  # noqa: PLR0912
     event_ends: bool,
 ) -> tuple[int, int, bool]:
     """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
+
+    paths: segments of trajectories, see `control.follow`. references: (N, L, 6), commands of the
+    last L steps where identified plants have dead times, else of any size.
 
     Ends early after a step in which a budget ran out, the events' buffer grew full or, with
     `event_ends`, anything was noted. Returns the steps done, the events written, and whether a
@@ -90,26 +109,56 @@ def advance_fleet(  # noqa: PLR0912
                 for k in range(3):
                     body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
             else:
-                plant = models[uavs[i].model].plant
-                gains = models[uavs[i].model].gains
+                model = models[uavs[i].model]
+                plant = model.plant
+                gains = model.gains
                 estimate = body  # what control knows of the motion: for now, the truth
                 mode = pilot.mode
-                if guiding:
-                    guide(pilot, estimate, gains, step)
-                if turning:
-                    hold_attitude(pilot, estimate, gains)
-                hold_rates(pilot, estimate, gains, dt)
-                accelerate(body, plant, pilot, wind_x, wind_y, wind_z, dt)
-                touch = NO_TOUCH
-                if near_ground(body, dt):
-                    touch = meet_ground(
-                        body, plant, pilot, grid, steepest, bounce, scratch, step + 1, dt
+                if model.kind == KINEMATIC_MOTION:
+                    touch = fly_kinematic(
+                        body,
+                        pilot,
+                        plant,
+                        model.kinematic,
+                        gains,
+                        paths,
+                        grid,
+                        steepest,
+                        step,
+                        guiding,
+                        dt,
                     )
-                carry(body, dt)
+                else:
+                    if guiding:
+                        guide(pilot, estimate, gains, paths, step, dt)
+                    if model.kind == RIGID_BODY:
+                        if turning:
+                            hold_attitude(pilot, estimate, gains)
+                        hold_rates(pilot, estimate, gains, dt)
+                        accelerate(body, plant, pilot, wind_x, wind_y, wind_z, dt)
+                    else:
+                        _follow_loops(
+                            body,
+                            plant,
+                            model.identified,
+                            pilot,
+                            references[i],
+                            step,
+                            wind_x,
+                            wind_y,
+                            wind_z,
+                            dt,
+                        )
+                    touch = NO_TOUCH
+                    if near_ground(body, dt):
+                        touch = meet_ground(
+                            body, plant, pilot, grid, steepest, bounce, scratch, step + 1, dt
+                        )
+                    carry(body, dt)
                 if touch != NO_TOUCH:
                     _note(events[written], step + 1, i, touch, mode, body.touch_speed, body)
                     written += 1
-                    if touch == IMPACT and not bounce:
+                    if touch == IMPACT and not bounce and model.kind != KINEMATIC_MOTION:
                         body.crashed = True
                         pilot.mode = CRASHED
                         stop(pilot)
@@ -124,6 +173,26 @@ def advance_fleet(  # noqa: PLR0912
         step += 1
         done += 1
     return done, written, spent
+
+
+@apart_kernel
+def _follow_loops(
+    body: Any,
+    plant: Any,
+    model: Any,
+    pilot: Any,
+    references: Any,
+    step: int,
+    wind_x: float,
+    wind_y: float,
+    wind_z: float,
+    dt: float,
+) -> None:
+    """Attitude and acceleration of an identified plant, out of the way of the others."""
+    live = pilot.level != _STOPPED
+    accelerate_identified(
+        body, plant, model, pilot, live, references, step, wind_x, wind_y, wind_z, dt
+    )
 
 
 @inner_kernel

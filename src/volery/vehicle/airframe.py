@@ -110,6 +110,19 @@ class Limits(_Table):
     yaw_rate_deg_s: Positive
 
 
+class TrackingPoles(_Table):
+    """Where `control.rpt` puts the poles of an axis group; what is left out is derived."""
+
+    wn: Positive | None = None
+    """Natural frequency times epsilon, rad/s."""
+    zeta: Positive | None = None
+    """Damping."""
+    ki: NotNegative | None = None
+    """Integral pole times epsilon, rad/s; 0: no integral."""
+    epsilon: Positive = 1.0
+    """Smaller tracks tighter."""
+
+
 class Bandwidths(_Table):
     """Bandwidths of the control loops, rad/s; what is left out follows from the rotors' lag."""
 
@@ -120,6 +133,9 @@ class Bandwidths(_Table):
     velocity: Positive | None = None
     vertical: Positive | None = None
     position: Positive | None = None
+    """Of the reference's approach to a place."""
+    horizontal: TrackingPoles = TrackingPoles()
+    height: TrackingPoles = TrackingPoles()
 
 
 class Airframe(_Table):

@@ -1,0 +1,159 @@
+"""How a kinematic UAV flies its modes: it is where its reference is."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from volery.control.flight_modes import (
+    LAND,
+    LANDED,
+    TRAJECTORY,
+    VELOCITY,
+    plan,
+    stop,
+    wanted_velocity,
+)
+from volery.control.follow import END, path_time, polynomial, segment_at
+from volery.control.heading import heading_of
+from volery.control.setpoints import ControlLevel
+from volery.vehicle.compiled import apart_kernel, inner_kernel
+from volery.vehicle.kinematic import drive, face, glide, put, stop_at_ground, turn_by
+from volery.vehicle.rigid import three
+from volery.world.terrain import TerrainGrid
+
+_STOPPED = int(ControlLevel.STOPPED)
+_POSE = int(ControlLevel.POSE)
+
+
+@apart_kernel
+def fly_kinematic(
+    body: Any,
+    pilot: Any,
+    plant: Any,
+    model: Any,
+    gains: Any,
+    paths: Any,
+    grid: TerrainGrid,
+    steepest: float,
+    step: int,
+    guiding: bool,
+    dt: float,
+) -> int:
+    """One step of a kinematic UAV, control and motion; what its ground contact is, if any.
+
+    model: a `KINEMATIC` row. guiding: whether this step begins with a guidance tick.
+    """
+    if pilot.level == _STOPPED:
+        _rest(body, plant)
+        return 0
+    for r in range(plant.rotors):
+        body.rotor_speed[r] = model.hover_speed
+    if pilot.level == _POSE:
+        _take_pose(body, pilot, dt)
+        return stop_at_ground(body, plant, model, grid, steepest, step + 1, dt)
+    if guiding:
+        for k in range(3):
+            pilot.position[k] = body.position_map[k]
+            pilot.velocity[k] = body.velocity_map[k]
+        pilot.heading[0], pilot.heading[1] = heading_of(body)
+        plan(pilot, body, gains, paths, step, dt)
+    if pilot.mode == VELOCITY:
+        _follow_velocity(body, pilot, model, gains, dt)
+    elif pilot.mode == TRAJECTORY:
+        _follow_trajectory(body, pilot, paths, step, dt)
+    else:
+        ax, ay, az = three(pilot.acceleration)
+        glide(body, ax, ay, az, dt)
+        turn_by(body, pilot.yaw_rate, dt)
+    touch = stop_at_ground(body, plant, model, grid, steepest, step + 1, dt)
+    if body.on_ground and pilot.mode == LAND:
+        stop(pilot)
+        pilot.mode = LANDED
+    return touch
+
+
+@inner_kernel
+def _rest(body: Any, plant: Any) -> None:
+    """Stay where it is, to be computed again when it is commanded."""
+    for k in range(3):
+        body.velocity_map[k] = body.omega_body[k] = 0.0
+        body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
+    for r in range(plant.rotors):
+        body.rotor_speed[r] = 0.0
+    body.asleep = True
+
+
+@inner_kernel
+def _take_pose(body: Any, pilot: Any, dt: float) -> None:
+    px, py, pz = three(pilot.position_target)
+    vx, vy, vz = three(pilot.velocity_target)
+    put(body, px, py, pz, vx, vy, vz, dt)
+    for k in range(4):
+        body.attitude[k] = pilot.attitude[k]
+    for k in range(3):
+        body.angular_acceleration_body[k] = (pilot.rates[k] - body.omega_body[k]) / dt
+        body.omega_body[k] = pilot.rates[k]
+
+
+@inner_kernel
+def _follow_velocity(body: Any, pilot: Any, model: Any, gains: Any, dt: float) -> None:
+    """The velocity commanded, at once or with a lag; the reference goes along."""
+    if model.limited:
+        tx, ty, tz = wanted_velocity(pilot, body, gains)
+    else:
+        tx, ty, tz = three(pilot.velocity_target)
+        if pilot.velocity_in_heading:
+            c, s = heading_of(body)
+            tx, ty = c * tx - s * ty, s * tx + c * ty
+    rate = pilot.yaw_rate
+    if pilot.turning:
+        rate = pilot.yaw_rate_target
+        if model.limited:
+            rate = min(max(rate, -gains.yaw_rate_limit), gains.yaw_rate_limit)
+        rate += model.left * (body.omega_body[2] - rate)
+    tx += model.left * (body.velocity_map[0] - tx)
+    ty += model.left * (body.velocity_map[1] - ty)
+    tz += model.left * (body.velocity_map[2] - tz)
+    if pilot.velocity_in_heading:
+        c, s = heading_of(body)
+        drive(body, c * tx + s * ty, c * ty - s * tx, tz, rate, dt)
+    else:
+        px, py, pz = three(body.position_map)
+        put(body, px + dt * tx, py + dt * ty, pz + dt * tz, tx, ty, tz, dt)
+        turn_by(body, rate, dt)
+    for k in range(3):
+        pilot.acceleration[k] = 0.0
+
+
+@inner_kernel
+def _follow_trajectory(body: Any, pilot: Any, paths: Any, step: int, dt: float) -> None:
+    """Where the trajectory, or the setpoint that moves on by itself, is at the step's end."""
+    t = path_time(pilot, step + 1, dt)
+    if pilot.path_last < 0:
+        p, v, a = pilot.position_target, pilot.velocity_target, pilot.acceleration_target
+        h = 0.5 * t
+        put(
+            body,
+            p[0] + t * (v[0] + h * a[0]),
+            p[1] + t * (v[1] + h * a[1]),
+            p[2] + t * (v[2] + h * a[2]),
+            v[0] + t * a[0],
+            v[1] + t * a[1],
+            v[2] + t * a[2],
+            dt,
+        )
+        turn_by(body, pilot.yaw_rate, dt)
+        return
+    t = min(t, paths[pilot.path_last, END])
+    row = segment_at(paths, pilot.path_row, pilot.path_last, t)
+    t -= paths[row, 0]
+    px, vx, _ = polynomial(paths, row, 0, t)
+    py, vy, _ = polynomial(paths, row, 1, t)
+    pz, vz, _ = polynomial(paths, row, 2, t)
+    put(body, px, py, pz, vx, vy, vz, dt)
+    if pilot.path_faces:
+        yaw, rate, _ = polynomial(paths, row, 3, t)
+        face(body, math.cos(yaw), math.sin(yaw), rate, dt)
+    else:
+        turn_by(body, pilot.yaw_rate, dt)

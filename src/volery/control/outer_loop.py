@@ -1,0 +1,130 @@
+"""The outer loop, run at guidance ticks: a reference becomes attitude and thrust.
+
+Where places count, the law is robust and perfect tracking (`control.rpt`); where only velocities
+do, it is the same law without its share of the position. What the airframe's rotors drag at hover
+speed is fed forward with the acceleration (M. Faessler et al., arXiv 1712.02402). Height has
+priority: where thrust or tilt are at their limits the horizontal acceleration gives way. Integrals
+are accelerations that answer what pushes steadily: they stop where they would push further into a
+limit, are bounded, and pass from one law to the other as they are.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from volery.vehicle.airframe import GRAVITY
+from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.rigid import four, three
+
+
+@inner_kernel
+def track(
+    pilot: Any,
+    estimate: Any,
+    gains: Any,
+    level_placed: bool,
+    height_placed: bool,
+    fx: float,
+    fy: float,
+    fz: float,
+) -> None:
+    """Attitude and thrust setpoints that keep the vehicle at its reference.
+
+    level_placed, height_placed: whether places count, horizontally and vertically. (fx, fy, fz):
+    acceleration fed forward, m/s^2, map.
+    """
+    ex, ey, ez = _velocity_error(pilot, estimate)
+    ix, iy, iz = three(pilot.velocity_integral)
+    if level_placed:
+        ax, ay = fx + gains.level_velocity * ex + ix, fy + gains.level_velocity * ey + iy
+        ex, ey = _level_error(pilot, estimate, gains)
+        ax += gains.level_position * ex
+        ay += gains.level_position * ey
+        level_learning = gains.level_integral
+    else:
+        ax, ay = fx + gains.velocity * ex + ix, fy + gains.velocity * ey + iy
+        level_learning = gains.velocity_integral
+    if height_placed:
+        az = fz + gains.height_velocity * ez + iz + GRAVITY
+        ez = pilot.position[2] - estimate.position_map[2]
+        ez = min(max(ez, -gains.height_leash), gains.height_leash)
+        az += gains.height_position * ez
+        learning = gains.height_integral
+    else:
+        az = fz + gains.vertical * ez + iz + GRAVITY
+        learning = gains.vertical_integral
+
+    # height first
+    least, most = gains.least_acceleration, gains.most_acceleration
+    free_z = (az < most or ez < 0.0) and (az > least or ez > 0.0)
+    az = min(max(az, least), most)
+    reach = min(gains.tilt_tangent * az, math.sqrt(max(most * most - az * az, 0.0)))
+    size = math.sqrt(ax * ax + ay * ay)
+    free_xy = True
+    if size > reach:
+        free_xy = ax * ex + ay * ey < 0.0
+        share = reach / size
+        ax *= share
+        ay *= share
+    bound = gains.integral_limit
+    if free_xy:
+        gain = level_learning * gains.tick
+        pilot.velocity_integral[0] = min(max(ix + gain * ex, -bound), bound)
+        pilot.velocity_integral[1] = min(max(iy + gain * ey, -bound), bound)
+    if free_z:
+        gain = learning * gains.tick
+        pilot.velocity_integral[2] = min(max(iz + gain * ez, -bound), bound)
+    _point_thrust(pilot, estimate, gains, ax, ay, az)
+
+
+@inner_kernel
+def _velocity_error(pilot: Any, estimate: Any) -> tuple[float, float, float]:
+    vx, vy, vz = three(estimate.velocity_map)
+    return pilot.velocity[0] - vx, pilot.velocity[1] - vy, pilot.velocity[2] - vz
+
+
+@inner_kernel
+def _level_error(pilot: Any, estimate: Any, gains: Any) -> tuple[float, float]:
+    """Way (m) to the reference's place; farther than the leash it counts as that."""
+    ex = pilot.position[0] - estimate.position_map[0]
+    ey = pilot.position[1] - estimate.position_map[1]
+    size = math.sqrt(ex * ex + ey * ey)
+    share = gains.level_leash / size if size > gains.level_leash else 1.0
+    return share * ex, share * ey
+
+
+@inner_kernel
+def _point_thrust(pilot: Any, estimate: Any, gains: Any, ax: float, ay: float, az: float) -> None:
+    """Attitude whose z axis lies along (ax, ay, az), az > 0, with the heading setpoint; thrust."""
+    k = 1.0 / math.sqrt(ax * ax + ay * ay + az * az)
+    zx, zy, zz = ax * k, ay * k, az * k
+    # shortest turn that takes the map's z to (zx, zy, zz)
+    k = 1.0 / math.sqrt(2.0 * (1.0 + zz))
+    px, py, pw = -zy * k, zx * k, (1.0 + zz) * k
+    # turn about z after which the x axis, seen from above, points along the heading
+    m = 2.0 * k * k
+    c, s = pilot.heading[0], pilot.heading[1]
+    cy = (1.0 - zy * zy * m) * c + zx * zy * m * s
+    sy = zx * zy * m * c + (1.0 - zx * zx * m) * s
+    k = 1.0 / math.sqrt(cy * cy + sy * sy)
+    cy *= k
+    sy *= k
+    if cy >= 0.0:
+        hw = math.sqrt(0.5 * (1.0 + cy))
+        hz = 0.5 * sy / hw
+    else:
+        hz = math.sqrt(0.5 * (1.0 - cy))
+        hw = 0.5 * sy / hz
+    pilot.attitude[0] = px * hw + py * hz
+    pilot.attitude[1] = py * hw - px * hz
+    pilot.attitude[2] = pw * hz
+    pilot.attitude[3] = pw * hw
+    # thrust: the part of the wanted acceleration that the present thrust axis can give
+    qx, qy, qz, qw = four(estimate.attitude)
+    along = (
+        ax * 2.0 * (qx * qz + qy * qw)
+        + ay * 2.0 * (qy * qz - qx * qw)
+        + az * (1.0 - 2.0 * (qx * qx + qy * qy))
+    )
+    pilot.thrust = min(max(gains.mass * along, gains.least_thrust), gains.most_thrust)

@@ -1,0 +1,142 @@
+"""The reference that the outer loop tracks: a place, a velocity and an acceleration that agree.
+
+At each guidance tick the reference moves on by the acceleration chosen at the last one, then a new
+acceleration is chosen. Towards a place it follows a braking profile (proportional near the goal,
+the square root of the distance farther out); acceleration and its change are limited, so that the
+vehicle can follow. A vehicle that is held back keeps its reference on a leash: it lies no farther
+ahead than where the position's share of the law asks for the whole acceleration.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from volery.vehicle.compiled import inner_kernel
+
+
+@inner_kernel
+def move_on(pilot: Any, gains: Any) -> None:
+    """Take the reference of a `PILOT` from the last guidance tick to this one."""
+    tick = gains.tick
+    for k in range(3):
+        change = tick * pilot.acceleration[k]
+        pilot.position[k] += tick * (pilot.velocity[k] + 0.5 * change)
+        pilot.velocity[k] += change
+
+
+@inner_kernel
+def approach_speed(distance: float, gain: float, brake: float, limit: float) -> float:
+    """Speed (m/s) towards a goal `distance` m away from which `brake` (m/s^2) still stops."""
+    linear = brake / (gain * gain)
+    if distance <= linear:
+        return min(gain * distance, limit)
+    return min(math.sqrt(2.0 * brake * (distance - 0.5 * linear)), limit)
+
+
+@inner_kernel
+def _slope(speed: float, gain: float, brake: float, limit: float) -> float:
+    """Change of `approach_speed` with the distance, 1/s, where it is `speed`."""
+    if speed >= limit:
+        return 0.0
+    return min(gain, brake / max(speed, 1e-9))
+
+
+@inner_kernel
+def lead_level(pilot: Any, estimate: Any, gains: Any, speed: float) -> None:
+    """Choose the horizontal acceleration that leads to `position_target` at up to `speed` m/s."""
+    dx = pilot.position[0] - estimate.position_map[0]
+    dy = pilot.position[1] - estimate.position_map[1]
+    size = math.sqrt(dx * dx + dy * dy)
+    if size > gains.level_leash:
+        share = gains.level_leash / size
+        pilot.position[0] = estimate.position_map[0] + share * dx
+        pilot.position[1] = estimate.position_map[1] + share * dy
+    vx, vy = pilot.velocity[0], pilot.velocity[1]
+    dx = pilot.position_target[0] - pilot.position[0]
+    dy = pilot.position_target[1] - pilot.position[1]
+    distance = math.sqrt(dx * dx + dy * dy)
+    ax, ay = -gains.ease * vx, -gains.ease * vy
+    if distance > 1e-9:
+        wanted = approach_speed(distance, gains.position, gains.brake, speed)
+        nx, ny = dx / distance, dy / distance
+        along = nx * vx + ny * vy
+        # how the wanted velocity changes on the way, and what is missing to it
+        turn = wanted / distance
+        ahead = (turn - _slope(wanted, gains.position, gains.brake, speed)) * along
+        ax += (gains.ease * wanted + ahead) * nx - turn * vx
+        ay += (gains.ease * wanted + ahead) * ny - turn * vy
+    _choose_level(pilot, gains, ax, ay, gains.acceleration * gains.ease * gains.tick)
+
+
+@inner_kernel
+def lead_height(pilot: Any, estimate: Any, gains: Any, climb: float, descent: float) -> None:
+    """Choose the vertical acceleration that leads to `position_target`, limits in m/s."""
+    ahead = pilot.position[2] - estimate.position_map[2]
+    ahead = min(max(ahead, -gains.height_leash), gains.height_leash)
+    pilot.position[2] = estimate.position_map[2] + ahead
+    dz = pilot.position_target[2] - pilot.position[2]
+    limit = climb if dz > 0.0 else descent
+    brake = 0.6 * gains.climb_acceleration
+    wanted = approach_speed(abs(dz), gains.position, brake, limit)
+    slope = _slope(wanted, gains.position, brake, limit)
+    vz = pilot.velocity[2]
+    az = gains.ease * (math.copysign(wanted, dz) - vz) - slope * vz
+    _choose_height(pilot, gains, az, gains.climb_acceleration * gains.ease * gains.tick)
+
+
+@inner_kernel
+def steer_level(pilot: Any, estimate: Any, gains: Any, tx: float, ty: float) -> None:
+    """Choose the horizontal acceleration that brings the velocity to (tx, ty) m/s.
+
+    The reference's place is the vehicle's own: places do not count.
+    """
+    rate = gains.inverse_tick
+    ax, ay = rate * (tx - pilot.velocity[0]), rate * (ty - pilot.velocity[1])
+    _choose_level(pilot, gains, ax, ay, math.inf)
+    pilot.position[0] = estimate.position_map[0]
+    pilot.position[1] = estimate.position_map[1]
+
+
+@inner_kernel
+def steer_height(pilot: Any, estimate: Any, gains: Any, tz: float) -> None:
+    """Like `steer_level`, for the vertical velocity tz."""
+    _choose_height(pilot, gains, gains.inverse_tick * (tz - pilot.velocity[2]), math.inf)
+    pilot.position[2] = estimate.position_map[2]
+
+
+@inner_kernel
+def brake_level(pilot: Any, estimate: Any, gains: Any) -> None:
+    """Choose the horizontal acceleration that ends in rest, gently; places do not count."""
+    ax, ay = -gains.ease * pilot.velocity[0], -gains.ease * pilot.velocity[1]
+    _choose_level(pilot, gains, ax, ay, gains.acceleration * gains.ease * gains.tick)
+    pilot.position[0] = estimate.position_map[0]
+    pilot.position[1] = estimate.position_map[1]
+
+
+@inner_kernel
+def brake_height(pilot: Any, estimate: Any, gains: Any) -> None:
+    """Like `brake_level`, vertically."""
+    az = -gains.ease * pilot.velocity[2]
+    _choose_height(pilot, gains, az, gains.climb_acceleration * gains.ease * gains.tick)
+    pilot.position[2] = estimate.position_map[2]
+
+
+@inner_kernel
+def _choose_level(pilot: Any, gains: Any, ax: float, ay: float, most_change: float) -> None:
+    size = math.sqrt(ax * ax + ay * ay)
+    if size > gains.acceleration:
+        ax *= gains.acceleration / size
+        ay *= gains.acceleration / size
+    dx, dy = ax - pilot.acceleration[0], ay - pilot.acceleration[1]
+    size = math.sqrt(dx * dx + dy * dy)
+    share = most_change / size if size > most_change else 1.0
+    pilot.acceleration[0] += share * dx
+    pilot.acceleration[1] += share * dy
+
+
+@inner_kernel
+def _choose_height(pilot: Any, gains: Any, az: float, most_change: float) -> None:
+    az = min(max(az, -gains.climb_acceleration), gains.climb_acceleration)
+    change = az - pilot.acceleration[2]
+    pilot.acceleration[2] += min(max(change, -most_change), most_change)

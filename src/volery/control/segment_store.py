@@ -1,0 +1,67 @@
+"""The segments of all trajectories that are being flown, in one array for the fused step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.flight_modes import FlightMode
+from volery.control.follow import SEGMENT_COLUMNS
+
+Array = NDArray[np.float64]
+
+_LEAST_ROWS = 64
+
+
+class SegmentStore:
+    """Blocks of rows; pilots (N,) of `setpoints.PILOT` know which block is theirs.
+
+    A block is free as soon as its pilot flies something else. Room is made by moving the blocks
+    together, and doubled where they fill more than half of it.
+    """
+
+    def __init__(self, pilots: NDArray[np.void]) -> None:
+        self._pilots = pilots
+        self._used = 0
+        self.rows: Array = np.zeros((_LEAST_ROWS, SEGMENT_COLUMNS))
+
+    def put(self, i: int, segments: Array) -> None:
+        """Store the trajectory of pilot `i` in place of what it had."""
+        pilot: Any = self._pilots[i]
+        pilot["path_last"] = -1
+        if self._used + len(segments) > len(self.rows):
+            self._make_room(len(segments))
+        first = self._used
+        self._used = first + len(segments)
+        self.rows[first : self._used] = segments
+        pilot["path_first"] = pilot["path_row"] = first
+        pilot["path_last"] = self._used - 1
+
+    def get_state(self) -> Array:
+        """What a snapshot keeps."""
+        return self.rows[: self._used].copy()
+
+    def set_state(self, state: Array) -> None:
+        """Go back to a `get_state`; the pilots' rows are theirs to bring back."""
+        self._used = len(state)
+        self.rows = np.zeros((max(_LEAST_ROWS, len(state)), SEGMENT_COLUMNS))
+        self.rows[: self._used] = state
+
+    def _make_room(self, wanted: int) -> None:
+        pilots = self._pilots
+        live = np.flatnonzero(
+            (pilots["mode"] == FlightMode.TRAJECTORY) & (pilots["path_last"] >= 0)
+        )
+        blocks = [self.rows[pilots["path_first"][i] : pilots["path_last"][i] + 1] for i in live]
+        used = sum(len(block) for block in blocks)
+        rows = np.zeros((max(_LEAST_ROWS, 2 * (used + wanted)), SEGMENT_COLUMNS))
+        self._used = 0
+        for i, block in zip(live, blocks, strict=True):
+            shift = self._used - pilots["path_first"][i]
+            rows[self._used : self._used + len(block)] = block
+            self._used += len(block)
+            for name in ("path_first", "path_row", "path_last"):
+                pilots[name][i] += shift
+        self.rows = rows

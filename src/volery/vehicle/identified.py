@@ -1,0 +1,301 @@
+"""The identified plant: closed loops of attitude and thrust, as measured on a vehicle that flies.
+
+The model of the ROSUnitySim platform: with its inner controllers a vehicle answers a wanted
+attitude and thrust as first- or second-order systems with gain and dead time. A file names their
+numbers; `volery identify` makes one. Roll and pitch turn about the body's x and y axes, which for
+small angles is what Euler angles do, without their singularity. Thrust tilts with the vehicle and
+moves it with gravity and a linear drag along the body's axes:
+
+    v' = R (0, 0, T/m) - R D R^T (v - wind) - g
+
+Each loop is stepped by its exact solution over a physics step.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from volery.scenario.data_files import find_data_file, load_data_file
+from volery.vehicle.airframe import GRAVITY, Airframe
+from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.rigid import four, matrix_of, nudged, three
+
+Array = NDArray[np.float64]
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Gain = Annotated[float, Field(gt=0.0, le=2.0)]
+DeadTime = Annotated[float, Field(ge=0.0, le=0.25)]
+
+_MODELS = Path(__file__).parent / "identified"
+REFERENCE_COLUMNS = 6
+"""Kept of each past step: the wanted attitude (4), thrust and yaw rate."""
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class FirstOrder(_Table):
+    """gain / (tau s + 1)."""
+
+    kind: Literal["first_order"]
+    time_constant_s: Positive
+    gain: Gain = 1.0
+
+
+class SecondOrder(_Table):
+    """gain w^2 / (s^2 + 2 zeta w s + w^2)."""
+
+    kind: Literal["second_order"]
+    natural_frequency_rad_s: Positive
+    damping: Positive
+    gain: Gain = 1.0
+
+
+Loop = Annotated[FirstOrder | SecondOrder, Field(discriminator="kind")]
+
+
+class Heave(_Table):
+    """Thrust: gain / (tau s + 1), and its dead time."""
+
+    time_constant_s: Positive
+    gain: Gain = 1.0
+    dead_time_s: DeadTime = 0.0
+
+
+class FitError(_Table):
+    """Root mean square errors on flights that were not used for the fit."""
+
+    attitude_deg: NotNegative
+    yaw_deg: NotNegative
+    vertical_acceleration_m_s2: NotNegative
+    velocity_m_s: NotNegative
+
+
+class IdentifiedModel(_Table):
+    """Closed loops of one vehicle from wanted to true attitude and thrust."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z0-9_]+$")]
+    source: str
+    """Where the numbers are from."""
+    roll: Loop
+    pitch: Loop
+    yaw: Loop
+    attitude_dead_time_s: DeadTime = 0.0
+    heave: Heave
+    drag_1_s: tuple[NotNegative, NotNegative, NotNegative]
+    """Deceleration per velocity through the air along each body axis."""
+    fit_error: FitError | None = None
+
+
+IDENTIFIED = np.dtype(
+    [
+        ("roll", "f8", 4),  # transition of (angle, rate) over a step, row by row
+        ("pitch", "f8", 4),
+        ("yaw", "f8", 4),
+        ("roll_gain", "f8"),
+        ("pitch_gain", "f8"),
+        ("heave_gain", "f8"),
+        ("heave", "f8"),  # what is left of a thrust error after a step
+        ("heave_half", "f8"),
+        ("drag", "f8", 3),
+        ("rate_limit", "f8"),
+        ("yaw_rate_limit", "f8"),
+        ("most_thrust", "f8"),
+        ("attitude_delay", "i8"),  # steps
+        ("heave_delay", "i8"),
+    ],
+    align=True,
+)
+"""An identified model as kernels read it, for one time step."""
+
+
+def identified_row(model: IdentifiedModel, airframe: Airframe, dt: float) -> NDArray[np.void]:
+    """The (1,) `IDENTIFIED` row of a model, within its airframe's limits, stepped by `dt` s."""
+    row = np.zeros(1, IDENTIFIED)
+    for name in ("roll", "pitch", "yaw"):
+        row[name] = transition(getattr(model, name), dt)
+    row["roll_gain"], row["pitch_gain"] = model.roll.gain, model.pitch.gain
+    row["heave_gain"] = model.heave.gain
+    row["heave"] = math.exp(-dt / model.heave.time_constant_s)
+    row["heave_half"] = math.exp(-0.5 * dt / model.heave.time_constant_s)
+    row["drag"] = model.drag_1_s
+    row["rate_limit"] = math.radians(airframe.limits.rate_deg_s)
+    row["yaw_rate_limit"] = math.radians(airframe.limits.yaw_rate_deg_s)
+    row["most_thrust"] = len(airframe.rotors.places) * airframe.max_rotor_thrust
+    row["attitude_delay"] = round(model.attitude_dead_time_s / dt)
+    row["heave_delay"] = round(model.heave.dead_time_s / dt)
+    return row
+
+
+def transition(loop: FirstOrder | SecondOrder, dt: float) -> Array:
+    """How (angle to go, rate) of a loop moves on in `dt` s: a (2, 2) matrix as (4,)."""
+    if isinstance(loop, FirstOrder):
+        left = math.exp(-dt / loop.time_constant_s)
+        return np.array([left, 0.0, -left / loop.time_constant_s, 0.0])
+    w, damping = loop.natural_frequency_rad_s, loop.damping
+    half = -damping * w
+    root = np.sqrt(complex(damping * damping - 1.0)) * w
+    cosh = np.cosh(root * dt).real
+    sinh = (np.sinh(root * dt) / root).real if abs(root) > 1e-9 else dt
+    decay = math.exp(half * dt)
+    return decay * np.array(
+        [cosh - half * sinh, sinh, -w * w * sinh, cosh + half * sinh], dtype=np.float64
+    )
+
+
+def load_identified(name: str, folder: Path | None = None) -> IdentifiedModel:
+    """Model of a shipped name such as `f450`, or of a `.toml` file, also beside `folder`.
+
+    Raises DataFileError that names the file, each wrong key and what is allowed there.
+    """
+    return load_data_file(
+        find_data_file(name, _MODELS, "identified model", folder), IdentifiedModel
+    )
+
+
+@inner_kernel
+def accelerate_identified(
+    body: Any,
+    plant: Any,
+    model: Any,
+    command: Any,
+    live: bool,
+    references: Any,
+    step: int,
+    wind_x: float,
+    wind_y: float,
+    wind_z: float,
+    dt: float,
+) -> None:
+    """Like `kernels.accelerate`: take velocity and rates of a `BODY` to the end of the step.
+
+    command: a record with `attitude`, `thrust` and `yaw_rate`, and `rotor_reference` to be filled.
+    live: whether its controllers run. references: (L, 6), the commands of the last steps.
+    """
+    rows = references.shape[0]
+    now = references[step % rows]
+    for k in range(4):
+        now[k] = command.attitude[k]
+    now[4] = command.thrust if live else 0.0
+    now[5] = command.yaw_rate
+
+    half = 0.5 * dt
+    thrust = _thrust(body, plant, model, command, references[(step - model.heave_delay) % rows][4])
+    if live:
+        _turn(body, model, references[(step - model.attitude_delay) % rows], dt)
+    else:
+        for k in range(3):
+            body.free_angular_acceleration[k] = body.angular_acceleration_body[k] = 0.0
+
+    # forces at mid-step
+    quarter = 0.5 * half
+    ox, oy, oz = three(body.omega_body)
+    gx, gy, gz = three(body.free_angular_acceleration)
+    x, y, z, w = nudged(
+        body.attitude[0],
+        body.attitude[1],
+        body.attitude[2],
+        body.attitude[3],
+        quarter * (ox - half * gx),
+        quarter * (oy - half * gy),
+        quarter * (oz - half * gz),
+    )
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = matrix_of(x, y, z, w)
+    vx, vy, vz = three(body.velocity_map)
+    ax = vx + half * body.free_acceleration[0] - wind_x
+    ay = vy + half * body.free_acceleration[1] - wind_y
+    az = vz + half * body.free_acceleration[2] - wind_z
+    fx = -model.drag[0] * (r00 * ax + r10 * ay + r20 * az)
+    fy = -model.drag[1] * (r01 * ax + r11 * ay + r21 * az)
+    fz = thrust * plant.inverse_mass - model.drag[2] * (r02 * ax + r12 * ay + r22 * az)
+    ax = r00 * fx + r01 * fy + r02 * fz
+    ay = r10 * fx + r11 * fy + r12 * fz
+    az = r20 * fx + r21 * fy + r22 * fz - GRAVITY
+    body.velocity_map[0] = vx + dt * ax
+    body.velocity_map[1] = vy + dt * ay
+    body.velocity_map[2] = vz + dt * az
+    body.free_acceleration[0], body.free_acceleration[1], body.free_acceleration[2] = ax, ay, az
+    for k in range(3):
+        body.acceleration_map[k] = body.free_acceleration[k]
+    body.on_ground = False
+
+
+@inner_kernel
+def _thrust(body: Any, plant: Any, model: Any, command: Any, wanted: float) -> float:
+    """Thrust at mid-step, N; it is kept as the speed at which all rotors alike would give it."""
+    whole = plant.thrust_constant * plant.rotors
+    wanted = min(max(model.heave_gain * wanted, 0.0), model.most_thrust)
+    before = 0.0
+    for r in range(plant.rotors):
+        before += plant.thrust_constant * body.rotor_speed[r] * body.rotor_speed[r]
+    after = wanted + (before - wanted) * model.heave
+    speed, reference = math.sqrt(after / whole), math.sqrt(wanted / whole)
+    for r in range(plant.rotors):
+        body.rotor_speed[r] = speed
+        command.rotor_reference[r] = reference
+    mean: float = wanted + (before - wanted) * model.heave_half
+    return mean
+
+
+@inner_kernel
+def _turn(body: Any, model: Any, wanted: Any, dt: float) -> None:
+    """Rates at the step's end, and the acceleration with which `carry` turns by the right angle."""
+    px, py, turn = _angles_to(body, model, wanted)
+    x, y, z, w = four(body.attitude)
+    ux, uy = wanted[5] * 2.0 * (x * z - y * w), wanted[5] * 2.0 * (y * z + x * w)
+    uz = wanted[5] * (1.0 - 2.0 * (x * x + y * y))
+    limit = model.rate_limit
+    _advance(body, 0, model.roll, px, ux, limit, dt)
+    _advance(body, 1, model.pitch, py, uy, limit, dt)
+    _advance(body, 2, model.yaw, turn, uz, model.yaw_rate_limit, dt)
+
+
+@inner_kernel
+def _advance(
+    body: Any, axis: int, loop: Any, angle: float, moving: float, limit: float, dt: float
+) -> None:
+    """One axis: `angle` rad to go to a reference that itself turns at `moving` rad/s."""
+    before = body.omega_body[axis]
+    lag = before - moving
+    way = (1.0 - loop[0]) * angle + loop[1] * lag + moving * dt
+    rate = loop[3] * lag - loop[2] * angle + moving
+    way = min(max(way, -limit * dt), limit * dt)
+    rate = min(max(rate, -limit), limit)
+    body.omega_body[axis] = rate
+    body.angular_acceleration_body[axis] = (rate - before) / dt
+    body.free_angular_acceleration[axis] = 2.0 * (rate - way / dt) / dt
+
+
+@inner_kernel
+def _angles_to(body: Any, model: Any, wanted: Any) -> tuple[float, float, float]:
+    """Angles (rad) about the body's axes to the wanted attitude, its tilt times the loops' gains.
+
+    Tilt and turn apart, as the attitude controller does it (`control.rates_attitude`).
+    """
+    # wanted = turn about z * tilt without z; the tilt times the gains
+    qx, qy, qz, qw = wanted[0], wanted[1], wanted[2], wanted[3]
+    n = math.sqrt(qz * qz + qw * qw)
+    if n > 1e-6:
+        c, s = qw / n, qz / n
+        tx = model.roll_gain * (c * qx + s * qy)
+        ty = model.pitch_gain * (c * qy - s * qx)
+        tw = math.sqrt(max(1.0 - tx * tx - ty * ty, 0.0))
+        qx, qy, qz, qw = c * tx - s * ty, s * tx + c * ty, s * tw, c * tw
+    x, y, z, w = four(body.attitude)
+    ex = w * qx - x * qw - y * qz + z * qy
+    ey = w * qy + x * qz - y * qw - z * qx
+    ez = w * qz - x * qy + y * qx - z * qw
+    ew = w * qw + x * qx + y * qy + z * qz
+    n = math.sqrt(ez * ez + ew * ew)
+    if n < 1e-6:
+        return 2.0, 0.0, 0.0
+    k = 2.0 / n
+    turn = k * ez
+    return k * (ew * ex - ez * ey), k * (ez * ex + ew * ey), -turn if ew < 0.0 else turn

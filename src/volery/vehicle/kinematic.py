@@ -1,0 +1,171 @@
+"""The kinematic plant: a velocity or a pose from outside moves the body, exactly and at once.
+
+As the ROS and Unity3D platform of 2025 flew its vehicles: no forces, level attitude, a Twist is
+integrated along its arc. Optionally velocities follow with a first-order lag and within the
+airframe's limits. The ground stops it; nothing crashes by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.vehicle.airframe import Airframe, hover_thrusts
+from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.contact import NO_TOUCH, classify_touch
+from volery.vehicle.rigid import four, three
+from volery.world.terrain import TerrainGrid, terrain_height
+
+_GROUND_MARGIN = 0.05
+"""m kept when the next look at the terrain is put off."""
+
+
+@dataclass(frozen=True)
+class Kinematic:
+    """How a kinematic UAV answers velocity commands."""
+
+    time_constant_s: float = 0.0
+    """First-order lag of velocity and yaw rate; 0: at once."""
+    limited: bool = False
+    """Whether the airframe's limits of speed, climb, descent and yaw rate bind it."""
+
+
+KINEMATIC = np.dtype(
+    [
+        ("left", "f8"),  # what is left of a velocity error after a step
+        ("offset", "f8"),  # m, of the origin above the ground it stands on
+        ("hover_speed", "f8"),  # rad/s, shown as its rotors' speed
+        ("limited", "i8"),
+    ],
+    align=True,
+)
+"""A kinematic model as kernels read it, for one time step."""
+
+
+def kinematic_row(model: Kinematic, airframe: Airframe, dt: float) -> NDArray[np.void]:
+    """The (1,) `KINEMATIC` row of a model, stepped by `dt` s."""
+    row = np.zeros(1, KINEMATIC)
+    lag = model.time_constant_s
+    row["left"] = math.exp(-dt / lag) if lag > 0.0 else 0.0
+    row["offset"] = airframe.ground_offset
+    mean = float(hover_thrusts(airframe).mean())
+    row["hover_speed"] = math.sqrt(mean / airframe.rotors.thrust_n_s2)
+    row["limited"] = model.limited
+    return row
+
+
+@inner_kernel
+def drive(body: Any, ux: float, uy: float, uz: float, rate: float, dt: float) -> None:
+    """Move with (ux, uy, uz) m/s, forward, left and up, turning at `rate` rad/s: along an arc."""
+    c, s = _heading(body)
+    h = 0.5 * rate * dt
+    ch, sh = math.cos(h), math.sin(h)
+    chord = dt * (sh / h if abs(h) > 1e-5 else 1.0 - h * h / 6.0)
+    cm, sm = c * ch - s * sh, s * ch + c * sh  # the mean heading of the step
+    px = body.position_map[0] + chord * (cm * ux - sm * uy)
+    py = body.position_map[1] + chord * (sm * ux + cm * uy)
+    pz = body.position_map[2] + dt * uz
+    c, s = cm * ch - sm * sh, sm * ch + cm * sh
+    put(body, px, py, pz, c * ux - s * uy, s * ux + c * uy, uz, dt)
+    face(body, c, s, rate, dt)
+
+
+@inner_kernel
+def glide(body: Any, ax: float, ay: float, az: float, dt: float) -> None:
+    """Move on from the present velocity with a steady acceleration, m/s^2, map."""
+    half = 0.5 * dt
+    px, py, pz = three(body.position_map)
+    vx, vy, vz = three(body.velocity_map)
+    px += dt * (vx + half * ax)
+    py += dt * (vy + half * ay)
+    pz += dt * (vz + half * az)
+    put(body, px, py, pz, vx + dt * ax, vy + dt * ay, vz + dt * az, dt)
+
+
+@inner_kernel
+def put(
+    body: Any, px: float, py: float, pz: float, vx: float, vy: float, vz: float, dt: float
+) -> None:
+    """Place and velocity at the step's end, map; the way counts against the budgets."""
+    dx, dy, dz = (
+        px - body.position_map[0],
+        py - body.position_map[1],
+        pz - body.position_map[2],
+    )
+    way = math.sqrt(dx * dx + dy * dy + dz * dz)
+    body.ground_budget -= way
+    body.contact_budget -= way
+    body.separation_budget -= way
+    body.acceleration_map[0] = (vx - body.velocity_map[0]) / dt
+    body.acceleration_map[1] = (vy - body.velocity_map[1]) / dt
+    body.acceleration_map[2] = (vz - body.velocity_map[2]) / dt
+    body.position_map[0], body.position_map[1], body.position_map[2] = px, py, pz
+    body.velocity_map[0], body.velocity_map[1], body.velocity_map[2] = vx, vy, vz
+    body.on_ground = False
+
+
+@inner_kernel
+def turn_by(body: Any, rate: float, dt: float) -> None:
+    """Stand level and turn at `rate` rad/s for a step."""
+    c, s = _heading(body)
+    angle = rate * dt
+    ct, st = math.cos(angle), math.sin(angle)
+    face(body, c * ct - s * st, s * ct + c * st, rate, dt)
+
+
+@inner_kernel
+def face(body: Any, c: float, s: float, rate: float, dt: float) -> None:
+    """Level attitude with the heading of cosine `c` and sine `s`, turning at `rate` rad/s."""
+    n = 1.0 / math.sqrt(c * c + s * s)
+    c *= n
+    s *= n
+    if c >= 0.0:
+        w = math.sqrt(0.5 * (1.0 + c))
+        z = 0.5 * s / w
+    else:
+        z = math.copysign(math.sqrt(0.5 * (1.0 - c)), s)
+        w = 0.5 * s / z
+    body.attitude[0] = body.attitude[1] = 0.0
+    body.attitude[2], body.attitude[3] = z, w
+    for k in range(3):
+        last = rate if k == 2 else 0.0
+        body.angular_acceleration_body[k] = (last - body.omega_body[k]) / dt
+        body.omega_body[k] = last
+
+
+@inner_kernel
+def stop_at_ground(
+    body: Any, plant: Any, model: Any, grid: TerrainGrid, steepest: float, step: int, dt: float
+) -> int:
+    """Keep its feet above the ground; `NO_TOUCH`, `TOUCH_DOWN` or `IMPACT`, which ends nothing.
+
+    steepest: cosine of the terrain's steepest slope. step: number of the step that ends here.
+    """
+    if body.ground_budget > _GROUND_MARGIN:
+        return NO_TOUCH
+    ground = terrain_height(grid, body.position_map[0], body.position_map[1])
+    gap = body.position_map[2] - ground - model.offset
+    body.ground_budget = gap * steepest
+    if gap > 0.0:
+        return NO_TOUCH
+    vx, vy, vz = three(body.velocity_map)
+    body.position_map[2] = ground + model.offset
+    body.velocity_map[2] = max(vz, 0.0)
+    body.acceleration_map[2] += (body.velocity_map[2] - vz) / dt
+    body.on_ground = True
+    speed = math.sqrt(vx * vx + vy * vy + vz * vz)
+    return classify_touch(body, plant, max(-vz, 0.0), speed, step, dt, True)
+
+
+@inner_kernel
+def _heading(body: Any) -> tuple[float, float]:
+    x, y, z, w = four(body.attitude)
+    c, s = 1.0 - 2.0 * (y * y + z * z), 2.0 * (w * z + x * y)
+    n = math.sqrt(c * c + s * s)
+    if n < 1e-6:
+        return 1.0, 0.0
+    return c / n, s / n
