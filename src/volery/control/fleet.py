@@ -1,7 +1,7 @@
 """A fleet of UAVs: give commands, advance time, read the state, collect what happened.
 
 `Fleet` owns all state of plants and controllers as rows of arrays; the compiled step
-(`control.step`) does the work. It knows the ground and the wind; trees and other UAVs are the
+(`control.step`) does the work. It knows the ground and the air; trees and other UAVs are the
 engine's business, which looks up clearances, fills the budgets and calls `strike`.
 """
 
@@ -29,7 +29,7 @@ from volery.control.setpoints import (
 )
 from volery.control.step import EVENT, EVENTS_A_STEP, MODE_CHANGE, MODEL, UAV, advance_fleet
 from volery.core import rotations
-from volery.core.clock import NS_PER_S
+from volery.core.clock import NS_PER_S, s_from_ns
 from volery.core.errors import CommandError
 from volery.vehicle.aerodynamics import plant_of
 from volery.vehicle.airframe import Airframe, hover_thrusts
@@ -37,6 +37,10 @@ from volery.vehicle.contact import IMPACT, TOUCH_DOWN, steepest_cosine
 from volery.vehicle.fleet import FleetState, new_bodies, state_of
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.terrain import TerrainGrid
+from volery.world.weather import CALM, Gust, Weather
+from volery.world.weather.dryden import new_turbulence
+from volery.world.weather.table import air_of
+from volery.world.weather.wind_field import nodes_of
 
 Array = NDArray[np.float64]
 
@@ -87,7 +91,8 @@ class Fleet:
     airframes: one a UAV. position_map: (N, 3) m. attitude: (N, 4) unit quaternions, map from body.
     dt_ns: physics step. on_contact: what an impact does, "crash" (rotors stop, it falls and rests)
     or "bounce" (it rebounds and flies on). mode: `HOLD` starts in the air with rotors turning,
-    `LANDED` on the ground with rotors stopped; one for all or one a UAV. names: for messages.
+    `LANDED` on the ground with rotors stopped; one for all or one a UAV. names: for messages and,
+    with `seed`, the streams of what is random. weather: the air; `set_weather` changes it.
 
     Rows are numbered from 0. After `advance` the state belongs to time `step * dt_ns`.
     """
@@ -102,6 +107,8 @@ class Fleet:
         on_contact: Literal["crash", "bounce"] = "crash",
         mode: FlightMode | Sequence[FlightMode] = FlightMode.HOLD,
         names: Sequence[str] | None = None,
+        weather: Weather = CALM,
+        seed: int = 0,
     ) -> None:
         count = len(airframes)
         if count == 0:
@@ -129,6 +136,7 @@ class Fleet:
         self._uavs = np.zeros(count, UAV)
         self._uavs["body"] = new_bodies(position, attitude)
         self._uavs["pilot"] = new_pilots(attitude)
+        self._uavs["turbulence"] = new_turbulence(seed, self.names)
         self._uavs["model"] = rows
         self._bodies: NDArray[np.void] = self._uavs["body"]
         self._pilots: NDArray[np.void] = self._uavs["pilot"]
@@ -136,6 +144,9 @@ class Fleet:
         self._drained: list[FleetEvent] = []
         self._grid: TerrainGrid | None = None
         self._ground: tuple[Array, float, float, float, float] | None = None
+        self._weather = weather
+        self._air = air_of(weather)
+        self._air_nodes = nodes_of(weather.field)
         self.state: FleetState = state_of(self._bodies)
         self.history: PoseHistory = new_history(position, attitude, self._dt_ns)
         self._pilots["home"] = position
@@ -166,7 +177,6 @@ class Fleet:
         self,
         steps: int,
         terrain: TerrainGrid,
-        wind_map: Sequence[float] | Array = (0.0, 0.0, 0.0),
         *,
         event_ends: bool = False,
     ) -> int:
@@ -174,11 +184,10 @@ class Fleet:
 
         Fewer are done, all of them whole, when some UAV has used up its `contact_budget` or
         `separation_budget`, or, with `event_ends`, when something happened. `advance(0, ...)`
-        compiles the step. wind_map: (3,) m/s.
+        compiles the step.
         """
         if terrain is not self._grid or self._ground is None:
             self._ground = self._ground_of(terrain)
-        wx, wy, wz = wind_map
         done = 0
         while True:
             more, written, spent = advance_fleet(
@@ -187,9 +196,8 @@ class Fleet:
                 *self._ground,
                 self.history.position,
                 self.history.attitude,
-                float(wx),
-                float(wy),
-                float(wz),
+                self._air,
+                self._air_nodes,
                 self._events,
                 self.step,
                 steps - done,
@@ -214,12 +222,31 @@ class Fleet:
         self._grid = terrain
         self._bodies["ground_budget"] = 0.0
         return (
-            np.ascontiguousarray(terrain.heights, dtype=np.float64),
+            # a copy: numba is quicker to tell the type of an array that may be written
+            np.array(terrain.heights, dtype=np.float64, order="C"),
             float(terrain.origin_x),
             float(terrain.origin_y),
             float(terrain.spacing),
             steepest_cosine(terrain),
         )
+
+    # ----------------------------------------------------------------------------------- air
+
+    @property
+    def weather(self) -> Weather:
+        """The air around the UAVs."""
+        return self._weather
+
+    def set_weather(self, weather: Weather) -> None:
+        """Let `weather` blow from the next guidance tick on (125 Hz)."""
+        if weather.field is not self._weather.field:
+            self._air_nodes = nodes_of(weather.field)
+        self._air = air_of(weather)
+        self._weather = weather
+
+    def add_gust(self, gust: Gust) -> None:
+        """Let a gust blow besides."""
+        self.set_weather(self._weather.with_gust(gust, s_from_ns(self.time_ns)))
 
     # ------------------------------------------------------------------------------ commands
 
@@ -378,12 +405,13 @@ class Fleet:
     # ------------------------------------------------------------------------------ snapshot
 
     def get_state(self) -> dict[str, Any]:
-        """Copy of everything that changes: UAVs, history, step, events not yet drained."""
+        """Copy of everything that changes: UAVs, history, step, weather, events not yet drained."""
         return {
             "uavs": self._uavs.copy(),
             "position": self.history.position.copy(),
             "attitude": self.history.attitude.copy(),
             "step": self.step,
+            "weather": self._weather,
             "events": list(self._drained),
         }
 
@@ -393,6 +421,7 @@ class Fleet:
         self.history.position[...] = state["position"]
         self.history.attitude[...] = state["attitude"]
         self.step = state["step"]
+        self.set_weather(state["weather"])
         self._drained = list(state["events"])
 
     # -------------------------------------------------------------------------------- inside

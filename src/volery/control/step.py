@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.control.air import refresh_air
 from volery.control.flight_modes import CRASHED, guide, stop
 from volery.control.gains import GAINS
 from volery.control.rates_attitude import hold_attitude, hold_rates
@@ -17,11 +18,14 @@ from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
 from volery.vehicle.fleet import BODY
 from volery.vehicle.kernels import accelerate, carry, meet_ground, near_ground
 from volery.world.terrain import TerrainGrid
+from volery.world.weather.dryden import TURBULENCE
 
 Array = NDArray[np.float64]
 
-UAV = np.dtype([("body", BODY), ("pilot", PILOT), ("model", "i8")], align=True)
-"""One UAV: its plant, its control, and the row of its airframe."""
+UAV = np.dtype(
+    [("body", BODY), ("pilot", PILOT), ("turbulence", TURBULENCE), ("model", "i8")], align=True
+)
+"""One UAV: its plant, its control, the turbulence around it, and the row of its airframe."""
 MODEL = np.dtype([("plant", PLANT), ("gains", GAINS)], align=True)
 """One airframe."""
 
@@ -53,9 +57,8 @@ def advance_fleet(  # noqa: PLR0912
     steepest: float,
     history_position: Array,
     history_attitude: Array,
-    wind_x: float,
-    wind_y: float,
-    wind_z: float,
+    air: NDArray[np.void],
+    air_nodes: Array,
     events: NDArray[np.void],
     step: int,
     steps: int,
@@ -83,6 +86,9 @@ def advance_fleet(  # noqa: PLR0912
         guiding = step % guidance_steps == 0
         turning = step % attitude_steps == 0
         row = (step + 1) % rows
+        if guiding:
+            tick = step // guidance_steps
+            refresh_air(uavs, air[0], air_nodes, grid, tick, guidance_steps * dt)
         for i in range(count):
             body = uavs[i].body
             pilot = uavs[i].pilot
@@ -99,7 +105,7 @@ def advance_fleet(  # noqa: PLR0912
                 if turning:
                     hold_attitude(pilot, estimate, gains)
                 hold_rates(pilot, estimate, gains, dt)
-                accelerate(body, plant, pilot, wind_x, wind_y, wind_z, dt)
+                accelerate(body, plant, pilot, dt)
                 touch = NO_TOUCH
                 if near_ground(body, dt):
                     touch = meet_ground(

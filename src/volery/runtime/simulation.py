@@ -29,7 +29,7 @@ from volery.runtime.placement import Start, place_uavs
 from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
-from volery.runtime.worlds import build_forest, build_terrain
+from volery.runtime.worlds import build_forest, build_terrain, build_weather
 from volery.scenario.schema import Scenario
 from volery.sensors.mount import Mount
 from volery.sensors.samples import (
@@ -43,6 +43,7 @@ from volery.sensors.samples import (
 from volery.vehicle.airframe import Airframe, load_airframe
 from volery.vehicle.body_shape import body_shape
 from volery.world.scene import Scene
+from volery.world.weather import Weather
 
 _CLOCK_PERIOD_S = 0.01
 _DIGEST_PERIOD_S = 0.01
@@ -91,7 +92,7 @@ class Simulation:
         self._events: list[Event] = []
 
         starts = self._place()
-        self._fleet = _make_fleet(scenario, starts)
+        self._fleet = _make_fleet(scenario, starts, build_weather(scenario))
         _add_bodies(self.scene, starts)
         names = tuple(start.name for start in starts)
         fitted = fit_sensors(scenario, starts)
@@ -105,7 +106,6 @@ class Simulation:
             self._fleet,
             self.scene,
             self.terrain,
-            np.array(scenario.world.wind.velocity_m_s),
             self._banks,
             names,
             self,
@@ -183,6 +183,21 @@ class Simulation:
                     on_progress(Progress(self.time_s - start_s, left, now - wall_start))
             if ended:
                 break
+
+    @property
+    def weather(self) -> Weather:
+        """The air."""
+        return self._fleet.weather
+
+    def set_weather(self, weather: Weather) -> None:
+        """Let `weather` blow from the next guidance tick on."""
+        self._engine.set_weather(weather)
+
+    def gust_now(
+        self, amplitude_map: tuple[float, float, float], rise_s: float, lasts_s: float = math.inf
+    ) -> None:
+        """Let a 1-cosine gust of `amplitude_map` (3,) m/s begin now, over after `lasts_s`."""
+        self._engine.gust_now(amplitude_map, rise_s, lasts_s)
 
     def post(self, action: Callable[[], Any]) -> Future[Any]:
         """Have `action()` called by the simulation's thread before its next tick.
@@ -304,7 +319,7 @@ class Simulation:
         )
 
 
-def _make_fleet(scenario: Scenario, starts: tuple[Start, ...]) -> Fleet:
+def _make_fleet(scenario: Scenario, starts: tuple[Start, ...], weather: Weather) -> Fleet:
     return Fleet(
         [start.airframe for start in starts],
         np.array([start.position_map for start in starts]),
@@ -313,6 +328,8 @@ def _make_fleet(scenario: Scenario, starts: tuple[Start, ...]) -> Fleet:
         on_contact=scenario.physics.on_contact,
         names=[start.name for start in starts],
         mode=[FlightMode.LANDED if start.on_ground else FlightMode.HOLD for start in starts],
+        weather=weather,
+        seed=scenario.seed,
     )
 
 

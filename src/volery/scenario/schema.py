@@ -9,21 +9,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
-Vector2 = tuple[float, float]
-Vector3 = tuple[float, float, float]
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
-Rate = Annotated[float, Field(gt=0.0, le=1000.0)]
-
-
-class _Data(BaseModel):
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, str_strip_whitespace=True
-    )
-
+from volery.scenario.base import Data as _Data
+from volery.scenario.base import Name, NonNegative, Positive, Rate, Vector2, Vector3
+from volery.scenario.wind import Wind
 
 # ------------------------------------------------------------------------------------------ world
 
@@ -79,18 +69,6 @@ class ProceduralForest(_Data):
 def _check_rectangle(region: tuple[float, float, float, float] | None) -> None:
     if region is not None and not (region[0] < region[2] and region[1] < region[3]):
         raise ValueError("region_m must be [x_min, y_min, x_max, y_max] with min < max")
-
-
-class Wind(_Data):
-    """Steady wind, ENU."""
-
-    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
-
-    @model_validator(mode="after")
-    def _is_flyable(self) -> Self:
-        if max(abs(v) for v in self.velocity_m_s) > 60.0:
-            raise ValueError("velocity_m_s components must lie within +-60 m/s")
-        return self
 
 
 class World(_Data):
@@ -206,7 +184,7 @@ class NodeEntry(_Data):
 
     node: Annotated[str, Field(pattern=r"^[\w.]+:\w+$")]
     """`module:Class` with the node contract of `volery.graph.node`."""
-    parameters: dict[str, Any] = {}
+    parameters: dict[str, Any] = Field(default_factory=dict)
 
 
 class UavType(_Data):
