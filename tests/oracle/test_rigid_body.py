@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from volery.control.fleet import Fleet
 from volery.vehicle.airframe import Airframe, load_airframe
 from volery.world.terrain import Terrain
+from volery.world.weather import Weather
 
 FAR_BELOW = Terrain.flat(1e5, -1e4, (-5e4, -5e4)).grid
 RHO, G = 1.225, 9.80665
@@ -69,14 +70,15 @@ def solve(airframe, start, reference, wind, seconds):
 
 
 def fly(airframe, start, reference, wind, seconds, dt_ns=1_000_000):
-    fleet = Fleet([airframe], start[None, :3], start[None, 6:10], dt_ns=dt_ns)
+    start_pose = start[None, :3], start[None, 6:10]
+    fleet = Fleet([airframe], *start_pose, dt_ns=dt_ns, weather=Weather(wind))
     fleet.command_rotor_speeds(0, reference)
     state, count = fleet.state, len(reference)
     state.velocity_map[0] = start[3:6]
     state.omega_body[0] = start[10:13]
     state.rotor_speed[0, :count] = start[13:]
     steps = round(seconds * 1e9 / dt_ns)
-    assert fleet.advance(steps, FAR_BELOW, wind) == steps
+    assert fleet.advance(steps, FAR_BELOW) == steps
     return np.concatenate(
         [
             state.position_map[0],

@@ -1,7 +1,7 @@
 """A fleet of UAVs: give commands, advance time, read the state, collect what happened.
 
 `Fleet` owns all state of plants and controllers as rows of arrays; the compiled step
-(`control.step`) does the work. It knows the ground and the wind; trees and other UAVs are the
+(`control.step`) does the work. It knows the ground and the air; trees and other UAVs are the
 engine's business, which looks up clearances, fills the budgets and calls `strike`.
 """
 
@@ -28,7 +28,7 @@ from volery.control.setpoints import (
     new_pilots,
 )
 from volery.control.step import EVENT, EVENTS_A_STEP, UAV, advance_fleet
-from volery.core.clock import NS_PER_S
+from volery.core.clock import NS_PER_S, s_from_ns
 from volery.core.errors import CommandError
 from volery.vehicle.airframe import Airframe, hover_thrusts
 from volery.vehicle.contact import steepest_cosine
@@ -36,6 +36,10 @@ from volery.vehicle.fleet import FleetState, new_bodies, state_of
 from volery.vehicle.plants import Plant, RigidBody
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.terrain import TerrainGrid
+from volery.world.weather import CALM, Gust, Weather
+from volery.world.weather.dryden import new_turbulence
+from volery.world.weather.table import air_of
+from volery.world.weather.wind_field import nodes_of
 
 Array = NDArray[np.float64]
 
@@ -50,8 +54,9 @@ class Fleet(FleetCommands):
     airframes: one a UAV. position_map: (N, 3) m. attitude: (N, 4) unit quaternions, map from body.
     dt_ns: physics step. on_contact: what an impact does, "crash" (rotors stop, it falls and rests)
     or "bounce" (it rebounds and flies on). mode: `HOLD` starts in the air with rotors turning,
-    `LANDED` on the ground with rotors stopped; one for all or one a UAV. names: for messages.
-    plants: what turns commands into motion (`vehicle.plants`), one for all or one a UAV.
+    `LANDED` on the ground with rotors stopped; one for all or one a UAV. names: for messages and,
+    with `seed`, the streams of what is random. plants: what turns commands into motion
+    (`vehicle.plants`), one for all or one a UAV. weather: the air; `set_weather` changes it.
 
     Rows are numbered from 0. After `advance` the state belongs to time `step * dt_ns`.
     """
@@ -67,6 +72,8 @@ class Fleet(FleetCommands):
         mode: FlightMode | Sequence[FlightMode] = FlightMode.HOLD,
         names: Sequence[str] | None = None,
         plants: Plant | Sequence[Plant] = RigidBody(),  # noqa: B008  (frozen)
+        weather: Weather = CALM,
+        seed: int = 0,
     ) -> None:
         count = len(airframes)
         if count == 0:
@@ -90,6 +97,7 @@ class Fleet(FleetCommands):
         uavs["pilot"] = new_pilots(attitude)
         uavs["model"] = rows
         names = tuple(names or (f"UAV {i}" for i in range(count)))
+        uavs["turbulence"] = new_turbulence(seed, names)
         super().__init__(tuple(airframes), plants, names, uavs, dt_ns / NS_PER_S)
         self._models = models
         weight = np.array([airframe.weight for airframe in airframes])
@@ -105,6 +113,9 @@ class Fleet(FleetCommands):
         self._drained: list[FleetEvent] = []
         self._grid: TerrainGrid | None = None
         self._ground: tuple[Array, float, float, float, float] | None = None
+        self._weather = weather
+        self._air = air_of(weather)
+        self._air_nodes = nodes_of(weather.field)
         self.state: FleetState = state_of(self._bodies)
         self.history: PoseHistory = new_history(position, attitude, self._dt_ns)
         self._pilots["home"] = position
@@ -131,7 +142,6 @@ class Fleet(FleetCommands):
         self,
         steps: int,
         terrain: TerrainGrid,
-        wind_map: Sequence[float] | Array = (0.0, 0.0, 0.0),
         *,
         event_ends: bool = False,
     ) -> int:
@@ -139,11 +149,10 @@ class Fleet(FleetCommands):
 
         Fewer are done, all of them whole, when some UAV has used up its `contact_budget` or
         `separation_budget`, or, with `event_ends`, when something happened. `advance(0, ...)`
-        compiles the step. wind_map: (3,) m/s.
+        compiles the step.
         """
         if terrain is not self._grid or self._ground is None:
             self._ground = self._ground_of(terrain)
-        wx, wy, wz = wind_map
         done = 0
         while True:
             more, written, spent = advance_fleet(
@@ -152,11 +161,10 @@ class Fleet(FleetCommands):
                 *self._ground,
                 self.history.position,
                 self.history.attitude,
-                float(wx),
-                float(wy),
-                float(wz),
                 self._paths.rows,
                 self._references,
+                self._air,
+                self._air_nodes,
                 self._events,
                 self.step,
                 steps - done,
@@ -181,12 +189,31 @@ class Fleet(FleetCommands):
         self._grid = terrain
         self._bodies["ground_budget"] = 0.0
         return (
-            np.ascontiguousarray(terrain.heights, dtype=np.float64),
+            # a copy: numba is quicker to tell the type of an array that may be written
+            np.array(terrain.heights, dtype=np.float64, order="C"),
             float(terrain.origin_x),
             float(terrain.origin_y),
             float(terrain.spacing),
             steepest_cosine(terrain),
         )
+
+    # ----------------------------------------------------------------------------------- air
+
+    @property
+    def weather(self) -> Weather:
+        """The air around the UAVs."""
+        return self._weather
+
+    def set_weather(self, weather: Weather) -> None:
+        """Let `weather` blow from the next guidance tick on (125 Hz)."""
+        if weather.field is not self._weather.field:
+            self._air_nodes = nodes_of(weather.field)
+        self._air = air_of(weather)
+        self._weather = weather
+
+    def add_gust(self, gust: Gust) -> None:
+        """Let a gust blow besides."""
+        self.set_weather(self._weather.with_gust(gust, s_from_ns(self.time_ns)))
 
     # ------------------------------------------------------------------------------ contacts
 
@@ -234,7 +261,7 @@ class Fleet(FleetCommands):
     # ------------------------------------------------------------------------------ snapshot
 
     def get_state(self) -> dict[str, Any]:
-        """Copy of everything that changes: UAVs, history, step, events not yet drained."""
+        """Copy of everything that changes: UAVs, history, step, weather, events not yet drained."""
         return {
             "uavs": self._uavs.copy(),
             "position": self.history.position.copy(),
@@ -242,6 +269,7 @@ class Fleet(FleetCommands):
             "step": self.step,
             "references": self._references.copy(),
             "paths": self._paths.get_state(),
+            "weather": self._weather,
             "events": list(self._drained),
         }
 
@@ -253,6 +281,7 @@ class Fleet(FleetCommands):
         self._references[...] = state["references"]
         self._paths.set_state(state["paths"])
         self.step = state["step"]
+        self.set_weather(state["weather"])
         self._drained = list(state["events"])
 
     # -------------------------------------------------------------------------------- inside

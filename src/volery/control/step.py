@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.control.air import refresh_air
 from volery.control.flight_modes import CRASHED, guide, stop
 from volery.control.gains import GAINS
 from volery.control.kinematic_flight import fly_kinematic
@@ -21,11 +22,14 @@ from volery.vehicle.kernels import accelerate, carry, meet_ground, near_ground
 from volery.vehicle.kinematic import KINEMATIC
 from volery.vehicle.plants import KINEMATIC_MOTION, RIGID_BODY
 from volery.world.terrain import TerrainGrid
+from volery.world.weather.dryden import TURBULENCE
 
 Array = NDArray[np.float64]
 
-UAV = np.dtype([("body", BODY), ("pilot", PILOT), ("model", "i8")], align=True)
-"""One UAV: its plant, its control, and the row of its airframe."""
+UAV = np.dtype(
+    [("body", BODY), ("pilot", PILOT), ("turbulence", TURBULENCE), ("model", "i8")], align=True
+)
+"""One UAV: its plant, its control, the turbulence around it, and the row of its airframe."""
 MODEL = np.dtype(
     [
         ("plant", PLANT),
@@ -67,11 +71,10 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     steepest: float,
     history_position: Array,
     history_attitude: Array,
-    wind_x: float,
-    wind_y: float,
-    wind_z: float,
     paths: Array,
     references: Array,
+    air: NDArray[np.void],
+    air_nodes: Array,
     events: NDArray[np.void],
     step: int,
     steps: int,
@@ -102,6 +105,9 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
         guiding = step % guidance_steps == 0
         turning = step % attitude_steps == 0
         row = (step + 1) % rows
+        if guiding:
+            tick = step // guidance_steps
+            refresh_air(uavs, air[0], air_nodes, grid, tick, guidance_steps * dt)
         for i in range(count):
             body = uavs[i].body
             pilot = uavs[i].pilot
@@ -135,7 +141,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                         if turning:
                             hold_attitude(pilot, estimate, gains)
                         hold_rates(pilot, estimate, gains, dt)
-                        accelerate(body, plant, pilot, wind_x, wind_y, wind_z, dt)
+                        accelerate(body, plant, pilot, dt)
                     else:
                         _follow_loops(
                             body,
@@ -144,9 +150,6 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                             pilot,
                             references[i],
                             step,
-                            wind_x,
-                            wind_y,
-                            wind_z,
                             dt,
                         )
                     touch = NO_TOUCH
@@ -183,16 +186,11 @@ def _follow_loops(
     pilot: Any,
     references: Any,
     step: int,
-    wind_x: float,
-    wind_y: float,
-    wind_z: float,
     dt: float,
 ) -> None:
     """Attitude and acceleration of an identified plant, out of the way of the others."""
     live = pilot.level != _STOPPED
-    accelerate_identified(
-        body, plant, model, pilot, live, references, step, wind_x, wind_y, wind_z, dt
-    )
+    accelerate_identified(body, plant, model, pilot, live, references, step, dt)
 
 
 @inner_kernel

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.control.fleet import Fleet
-from volery.core.clock import NS_PER_S, Schedule, ns_from_s
+from volery.core.clock import NS_PER_S, Schedule, ns_from_s, s_from_ns
 from volery.engine import flight_log
 from volery.engine.agenda import Agenda
 from volery.engine.collisions import BOUNCE, CRASH, Collisions
@@ -26,6 +24,7 @@ from volery.sensors.faults import FaultTable
 from volery.sensors.samples import Samples
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
+from volery.world.weather import Gust, Weather
 
 _MOST_STEPS_A_TICK = 50
 """The history of poses holds 64 steps; whoever reads along must not miss one."""
@@ -67,7 +66,6 @@ class Engine:
         fleet: Fleet,
         scene: Scene,
         terrain: Terrain,
-        wind_map: NDArray[np.float64],
         banks: Sequence[SensorBank],
         names: tuple[str, ...],
         sink: Sink,
@@ -78,7 +76,6 @@ class Engine:
         self.fleet = fleet
         self.scene = scene
         self.terrain = terrain.grid
-        self.wind_map = wind_map
         self.sink = sink
         self.inbox = Inbox()
         self.stands = True
@@ -103,6 +100,17 @@ class Engine:
     def time_ns(self) -> int:
         """Simulated time."""
         return self.fleet.step * self.dt_ns
+
+    def set_weather(self, weather: Weather) -> None:
+        """Let `weather` blow from the next guidance tick on."""
+        self.fleet.set_weather(weather)
+
+    def gust_now(
+        self, amplitude_map: tuple[float, float, float], rise_s: float, lasts_s: float = math.inf
+    ) -> None:
+        """Let a 1-cosine gust of `amplitude_map` (3,) m/s begin now, over after `lasts_s`."""
+        now_s = s_from_ns(self.time_ns)
+        self.fleet.add_gust(Gust(amplitude_map, now_s, rise_s, now_s + lasts_s))
 
     def every(self, period_s: float, callback: Callable[[], Any]) -> None:
         """Call `callback` each period of simulated time, first after one period."""

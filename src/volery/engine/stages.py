@@ -39,7 +39,7 @@ def advance_vehicles(engine: Engine, tick: Tick) -> None:
     first = engine.fleet.step
     steps = engine.horizon(tick.last_step) - first
     if steps > 0:
-        engine.fleet.advance(steps, engine.terrain, engine.wind_map, event_ends=True)
+        engine.fleet.advance(steps, engine.terrain, event_ends=True)
         engine.sink.advanced(first + 1, engine.fleet.step)
 
 

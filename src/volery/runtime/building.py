@@ -10,6 +10,7 @@ from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.core.errors import DataFileError
 from volery.runtime.placement import Start, place_uavs
+from volery.runtime.worlds import build_weather
 from volery.scenario.schema import Scenario
 from volery.vehicle.airframe import Airframe, load_airframe
 from volery.vehicle.body_shape import body_shape
@@ -30,7 +31,7 @@ def place(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[Start, ..
 
 
 def build_fleet(scenario: Scenario, starts: Sequence[Start], names: Sequence[str]) -> Fleet:
-    """The UAVs at their places, `names` in messages."""
+    """The UAVs at their places in the scenario's weather, `names` in messages."""
     fleet = Fleet(
         [start.airframe for start in starts],
         np.array([start.position_map for start in starts]),
@@ -39,6 +40,8 @@ def build_fleet(scenario: Scenario, starts: Sequence[Start], names: Sequence[str
         on_contact=scenario.physics.on_contact,
         names=names,
         mode=[FlightMode.LANDED if start.on_ground else FlightMode.HOLD for start in starts],
+        weather=build_weather(scenario),
+        seed=scenario.seed,
     )
     for row, start in enumerate(starts):
         flight = scenario.types[start.type_name].flight

@@ -97,7 +97,6 @@ class Simulation:
             self._fleet,
             self.scene,
             self.terrain,
-            np.array(scenario.world.wind.velocity_m_s),
             self._banks,
             names,
             self,
@@ -177,6 +176,21 @@ class Simulation:
                     on_progress(Progress(self.time_s - start_s, left, now - wall_start))
             if ended:
                 break
+
+    @property
+    def weather(self) -> Weather:
+        """The air."""
+        return self._fleet.weather
+
+    def set_weather(self, weather: Weather) -> None:
+        """Let `weather` blow from the next guidance tick on."""
+        self._engine.set_weather(weather)
+
+    def gust_now(
+        self, amplitude_map: tuple[float, float, float], rise_s: float, lasts_s: float = math.inf
+    ) -> None:
+        """Let a 1-cosine gust of `amplitude_map` (3,) m/s begin now, over after `lasts_s`."""
+        self._engine.gust_now(amplitude_map, rise_s, lasts_s)
 
     def post(self, action: Callable[[], Any]) -> Future[Any]:
         """Have `action()` called by the simulation's thread before its next tick.

@@ -1,14 +1,17 @@
-"""Builds terrain and forest of a scenario."""
+"""Builds terrain, forest and weather of a scenario."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
+from volery.scenario import wind as schema
 from volery.scenario.files import resolve
 from volery.scenario.schema import GridTerrain, InventoryForest, ProceduralForest, Scenario
 from volery.world.forest import Forest, forest_from_inventory, procedural_forest
 from volery.world.terrain import Terrain
+from volery.world.weather import W20_M_S, Gust, LogProfile, PowerProfile, Weather, WindField
 
 SHIPPED_DATA = Path(__file__).resolve().parent.parent / "world" / "data"
 
@@ -69,3 +72,42 @@ def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
             terrain=terrain,
         )
     return None
+
+
+def build_weather(scenario: Scenario) -> Weather:
+    """Air of the scenario. Raises `DataFileError` where its wind field cannot be read."""
+    wind = scenario.world.wind
+    return Weather(
+        wind.velocity_m_s,
+        _profile_of(wind),
+        _read_field(scenario),
+        W20_M_S[wind.turbulence] if wind.w20_m_s is None else wind.w20_m_s,
+        tuple(_gust_of(gust, wind) for gust in wind.gusts),
+    )
+
+
+def _profile_of(wind: schema.Wind) -> LogProfile | PowerProfile | None:
+    profile = wind.profile
+    if isinstance(profile, schema.LogProfile):
+        return LogProfile(profile.reference_height_m, profile.roughness_m)
+    if isinstance(profile, schema.PowerProfile):
+        return PowerProfile(profile.reference_height_m, profile.exponent)
+    return None
+
+
+def _read_field(scenario: Scenario) -> WindField | None:
+    name = scenario.world.wind.field
+    if name is None:
+        return None
+    try:
+        return WindField.from_file(resolve(name, scenario.folder, SHIPPED_DATA))
+    except DataFileError as error:
+        raise DataFileError(f"{scenario.name}: world.wind.field: {error}") from None
+
+
+def _gust_of(gust: schema.Gust, wind: schema.Wind) -> Gust:
+    end_s = math.inf if gust.end_s is None else gust.end_s
+    if gust.rise_m is None:
+        return Gust(gust.amplitude_m_s, gust.start_s, gust.rise_s or 0.0, end_s)
+    rise_s = gust.rise_m / wind.speed_m_s
+    return Gust(gust.amplitude_m_s, gust.start_s, rise_s, end_s, wind.velocity_m_s)

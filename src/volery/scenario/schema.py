@@ -25,6 +25,7 @@ from volery.scenario.base import (
 )
 from volery.scenario.faults import Fault
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
+from volery.scenario.wind import Wind
 
 # ------------------------------------------------------------------------------------------ world
 
@@ -74,18 +75,6 @@ class ProceduralForest(Data):
     @model_validator(mode="after")
     def _region_is_a_rectangle(self) -> Self:
         check_rectangle(self.region_m)
-        return self
-
-
-class Wind(Data):
-    """Steady wind, ENU."""
-
-    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
-
-    @model_validator(mode="after")
-    def _is_flyable(self) -> Self:
-        if max(abs(v) for v in self.velocity_m_s) > 60.0:
-            raise ValueError("velocity_m_s components must lie within +-60 m/s")
         return self
 
 

@@ -21,6 +21,7 @@ BODY = np.dtype(
         ("angular_acceleration_body", "f8", 3),
         ("free_acceleration", "f8", 3),
         ("free_angular_acceleration", "f8", 3),
+        ("air_velocity_map", "f8", 3),
         ("contact_budget", "f8"),
         ("separation_budget", "f8"),
         ("ground_budget", "f8"),
@@ -72,6 +73,8 @@ class FleetState(NamedTuple):
     """(N,) m that may be flown before the clearance to solids must be looked up; inf: ever."""
     separation_budget: Array
     """(N,) m likewise, for the distance to other UAVs."""
+    air_velocity_map: Array
+    """(N, 3) m/s: velocity of the air at the UAV, refreshed at each guidance tick."""
 
 
 def new_bodies(position_map: Array, attitude: Array) -> NDArray[np.void]:

@@ -169,9 +169,6 @@ def accelerate_identified(
     live: bool,
     references: Any,
     step: int,
-    wind_x: float,
-    wind_y: float,
-    wind_z: float,
     dt: float,
 ) -> None:
     """Like `kernels.accelerate`: take velocity and rates of a `BODY` to the end of the step.
@@ -209,9 +206,9 @@ def accelerate_identified(
     )
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = matrix_of(x, y, z, w)
     vx, vy, vz = three(body.velocity_map)
-    ax = vx + half * body.free_acceleration[0] - wind_x
-    ay = vy + half * body.free_acceleration[1] - wind_y
-    az = vz + half * body.free_acceleration[2] - wind_z
+    ax = vx + half * body.free_acceleration[0] - body.air_velocity_map[0]
+    ay = vy + half * body.free_acceleration[1] - body.air_velocity_map[1]
+    az = vz + half * body.free_acceleration[2] - body.air_velocity_map[2]
     fx = -model.drag[0] * (r00 * ax + r10 * ay + r20 * az)
     fy = -model.drag[1] * (r01 * ax + r11 * ay + r21 * az)
     fz = thrust * plant.inverse_mass - model.drag[2] * (r02 * ax + r12 * ay + r22 * az)

@@ -35,16 +35,15 @@ _WRECK_DAMPING_S = 0.15
 
 
 @inner_kernel
-def accelerate(
-    body: Any, plant: Any, command: Any, wind_x: float, wind_y: float, wind_z: float, dt: float
-) -> None:
+def accelerate(body: Any, plant: Any, command: Any, dt: float) -> None:
     """Rotors, air and gravity: take velocity and rates of a `BODY` to the end of the step.
 
-    command: a record with `rotor_reference`, rad/s, held over the step. wind: m/s, map.
+    command: a record with `rotor_reference`, rad/s, held over the step.
     """
     half = 0.5 * dt
     vx, vy, vz = three(body.velocity_map)
     ox, oy, oz = three(body.omega_body)
+    wind_x, wind_y, wind_z = three(body.air_velocity_map)
     # mid-step, extrapolated
     mx = ox + half * body.free_angular_acceleration[0]
     my = oy + half * body.free_angular_acceleration[1]

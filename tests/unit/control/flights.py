@@ -7,6 +7,7 @@ from volery.control.flight_modes import FlightMode
 from volery.vehicle.airframe import Airframe, load_airframe
 from volery.vehicle.contact import standing_pose
 from volery.world.terrain import Terrain
+from volery.world.weather import Weather
 
 F450 = load_airframe("f450")
 FLAT = Terrain.flat(4000.0, 0.0, (-2000.0, -2000.0))
@@ -38,11 +39,13 @@ def on_ground(x=0.0, y=0.0, yaw=0.0, terrain=FLAT, airframe=F450, **options) -> 
     return Fleet([airframe], [pose[:3]], [pose[3:]], mode=FlightMode.LANDED, **options)
 
 
-def track(fleet, seconds, terrain=FLAT, wind=(0.0, 0.0, 0.0), every=10, i=0):
+def track(fleet, seconds, terrain=FLAT, wind=None, every=10, i=0):
     """Positions, velocities and tilts (rad) of UAV `i` while it flies on."""
+    if wind is not None:
+        fleet.set_weather(Weather(wind))
     rows = []
     for _ in range(round(seconds * 1e9 / fleet.dt_ns / every)):
-        fleet.advance(every, terrain.grid, wind)
+        fleet.advance(every, terrain.grid)
         q = fleet.state.attitude[i]
         tilt = np.arccos(np.clip(1 - 2 * (q[0] ** 2 + q[1] ** 2), -1, 1))
         rows.append([*fleet.state.position_map[i], *fleet.state.velocity_map[i], tilt])

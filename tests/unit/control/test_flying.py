@@ -15,6 +15,7 @@ from volery.vehicle.aerodynamics import contact_points
 from volery.vehicle.contact import standing_pose
 from volery.vehicle.fleet import BODY
 from volery.world.terrain import Terrain
+from volery.world.weather import Gust, LogProfile, Weather
 
 NAN, INF = float("nan"), float("inf")
 
@@ -316,7 +317,8 @@ def test_crash_in_the_air_falls_and_rests():
     assert velocity[:, 2].min() < -12.0
     assert fleet.state.asleep[0]
     before = fleet.state.position_map[0].copy()
-    fleet.advance(2000, FLAT.grid, (10.0, 0.0, 0.0))
+    fleet.set_weather(Weather((10.0, 0.0, 0.0)))
+    fleet.advance(2000, FLAT.grid)
     np.testing.assert_array_equal(fleet.state.position_map[0], before)
     assert kinds(fleet) == []
 
@@ -324,14 +326,23 @@ def test_crash_in_the_air_falls_and_rests():
 # -------------------------------------------------------------------------------- time and budgets
 
 
+STORM = Weather(
+    (2.0, 1.0, 0.0),
+    LogProfile(roughness_m=0.1),
+    w20_m_s=15.0,
+    gusts=(Gust((3.0, -2.0, 1.0), 0.5, 0.2, 1.3), Gust((0.0, 4.0, 0.0), 0.9, 0.4)),
+)
+
+
 def busy_fleet():
-    """UAVs in every mode, some about to hit the ground."""
+    """UAVs in every mode, some about to hit the ground, in a storm."""
     ground = slope(12)
     z = [30.0, 30.0, 30.0, 30.0, 30.0]
     fleet = Fleet(
         [F450, ring(6), F450, ring(8), F450],
         [[6.0 * i, 3.0, float(ground.height(6.0 * i, 3.0)) + z[i]] for i in range(5)],
         [rotations.from_rpy(0, 0, 0.3 * i) for i in range(5)],
+        weather=STORM,
     )
     fleet.command_position(0, (10, 20, 60), yaw=1.0)
     fleet.command_velocity_body(1, (4, 1, 0), 0.4)
@@ -344,12 +355,12 @@ def busy_fleet():
 def test_slicing_changes_nothing():
     """Bit for bit: states, histories and events, contacts included."""
     whole, ground = busy_fleet()
-    assert whole.advance(4000, ground.grid, (2, 1, 0)) == 4000
+    assert whole.advance(4000, ground.grid) == 4000
     sliced, _ = busy_fleet()
     rng = np.random.default_rng(0)
     while sliced.step < 4000:
         slice_ = min(int(rng.choice([1, 2, 3, 5, 7, 25, 100])), 4000 - sliced.step)
-        assert sliced.advance(slice_, ground.grid, (2, 1, 0)) == slice_
+        assert sliced.advance(slice_, ground.grid) == slice_
     assert whole.get_state()["uavs"].tobytes() == sliced.get_state()["uavs"].tobytes()
     np.testing.assert_array_equal(whole.history.position, sliced.history.position)
     np.testing.assert_array_equal(whole.history.attitude, sliced.history.attitude)
@@ -361,7 +372,8 @@ def test_slicing_changes_nothing():
 def test_a_uav_flies_alike_in_company():
     many, ground = busy_fleet()
     many.advance(1500, ground.grid)
-    alone = Fleet([F450], busy_fleet()[0].state.position_map[:1], [LEVEL])
+    place = busy_fleet()[0].state.position_map[:1]
+    alone = Fleet([F450], place, [LEVEL], weather=STORM)
     alone.command_position(0, (10, 20, 60), yaw=1.0)
     alone.advance(1500, ground.grid)
     for name in ("position_map", "velocity_map", "attitude", "rotor_speed"):

@@ -1,0 +1,119 @@
+"""The wind of a scenario: mean wind, gusts and turbulence; vectors are ENU."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from volery.scenario.base import Data, NonNegative, Positive, Vector3
+
+MAX_WIND_M_S = 60.0
+"""Largest component of any wind, gust or node of a field."""
+MAX_GUSTS = 64
+"""Gusts that a weather may hold at once."""
+
+_Height = Annotated[float, Field(ge=0.1, le=304.8)]
+
+
+class LogProfile(Data):
+    """Logarithmic growth of the steady wind with height above ground."""
+
+    kind: Literal["log"]
+    reference_height_m: _Height = 10.0
+    """Height at which velocity_m_s blows."""
+    roughness_m: Annotated[float, Field(ge=1e-6, le=10.0)] = 0.03
+
+    @model_validator(mode="after")
+    def _reference_is_above_roughness(self) -> Self:
+        if self.reference_height_m < 2.0 * self.roughness_m:
+            raise ValueError("reference_height_m must be at least twice roughness_m")
+        return self
+
+
+class PowerProfile(Data):
+    """Growth of the steady wind with a power of the height above ground."""
+
+    kind: Literal["power"]
+    reference_height_m: _Height = 10.0
+    exponent: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0 / 7.0
+
+
+class Gust(Data):
+    """A 1-cosine gust that rises, stays, and falls again; its end is when it is over."""
+
+    amplitude_m_s: Vector3
+    start_s: NonNegative
+    rise_s: Annotated[float, Field(ge=1e-3, le=1e6)] | None = None
+    rise_m: Positive | None = None
+    """Instead of rise_s: length of the rise in a front that the steady wind carries."""
+    end_s: Positive | None = None
+    """None: the gust stays."""
+
+    @model_validator(mode="after")
+    def _rises_one_way(self) -> Self:
+        _check_speed("amplitude_m_s", self.amplitude_m_s)
+        if (self.rise_s is None) == (self.rise_m is None):
+            raise ValueError("a gust needs either rise_s or rise_m")
+        if self.rise_s is not None:
+            _check_end("end_s", self, self.rise_s)
+        return self
+
+
+class Wind(Data):
+    """Motion of the air: steady wind (with a profile) or a field, gusts, turbulence."""
+
+    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
+    """Steady wind."""
+    profile: Annotated[LogProfile | PowerProfile | None, Field(discriminator="kind")] = None
+    field: str | None = None
+    """A .csv or .npz file of velocities on a regular grid, instead of the steady wind."""
+    turbulence: Literal["none", "light", "moderate", "severe"] = "none"
+    w20_m_s: Annotated[float, Field(ge=0.0, le=MAX_WIND_M_S)] | None = None
+    """Instead of turbulence: the mean wind at 20 ft (6.1 m) that sets its intensity."""
+    gusts: Annotated[tuple[Gust, ...], Field(max_length=MAX_GUSTS)] = ()
+
+    @model_validator(mode="after")
+    def _is_flyable(self) -> Self:
+        _check_speed("velocity_m_s", self.velocity_m_s)
+        return self
+
+    @model_validator(mode="after")
+    def _is_told_once(self) -> Self:
+        if self.field is not None and (self.profile is not None or any(self.velocity_m_s)):
+            raise ValueError("a field takes the place of velocity_m_s and profile; leave them out")
+        if self.w20_m_s is not None and self.turbulence != "none":
+            raise ValueError("turbulence and w20_m_s exclude each other; leave one out")
+        return self
+
+    @model_validator(mode="after")
+    def _fronts_are_carried(self) -> Self:
+        for k, gust in enumerate(self.gusts):
+            if gust.rise_m is None:
+                continue
+            if self.speed_m_s < 0.1:
+                raise ValueError(
+                    f"gusts[{k}].rise_m needs a velocity_m_s of 0.1 m/s or more that carries the "
+                    "front; give rise_s instead"
+                )
+            _check_end(f"gusts[{k}].end_s", gust, gust.rise_m / self.speed_m_s)
+        return self
+
+    @property
+    def speed_m_s(self) -> float:
+        """Of the steady wind."""
+        x, y, z = self.velocity_m_s
+        return float((x * x + y * y + z * z) ** 0.5)
+
+
+def _check_end(key: str, gust: Gust, rise_s: float) -> None:
+    least = gust.start_s + 2.0 * rise_s
+    if gust.end_s is not None and gust.end_s < least - 1e-6:
+        raise ValueError(
+            f"{key} must leave time to rise and to fall: at least {least:g} s is needed"
+        )
+
+
+def _check_speed(key: str, velocity: Vector3) -> None:
+    if max(abs(v) for v in velocity) > MAX_WIND_M_S:
+        raise ValueError(f"{key} components must lie within +-{MAX_WIND_M_S:g} m/s")

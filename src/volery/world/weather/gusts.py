@@ -1,0 +1,31 @@
+"""1-cosine gusts (MIL-F-8785C, discrete gust model), with a fall like the rise."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.compiled import inner_kernel
+
+Array = NDArray[np.float64]
+
+
+@inner_kernel
+def gust_velocity(air: Any, position: Array, time: float) -> tuple[float, float, float]:
+    """Sum (x, y, z) m/s, map, of all gusts of an `AIR` record at `position` (3,) m, `time` s."""
+    x = y = z = 0.0
+    for g in range(air.gusts):
+        since = time - air.gust_start[g]
+        for k in range(3):
+            since -= air.gust_slowness[g, k] * position[k]
+        left = air.gust_length[g] - since
+        if since > 0.0 and left > 0.0:
+            phase = min(since, left) * air.gust_inverse_rise[g]
+            share = 0.5 - 0.5 * math.cos(math.pi * min(phase, 1.0))
+            x += share * air.gust_amplitude[g, 0]
+            y += share * air.gust_amplitude[g, 1]
+            z += share * air.gust_amplitude[g, 2]
+    return x, y, z

@@ -1,0 +1,39 @@
+"""The mean wind at a place: steady, by a profile over height, or from a field."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.compiled import inner_kernel
+from volery.world.weather.wind_field import field_velocity
+
+Array = NDArray[np.float64]
+
+UNIFORM, LOG, POWER, FIELD = 0, 1, 2, 3
+"""Kinds of mean wind."""
+_TOP = 304.8
+"""m above ground (1000 ft) beyond which profiles stay as they are (MIL-F-8785C)."""
+
+
+@inner_kernel
+def mean_wind(air: Any, nodes: Array, position: Array, height: float) -> tuple[float, float, float]:
+    """Velocity (x, y, z) m/s, map, at `position` (3,) m, `height` m above ground.
+
+    air: an `AIR` record. nodes: its field, (Z, Y, X, 3).
+    """
+    if air.kind == FIELD:
+        return field_velocity(air, nodes, position)
+    share = 1.0
+    if air.kind == LOG:
+        # profile_shape: roughness, m. profile_scale: 1 / ln(reference / roughness)
+        above = min(max(height, air.profile_shape), _TOP)
+        share = math.log(above / air.profile_shape) * air.profile_scale
+    elif air.kind == POWER:
+        # profile_shape: exponent. profile_scale: 1 / reference, 1/m
+        above = min(max(height, 0.0), _TOP)
+        share = (above * air.profile_scale) ** air.profile_shape
+    return share * air.velocity[0], share * air.velocity[1], share * air.velocity[2]

@@ -1,0 +1,202 @@
+"""Reading wind fields: a CSV table of nodes or a numpy .npz archive.
+
+A .csv file names its columns `x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s` in its first row and holds one node
+of a regular grid a row, both in any order. An .npz file holds `velocity_m_s` (Z, Y, X, 3),
+`origin_m` (3,) and `spacing_m` (3,).
+"""
+
+from __future__ import annotations
+
+import csv
+import zipfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.errors import DataFileError
+from volery.scenario.wind import MAX_WIND_M_S
+
+Array = NDArray[np.float64]
+Field = tuple[Array, tuple[float, float, float], tuple[float, float, float]]
+
+_COLUMNS = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
+_SHAPES = {"velocity_m_s": "(Z, Y, X, 3)", "origin_m": "(3,)", "spacing_m": "(3,)"}
+_SHOWN_FAULTS = 20
+_SLACK = 1e-3
+"""Share of the spacing by which a node may stand off the grid: written coordinates are rounded."""
+
+
+def read_wind_field(path: Path) -> Field:
+    """Velocities (Z, Y, X, 3) m/s, origin (3,) m and spacing (3,) m of a file.
+
+    Raises one DataFileError that names the file and every bad row.
+    """
+    if path.suffix not in (".csv", ".npz"):
+        raise DataFileError(f"wind field {path}: a .csv or an .npz file is needed")
+    if not path.is_file():
+        raise DataFileError(f"wind field {path} does not exist")
+    return _read_npz(path) if path.suffix == ".npz" else _read_csv(path)
+
+
+# --------------------------------------------------------------------------------------------- npz
+
+
+def _read_npz(path: Path) -> Field:
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            held = {name: np.asarray(archive[name], np.float64) for name in _SHAPES}
+    except KeyError:
+        wanted = ", ".join(f"{name} {shape}" for name, shape in _SHAPES.items())
+        raise DataFileError(f"wind field {path} must hold {wanted}") from None
+    except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise DataFileError(f"wind field {path} cannot be read: {error}") from None
+    velocity, origin, spacing = held.values()
+    for name, shape in _SHAPES.items():
+        right = held[name].shape == (3,) if name != "velocity_m_s" else _is_grid(velocity)
+        if not right:
+            raise DataFileError(
+                f"wind field {path}: {name} has shape {held[name].shape}, not {shape}"
+            )
+    wrong = np.argwhere(~(np.abs(velocity) <= MAX_WIND_M_S))
+    if len(wrong):
+        place, value = tuple(wrong[0].tolist()), velocity[tuple(wrong[0])]
+        raise DataFileError(
+            f"wind field {path}: velocity_m_s{list(place)} = {value:g}; finite numbers within "
+            f"+-{MAX_WIND_M_S:g} m/s are allowed"
+        )
+    if not np.isfinite(origin).all():
+        raise DataFileError(f"wind field {path}: origin_m must be finite")
+    if not ((spacing > 0.0) & np.isfinite(spacing)).all():
+        raise DataFileError(f"wind field {path}: spacing_m must be above 0")
+    return velocity, _three(origin), _three(spacing)
+
+
+def _is_grid(velocity: Array) -> bool:
+    return velocity.ndim == 4 and velocity.shape[3] == 3 and 0 not in velocity.shape
+
+
+# --------------------------------------------------------------------------------------------- csv
+
+
+def _read_csv(path: Path) -> Field:
+    numbers, table = _rows_of(path)
+    faults: list[str] = []
+    axes = [_axis_of(path, table[:, k], name) for k, name in enumerate(_COLUMNS[:3])]
+    shape = tuple(len(axis) for axis in axes)
+    cells = np.empty((len(table), 3), np.int64)
+    for k, axis in enumerate(axes):
+        step = axis[1] - axis[0] if len(axis) > 1 else 1.0
+        near = np.rint((table[:, k] - axis[0]) / step)
+        cells[:, k] = np.clip(near, 0, len(axis) - 1)
+        off = np.abs(table[:, k] - (axis[0] + cells[:, k] * step)) > _SLACK * step
+        for row in np.flatnonzero(off):
+            faults.append(
+                f"row {numbers[row]}: {_COLUMNS[k]} {table[row, k]:g} is not on the grid "
+                f"{_shown(axis)}"
+            )
+    _report(path, faults)
+    flat = np.asarray(np.ravel_multi_index(tuple(cells.T), shape))
+    _check_complete(path, flat, numbers, axes)
+    velocity = np.empty((int(np.prod(shape)), 3))
+    velocity[flat] = table[:, 3:]
+    grid = velocity.reshape(*shape, 3).transpose(2, 1, 0, 3)
+    spacing = [axis[1] - axis[0] if len(axis) > 1 else 1.0 for axis in axes]
+    return grid, _three([axis[0] for axis in axes]), _three(spacing)
+
+
+def _rows_of(path: Path) -> tuple[list[int], Array]:
+    """Row numbers in the file (the heading is row 1) and the table (M, 6) of `_COLUMNS`."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DataFileError(f"wind field {path} cannot be read: {error}") from None
+    heading = [name.strip() for name in rows[0]] if rows else []
+    if sorted(heading) != sorted(_COLUMNS):
+        raise DataFileError(f"wind field {path}: row 1 must name the columns {','.join(_COLUMNS)}")
+    order = [heading.index(name) for name in _COLUMNS]
+    faults: list[str] = []
+    numbers, table = [], []
+    for number, row in enumerate(rows[1:], start=2):
+        if not any(text.strip() for text in row):
+            continue
+        fault, values = _parse(row, order)
+        if fault:
+            faults.append(f"row {number}: {fault}")
+        else:
+            numbers.append(number)
+            table.append(values)
+    _report(path, faults)
+    if not table:
+        raise DataFileError(f"wind field {path} has no nodes below its heading")
+    return numbers, np.array(table)
+
+
+def _parse(row: list[str], order: list[int]) -> tuple[str, list[float]]:
+    """What is wrong with a row ("" if nothing), and its numbers in the order of `_COLUMNS`."""
+    if len(row) != len(order):
+        return f"{len(row)} fields, the heading has {len(order)}", []
+    values = []
+    for name, column in zip(_COLUMNS, order, strict=True):
+        text = row[column].strip()
+        try:
+            value = float(text)
+        except ValueError:
+            return f"{name} {text!r} is not a number", []
+        limit = MAX_WIND_M_S if name.endswith("_m_s") else 1e6
+        if not abs(value) <= limit:
+            return f"{name} {text} is out of range; +-{limit:g} is allowed", []
+        values.append(value)
+    return "", values
+
+
+def _axis_of(path: Path, column: Array, name: str) -> Array:
+    """Evenly spaced coordinates of the grid: those that as good as every line of nodes has."""
+    values, counts = np.unique(column, return_counts=True)
+    axis = values[2 * counts >= counts.max()]
+    even: Array = np.linspace(axis[0], axis[-1], len(axis))
+    if len(axis) > 2 and np.abs(axis - even).max() > _SLACK * (even[1] - even[0]):
+        raise DataFileError(f"wind field {path}: {name} must be evenly spaced, not {_shown(axis)}")
+    return even
+
+
+def _check_complete(
+    path: Path, flat: NDArray[np.intp], numbers: list[int], axes: list[Array]
+) -> None:
+    _, first, place = np.unique(flat, return_index=True, return_inverse=True)
+    earlier = first[place]
+    _report(
+        path,
+        [
+            f"row {numbers[row]} repeats the node of row {numbers[earlier[row]]}"
+            for row in np.flatnonzero(earlier != np.arange(len(flat)))
+        ],
+    )
+    shape = tuple(len(axis) for axis in axes)
+    count = int(np.prod(shape))
+    if len(flat) < count:
+        gap = int(np.argmax(np.append(np.sort(flat), count) != np.arange(len(flat) + 1)))
+        at = np.unravel_index(gap, shape)
+        node = ", ".join(f"{axis[i]:g}" for axis, i in zip(axes, at, strict=True))
+        raise DataFileError(
+            f"wind field {path} has {len(flat)} of the {count} nodes of its grid; the first gap is "
+            f"at ({node}) m"
+        )
+
+
+def _report(path: Path, faults: list[str]) -> None:
+    if faults:
+        more = len(faults) - _SHOWN_FAULTS
+        shown = "; ".join(faults[:_SHOWN_FAULTS]) + (f"; and {more} more" if more > 0 else "")
+        raise DataFileError(f"wind field {path}: {shown}")
+
+
+def _shown(axis: Array) -> str:
+    few = [f"{value:g}" for value in axis[:4]]
+    return ", ".join([*few, "..."] if len(axis) > 4 else few)
+
+
+def _three(values: Array | list[float]) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
