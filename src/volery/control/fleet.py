@@ -27,14 +27,24 @@ from volery.control.setpoints import (
     checked_within,
     new_pilots,
 )
-from volery.control.step import EVENT, EVENTS_A_STEP, MODE_CHANGE, MODEL, UAV, advance_fleet
+from volery.control.step import (
+    BATTERY_FELL,
+    EVENT,
+    EVENTS_A_STEP,
+    MODE_CHANGE,
+    MODEL,
+    UAV,
+    advance_fleet,
+)
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
-from volery.vehicle.aerodynamics import plant_of
+from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe, hover_thrusts
+from volery.vehicle.battery import BatteryLevel
 from volery.vehicle.contact import IMPACT, TOUCH_DOWN, steepest_cosine
-from volery.vehicle.fleet import FleetState, new_bodies, state_of
+from volery.vehicle.fleet import FleetState, charge_battery, fit_rotors, new_bodies, state_of
+from volery.vehicle.plant import plant_of
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.terrain import TerrainGrid
 
@@ -55,12 +65,15 @@ class FleetEventKind(StrEnum):
     """Touched the ground faster than the landing limit or tilted beyond 60 degrees."""
     MODE = "mode"
     """Changed its flight mode by itself."""
+    BATTERY = "battery"
+    """Its battery fell to a lower level."""
 
 
 _KINDS = {
     TOUCH_DOWN: FleetEventKind.TOUCH_DOWN,
     IMPACT: FleetEventKind.IMPACT,
     MODE_CHANGE: FleetEventKind.MODE,
+    BATTERY_FELL: FleetEventKind.BATTERY,
 }
 
 
@@ -79,6 +92,8 @@ class FleetEvent:
     """Of the centre of mass just before a touch; 0 for a change of mode."""
     mode: FlightMode
     """Mode after a change, mode in which a touch happened."""
+    battery_level: BatteryLevel = BatteryLevel.NORMAL
+    """At the time."""
 
 
 class Fleet:
@@ -88,6 +103,9 @@ class Fleet:
     dt_ns: physics step. on_contact: what an impact does, "crash" (rotors stop, it falls and rests)
     or "bounce" (it rebounds and flies on). mode: `HOLD` starts in the air with rotors turning,
     `LANDED` on the ground with rotors stopped; one for all or one a UAV. names: for messages.
+    wear: of the rotors, one a rotor, for each UAV; an empty one means new. battery_charge: shares
+    from 0 to 1, one for all or one a UAV. copies: (N,) whole numbers; UAVs of different copies of
+    a scenario do not feel each other's air.
 
     Rows are numbered from 0. After `advance` the state belongs to time `step * dt_ns`.
     """
@@ -102,6 +120,9 @@ class Fleet:
         on_contact: Literal["crash", "bounce"] = "crash",
         mode: FlightMode | Sequence[FlightMode] = FlightMode.HOLD,
         names: Sequence[str] | None = None,
+        wear: Sequence[Sequence[RotorWear]] | None = None,
+        battery_charge: ArrayLike = 1.0,
+        copies: ArrayLike = 0,
     ) -> None:
         count = len(airframes)
         if count == 0:
@@ -125,13 +146,24 @@ class Fleet:
             steps_of(GUIDANCE_PERIOD_S, self._dt),
             steps_of(ATTITUDE_PERIOD_S, self._dt),
         )
-        self._models, rows = _model_table(self.airframes, self._dt)
+        worn = [tuple(one) for one in wear or [()] * count]
+        _check_wear(self.names, self.airframes, worn)
+        charge = checked_within("battery_charge", np.broadcast_to(battery_charge, count), (count,), 1.0)
+        self._models, rows = _model_table(self.airframes, worn, self._dt)
         self._uavs = np.zeros(count, UAV)
         self._uavs["body"] = new_bodies(position, attitude)
         self._uavs["pilot"] = new_pilots(attitude)
         self._uavs["model"] = rows
+        self._uavs["copy"] = copies
+        self._order = np.arange(count)
         self._bodies: NDArray[np.void] = self._uavs["body"]
         self._pilots: NDArray[np.void] = self._uavs["pilot"]
+        for i, row in enumerate(rows):
+            plant = self._models["plant"][row]
+            health = [rotor.thrust for rotor in worn[i]] or np.ones(int(plant["rotors"]))
+            fit_rotors(self._bodies[i], plant, health)
+            charge_battery(self._bodies[i], plant, float(charge[i]))
+            self._pilots["full_thrust"][i] = self.airframes[i].max_rotor_thrust
         self._events = np.zeros(max(256, 2 * EVENTS_A_STEP * count), EVENT)
         self._drained: list[FleetEvent] = []
         self._grid: TerrainGrid | None = None
@@ -184,6 +216,7 @@ class Fleet:
             more, written, spent = advance_fleet(
                 self._uavs,
                 self._models,
+                self._order,
                 *self._ground,
                 self.history.position,
                 self.history.attitude,
@@ -332,6 +365,21 @@ class Fleet:
         """Place (3,) m, map, to which UAV `i` returns; else that of its last take-off."""
         self._pilots["home"][i] = checked("home", position, (3,), MAX_COORDINATE)
 
+    def set_rotor_health(self, i: int, rotor: int, factor: float) -> None:
+        """Let rotor number `rotor` of UAV `i` give `factor` of a new one's thrust from now on.
+
+        From 0 to 1; 0 is a lost motor, which stops. Controllers are not told.
+        """
+        if not 0 <= i < len(self):
+            raise CommandError(f"there is no UAV {i}; rows 0 to {len(self) - 1} exist")
+        rotors = len(self.airframes[i].rotors.places)
+        if not 0 <= rotor < rotors:
+            raise CommandError(f"{self.names[i]} has no rotor {rotor}; 0 to {rotors - 1} exist")
+        health = self._bodies["rotor_health"][i, :rotors].copy()
+        health[rotor] = checked_within("rotor health", factor, (), 1.0)
+        fit_rotors(self._bodies[i], self._models["plant"][self._uavs["model"][i]], health)
+        self._bodies["ground_budget"][i] = 0.0
+
     # ------------------------------------------------------------------------------ contacts
 
     def crash(self, i: int) -> None:
@@ -340,7 +388,7 @@ class Fleet:
         self._wake(i)
         pilot: Any = self._pilots[i]
         fresh = np.zeros(1, PILOT)[0]
-        for name in ("home", "heading", "heading_target", "timeout_steps"):
+        for name in ("home", "heading", "heading_target", "timeout_steps", "full_thrust"):
             fresh[name] = pilot[name]
         fresh["mode"] = FlightMode.CRASHED
         fresh["level"] = ControlLevel.STOPPED
@@ -423,6 +471,7 @@ class Fleet:
         self._bodies["asleep"][i] = False
         self._bodies["still_steps"][i] = 0
         self._bodies["ground_budget"][i] = 0.0
+        self._bodies["downwash_budget"][i] = 0.0
 
     def _enter_low_level(self, i: int, level: ControlLevel) -> Any:
         self._wake(i)
@@ -513,20 +562,39 @@ class Fleet:
         return float(np.linalg.norm(impulse))
 
 
-def _model_table(airframes: Sequence[Airframe], dt: float) -> tuple[NDArray[np.void], list[int]]:
-    """Distinct airframes as `MODEL` rows, and each UAV's row."""
-    kinds: dict[str, int] = {}
-    distinct: list[Airframe] = []
+def _check_wear(
+    names: Sequence[str], airframes: Sequence[Airframe], worn: Sequence[tuple[RotorWear, ...]]
+) -> None:
+    if len(worn) != len(airframes):
+        raise CommandError(f"wear is given for {len(worn)} UAVs, not {len(airframes)}")
+    for name, airframe, wear in zip(names, airframes, worn, strict=True):
+        if len(wear) not in (0, len(airframe.rotors.places)):
+            raise CommandError(
+                f"wear of {name} names {len(wear)} rotors; {airframe.name} has "
+                f"{len(airframe.rotors.places)}"
+            )
+
+
+def _model_table(
+    airframes: Sequence[Airframe], worn: Sequence[tuple[RotorWear, ...]], dt: float
+) -> tuple[NDArray[np.void], list[int]]:
+    """Distinct airframes and wears as `MODEL` rows, and each UAV's row.
+
+    Gains are those of the new vehicle: controllers know nothing of wear.
+    """
+    kinds: dict[tuple[str, tuple[RotorWear, ...]], int] = {}
+    distinct: list[tuple[Airframe, tuple[RotorWear, ...]]] = []
     rows = []
-    for airframe in airframes:
-        key = airframe.model_dump_json()
+    for airframe, wear in zip(airframes, worn, strict=True):
+        key = (airframe.model_dump_json(), wear)
         if key not in kinds:
             kinds[key] = len(distinct)
-            distinct.append(airframe)
+            distinct.append((airframe, wear))
         rows.append(kinds[key])
     models = np.zeros(len(distinct), MODEL)
-    for row, airframe in enumerate(distinct):
-        models["plant"][row] = plant_of(airframe, dt)[0]
+    tick = steps_of(GUIDANCE_PERIOD_S, dt) * dt
+    for row, (airframe, wear) in enumerate(distinct):
+        models["plant"][row] = plant_of(airframe, dt, tick, wear)[0]
         models["gains"][row] = gains_of(airframe, dt)[0]
     return models, rows
 
@@ -540,4 +608,5 @@ def _event(row: Any) -> FleetEvent:
         (x, y, z),
         float(row["speed"]),
         FlightMode(int(row["mode"])),
+        BatteryLevel(int(row["level"])),
     )

@@ -11,17 +11,21 @@ from volery.control.flight_modes import CRASHED, guide, stop
 from volery.control.gains import GAINS
 from volery.control.rates_attitude import hold_attitude, hold_rates
 from volery.control.setpoints import PILOT
-from volery.vehicle.aerodynamics import PLANT
+from volery.vehicle.battery import drain
 from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
+from volery.vehicle.downwash import add_downwash
 from volery.vehicle.fleet import BODY
+from volery.vehicle.ground_effect import feel_ground, feels_ground
 from volery.vehicle.kernels import accelerate, carry, meet_ground, near_ground
+from volery.vehicle.plant import PLANT
 from volery.world.terrain import TerrainGrid
 
 Array = NDArray[np.float64]
 
-UAV = np.dtype([("body", BODY), ("pilot", PILOT), ("model", "i8")], align=True)
-"""One UAV: its plant, its control, and the row of its airframe."""
+UAV = np.dtype([("body", BODY), ("pilot", PILOT), ("model", "i8"), ("copy", "i8")], align=True)
+"""One UAV: its plant, its control, the row of its airframe, and the copy of the scenario that it
+flies in; UAVs of different copies never meet."""
 MODEL = np.dtype([("plant", PLANT), ("gains", GAINS)], align=True)
 """One airframe."""
 
@@ -31,14 +35,16 @@ EVENT = np.dtype(
         ("uav", "i8"),
         ("kind", "i8"),
         ("mode", "i8"),
+        ("level", "i8"),
         ("speed", "f8"),
         ("position", "f8", 3),
     ],
     align=True,
 )
-"""One happening; `kind` is `TOUCH_DOWN`, `IMPACT` or `MODE_CHANGE`."""
+"""One happening; `kind` is `TOUCH_DOWN`, `IMPACT`, `MODE_CHANGE` or `BATTERY_FELL`."""
 MODE_CHANGE = 3
-EVENTS_A_STEP = 3
+BATTERY_FELL = 4
+EVENTS_A_STEP = 4
 """At most, of one UAV."""
 
 
@@ -46,6 +52,7 @@ EVENTS_A_STEP = 3
 def advance_fleet(  # noqa: PLR0912
     uavs: NDArray[np.void],
     models: NDArray[np.void],
+    order: NDArray[np.int64],
     heights: Array,
     origin_x: float,
     origin_y: float,
@@ -67,7 +74,7 @@ def advance_fleet(  # noqa: PLR0912
 ) -> tuple[int, int, bool]:
     """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
 
-    Ends early after a step in which a budget ran out, the events' buffer grew full or, with
+    order: (N,) rows in any order, kept from call to call to spare sorting. Ends early after a step in which a budget ran out, the events' buffer grew full or, with
     `event_ends`, anything was noted. Returns the steps done, the events written, and whether a
     budget ran out.
     """
@@ -83,14 +90,22 @@ def advance_fleet(  # noqa: PLR0912
         guiding = step % guidance_steps == 0
         turning = step % attitude_steps == 0
         row = (step + 1) % rows
+        if guiding:
+            for i in range(count):
+                air = uavs[i].body.air_velocity_map
+                air[0], air[1], air[2] = wind_x, wind_y, wind_z
+            add_downwash(uavs, models, order)
         for i in range(count):
             body = uavs[i].body
             pilot = uavs[i].pilot
+            plant = models[uavs[i].model].plant
+            if guiding and plant.battery.capacity > 0.0 and drain(body, plant, pilot):
+                _note(events[written], step + 1, i, BATTERY_FELL, pilot.mode, 0.0, body)
+                written += 1
             if body.asleep:
                 for k in range(3):
                     body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
             else:
-                plant = models[uavs[i].model].plant
                 gains = models[uavs[i].model].gains
                 estimate = body  # what control knows of the motion: for now, the truth
                 mode = pilot.mode
@@ -99,7 +114,9 @@ def advance_fleet(  # noqa: PLR0912
                 if turning:
                     hold_attitude(pilot, estimate, gains)
                 hold_rates(pilot, estimate, gains, dt)
-                accelerate(body, plant, pilot, wind_x, wind_y, wind_z, dt)
+                if feels_ground(body, plant):
+                    feel_ground(body, plant, grid, steepest, dt)
+                accelerate(body, plant, pilot, dt)
                 touch = NO_TOUCH
                 if near_ground(body, dt):
                     touch = meet_ground(
@@ -132,6 +149,7 @@ def _note(event: Any, step: int, uav: int, kind: int, mode: int, speed: float, b
     event.uav = uav
     event.kind = kind
     event.mode = mode
+    event.level = body.battery_level
     event.speed = speed
     for k in range(3):
         event.position[k] = body.position_map[k]
