@@ -40,7 +40,7 @@ def refresh_air(
                 uavs[i].turbulence,
                 body.position_map,
                 body.velocity_map,
-                tick,
+                tick - uavs[i].turbulence.first_tick,
                 period,
             )
         body.air_velocity_map[0] = x

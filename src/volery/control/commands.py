@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from volery.control import mass_commands
 from volery.control.flight_modes import FlightMode
 from volery.control.segment_store import SegmentStore
 from volery.control.setpoints import (
@@ -33,8 +34,8 @@ DEFAULT_RETURN_HEIGHT_M = 10.0
 class FleetCommands:
     """What UAVs can be told; `Fleet` adds time and state.
 
-    airframes, plants, names: one a UAV. uavs: (N,) rows of `step.UAV`. dt: physics step, s. A command acts
-    from the next step; one that is refused changes nothing.
+    airframes, plants, names: one a UAV. uavs: (N,) rows of `step.UAV`. dt: physics step, s. A
+    command acts from the next step; one that is refused changes nothing.
     """
 
     def __init__(
@@ -112,6 +113,16 @@ class FleetCommands:
         rate = checked("yaw rate", yaw_rate, (), 100.0)
         self._command_velocity(i, velocity, in_heading=True)
         self._turn(i, rate)
+
+    def command_velocities(self, velocity: Array, yaw_rate: Array) -> None:
+        """Fly all UAVs at `velocity` (N, 3) m/s in their level heading frames, turning at (N,).
+
+        As `command_velocity_body` for each, but those on the ground, wrecks and those that take off
+        are passed over.
+        """
+        velocity = checked("velocity", velocity, (len(self), 3), 1e3)
+        rate = checked("yaw rate", yaw_rate, (len(self),), 100.0)
+        mass_commands.command_velocities(self._bodies, self._pilots, self.step, velocity, rate)
 
     def command_velocity_map(
         self, i: int, velocity: ArrayLike, yaw_rate: float = 0.0, *, yaw: float | None = None
@@ -272,6 +283,7 @@ class FleetCommands:
         self._bodies["asleep"][i] = False
         self._bodies["still_steps"][i] = 0
         self._bodies["ground_budget"][i] = 0.0
+        self._bodies["downwash_budget"][i] = 0.0
 
     def _enter_low_level(self, i: int, level: ControlLevel) -> Any:
         self._wake(i)

@@ -18,21 +18,23 @@ from volery.control.commands import FleetCommands
 from volery.control.fleet_events import FleetEvent, event_of
 from volery.control.flight_modes import FlightMode
 from volery.control.gains import ATTITUDE_PERIOD_S, GUIDANCE_PERIOD_S, steps_of
-from volery.control.model_table import model_table, new_references
+from volery.control.model_table import checked_wear, model_table, new_references
 from volery.control.setpoints import (
     MAX_COORDINATE,
     PILOT,
     ControlLevel,
     checked,
     checked_attitude,
+    checked_within,
     new_pilots,
 )
 from volery.control.step import EVENT, EVENTS_A_STEP, UAV, advance_fleet
 from volery.core.clock import NS_PER_S, s_from_ns
 from volery.core.errors import CommandError
+from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe, hover_thrusts
 from volery.vehicle.contact import steepest_cosine
-from volery.vehicle.fleet import FleetState, new_bodies, state_of
+from volery.vehicle.fleet import NEVER, FleetState, charge_battery, fit_rotors, new_bodies, state_of
 from volery.vehicle.plants import Plant, RigidBody
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.terrain import TerrainGrid
@@ -57,6 +59,9 @@ class Fleet(FleetCommands):
     `LANDED` on the ground with rotors stopped; one for all or one a UAV. names: for messages and,
     with `seed`, the streams of what is random. plants: what turns commands into motion
     (`vehicle.plants`), one for all or one a UAV. weather: the air; `set_weather` changes it.
+    wear: of the rotors, one a rotor, for each UAV; an empty one means new. battery_charge: shares
+    from 0 to 1, one for all or one a UAV. copies: (N,) whole numbers; UAVs of different copies of
+    a scenario do not feel each other's air.
 
     Rows are numbered from 0. After `advance` the state belongs to time `step * dt_ns`.
     """
@@ -74,6 +79,9 @@ class Fleet(FleetCommands):
         plants: Plant | Sequence[Plant] = RigidBody(),  # noqa: B008  (frozen)
         weather: Weather = CALM,
         seed: int = 0,
+        wear: Sequence[Sequence[RotorWear]] | None = None,
+        battery_charge: ArrayLike = 1.0,
+        copies: ArrayLike = 0,
     ) -> None:
         count = len(airframes)
         if count == 0:
@@ -91,15 +99,22 @@ class Fleet(FleetCommands):
         if len(plants) != count:
             raise CommandError(f"there are {len(plants)} plants for {count} UAVs")
 
-        models, rows = model_table(airframes, plants, dt_ns / NS_PER_S)
+        names = tuple(names or (f"UAV {i}" for i in range(count)))
+        worn = checked_wear(names, airframes, wear)
+        charge = checked_within(
+            "battery_charge", np.broadcast_to(battery_charge, count), (count,), 1.0
+        )
+        models, rows = model_table(airframes, plants, worn, dt_ns / NS_PER_S)
         uavs = np.zeros(count, UAV)
         uavs["body"] = new_bodies(position, attitude)
         uavs["pilot"] = new_pilots(attitude)
         uavs["model"] = rows
-        names = tuple(names or (f"UAV {i}" for i in range(count)))
+        uavs["copy"] = copies
         uavs["turbulence"] = new_turbulence(seed, names)
         super().__init__(tuple(airframes), plants, names, uavs, dt_ns / NS_PER_S)
         self._models = models
+        self._order = np.arange(count)
+        self._fit_out(worn, charge)
         weight = np.array([airframe.weight for airframe in airframes])
         flying = np.array([start is FlightMode.HOLD for start in modes])
         self._references = new_references(models, attitude, weight * flying)
@@ -158,6 +173,7 @@ class Fleet(FleetCommands):
             more, written, spent = advance_fleet(
                 self._uavs,
                 self._models,
+                self._order,
                 *self._ground,
                 self.history.position,
                 self.history.attitude,
@@ -215,6 +231,21 @@ class Fleet(FleetCommands):
         """Let a gust blow besides."""
         self.set_weather(self._weather.with_gust(gust, s_from_ns(self.time_ns)))
 
+    def set_rotor_health(self, i: int, rotor: int, factor: float) -> None:
+        """Let rotor number `rotor` of UAV `i` give `factor` of a new one's thrust from now on.
+
+        From 0 to 1; 0 is a lost motor, which stops. Controllers are not told.
+        """
+        if not 0 <= i < len(self):
+            raise CommandError(f"there is no UAV {i}; rows 0 to {len(self) - 1} exist")
+        rotors = len(self.airframes[i].rotors.places)
+        if not 0 <= rotor < rotors:
+            raise CommandError(f"{self.names[i]} has no rotor {rotor}; 0 to {rotors - 1} exist")
+        health = self._bodies["rotor_health"][i, :rotors].copy()
+        health[rotor] = checked_within("rotor health", factor, (), 1.0)
+        fit_rotors(self._bodies[i], self._models["plant"][self._uavs["model"][i]], health)
+        self._bodies["ground_budget"][i] = 0.0
+
     # ------------------------------------------------------------------------------ contacts
 
     def crash(self, i: int) -> None:
@@ -223,7 +254,7 @@ class Fleet(FleetCommands):
         self._wake(i)
         pilot: Any = self._pilots[i]
         fresh = np.zeros(1, PILOT)[0]
-        for name in ("home", "heading", "heading_target", "timeout_steps"):
+        for name in ("home", "heading", "heading_target", "timeout_steps", "full_thrust"):
             fresh[name] = pilot[name]
         fresh["mode"] = FlightMode.CRASHED
         fresh["level"] = ControlLevel.STOPPED
@@ -284,7 +315,39 @@ class Fleet(FleetCommands):
         self.set_weather(state["weather"])
         self._drained = list(state["events"])
 
+    def seed_turbulence(self, seed: int, rows: NDArray[np.int64], names: Sequence[str]) -> None:
+        """Give the UAVs `rows` the turbulence of UAVs called `names` in a run of `seed`."""
+        self._uavs["turbulence"]["key"][rows] = new_turbulence(seed, names)["key"]
+
+    def restart(self, start: dict[str, Any], rows: NDArray[np.int64]) -> None:
+        """Put the UAVs `rows` back to what they were in `start`, a state at step 0, as of now.
+
+        A UAV's own time, which wind and time-outs go by, begins anew; it keeps its turbulence's
+        random stream.
+        """
+        fresh = start["uavs"][rows].copy()
+        fresh["turbulence"]["key"] = self._uavs["turbulence"]["key"][rows]
+        fresh["turbulence"]["first_tick"] = self.step // self._periods[0]
+        for part, name in (("pilot", "deadline_step"), ("pilot", "start_step")):
+            fresh[part][name] += self.step
+        touched = fresh["body"]["last_contact_step"] > NEVER
+        fresh["body"]["last_contact_step"][touched] += self.step
+        self._uavs[rows] = fresh
+        self.history.position[:, rows] = start["position"][0, rows]
+        self.history.attitude[:, rows] = start["attitude"][0, rows]
+        if len(self._references) == len(self):
+            self._references[rows] = start["references"][rows]
+
     # -------------------------------------------------------------------------------- inside
+
+    def _fit_out(self, worn: Sequence[tuple[RotorWear, ...]], charge: Array) -> None:
+        """Rotors as worn as they are, batteries as charged as they are."""
+        for i, row in enumerate(self._uavs["model"]):
+            plant = self._models["plant"][row]
+            health = [rotor.thrust for rotor in worn[i]] or np.ones(int(plant["rotors"]))
+            fit_rotors(self._bodies[i], plant, health)
+            charge_battery(self._bodies[i], plant, float(charge[i]))
+            self._pilots["full_thrust"][i] = self.airframes[i].max_rotor_thrust
 
     def _start_in_air(self, i: int) -> None:
         airframe = self.airframes[i]

@@ -7,7 +7,8 @@ from enum import StrEnum
 from typing import Any
 
 from volery.control.flight_modes import FlightMode
-from volery.control.step import MODE_CHANGE
+from volery.control.step import BATTERY_FELL, MODE_CHANGE
+from volery.vehicle.battery import BatteryLevel
 from volery.vehicle.contact import IMPACT, TOUCH_DOWN
 
 
@@ -20,12 +21,15 @@ class FleetEventKind(StrEnum):
     """Touched the ground faster than the landing limit or tilted beyond 60 degrees."""
     MODE = "mode"
     """Changed its flight mode by itself."""
+    BATTERY = "battery"
+    """Its battery fell to a lower level."""
 
 
 _KINDS = {
     TOUCH_DOWN: FleetEventKind.TOUCH_DOWN,
     IMPACT: FleetEventKind.IMPACT,
     MODE_CHANGE: FleetEventKind.MODE,
+    BATTERY_FELL: FleetEventKind.BATTERY,
 }
 
 
@@ -44,6 +48,8 @@ class FleetEvent:
     """Of the centre of mass just before a touch; 0 for a change of mode."""
     mode: FlightMode
     """Mode after a change, mode in which a touch happened."""
+    battery_level: BatteryLevel = BatteryLevel.NORMAL
+    """At the time."""
 
 
 def event_of(row: Any) -> FleetEvent:
@@ -56,4 +62,5 @@ def event_of(row: Any) -> FleetEvent:
         (x, y, z),
         float(row["speed"]),
         FlightMode(int(row["mode"])),
+        BatteryLevel(int(row["level"])),
     )

@@ -42,7 +42,6 @@ GAINS = np.dtype(
         ("inertia", "f8", 3),
         ("allocation", "f8", (MAX_ROTORS, 4)),
         ("idle_thrust", "f8"),
-        ("full_thrust", "f8"),
         ("inverse_thrust_constant", "f8"),
         ("rate", "f8", 3),
         ("rate_drag", "f8", 3),
@@ -119,7 +118,6 @@ def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:  # noqa: PLR091
     row["inertia"] = inertia
     row["allocation"][0, :count] = allocation
     row["idle_thrust"] = _IDLE_SPEED**2 * trim.min()
-    row["full_thrust"] = airframe.max_rotor_thrust
     row["inverse_thrust_constant"] = 1.0 / rotors.thrust_n_s2
     bandwidths = np.array([rate, rate, yaw_rate])
     row["rate"] = bandwidths

@@ -3,6 +3,8 @@
 Thrusts are `allocation_matrix` times (thrust, torques). Where that leaves a rotor's range, the
 vehicle keeps its attitude first: roll and pitch are scaled only where they alone exceed the range,
 thrust then moves to where roll and pitch fit, and yaw gets what room is left.
+A battery that sags leaves the rotors less: the mixer shares out `pilot.full_thrust`, as an autopilot
+does whose outputs are shares of the present full throttle.
 """
 
 from __future__ import annotations
@@ -16,8 +18,8 @@ from volery.vehicle.compiled import inner_kernel
 @inner_kernel
 def mix(gains: Any, thrust: float, tx: float, ty: float, tz: float, pilot: Any) -> None:
     """Rotor speeds into `pilot.rotor_reference`, rad/s, for a thrust (N) and torques (N m), FLU."""
-    low, high = gains.idle_thrust, gains.full_thrust
-    fits = True
+    lowest, highest = math.inf, -math.inf
+    k = gains.inverse_thrust_constant
     for r in range(gains.rotors):
         f = (
             gains.allocation[r, 0] * thrust
@@ -25,17 +27,18 @@ def mix(gains: Any, thrust: float, tx: float, ty: float, tz: float, pilot: Any) 
             + gains.allocation[r, 2] * ty
             + gains.allocation[r, 3] * tz
         )
-        pilot.rotor_reference[r] = math.sqrt(max(f, 0.0) * gains.inverse_thrust_constant)
-        fits = fits and low <= f <= high
-    pilot.saturated = not fits
-    if not fits:
+        pilot.rotor_reference[r] = math.sqrt(abs(f) * k)  # below zero: done again below
+        lowest = min(lowest, f)
+        highest = max(highest, f)
+    pilot.saturated = not (gains.idle_thrust <= lowest and highest <= pilot.full_thrust)
+    if pilot.saturated:
         _share(gains, thrust, tx, ty, tz, pilot)
 
 
 @inner_kernel
 def _share(gains: Any, thrust: float, tx: float, ty: float, tz: float, pilot: Any) -> None:
     """Like `mix` where a rotor's range is exceeded."""
-    low, high = gains.idle_thrust, gains.full_thrust
+    low, high = gains.idle_thrust, pilot.full_thrust
     # the largest share of roll and pitch for which some collective thrust keeps all rotors in range
     share = 1.0
     for a in range(gains.rotors):

@@ -7,33 +7,42 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.control.gains import gains_of
+from volery.control.gains import GUIDANCE_PERIOD_S, gains_of, steps_of
 from volery.control.step import MODEL
-from volery.vehicle.aerodynamics import plant_of
+from volery.core.errors import CommandError
+from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe
 from volery.vehicle.identified import REFERENCE_COLUMNS, IdentifiedModel, identified_row
 from volery.vehicle.kinematic import Kinematic, kinematic_row
+from volery.vehicle.plant import plant_of
 from volery.vehicle.plants import IDENTIFIED_LOOPS, Plant, kind_of
 
 Array = NDArray[np.float64]
 
 
 def model_table(
-    airframes: Sequence[Airframe], plants: Sequence[Plant], dt: float
+    airframes: Sequence[Airframe],
+    plants: Sequence[Plant],
+    worn: Sequence[tuple[RotorWear, ...]],
+    dt: float,
 ) -> tuple[NDArray[np.void], list[int]]:
-    """Distinct pairs of airframe and plant as `MODEL` rows, and each UAV's row."""
-    numbers: dict[tuple[str, Plant], int] = {}
-    distinct: list[tuple[Airframe, Plant]] = []
+    """Distinct airframes, plants and wears as `MODEL` rows, and each UAV's row.
+
+    Gains are those of the new vehicle: controllers know nothing of wear.
+    """
+    numbers: dict[tuple[str, Plant, tuple[RotorWear, ...]], int] = {}
+    distinct: list[tuple[Airframe, Plant, tuple[RotorWear, ...]]] = []
     rows = []
-    for airframe, plant in zip(airframes, plants, strict=True):
-        key = (airframe.model_dump_json(), plant)
+    for airframe, plant, wear in zip(airframes, plants, worn, strict=True):
+        key = (airframe.model_dump_json(), plant, wear)
         if key not in numbers:
             numbers[key] = len(distinct)
-            distinct.append((airframe, plant))
+            distinct.append((airframe, plant, wear))
         rows.append(numbers[key])
     models = np.zeros(len(distinct), MODEL)
-    for row, (airframe, plant) in enumerate(distinct):
-        models["plant"][row] = plant_of(airframe, dt)[0]
+    tick = steps_of(GUIDANCE_PERIOD_S, dt) * dt
+    for row, (airframe, plant, wear) in enumerate(distinct):
+        models["plant"][row] = plant_of(airframe, dt, tick, wear)[0]
         models["gains"][row] = gains_of(airframe, dt)[0]
         models["kind"][row] = kind_of(plant)
         if isinstance(plant, IdentifiedModel):
@@ -41,6 +50,24 @@ def model_table(
         elif isinstance(plant, Kinematic):
             models["kinematic"][row] = kinematic_row(plant, airframe, dt)[0]
     return models, rows
+
+
+def checked_wear(
+    names: Sequence[str],
+    airframes: Sequence[Airframe],
+    wear: Sequence[Sequence[RotorWear]] | None,
+) -> list[tuple[RotorWear, ...]]:
+    """Wear of each UAV's rotors, an empty one where all are new. CommandError if it fits none."""
+    worn = [tuple(one) for one in wear or [()] * len(airframes)]
+    if len(worn) != len(airframes):
+        raise CommandError(f"wear is given for {len(worn)} UAVs, not {len(airframes)}")
+    for name, airframe, rotors in zip(names, airframes, worn, strict=True):
+        if len(rotors) not in (0, len(airframe.rotors.places)):
+            raise CommandError(
+                f"wear of {name} names {len(rotors)} rotors; {airframe.name} has "
+                f"{len(airframe.rotors.places)}"
+            )
+    return worn
 
 
 def new_references(models: NDArray[np.void], attitude: Array, thrust: Array) -> Array:

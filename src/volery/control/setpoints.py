@@ -74,6 +74,7 @@ PILOT = np.dtype(
         ("yaw_rate", "f8"),  # rad/s, fed forward to the rates
         ("rates", "f8", 3),  # rad/s, FLU
         ("rate_integral", "f8", 3),  # rad/s^2
+        ("full_thrust", "f8"),  # N: the most that one rotor gives at the battery's present voltage
         ("rotor_reference", "f8", MAX_ROTORS),  # rad/s
     ],
     align=True,

@@ -13,13 +13,16 @@ from volery.control.gains import GAINS
 from volery.control.kinematic_flight import fly_kinematic
 from volery.control.rates_attitude import hold_attitude, hold_rates
 from volery.control.setpoints import PILOT, ControlLevel
-from volery.vehicle.aerodynamics import PLANT
+from volery.vehicle.battery import drain
 from volery.vehicle.compiled import apart_kernel, fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
+from volery.vehicle.downwash import add_downwash
 from volery.vehicle.fleet import BODY
+from volery.vehicle.ground_effect import feel_ground, feels_ground
 from volery.vehicle.identified import IDENTIFIED, accelerate_identified
 from volery.vehicle.kernels import accelerate, carry, meet_ground, near_ground
 from volery.vehicle.kinematic import KINEMATIC
+from volery.vehicle.plant import PLANT
 from volery.vehicle.plants import KINEMATIC_MOTION, RIGID_BODY
 from volery.world.terrain import TerrainGrid
 from volery.world.weather.dryden import TURBULENCE
@@ -27,9 +30,17 @@ from volery.world.weather.dryden import TURBULENCE
 Array = NDArray[np.float64]
 
 UAV = np.dtype(
-    [("body", BODY), ("pilot", PILOT), ("turbulence", TURBULENCE), ("model", "i8")], align=True
+    [
+        ("body", BODY),
+        ("pilot", PILOT),
+        ("turbulence", TURBULENCE),
+        ("model", "i8"),
+        ("copy", "i8"),
+    ],
+    align=True,
 )
-"""One UAV: its plant, its control, the turbulence around it, and the row of its airframe."""
+"""One UAV: its plant, its control, the turbulence around it, the row of its model, and the copy of
+the scenario that it flies in; UAVs of different copies never meet."""
 MODEL = np.dtype(
     [
         ("plant", PLANT),
@@ -48,22 +59,25 @@ EVENT = np.dtype(
         ("uav", "i8"),
         ("kind", "i8"),
         ("mode", "i8"),
+        ("level", "i8"),
         ("speed", "f8"),
         ("position", "f8", 3),
     ],
     align=True,
 )
-"""One happening; `kind` is `TOUCH_DOWN`, `IMPACT` or `MODE_CHANGE`."""
+"""One happening; `kind` is `TOUCH_DOWN`, `IMPACT`, `MODE_CHANGE` or `BATTERY_FELL`."""
 MODE_CHANGE = 3
-_STOPPED = int(ControlLevel.STOPPED)
-EVENTS_A_STEP = 3
+BATTERY_FELL = 4
+EVENTS_A_STEP = 4
 """At most, of one UAV."""
+_STOPPED = int(ControlLevel.STOPPED)
 
 
 @fused_kernel
 def advance_fleet(  # noqa: PLR0912, PLR0915
     uavs: NDArray[np.void],
     models: NDArray[np.void],
+    order: NDArray[np.int64],
     heights: Array,
     origin_x: float,
     origin_y: float,
@@ -87,7 +101,8 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
 
     paths: segments of trajectories, see `control.follow`. references: (N, L, 6), commands of the
-    last L steps where identified plants have dead times, else of any size.
+    last L steps where identified plants have dead times, else of any size. order: (N,) rows in any
+    order, kept from call to call to spare sorting.
 
     Ends early after a step in which a budget ran out, the events' buffer grew full or, with
     `event_ends`, anything was noted. Returns the steps done, the events written, and whether a
@@ -108,15 +123,19 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
         if guiding:
             tick = step // guidance_steps
             refresh_air(uavs, air[0], air_nodes, grid, tick, guidance_steps * dt)
+            add_downwash(uavs, models, order)
         for i in range(count):
             body = uavs[i].body
             pilot = uavs[i].pilot
+            model = models[uavs[i].model]
+            plant = model.plant
+            if guiding and plant.battery.capacity > 0.0 and drain(body, plant, pilot):
+                _note(events[written], step + 1, i, BATTERY_FELL, pilot.mode, 0.0, body)
+                written += 1
             if body.asleep:
                 for k in range(3):
                     body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
             else:
-                model = models[uavs[i].model]
-                plant = model.plant
                 gains = model.gains
                 estimate = body  # what control knows of the motion: for now, the truth
                 mode = pilot.mode
@@ -141,6 +160,8 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                         if turning:
                             hold_attitude(pilot, estimate, gains)
                         hold_rates(pilot, estimate, gains, dt)
+                        if feels_ground(body, plant):
+                            feel_ground(body, plant, grid, steepest, dt)
                         accelerate(body, plant, pilot, dt)
                     else:
                         _follow_loops(
@@ -199,6 +220,7 @@ def _note(event: Any, step: int, uav: int, kind: int, mode: int, speed: float, b
     event.uav = uav
     event.kind = kind
     event.mode = mode
+    event.level = body.battery_level
     event.speed = speed
     for k in range(3):
         event.position[k] = body.position_map[k]

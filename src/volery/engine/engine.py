@@ -8,6 +8,9 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from volery.control.fleet import Fleet
 from volery.core.clock import NS_PER_S, Schedule, ns_from_s, s_from_ns
 from volery.engine import flight_log

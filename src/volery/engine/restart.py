@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ Keys = Mapping[tuple[int, str], np.uint64]
 
 
 def restart_sensors(
-    agenda: Agenda[Bank], banks: tuple[Bank, ...], fleet: Fleet, uavs: NDArray[np.int64], keys: Keys
+    agenda: Agenda[Any], banks: Sequence[Bank], fleet: Fleet, uavs: NDArray[np.int64], keys: Keys
 ) -> list[tuple[Samples, NDArray[np.int64]]]:
     """Put the sensors of `uavs` back to their start, after the UAVs themselves.
 

@@ -30,8 +30,13 @@ def place(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[Start, ..
     return place_uavs(scenario, airframes, scene, terrain)
 
 
-def build_fleet(scenario: Scenario, starts: Sequence[Start], names: Sequence[str]) -> Fleet:
-    """The UAVs at their places in the scenario's weather, `names` in messages."""
+def build_fleet(
+    scenario: Scenario, starts: Sequence[Start], names: Sequence[str], *, copies: int = 1
+) -> Fleet:
+    """The UAVs at their places in the scenario's weather, `names` in messages.
+
+    `copies`: how often `starts` holds the scenario's UAVs, copy after copy.
+    """
     fleet = Fleet(
         [start.airframe for start in starts],
         np.array([start.position_map for start in starts]),
@@ -42,6 +47,7 @@ def build_fleet(scenario: Scenario, starts: Sequence[Start], names: Sequence[str
         mode=[FlightMode.LANDED if start.on_ground else FlightMode.HOLD for start in starts],
         weather=build_weather(scenario),
         seed=scenario.seed,
+        copies=np.repeat(np.arange(copies), len(starts) // copies),
     )
     for row, start in enumerate(starts):
         flight = scenario.types[start.type_name].flight

@@ -16,6 +16,8 @@ There is no graph: commands and readings are arrays. Nodes of the scenario do no
 
 from __future__ import annotations
 
+import bisect
+import itertools
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -66,12 +68,12 @@ class Copies:
         self.forest = build_forest(scenario, self.terrain)
         self.scene = Scene(self.terrain, self.forest)
         self._starts = place(scenario, self.scene, self.terrain)
-        ends = np.linspace(0, count, min(threads, count) + 1).round().astype(int)
+        ends = np.linspace(0, count, min(threads, count) + 1).round().astype(int).tolist()
         self._blocks = [
-            CopyBlock(scenario, self._starts, self.terrain, self.scene, seeds[a:b], int(a))
-            for a, b in zip(ends, ends[1:], strict=False)
+            CopyBlock(scenario, self._starts, self.terrain, self.scene, seeds[a:b], a)
+            for a, b in itertools.pairwise(ends)
         ]
-        self._first = ends[:-1]
+        self._first: list[int] = ends[:-1]
         self._owed_ns = 0
         self._pool = ThreadPoolExecutor(len(self._blocks), thread_name_prefix="volery-copies")
 
@@ -137,7 +139,7 @@ class Copies:
         for block, first in zip(self._blocks, self._first, strict=True):
             here = np.flatnonzero((chosen >= first) & (chosen < first + len(block.seeds)))
             if len(here):
-                own = None if seeds is None else [int(seeds[k]) for k in here]
+                own = None if seeds is None else [seeds[k] for k in here.tolist()]
                 block.reset(chosen[here] - first, own)
 
     def get_state(self) -> list[Any]:
@@ -193,8 +195,8 @@ class Copies:
     def uav(self, copy: int, name: str) -> Uav:
         """Handle on one UAV of one copy."""
         self._chosen([copy])
-        k = int(np.searchsorted(self._first, copy, side="right")) - 1
-        return self._blocks[k].uav(copy - int(self._first[k]), name)
+        k = bisect.bisect_right(self._first, copy) - 1
+        return self._blocks[k].uav(copy - self._first[k], name)
 
     # --------------------------------------------------------------------------------- commands
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.gains import GUIDANCE_PERIOD_S
-from volery.core.clock import NS_PER_S, ns_from_s, s_from_ns
+from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.errors import CommandError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
@@ -56,7 +56,7 @@ class CopyBlock:
         copies = len(self.seeds)
         everyone = self._starts * copies
         names = tuple(f"{k}/{start.name}" for k in range(copies) for start in self._starts)
-        self.fleet = build_fleet(scenario, everyone, names)
+        self.fleet = build_fleet(scenario, everyone, names, copies=copies)
         self._scene = scene.twin()
         add_bodies(self._scene, everyone)
         fitted = [f for k in range(copies) for f in self._fit(k)]
@@ -64,7 +64,6 @@ class CopyBlock:
             self.fleet,
             self._scene,
             terrain,
-            np.array(scenario.world.wind.velocity_m_s),
             build_banks(scenario, fitted, self.fleet, self._scene),
             names,
             self,
@@ -81,6 +80,7 @@ class CopyBlock:
             if start.takes_off:
                 altitude = scenario.types[start.type_name].flight.take_off_altitude_m
                 self.fleet.take_off(row, altitude)
+        self._stir_air(np.arange(copies))
         self._start_state = self.fleet.get_state()
 
     # -------------------------------------------------------------------------------------- time
@@ -110,7 +110,7 @@ class CopyBlock:
 
     def age_s(self) -> NDArray[np.float64]:
         """(copies,) time since each began."""
-        return np.array([s_from_ns(self.time_ns - began) for began in self._began_ns])
+        return (self.time_ns - self._began_ns) / NS_PER_S
 
     def advance_to(self, step: int) -> None:
         """Advance all copies."""
@@ -124,6 +124,7 @@ class CopyBlock:
         crew = len(self._starts)
         rows = (copies[:, None] * crew + np.arange(crew)).ravel()
         self.fleet.restart(self._start_state, rows)
+        self._stir_air(copies)
         self._engine.collisions.forget(rows)
         self._began_ns[copies] = self.time_ns
         keys = self._keys_of(copies)
@@ -200,7 +201,7 @@ class CopyBlock:
         bank = self._bank_of[id(samples.sensors)]
         last = self._latest[bank]
         if last is not None:
-            changed = {}
+            changed: dict[str, Any] = {}
             for name, array in _arrays(last).items():
                 changed[name] = array.copy()
                 changed[name][rows] = _arrays(samples)[name][rows]
@@ -209,6 +210,13 @@ class CopyBlock:
     def _fit(self, copy: int) -> list[Fitted]:
         row = copy * len(self._starts)
         return fit_sensors(self._scenario, self._starts, seed=self.seeds[copy], row=row)
+
+    def _stir_air(self, copies: NDArray[np.int64]) -> None:
+        """Give each copy the turbulence of its own seed."""
+        crew = len(self._starts)
+        names = [start.name for start in self._starts]
+        for k in copies:
+            self.fleet.seed_turbulence(self.seeds[k], k * crew + np.arange(crew), names)
 
     def _keys_of(self, copies: NDArray[np.int64]) -> dict[tuple[int, str], np.uint64]:
         """Noise streams by UAV row and name of the sensor."""

@@ -42,6 +42,7 @@ from volery.scenario.schema import Scenario
 from volery.sensors.mount import Mount
 from volery.sensors.samples import JointAngles, Samples
 from volery.world.scene import Scene
+from volery.world.weather import Weather
 
 _CLOCK_PERIOD_S = 0.01
 _DIGEST_PERIOD_S = 0.01
@@ -86,6 +87,7 @@ class Simulation:
         names = tuple(start.name for start in starts)
         self._fleet = build_fleet(scenario, starts, names)
         add_bodies(self.scene, starts)
+        self._starts = starts
         fitted = fit_sensors(scenario, starts)
         self.graph = Graph(lambda: self.time_ns)
         self._publisher = _make_publisher(self.graph, fitted)
@@ -267,7 +269,11 @@ class Simulation:
         self._seed_streams(self.scenario.seed if seed is None else seed)
 
     def _seed_streams(self, seed: int) -> None:
-        pass  # TEMP
+        """Give sensors and turbulence the random streams of another run; at the start only."""
+        rows = np.arange(len(self._fleet))
+        self._fleet.seed_turbulence(seed, rows, self.uav_names)
+        fitted = fit_sensors(self.scenario, self._starts, seed=seed)
+        self._engine.restart_sensors(rows, {(f.id.uav, f.id.name): f.key for f in fitted})
 
     def _state(self) -> dict[str, Any]:
         return {

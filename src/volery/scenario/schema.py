@@ -20,7 +20,6 @@ from volery.scenario.base import (
     Rate,
     SensorData,
     Vector2,
-    Vector3,
     check_rectangle,
 )
 from volery.scenario.faults import Fault
@@ -150,14 +149,29 @@ class GroundTruthSensor(SensorData):
     rate_hz: Rate = 50.0
 
 
+class BatterySensor(SensorData):
+    """Voltage, current and charge of the battery, if the airframe has one."""
+
+    kind: Literal["battery"]
+    name: Literal["battery"] = "battery"
+    rate_hz: Rate = 1.0
+
+
 Sensor = Annotated[
-    LidarSensor | ImuSensor | SonarSensor | OdometrySensor | GroundTruthSensor | NavigationSensor,
+    LidarSensor
+    | ImuSensor
+    | SonarSensor
+    | OdometrySensor
+    | GroundTruthSensor
+    | NavigationSensor
+    | BatterySensor,
     Field(discriminator="kind"),
 ]
 
 
 _TAKEN_NAMES = (
     "base_link",
+    "battery",
     "cmd_vel",
     "goal_pose",
     "ground_truth",
@@ -191,10 +205,25 @@ class NodeEntry(Data):
     """Simulated time from a callback's input to its output; above 0 the node runs on a worker."""
 
 
+class RotorWear(Data):
+    """What use has made of a rotor and its motor, as factors of a new one's numbers."""
+
+    thrust: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
+    """0: a lost motor, which stands still."""
+    torque: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
+    """Of the reaction torque and so of the power."""
+    lag: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
+    """Of the times in which it speeds up and slows down."""
+
+
 class UavType(Data):
     """What a UAV is made of and what runs on it."""
 
     airframe: str = "f450"
+    wear: tuple[RotorWear, ...] = ()
+    """One a rotor, in the order of the airframe; none: all are new."""
+    battery_charge: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    """Share of the capacity at the start, if the airframe has a battery."""
     flight: Flight = Flight()
     sensors: tuple[Sensor, ...] = ()
     nodes: tuple[NodeEntry, ...] = ()

@@ -13,9 +13,11 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from volery.scenario.data_files import find_data_file, load_data_file
+from volery.vehicle.battery import Battery, open_circuit_voltage
+from volery.vehicle.tables import NotNegative, Positive, PositiveVector, Table, Vector
 
 GRAVITY = 9.80665
 """Standard gravity, m/s^2 (ISO 80000-3)."""
@@ -25,14 +27,6 @@ _HOVER_MARGIN = 1.1
 _AIRFRAMES = Path(__file__).parent / "airframes"
 
 Array = NDArray[np.float64]
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
-Vector = tuple[float, float, float]
-PositiveVector = tuple[Positive, Positive, Positive]
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 def _possible_inertia(moments: PositiveVector) -> PositiveVector:
@@ -49,7 +43,7 @@ def _unit(axis: Vector) -> Vector:
     return axis[0] / length, axis[1] / length, axis[2] / length
 
 
-class Body(_Table):
+class Body(Table):
     """The rigid body; axes x forward, y left, z up, origin at the centre of mass."""
 
     mass_kg: Positive
@@ -63,7 +57,7 @@ class Body(_Table):
     """Sphere about the origin that holds the whole vehicle, rotor discs included."""
 
 
-class RotorPlace(_Table):
+class RotorPlace(Table):
     """Where a rotor sits and how it turns, seen from above."""
 
     position_m: Vector
@@ -72,7 +66,7 @@ class RotorPlace(_Table):
     """Direction of its thrust; made a unit vector."""
 
 
-class Rotors(_Table):
+class Rotors(Table):
     """The rotors, all alike; the model is that of RotorS and PX4 (see `vehicle.aerodynamics`)."""
 
     thrust_n_s2: Positive
@@ -86,7 +80,7 @@ class Rotors(_Table):
     places: Annotated[tuple[RotorPlace, ...], Field(min_length=4, max_length=MAX_ROTORS)]
 
 
-class Ground(_Table):
+class Ground(Table):
     """How the vehicle stands and what it survives."""
 
     feet_m: Annotated[tuple[Vector, ...], Field(min_length=3, max_length=MAX_FEET)]
@@ -95,7 +89,7 @@ class Ground(_Table):
     restitution: Annotated[float, Field(ge=0.0, le=1.0)]
 
 
-class Limits(_Table):
+class Limits(Table):
     """What the controllers may ask of the vehicle."""
 
     tilt_deg: Annotated[float, Field(gt=0.0, le=75.0)]
@@ -110,7 +104,7 @@ class Limits(_Table):
     yaw_rate_deg_s: Positive
 
 
-class TrackingPoles(_Table):
+class TrackingPoles(Table):
     """Where `control.rpt` puts the poles of an axis group; what is left out is derived."""
 
     wn: Positive | None = None
@@ -123,7 +117,7 @@ class TrackingPoles(_Table):
     """Smaller tracks tighter."""
 
 
-class Bandwidths(_Table):
+class Bandwidths(Table):
     """Bandwidths of the control loops, rad/s; what is left out follows from the rotors' lag."""
 
     rate: Positive | None = None
@@ -138,8 +132,8 @@ class Bandwidths(_Table):
     height: TrackingPoles = TrackingPoles()
 
 
-class Airframe(_Table):
-    """A vehicle: body, rotors, feet, limits and, where given, bandwidths."""
+class Airframe(Table):
+    """A vehicle: body, rotors, feet, limits and, where given, battery and bandwidths."""
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9_]+$")]
     title: str
@@ -148,6 +142,8 @@ class Airframe(_Table):
     ground: Ground
     limits: Limits
     control: Bandwidths = Bandwidths()
+    battery: Battery | None = None
+    """Left out: an ideal supply that never sags or ends."""
 
     @model_validator(mode="after")
     def _can_fly(self) -> Self:
@@ -164,6 +160,7 @@ class Airframe(_Table):
             )
         _check_feet(self)
         _check_hover(self)
+        _check_battery(self)
         return self
 
     @property
@@ -245,6 +242,34 @@ def _check_hover(airframe: Airframe) -> None:
                 f"rotors.places.{number} would have to pull {thrust:.3g} N in hover; more than 0 "
                 f"and less than {airframe.max_rotor_thrust:.3g} N is possible"
             )
+
+
+def hover_power(airframe: Airframe) -> float:
+    """Power that hovering takes out of the battery, W; 0 without one."""
+    battery, rotors = airframe.battery, airframe.rotors
+    if battery is None:
+        return 0.0
+    thrusts = hover_thrusts(airframe)
+    torque = (battery.power_torque_m or rotors.torque_m) * thrusts
+    shaft = float((torque * np.sqrt(thrusts / rotors.thrust_n_s2)).sum())
+    return shaft / battery.efficiency + battery.avionics_w
+
+
+def _check_battery(airframe: Airframe) -> None:
+    battery = airframe.battery
+    if battery is None:
+        return
+    source, power = open_circuit_voltage(battery, 1.0), hover_power(airframe)
+    room = source**2 - 4.0 * battery.resistance_ohm * power
+    voltage = 0.5 * (source + math.sqrt(max(room, 0.0)))
+    speed = float(np.sqrt(hover_thrusts(airframe).max() / airframe.rotors.thrust_n_s2))
+    needed = speed / airframe.rotors.max_speed_rad_s * battery.rated_v
+    if room < 0.0 or voltage < needed:
+        raise ValueError(
+            f"battery cannot hold it up: hovering takes {power:.3g} W at no less than "
+            f"{needed:.3g} V; a full pack of {source:.3g} V behind {battery.resistance_ohm} ohm "
+            f"{'cannot give that power' if room < 0.0 else f'sags to {voltage:.3g} V'}"
+        )
 
 
 def airframe_names() -> tuple[str, ...]:

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
-from volery.vehicle.aerodynamics import MAX_CONTACTS
 from volery.vehicle.airframe import Airframe
 from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.plant import MAX_CONTACTS
 from volery.vehicle.rigid import matrix_of, three
 from volery.world.terrain import Terrain, TerrainGrid, terrain_height, terrain_normal
 

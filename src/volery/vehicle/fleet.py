@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from volery.vehicle.airframe import MAX_ROTORS
 
@@ -17,14 +17,15 @@ BODY = np.dtype(
         ("velocity_map", "f8", 3),
         ("attitude", "f8", 4),
         ("omega_body", "f8", 3),
+        ("air_velocity_map", "f8", 3),
         ("acceleration_map", "f8", 3),
         ("angular_acceleration_body", "f8", 3),
         ("free_acceleration", "f8", 3),
         ("free_angular_acceleration", "f8", 3),
-        ("air_velocity_map", "f8", 3),
         ("contact_budget", "f8"),
         ("separation_budget", "f8"),
         ("ground_budget", "f8"),
+        ("downwash_budget", "f8"),  # m until it may meet the air of another, vehicle.downwash
         ("touch_speed", "f8"),
         ("last_contact_step", "i8"),
         ("still_steps", "i8"),
@@ -33,6 +34,14 @@ BODY = np.dtype(
         ("asleep", "?"),
         ("spare", "u1", 5),  # no hidden padding: equal states are equal bytes
         ("rotor_speed", "f8", MAX_ROTORS),
+        ("rotor_lift", "f8", MAX_ROTORS),  # N s^2: thrust over speed squared, wear and ground in it
+        ("rotor_limit", "f8", MAX_ROTORS),  # rad/s that wear and battery allow
+        ("rotor_health", "f8", MAX_ROTORS),
+        ("battery_charge", "f8"),
+        ("battery_pair_voltage", "f8"),  # V lost over the battery's RC pair
+        ("battery_voltage", "f8"),
+        ("battery_current", "f8"),
+        ("battery_level", "i8"),
     ],
     align=True,
 )
@@ -57,12 +66,25 @@ class FleetState(NamedTuple):
     """(N, 4) unit quaternions, map from body."""
     omega_body: Array
     """(N, 3) rad/s, FLU."""
+    air_velocity_map: Array
+    """(N, 3) m/s of the air around each UAV: wind and downwash, of the last guidance tick."""
     acceleration_map: Array
     """(N, 3) m/s^2: dv/dt, the mean over the last step, contacts included; zero at rest."""
     angular_acceleration_body: Array
     """(N, 3) rad/s^2, FLU, the mean over the last step."""
     rotor_speed: Array
     """(N, MAX_ROTORS) rad/s; columns beyond a UAV's rotors stay zero."""
+    rotor_health: Array
+    """(N, MAX_ROTORS) share of the new rotor's thrust; 0: lost, it stops; zero beyond a UAV's
+    rotors. `Fleet.set_rotor_health` changes it."""
+    battery_charge: Array
+    """(N,) share of the capacity that is left; stays 1 without a battery."""
+    battery_voltage: Array
+    """(N,) V under the present load; 0 without a battery."""
+    battery_current: Array
+    """(N,) A drawn; 0 without a battery."""
+    battery_level: NDArray[np.int64]
+    """(N,) `vehicle.battery.BatteryLevel`."""
     crashed: NDArray[np.bool_]
     """(N,) rotors stopped for good."""
     on_ground: NDArray[np.bool_]
@@ -73,8 +95,6 @@ class FleetState(NamedTuple):
     """(N,) m that may be flown before the clearance to solids must be looked up; inf: ever."""
     separation_budget: Array
     """(N,) m likewise, for the distance to other UAVs."""
-    air_velocity_map: Array
-    """(N, 3) m/s: velocity of the air at the UAV, refreshed at each guidance tick."""
 
 
 def new_bodies(position_map: Array, attitude: Array) -> NDArray[np.void]:
@@ -86,6 +106,24 @@ def new_bodies(position_map: Array, attitude: Array) -> NDArray[np.void]:
     bodies["separation_budget"] = np.inf
     bodies["last_contact_step"] = NEVER
     return bodies
+
+
+def fit_rotors(body: np.void, plant: np.void, health: ArrayLike) -> None:
+    """Give a `BODY` record new rotors of its `PLANT`, of `health` (R,)."""
+    count = int(plant["rotors"])
+    body["rotor_health"][:count] = health
+    body["rotor_lift"][:count] = plant["thrust_constant"] * np.asarray(health)
+    body["rotor_limit"][:count] = np.where(np.asarray(health) > 0.0, plant["max_speed"], 0.0)
+
+
+def charge_battery(body: np.void, plant: np.void, charge: float) -> None:
+    """Give a `BODY` record a rested battery of its `PLANT` with `charge` from 0 to 1."""
+    battery = plant["battery"]
+    body["battery_charge"] = charge
+    body["battery_pair_voltage"] = body["battery_current"] = 0.0
+    body["battery_level"] = 0
+    table = battery["open_circuit"]
+    body["battery_voltage"] = np.interp(charge, np.linspace(0.0, 1.0, len(table)), table)
 
 
 def state_of(bodies: NDArray[np.void]) -> FleetState:

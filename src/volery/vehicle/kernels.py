@@ -43,14 +43,13 @@ def accelerate(body: Any, plant: Any, command: Any, dt: float) -> None:
     half = 0.5 * dt
     vx, vy, vz = three(body.velocity_map)
     ox, oy, oz = three(body.omega_body)
-    wind_x, wind_y, wind_z = three(body.air_velocity_map)
     # mid-step, extrapolated
     mx = ox + half * body.free_angular_acceleration[0]
     my = oy + half * body.free_angular_acceleration[1]
     mz = oz + half * body.free_angular_acceleration[2]
-    ax = vx + half * body.free_acceleration[0] - wind_x
-    ay = vy + half * body.free_acceleration[1] - wind_y
-    az = vz + half * body.free_acceleration[2] - wind_z
+    ax = vx + half * body.free_acceleration[0] - body.air_velocity_map[0]
+    ay = vy + half * body.free_acceleration[1] - body.air_velocity_map[1]
+    az = vz + half * body.free_acceleration[2] - body.air_velocity_map[2]
     quarter = 0.5 * half
     x, y, z, w = nudged(
         body.attitude[0],
@@ -168,6 +167,7 @@ def carry(body: Any, dt: float) -> None:
     body.ground_budget -= travel
     body.contact_budget -= travel
     body.separation_budget -= travel
+    body.downwash_budget -= travel
 
 
 @inner_kernel

@@ -11,9 +11,9 @@ from volery.control.setpoints import PILOT
 from volery.control.step import UAV
 from volery.core import rotations
 from volery.core.errors import CommandError
-from volery.vehicle.aerodynamics import contact_points
 from volery.vehicle.contact import standing_pose
 from volery.vehicle.fleet import BODY
+from volery.vehicle.plant import contact_points
 from volery.world.terrain import Terrain
 from volery.world.weather import Gust, LogProfile, Weather
 

@@ -22,6 +22,7 @@ def _mix(gains, pilots, thrust, tx, ty, tz):
 def mixed(name, thrust, torque):
     """Rotor thrusts, and the thrust and torque (4,) that they make."""
     frame, pilots = FRAMES[name], new_pilots(np.array([[0.0, 0.0, 0.0, 1.0]]))
+    pilots["full_thrust"] = frame.max_rotor_thrust
     _mix(GAINS[name], pilots, float(thrust), *map(float, torque))
     speeds = pilots["rotor_reference"][0, : len(frame.rotors.places)]
     assert not pilots["rotor_reference"][0, len(frame.rotors.places) :].any()
@@ -40,7 +41,7 @@ def test_every_rotor_stays_in_range(name, thrust, torque):
     forces, _ = mixed(name, thrust, torque)
     gains = GAINS[name]
     assert (forces >= gains["idle_thrust"][0] * (1 - 1e-9)).all()
-    assert (forces <= gains["full_thrust"][0] * (1 + 1e-9)).all()
+    assert (forces <= FRAMES[name].max_rotor_thrust * (1 + 1e-9)).all()
 
 
 @settings(max_examples=300, deadline=None)

@@ -41,6 +41,7 @@ W20_M_S = {"none": 0.0, "light": 15.0 * _KNOT, "moderate": 30.0 * _KNOT, "severe
 TURBULENCE = np.dtype(
     [
         ("key", "u8"),  # of the random stream
+        ("first_tick", "i8"),  # guidance tick at which the UAV's time began
         ("axis", "f8", 2),  # unit vector of the longitudinal axis in the map; zero: not begun
         ("longitudinal", "f8"),
         ("lateral", "f8", 2),
