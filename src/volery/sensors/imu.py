@@ -1,8 +1,8 @@
 """Inertial measurement units: discrete noise and bias model of PX4 and RotorS.
 
 White noise N / sqrt(dt); bias a first-order Gauss-Markov process with correlation time tau:
-b+ = exp(-dt/tau) b + sigma sqrt(tau/2 (1 - exp(-2 dt/tau))) n; a turn-on bias drawn once. A part
-may also warm up: a bias drawn once that dies away as exp(-t / time constant).
+b+ = exp(-dt/tau) b + sigma sqrt(tau/2 (1 - exp(-2 dt/tau))) n. A turn-on bias, drawn once,
+stays as it is. A part may also warm up: a bias drawn once that dies as exp(-t / time constant).
 """
 
 from __future__ import annotations
@@ -88,6 +88,7 @@ class ImuBank:
         self._cold = _axes(model.gyro_warm_up_bias_rad_s, model.accel_warm_up_bias_m_s2)
         self._warm_up_s = model.warm_up_time_constant_s
         self._bias = np.zeros((len(sensors), 6))
+        self._turn_on_bias = np.zeros((len(sensors), 6))
         self._warm_up_bias = np.zeros((len(sensors), 6))
         self._start_ns = np.zeros(len(sensors), np.int64)
         self._switch_on(np.arange(len(sensors)), 0)
@@ -108,7 +109,7 @@ class ImuBank:
         )
         if self._noise.enabled:
             noise = self._noise.measurement(k)
-            reading += self._bias + self._white * noise[:, :6]
+            reading += self._turn_on_bias + self._bias + self._white * noise[:, :6]
             if self._cold.any():
                 age_s = (time_ns - self._start_ns) / NS_PER_S
                 reading += self._warm_up_bias * np.exp(-age_s / self._warm_up_s)[:, None]
@@ -127,6 +128,7 @@ class ImuBank:
         return {
             "noise": self._noise.get_state(),
             "bias": self._bias.copy(),
+            "turn_on_bias": self._turn_on_bias.copy(),
             "warm_up_bias": self._warm_up_bias.copy(),
             "start_ns": self._start_ns.copy(),
         }
@@ -135,6 +137,7 @@ class ImuBank:
         """Go back to a kept state."""
         self._noise.set_state(state["noise"])
         self._bias = np.array(state["bias"])
+        self._turn_on_bias = np.array(state["turn_on_bias"])
         self._warm_up_bias = np.array(state["warm_up_bias"])
         self._start_ns = np.array(state["start_ns"])
 
@@ -152,7 +155,8 @@ class ImuBank:
 
     def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:
         drawn = self._noise.start()[rows]
-        self._bias[rows] = self._turn_on * drawn[:, :6]
+        self._bias[rows] = 0.0
+        self._turn_on_bias[rows] = self._turn_on * drawn[:, :6]
         self._warm_up_bias[rows] = self._cold * drawn[:, 6:]
         self._start_ns[rows] = time_ns
 

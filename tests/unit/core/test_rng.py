@@ -53,3 +53,11 @@ def test_generator_is_reproducible():
     a = rng.generator(1, "trees").random(4)
     np.testing.assert_array_equal(a, rng.generator(1, "trees").random(4))
     assert not np.array_equal(a, rng.generator(1, "bushes").random(4))
+
+
+def test_rows_counted_by_themselves_are_the_same_numbers():
+    keys = np.array([rng.stream_key(1, "a"), rng.stream_key(1, "b")])
+    out = np.empty((2, 4))
+    rng.fill_normal_rows(keys, np.array([3, 1000]), out)
+    np.testing.assert_array_equal(out[0], draw(keys[0], 4, 3))
+    np.testing.assert_array_equal(out[1], draw(keys[1], 4, 1000))

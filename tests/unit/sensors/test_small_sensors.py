@@ -230,8 +230,6 @@ def test_bank_state_can_be_kept_and_restored(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.run(0.2)
     for bank in simulation._banks:
-        if not hasattr(bank, "get_state"):
-            continue
         kept = bank.get_state()
         first = bank.sample(99, 0, simulation._fleet)
         bank.set_state(kept)
