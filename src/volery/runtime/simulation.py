@@ -21,7 +21,7 @@ from volery.engine.events import Event
 from volery.engine.pacing import Pacer
 from volery.graph.graph import Graph
 from volery.graph.node import Context, Node
-from volery.graph.publishing import GraphPublisher, scan_topic
+from volery.graph.publishing import GraphPublisher
 from volery.runtime.command_door import open_commands
 from volery.runtime.digest import Digest
 from volery.runtime.node_loading import start_node
@@ -35,11 +35,11 @@ from volery.sensors.mount import Mount
 from volery.sensors.samples import (
     ImuReadings,
     JointAngles,
-    LidarScans,
     OdometryReadings,
     RangeReadings,
     Samples,
 )
+from volery.sensors.scan_patterns import PlanarScan
 from volery.vehicle.airframe import Airframe, load_airframe
 from volery.vehicle.body_shape import body_shape
 from volery.world.scene import Scene
@@ -48,7 +48,6 @@ _CLOCK_PERIOD_S = 0.01
 _DIGEST_PERIOD_S = 0.01
 _PROGRESS_PERIOD_S = 0.1
 _RESULT_OF = {
-    "lidar": LidarScans,
     "imu": ImuReadings,
     "sonar": RangeReadings,
     "odometry": OdometryReadings,
@@ -97,9 +96,8 @@ class Simulation:
         fitted = fit_sensors(scenario, starts)
         self.graph = Graph(lambda: self.time_ns)
         self._publisher = _make_publisher(self.graph, fitted)
-        self.mounts: Mapping[str, Mount] = MappingProxyType(
-            {scan_topic(f.id): f.mount for f in fitted if f.spec.kind == "lidar"}
-        )
+        self.mounts = _lidar_mounts(fitted, planar=True)
+        self.cloud_mounts = _lidar_mounts(fitted, planar=False)
         self._banks = build_banks(scenario, fitted, self._fleet, self.scene)
         self._engine = Engine(
             self._fleet,
@@ -328,10 +326,24 @@ def _add_bodies(scene: Scene, starts: tuple[Start, ...]) -> None:
 def _make_publisher(graph: Graph, fitted: list[Fitted]) -> GraphPublisher:
     publisher = GraphPublisher(graph)
     for sensor in fitted:
-        publisher.announce(sensor.id, _RESULT_OF[sensor.spec.kind], sensor.mount)
+        if sensor.lidar is not None:
+            publisher.announce_lidar(sensor.id, sensor.lidar, sensor.topic, sensor.mount)
+        else:
+            publisher.announce(sensor.id, _RESULT_OF[sensor.spec.kind], sensor.mount)
         if sensor.mount.nods:
             publisher.announce(sensor.id, JointAngles, sensor.mount)
     return publisher
+
+
+def _lidar_mounts(fitted: list[Fitted], *, planar: bool) -> Mapping[str, Mount]:
+    """Topics of LaserScans, or of PointCloud2s, and how their LIDARs are mounted."""
+    return MappingProxyType(
+        {
+            sensor.topic: sensor.mount
+            for sensor in fitted
+            if sensor.lidar is not None and isinstance(sensor.lidar.scan, PlanarScan) == planar
+        }
+    )
 
 
 def _slice_steps(slice_ns: int | None, dt_ns: int) -> int:

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
+Topic = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*$", max_length=120)]
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 Rate = Annotated[float, Field(gt=0.0, le=1000.0)]
@@ -126,11 +127,15 @@ class _Mounted(_Sensor):
 
 
 class LidarSensor(_Mounted):
-    """A scanning range finder of a named model."""
+    """A scanning range finder of a named model: planar, with many rings, or with a rosette."""
 
     kind: Literal["lidar"]
     name: Name = "horizontal"
     model: str = "utm_30lx"
+    topic: Topic | None = None
+    """Below the UAV's name; None: `laser/NAME/scan` of a planar scanner, else `points`."""
+    intensities: bool | None = None
+    """Whether echoes carry their strength; None: as the model says."""
     nodding: Nodding | None = None
 
 
