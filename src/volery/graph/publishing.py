@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from volery.core import rotations
 from volery.engine.events import Event
 from volery.graph.graph import Graph, Publisher
+from volery.graph.lidar_publishing import LidarPublisher, laser_frame
 from volery.graph.messages import (
     Clock,
     Imu,
     JointState,
-    LaserScan,
     Odometry,
     Point,
     Pose,
@@ -38,6 +38,7 @@ from volery.graph.messages import (
     time_from_ns,
 )
 from volery.graph.navigation_messages import CHANNELS
+from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
 from volery.sensors.samples import (
     ImuReadings,
@@ -51,23 +52,12 @@ from volery.sensors.samples import (
 
 Array = NDArray[np.float64]
 
-_NO_INTENSITIES = np.zeros(0, dtype=np.float32)
 _NO_EFFORT = np.zeros(0)
 _UNKNOWN_ORIENTATION = np.full(9, 0.0)
 _UNKNOWN_ORIENTATION[0] = -1.0
-for _shared in (_NO_INTENSITIES, _NO_EFFORT, _UNKNOWN_ORIENTATION):
+for _shared in (_NO_EFFORT, _UNKNOWN_ORIENTATION):
     _shared.flags.writeable = False
 _IDENTITY = Quaternion(0.0, 0.0, 0.0, 1.0)
-
-
-def scan_topic(sensor: SensorId) -> str:
-    """Topic of a LIDAR's scans."""
-    return f"/{sensor.uav_name}/laser/{sensor.name}/scan"
-
-
-def laser_frame(sensor: SensorId) -> str:
-    """Frame of a LIDAR."""
-    return f"{sensor.uav_name}/laser_{sensor.name}"
 
 
 class GraphPublisher:
@@ -76,6 +66,7 @@ class GraphPublisher:
     def __init__(self, graph: Graph) -> None:
         self._graph = graph
         self._publishers: dict[str, Publisher] = {}
+        self._lidars = LidarPublisher(graph)
         self._mounts: dict[SensorId, Mount] = {}
         self._clock = graph.advertise("/clock", Clock)
         self._tf = graph.advertise("/tf", TFMessage)
@@ -84,7 +75,7 @@ class GraphPublisher:
         self._static_sent = False
         self._static: list[TransformStamped] = []
         self._by_kind: dict[type[Any], Callable[[Any], None]] = {
-            LidarScans: self._scans,
+            LidarScans: self._lidars.publish,
             ImuReadings: self._imus,
             RangeReadings: self._ranges,
             OdometryReadings: self._odometry,
@@ -96,11 +87,7 @@ class GraphPublisher:
         """Advertise a sensor's topic and place its frame, before the run starts."""
         self._mounts[sensor] = mount
         base = f"{sensor.uav_name}/base_link"
-        if kind is LidarScans:
-            self._advertise(scan_topic(sensor), LaserScan)
-            if not mount.nods:
-                self._static.append(_mount_transform(base, laser_frame(sensor), mount))
-        elif kind is JointAngles:
+        if kind is JointAngles:
             self._advertise(f"/{sensor.uav_name}/joint_states", JointState)
         elif kind is OdometryReadings:
             self._advertise(_odometry_topic(sensor), Odometry)
@@ -114,6 +101,14 @@ class GraphPublisher:
                 message_class = Imu if kind is ImuReadings else Range
                 self._advertise(f"/{sensor.uav_name}/{sensor.name}", message_class)
             self._static.append(_mount_transform(base, f"{sensor.uav_name}/{sensor.name}", mount))
+
+    def announce_lidar(self, sensor: SensorId, model: LidarModel, topic: str, mount: Mount) -> None:
+        """Advertise what a LIDAR publishes and place its frame, before the run starts."""
+        self._mounts[sensor] = mount
+        self._lidars.announce(sensor, model, topic)
+        if not mount.nods:
+            base = f"{sensor.uav_name}/base_link"
+            self._static.append(_mount_transform(base, laser_frame(sensor), mount))
 
     def publish(self, samples: Samples) -> None:
         """Queue the messages of one batch of samples; before the first, the fixed transforms."""
@@ -145,27 +140,6 @@ class GraphPublisher:
             self._tf_static.publish(TFMessage(list(self._static)))
 
     # ---------------------------------------------------------------------------------- by kind
-
-    def _scans(self, scans: LidarScans) -> None:
-        model = scans.model
-        for i, sensor in enumerate(scans.sensors):
-            publisher = self._publishers[scan_topic(sensor)]
-            if not publisher.wanted:
-                continue
-            publisher.publish(
-                LaserScan(
-                    header(scans.stamp_ns, laser_frame(sensor)),
-                    model.scan.angle_min_rad,
-                    model.scan.angle_max_rad,
-                    model.angle_increment_rad,
-                    model.time_increment_s,
-                    1.0 / model.scan.rate_hz,
-                    model.range.min_m,
-                    model.range.max_m,
-                    scans.ranges[i],
-                    _NO_INTENSITIES,
-                )
-            )
 
     def _imus(self, readings: ImuReadings) -> None:
         rate_covariance = _diagonal(readings.angular_velocity_variance)

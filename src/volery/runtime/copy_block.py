@@ -18,7 +18,7 @@ from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.runtime.building import add_bodies, build_fleet
 from volery.runtime.placement import Start
-from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors
+from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors, refit
 from volery.runtime.uav import Uav
 from volery.scenario.schema import Scenario
 from volery.sensors.bank import Bank
@@ -59,6 +59,7 @@ class CopyBlock:
         self.fleet = build_fleet(scenario, everyone, names, copies=copies)
         self._scene = scene.twin()
         add_bodies(self._scene, everyone)
+        self._fitted = fit_sensors(scenario, self._starts)
         fitted = [f for k in range(copies) for f in self._fit(k)]
         self._engine = Engine(
             self.fleet,
@@ -208,8 +209,7 @@ class CopyBlock:
             self._latest[bank] = replace(last, **changed)
 
     def _fit(self, copy: int) -> list[Fitted]:
-        row = copy * len(self._starts)
-        return fit_sensors(self._scenario, self._starts, seed=self.seeds[copy], row=row)
+        return refit(self._fitted, self.seeds[copy], copy * len(self._starts))
 
     def _stir_air(self, copies: NDArray[np.int64]) -> None:
         """Give each copy the turbulence of its own seed."""

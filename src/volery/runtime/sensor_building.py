@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.clock import Schedule, ns_from_s
-from volery.core.errors import DataFileError
+from volery.core.errors import DataFileError, ScenarioError
 from volery.core.rng import stream_key
 from volery.engine.engine import SensorBank
+from volery.graph.lidar_publishing import lidar_topic
 from volery.runtime.navigation import denial, local_frame, magnetic_field_map
 from volery.runtime.placement import Start
 from volery.scenario import schema
@@ -27,7 +28,7 @@ from volery.sensors.gnss import GnssBank, load_gnss_model
 from volery.sensors.imu import ImuBank, load_imu_model
 from volery.sensors.joints import JointBank
 from volery.sensors.lidar_bank import LidarBank
-from volery.sensors.lidar_model import load_lidar
+from volery.sensors.lidar_model import LidarModel, load_lidar
 from volery.sensors.magnetometer import MagnetometerBank, load_magnetometer_model
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.odometry import GroundTruthBank, OdometryBank, load_odometry_model
@@ -43,6 +44,7 @@ from volery.sensors.samples import (
     Samples,
     SensorId,
 )
+from volery.sensors.scan_patterns import PlanarScan
 from volery.sensors.sonar import SonarBank, load_sonar_model
 from volery.world.scene import Scene
 
@@ -67,33 +69,92 @@ class Fitted:
     spec: Any
     mount: Mount
     key: np.uint64
+    lidar: LidarModel | None = None
+    """What kind of LIDAR it is, if it is one."""
 
     @property
     def bank_key(self) -> tuple[Any, ...]:
         """Sensors with equal keys are sampled together."""
         spec = self.spec
         rate, model = getattr(spec, "rate_hz", None), getattr(spec, "model", None)
-        return (spec.kind, model, rate, spec.phase_s, getattr(spec, "noise", None))
+        noise, intensities = getattr(spec, "noise", None), getattr(spec, "intensities", None)
+        return (spec.kind, model, rate, spec.phase_s, noise, intensities)
+
+    @property
+    def topic(self) -> str:
+        """Where a LIDAR's scans or points go."""
+        assert self.lidar is not None
+        return lidar_topic(self.id, self.lidar, self.spec.topic)
 
 
-def fit_sensors(
-    scenario: schema.Scenario, starts: Sequence[Start], *, seed: int | None = None, row: int = 0
-) -> list[Fitted]:
+def fit_sensors(scenario: schema.Scenario, starts: Sequence[Start]) -> list[Fitted]:
     """Every sensor of every UAV, in fleet order.
 
-    `seed`: of their noise (None: the scenario's). `row`: of the first UAV in the fleet.
+    Raises `DataFileError` for a LIDAR model that cannot be loaded, `ScenarioError` where two LIDARs
+    of a UAV have one topic.
     """
-    seed = scenario.seed if seed is None else seed
-    return [
+    models = _LidarModels(scenario)
+    fitted = [
         Fitted(
-            SensorId(row + i, start.name, spec.name),
+            SensorId(row, start.name, spec.name),
             spec,
             _mount(spec),
-            stream_key(seed, f"{start.name}/{spec.kind}/{spec.name}"),
+            _stream(scenario.seed, start.name, spec),
+            models.load(spec) if isinstance(spec, schema.LidarSensor) else None,
         )
-        for i, start in enumerate(starts)
+        for row, start in enumerate(starts)
         for spec in scenario.types[start.type_name].sensors
     ]
+    _check_topics(scenario, fitted)
+    return fitted
+
+
+def refit(fitted: Sequence[Fitted], seed: int, first_row: int = 0) -> list[Fitted]:
+    """The same sensors with the noise of a run of `seed`, on UAVs from `first_row` on."""
+    return [
+        replace(
+            sensor,
+            id=replace(sensor.id, uav=sensor.id.uav + first_row),
+            key=_stream(seed, sensor.id.uav_name, sensor.spec),
+        )
+        for sensor in fitted
+    ]
+
+
+def _stream(seed: int, uav: str, spec: Any) -> np.uint64:
+    return stream_key(seed, f"{uav}/{spec.kind}/{spec.name}")
+
+
+class _LidarModels:
+    """Loads each LIDAR model of a scenario once."""
+
+    def __init__(self, scenario: schema.Scenario) -> None:
+        self._scenario = scenario
+        self._loaded: dict[str, LidarModel] = {}
+
+    def load(self, spec: schema.LidarSensor) -> LidarModel:
+        """Model of a LIDAR; errors name the scenario and the sensor."""
+        if spec.model not in self._loaded:
+            try:
+                self._loaded[spec.model] = load_lidar(spec.model, self._scenario.folder)
+            except DataFileError as error:
+                where = f"{self._scenario.name}: sensor '{spec.name}'"
+                raise DataFileError(f"{where}: {error}") from None
+        return self._loaded[spec.model]
+
+
+def _check_topics(scenario: schema.Scenario, fitted: Sequence[Fitted]) -> None:
+    """Refuse LIDARs that would publish on one topic."""
+    taken: dict[str, str] = {}
+    for sensor in fitted:
+        if sensor.lidar is None:
+            continue
+        other = taken.setdefault(sensor.topic, sensor.id.name)
+        if other != sensor.id.name:
+            raise ScenarioError(
+                f"{scenario.name}: sensors '{other}' and '{sensor.id.name}' both publish on "
+                f"{sensor.topic}; give one of them another `topic`"
+            )
 
 
 def build_banks(
@@ -141,14 +202,16 @@ class _Builder:
             raise DataFileError(f"{self._scenario}: sensor '{name}': {error}") from None
 
     def _lidar(self, group: list[Fitted]) -> Bank:
-        model = load_lidar(group[0].spec.model, self._folder)
-        return LidarBank(  # type: ignore[return-value]  # has no state to keep or reset yet
+        model = group[0].lidar
+        assert model is not None
+        return LidarBank(
             model,
             Schedule.from_hz(model.scan.rate_hz, _phase_ns(group)),
             _ids(group),
             tuple(s.mount for s in group),
             _keys(group),
             self._scene,
+            intensities=_wants_intensities(group[0].spec, model),
         )
 
     def _imu(self, group: list[Fitted]) -> Bank:
@@ -193,6 +256,16 @@ class _Builder:
         _, turns = _places(group)
         field = magnetic_field_map(self._world)
         return MagnetometerBank(model, _schedule(group), _ids(group), turns, _keys(group), field)
+
+
+def _wants_intensities(spec: schema.LidarSensor, model: LidarModel) -> bool:
+    if spec.intensities and model.intensity is None:
+        raise DataFileError(f"LIDAR model '{model.name}' has no [intensity], which it needs here")
+    if model.intensity is None or spec.intensities is False:
+        return False
+    if not isinstance(model.scan, PlanarScan):
+        return True
+    return spec.intensities or model.intensity.published
 
 
 def _mount(spec: Any) -> Mount:

@@ -21,13 +21,13 @@ from volery.engine.pacing import Pacer
 from volery.engine.partners import Partner
 from volery.graph.graph import Graph
 from volery.graph.node import Context, Node
-from volery.graph.publishing import GraphPublisher, scan_topic
+from volery.graph.publishing import GraphPublisher
 from volery.runtime.building import add_bodies, build_fleet, place
 from volery.runtime.command_door import open_commands
 from volery.runtime.digest import Digest
 from volery.runtime.node_loading import start_node
 from volery.runtime.placement import Start
-from volery.runtime.sensor_building import RESULT_OF, Fitted, build_banks, fit_sensors
+from volery.runtime.sensor_building import RESULT_OF, Fitted, build_banks, fit_sensors, refit
 from volery.runtime.snapshot import (
     Snapshot,
     check_nodes,
@@ -41,6 +41,7 @@ from volery.runtime.worlds import build_forest, build_terrain
 from volery.scenario.schema import Scenario
 from volery.sensors.mount import Mount
 from volery.sensors.samples import JointAngles, Samples
+from volery.sensors.scan_patterns import PlanarScan
 from volery.world.scene import Scene
 from volery.world.weather import Weather
 
@@ -87,13 +88,11 @@ class Simulation:
         names = tuple(start.name for start in starts)
         self._fleet = build_fleet(scenario, starts, names)
         add_bodies(self.scene, starts)
-        self._starts = starts
-        fitted = fit_sensors(scenario, starts)
+        fitted = self._fitted = fit_sensors(scenario, starts)
         self.graph = Graph(lambda: self.time_ns)
         self._publisher = _make_publisher(self.graph, fitted)
-        self.mounts: Mapping[str, Mount] = MappingProxyType(
-            {scan_topic(f.id): f.mount for f in fitted if f.spec.kind == "lidar"}
-        )
+        self.mounts = _lidar_mounts(fitted, planar=True)
+        self.cloud_mounts = _lidar_mounts(fitted, planar=False)
         self._banks = build_banks(scenario, fitted, self._fleet, self.scene)
         self._engine = Engine(
             self._fleet,
@@ -272,7 +271,7 @@ class Simulation:
         """Give sensors and turbulence the random streams of another run; at the start only."""
         rows = np.arange(len(self._fleet))
         self._fleet.seed_turbulence(seed, rows, self.uav_names)
-        fitted = fit_sensors(self.scenario, self._starts, seed=seed)
+        fitted = refit(self._fitted, seed)
         self._engine.restart_sensors(rows, {(f.id.uav, f.id.name): f.key for f in fitted})
 
     def _state(self) -> dict[str, Any]:
@@ -399,10 +398,24 @@ class Simulation:
 def _make_publisher(graph: Graph, fitted: list[Fitted]) -> GraphPublisher:
     publisher = GraphPublisher(graph)
     for sensor in fitted:
-        publisher.announce(sensor.id, RESULT_OF[sensor.spec.kind], sensor.mount)
+        if sensor.lidar is not None:
+            publisher.announce_lidar(sensor.id, sensor.lidar, sensor.topic, sensor.mount)
+        else:
+            publisher.announce(sensor.id, RESULT_OF[sensor.spec.kind], sensor.mount)
         if sensor.mount.nods:
             publisher.announce(sensor.id, JointAngles, sensor.mount)
     return publisher
+
+
+def _lidar_mounts(fitted: list[Fitted], *, planar: bool) -> Mapping[str, Mount]:
+    """Topics of LaserScans, or of PointCloud2s, and how their LIDARs are mounted."""
+    return MappingProxyType(
+        {
+            sensor.topic: sensor.mount
+            for sensor in fitted
+            if sensor.lidar is not None and isinstance(sensor.lidar.scan, PlanarScan) == planar
+        }
+    )
 
 
 def _slice_steps(slice_ns: int | None, dt_ns: int) -> int:

@@ -29,6 +29,7 @@ from volery.sensors.lidar_bank import LidarBank
 from volery.sensors.lidar_model import load_lidar
 from volery.sensors.mount import make_mount
 from volery.sensors.odometry import GroundTruthBank
+from volery.sensors.point_cloud import PointMaker
 from volery.sensors.samples import SensorId
 from volery.sensors.sonar import SonarBank, load_sonar_model
 from volery.vehicle.airframe import load_airframe
@@ -83,6 +84,8 @@ def compile_sensors() -> None:
     schedule, mounts = Schedule.from_hz(40.0), 2 * (make_mount(amplitude_rad=0.5, period_s=2.0),)
     place, turn = np.zeros((2, 3)), np.tile(rotations.IDENTITY, (2, 1))
     keys = np.zeros(2, dtype=np.uint64)
+    clouds = LidarBank(load_lidar("vlp_16"), schedule, sensors, mounts, keys, scene)
+    PointMaker(clouds.sample(0, 0, fleet)).points(0)
     for bank in (
         LidarBank(load_lidar(), schedule, sensors, mounts, keys, scene),
         SonarBank(load_sonar_model("downward_sonar"), schedule, sensors, place, turn, keys, scene),

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
+Topic = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*$", max_length=120)]
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 Rate = Annotated[float, Field(gt=0.0, le=1000.0)]

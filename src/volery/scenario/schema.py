@@ -19,6 +19,7 @@ from volery.scenario.base import (
     Positive,
     Rate,
     SensorData,
+    Topic,
     Vector2,
     check_rectangle,
 )
@@ -105,11 +106,15 @@ class Nodding(Data):
 
 
 class LidarSensor(MountedSensor):
-    """A scanning range finder of a named model."""
+    """A scanning range finder of a named model: planar, with many rings, or with a rosette."""
 
     kind: Literal["lidar"]
     name: Name = "horizontal"
     model: str = "utm_30lx"
+    topic: Topic | None = None
+    """Below the UAV's name; None: `laser/NAME/scan` of a planar scanner, else `points`."""
+    intensities: bool | None = None
+    """Whether echoes carry their strength; None: as the model says."""
     nodding: Nodding | None = None
 
 

@@ -9,25 +9,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.workers import Workers, new_counter
-from volery.sensors.lidar_kernels import (
-    LidarBatch,
-    MountTable,
-    measure_scan,
-    poses_at,
-    scan_batch,
-    sweep_rays,
-)
+from volery.sensors.aim_kernels import LidarBatch, MountTable, poses_at, sweep_rays
+from volery.sensors.beam_table import BeamTable, packets_of
+from volery.sensors.echo_kernels import Echoes, Surfaces, measure_scan
+from volery.sensors.lidar_kernels import PIECE, measure_batch, scan_batch
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
 from volery.vehicle.pose_history import PoseHistory
+from volery.world.embree import LANES
 from volery.world.embreex_fallback import EmbreexBackend
 from volery.world.scene import Scene
 from volery.world.scene_kernels import new_block, thread_block
 
 __all__ = [
+    "Echoes",
     "LidarBatch",
     "MountTable",
     "make_batch",
+    "sample_echoes",
     "sample_lidars",
     "scan_rays",
     "stack_mounts",
@@ -80,73 +79,138 @@ def sample_lidars(
     history: PoseHistory,
     workers: Workers | None = None,
 ) -> NDArray[np.float32]:
-    """Make the batch's scans: ranges (S, beams) m; inf no return, -inf too near (REP-117).
+    """Make the batch's scans: ranges (S, beams) of the first echoes, m; see `sample_echoes`."""
+    return sample_echoes(scene, model, batch, history, workers=workers).ranges[:, 0]
+
+
+def sample_echoes(
+    scene: Scene,
+    model: LidarModel,
+    batch: LidarBatch,
+    history: PoseHistory,
+    *,
+    intensities: bool = False,
+    workers: Workers | None = None,
+) -> Echoes:
+    """Make the batch's scans: ranges of all echoes, and their intensities where wanted.
 
     `history` must reach from the earliest sweep's start to the latest one's end. The scene's
     bodies, if it has any, are moved along that interval, so that every beam sees the other UAVs
     where they were; the scan's own UAV is not seen. Results do not depend on the number of threads
     or on which scans share a batch, but for the bodies' linear interpolation over the interval.
+    A pattern that goes on from sweep to sweep needs scans of one number in a batch.
     """
-    ranges = np.empty((len(batch.uav), model.beams), dtype=np.float32)
-    if not len(ranges):
-        return ranges
-    start = int(batch.sweep_start_ns.min())
-    end = int(batch.sweep_start_ns.max()) + model.sweep_duration_ns
+    scans, beams = len(batch.uav), model.beams
+    echoes = Echoes(
+        np.empty((scans, model.echoes, beams), dtype=np.float32),
+        np.empty((scans, model.echoes if intensities else 0, beams), dtype=np.float32),
+    )
+    if not scans:
+        return echoes
+    start, end = _interval(model, batch, history)
+    bodies = _move_bodies(scene, history, start, end)
+    table = model.scan.table(_sweep_number(model, batch))
+    surfaces = _new_surfaces(scans, beams)
+    if not scene.compiled:
+        for scan in range(scans):
+            _scan_plainly(scene, model, table, batch, scan, history, (start, end), surfaces)
+            measure_scan(
+                model.constants,
+                batch.key[scan],
+                batch.scan_number[scan],
+                batch.sweep_start_ns[scan],
+                scan,
+                surfaces,
+                echoes,
+            )
+        return echoes
+    handle, constants, counter = scene.handle, model.constants, new_counter()
+    rays = min(beams, PIECE * LANES)
+
+    def cast() -> None:
+        block = thread_block(rays, bodies)
+        scan_batch(
+            handle, constants, table, batch, history, start, end, counter, block, surfaces, echoes
+        )
+
+    team, alone = workers or scene.workers, scans * beams <= _FEW_BEAMS
+    team.run(cast, alone=alone)
+    if packets_of(beams) > PIECE:
+        team.run(measure_batch, constants, batch, new_counter(), surfaces, echoes, alone=alone)
+    return echoes
+
+
+def scan_rays(
+    model: LidarModel, batch: LidarBatch, scan: int, history: PoseHistory
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """One scan's beams as rays: origins and unit directions (beams, 3), map, and times, ns.
+
+    A time is that at which the beam's packet sees the other UAVs.
+    """
+    table = model.scan.table(int(batch.scan_number[scan]))
+    return _rays(table, batch, scan, history)
+
+
+def _rays(
+    table: BeamTable, batch: LidarBatch, scan: int, history: PoseHistory
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    count = len(table.beam)
+    rays = np.empty((6, count), dtype=np.float32)
+    times = np.empty(count, dtype=np.int64)
+    sweep_rays(table, batch, scan, history, new_block(count, 0).rays, rays, times)
+    return rays[:3].T.astype(np.float64), rays[3:].T.astype(np.float64), times
+
+
+def _interval(model: LidarModel, batch: LidarBatch, history: PoseHistory) -> tuple[int, int]:
+    """Start of the earliest sweep and end of the latest one."""
     count = history.position.shape[1]
     if int(batch.uav.min()) < 0 or int(batch.uav.max()) >= count:
         raise ValueError(f"a scan names UAV row {int(batch.uav.max())} of {count}")
+    starts = batch.sweep_start_ns
+    return int(starts.min()), int(starts.max()) + model.sweep_duration_ns
+
+
+def _move_bodies(scene: Scene, history: PoseHistory, start: int, end: int) -> int:
+    """Let the bodies move through the interval; how many there are."""
     bodies = len(scene.handle.bodies.scene)
     if bodies:
         poses = np.empty((2, bodies, 3)), np.empty((2, bodies, 4))
         for i, time_ns in enumerate((start, end)):
             poses_at(history, time_ns, poses[0][i], poses[1][i])
         scene.move_bodies(poses[0][0], poses[1][0], poses[0][1], poses[1][1])
-    if not scene.compiled:
-        for scan in range(len(ranges)):
-            _scan_plainly(scene, model, batch, scan, history, (start, end), ranges[scan])
-        return ranges
-    handle, constants, counter = scene.handle, model.constants, new_counter()
-
-    def work() -> None:
-        block = thread_block(model.beams, bodies)
-        memory = np.empty((2, block.instance.size), dtype=np.float32)
-        scan_batch(handle, constants, batch, history, start, end, counter, block, memory, ranges)
-
-    (workers or scene.workers).run(work, alone=ranges.size <= _FEW_BEAMS)
-    return ranges
+    return bodies
 
 
-def scan_rays(
-    model: LidarModel, batch: LidarBatch, scan: int, history: PoseHistory
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """One scan's beams as rays: origins and unit directions (beams, 3), map, and times, ns."""
-    rays = np.empty((6, model.beams), dtype=np.float32)
-    times = np.empty(model.beams, dtype=np.int64)
-    packets = new_block(model.beams, 0).rays
-    sweep_rays(model.constants, batch, scan, history, packets, rays, times)
-    return rays[:3].T.astype(np.float64), rays[3:].T.astype(np.float64), times
+def _sweep_number(model: LidarModel, batch: LidarBatch) -> int:
+    number = int(batch.scan_number[0])
+    if not model.scan.is_fixed and (batch.scan_number != number).any():
+        raise ValueError(f"scans of a {model.name} in one batch must have one scan number")
+    return number
+
+
+def _new_surfaces(scans: int, beams: int) -> Surfaces:
+    shape = (scans, beams)
+    return Surfaces(
+        np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, np.uint8)
+    )
 
 
 def _scan_plainly(
     scene: Scene,
     model: LidarModel,
+    table: BeamTable,
     batch: LidarBatch,
     scan: int,
     history: PoseHistory,
     interval: tuple[int, int],
-    ranges: NDArray[np.float32],
+    surfaces: Surfaces,
 ) -> None:
-    """One scan through the fallback backend, with the same beams and the same noise."""
+    """One scan through the fallback backend: the same beams, which then meet the same noise."""
     backend = scene.backend
     assert isinstance(backend, EmbreexBackend)
-    beams = model.beams
-    origins, directions, times = scan_rays(model, batch, scan, history)
-    out = (
-        ranges,
-        np.empty((beams, 3), np.float32),
-        np.empty(beams, np.int32),
-        np.empty(beams, np.uint8),
-    )
+    origins, directions, times = _rays(table, batch, scan, history)
+    normal = np.empty((model.beams, 3), np.float32)
+    instance = np.empty(model.beams, np.int32)
     fraction = np.clip((times - interval[0]) / max(interval[1] - interval[0], 1), 0.0, 1.0)
     backend.cast(
         scene.handle,
@@ -156,7 +220,6 @@ def _scan_plainly(
         model.range.max_m,
         np.array([batch.uav[scan]], dtype=np.int32),
         fraction,
-        out,
+        (surfaces.distance[scan], normal, instance, surfaces.material[scan]),
     )
-    cosine = np.abs(np.einsum("ij,ij->i", out[1], directions)).astype(np.float32)
-    measure_scan(model.constants, batch.key[scan], batch.scan_number[scan], cosine, ranges)
+    surfaces.cosine[scan] = np.abs(np.einsum("ij,ij->i", normal, directions))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
 from volery.core.errors import DataFileError
-from volery.sensors.lidar import make_batch, sample_lidars, stack_mounts
+from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.lidar import make_batch, sample_echoes, stack_mounts
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
-from volery.sensors.samples import LidarScans, SensorId
+from volery.sensors.samples import LidarScans, SensorId, owned
 from volery.vehicle.pose_history import KEPT_NS
 from volery.world.scene import Scene
 
@@ -22,7 +25,9 @@ class LidarBank:
     """One batch of rays for all LIDARs that are due; `keys` (S,) are their noise streams, or None.
 
     A scan is known when its sweep has ended: it is sampled `lag_ns` after its first beam, from the
-    poses that the fleet's history kept.
+    poses that the fleet's history kept. Noise follows from the number of a LIDAR's scan since its
+    start; a rosette, which never repeats, goes on by the number of the scan of them all, and warming
+    up by time.
     """
 
     name = "lidar"
@@ -35,26 +40,62 @@ class LidarBank:
         mounts: tuple[Mount, ...],
         keys: NDArray[np.uint64] | None,
         scene: Scene,
+        *,
+        intensities: bool = False,
     ) -> None:
         if model.sweep_duration_ns > _LONGEST_SWEEP_NS:
             raise DataFileError(
-                f"LIDAR model '{model.name}': scan.sweep_duration_s may be "
-                f"{_LONGEST_SWEEP_NS / 1e9} s at most, not {model.scan.sweep_duration_s}"
+                f"LIDAR model '{model.name}': a sweep may take "
+                f"{_LONGEST_SWEEP_NS / 1e9} s at most, not {model.sweep_duration_ns / 1e9}"
             )
         self.schedule = schedule
         self.sensors = sensors
         self.lag_ns = model.sweep_duration_ns
         self._model = model if keys is not None else model.without_noise()
-        self._keys = np.zeros(len(sensors), np.uint64) if keys is None else keys
+        self._has_noise = keys is not None
+        self._keys = np.zeros(len(sensors), np.uint64) if keys is None else keys.copy()
         self._scene = scene
-        self._rows = np.array([s.uav for s in sensors])
+        self._intensities = intensities
+        self._rows = uav_rows(sensors)
+        self._first_scan = np.zeros(len(sensors), np.int64)
         self._mounts = stack_mounts(mounts)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> LidarScans:
         """Scan number k of all LIDARs of the bank; `time_ns` is that of the first beam."""
+        numbers = k - self._first_scan if self._model.scan.is_fixed else k
         batch = make_batch(
-            self._rows, np.arange(len(self._rows)), time_ns, self._keys, k, self._mounts
+            self._rows, np.arange(len(self._rows)), time_ns, self._keys, numbers, self._mounts
         )
-        ranges = sample_lidars(self._scene, self._model, batch, fleet.history)
-        ranges.flags.writeable = False
-        return LidarScans(self.sensors, time_ns, self._model, ranges)
+        echoes = sample_echoes(
+            self._scene, self._model, batch, fleet.history, intensities=self._intensities
+        )
+        return LidarScans(
+            self.sensors,
+            time_ns,
+            self._model,
+            k,
+            owned(echoes.ranges),
+            owned(echoes.intensities),
+        )
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {"keys": self._keys.copy(), "first_scan": self._first_scan.copy()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._keys = np.array(state["keys"])
+        self._first_scan = np.array(state["first_scan"])
+
+    def reset(
+        self,
+        uavs: NDArray[np.int64] | None,
+        keys: NDArray[np.uint64] | None,
+        time_ns: int,  # noqa: ARG002
+        k: int,
+    ) -> None:
+        """Let the LIDARs of some UAVs begin anew with scan number `k`; see `Bank.reset`."""
+        rows = rows_of(self._rows, uavs)
+        self._first_scan[rows] = k
+        if keys is not None and self._has_noise:
+            self._keys[rows] = keys

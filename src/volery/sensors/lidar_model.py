@@ -1,4 +1,4 @@
-"""What a planar scanning range finder is: pattern, reach and noise, from a data file."""
+"""What a scanning range finder is: pattern, reach, noise and intensity, from a data file."""
 
 from __future__ import annotations
 
@@ -6,34 +6,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from volery.core.clock import ns_from_s
-from volery.sensors.lidar_kernels import LidarConstants
-from volery.sensors.model import SensorModel, load_model
+from volery.scenario.data_files import load_data_file
+from volery.sensors.echo_kernels import MOST_ECHOES, LidarConstants
+from volery.sensors.model import SensorModel, find_model
+from volery.sensors.scan_patterns import ScanPattern, TableScan
+from volery.world.materials import REFLECTIVITY
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
-class Scan(SensorModel):
-    """When and where to the beams go."""
-
-    beams: Annotated[int, Field(ge=2)]
-    angle_min_rad: float
-    angle_max_rad: float
-    rate_hz: PositiveFloat
-    sweep_duration_s: PositiveFloat
-    """From the first beam to the last; the rest of a turn is blind."""
-
-    @model_validator(mode="after")
-    def _is_one_turn(self) -> Self:
-        if not self.angle_max_rad > self.angle_min_rad:
-            raise ValueError("angle_max_rad must exceed angle_min_rad")
-        if self.sweep_duration_s > 1.0 / self.rate_hz:
-            raise ValueError("sweep_duration_s must fit in one turn of 1 / rate_hz")
-        return self
 
 
 class Reach(SensorModel):
@@ -74,49 +55,64 @@ class MixedPixels(SensorModel):
     first_echo_share: Share
 
 
+class Intensity(SensorModel):
+    """I = scale reflectivity cos(incidence)^incidence_exponent (reference / r)^range_exponent.
+
+    The range counts as `reference_range_m` where it is less, and I is cut at `maximum`.
+    """
+
+    scale: PositiveFloat
+    """Of a surface that reflects everything, head on, at the reference range."""
+    incidence_exponent: NonNegativeFloat
+    range_exponent: NonNegativeFloat
+    """2 for the power of the echo, 0 for a sensor that makes up for the range."""
+    reference_range_m: PositiveFloat
+    maximum: PositiveFloat
+    noise: NonNegativeFloat
+    """Standard deviation as a share of I."""
+    published: bool = True
+    """Whether planar scans carry them unless the scenario says otherwise; clouds do."""
+
+
+class WarmUp(SensorModel):
+    """Range bias after the start: bias exp(-t / time constant)."""
+
+    bias_m: float = 0.0
+    time_constant_s: PositiveFloat = 1.0
+
+
 class LidarModel(SensorModel):
-    """A planar scanner; where the numbers come from stands in its data file."""
+    """A scanner; where the numbers come from stands in its data file."""
 
     name: str
-    scan: Scan
+    echoes: Annotated[int, Field(ge=1, le=MOST_ECHOES)] = 1
+    """Most echoes of a beam that are told apart."""
+    scan: ScanPattern
     range: Reach
     noise: RangeNoise
     dropout: Dropout
     mixed_pixels: MixedPixels
+    intensity: Intensity | None = None
+    warm_up: WarmUp = WarmUp()
     exact: bool = False
     """Exact distances: nothing is disturbed, rounded, lost or mixed."""
 
     @property
     def beams(self) -> int:
-        """Beams of a scan."""
-        return self.scan.beams
-
-    @property
-    def angle_increment_rad(self) -> float:
-        """Angle from a beam to the next."""
-        return (self.scan.angle_max_rad - self.scan.angle_min_rad) / (self.beams - 1)
-
-    @property
-    def time_increment_s(self) -> float:
-        """Time from a beam to the next."""
-        return self.scan.sweep_duration_s / (self.beams - 1)
+        """Beams of a sweep."""
+        return self.scan.beam_count
 
     @property
     def sweep_duration_ns(self) -> int:
-        """Duration of a sweep on the simulation's clock."""
-        return ns_from_s(self.scan.sweep_duration_s)
-
-    @cached_property
-    def angles(self) -> NDArray[np.float64]:
-        """(beams,) angle of each beam about the sensor's z axis, rad."""
-        return np.linspace(self.scan.angle_min_rad, self.scan.angle_max_rad, self.beams)
+        """From the start of a sweep to its last beam, on the simulation's clock."""
+        return self.scan.sweep_ns
 
     @cached_property
     def constants(self) -> LidarConstants:
         """The model as kernels take it."""
+        shine = self.intensity or _NO_INTENSITY
         return LidarConstants(
-            cosine=np.cos(self.angles),
-            sine=np.sin(self.angles),
+            stride=self.scan.stride,
             sweep_ns=self.sweep_duration_ns,
             range_min=self.range.min_m,
             range_max=self.range.max_m,
@@ -126,10 +122,18 @@ class LidarModel(SensorModel):
             noise_offset=self.noise.offset_m,
             dropout_far=self.dropout.far,
             dropout_grazing=self.dropout.grazing,
-            half_footprint=0.5 * self.mixed_pixels.divergence_rad / self.angle_increment_rad,
+            half_footprint=0.5 * self.mixed_pixels.divergence_rad / self.scan.spacing_rad,
             least_jump=self.mixed_pixels.least_jump_m,
             pulse_length=self.mixed_pixels.pulse_length_m,
             first_echo_share=self.mixed_pixels.first_echo_share,
+            warm_up_bias=self.warm_up.bias_m,
+            warm_up_s=self.warm_up.time_constant_s,
+            brightness=shine.scale * REFLECTIVITY,
+            incidence_exponent=shine.incidence_exponent,
+            range_exponent=shine.range_exponent,
+            reference_range=shine.reference_range_m,
+            brightest=shine.maximum,
+            brightness_noise=shine.noise,
             noise=not self.exact,
         )
 
@@ -141,8 +145,23 @@ class LidarModel(SensorModel):
         """The same scanner with other values; a section is changed by the keys given for it."""
         data = self.model_dump()
         for key, value in values.items():
-            data[key] = {**data[key], **value} if isinstance(value, dict) else value
-        return LidarModel.model_validate(data)
+            data[key] = {**(data[key] or {}), **value} if isinstance(value, dict) else value
+        return _placed(LidarModel.model_validate(data), self.folder)
+
+    @property
+    def folder(self) -> Path:
+        """Where files that the model names are looked for."""
+        return self.scan._folder if isinstance(self.scan, TableScan) else Path()
+
+
+_NO_INTENSITY = Intensity(
+    scale=1.0,
+    incidence_exponent=0.0,
+    range_exponent=0.0,
+    reference_range_m=1.0,
+    maximum=1.0,
+    noise=0.0,
+)
 
 
 def load_lidar(name: str | Path = "utm_30lx", folder: Path | None = None) -> LidarModel:
@@ -150,4 +169,13 @@ def load_lidar(name: str | Path = "utm_30lx", folder: Path | None = None) -> Lid
 
     Raises `DataFileError` naming file, key and what is allowed.
     """
-    return load_model(LidarModel, "LIDAR", name, folder)
+    path = find_model(name, "LIDAR", folder)
+    return _placed(load_data_file(path, LidarModel), path.parent)
+
+
+def _placed(model: LidarModel, folder: Path) -> LidarModel:
+    """The model with its beam table, if it names one, read from `folder`."""
+    if isinstance(model.scan, TableScan):
+        model.scan._folder = folder
+        _ = model.scan.time_ns  # a broken table is told now
+    return model

@@ -26,4 +26,9 @@ def load_model(kind: type[Model], what: str, name: str | Path, folder: Path | No
 
     `what` names the kind of sensor in errors. Raises `DataFileError` naming file and key.
     """
-    return load_data_file(find_data_file(str(name), _SHIPPED, f"{what} model", folder), kind)
+    return load_data_file(find_model(name, what, folder), kind)
+
+
+def find_model(name: str | Path, what: str, folder: Path | None) -> Path:
+    """Path of a model's file; see `load_model`."""
+    return find_data_file(str(name), _SHIPPED, f"{what} model", folder)

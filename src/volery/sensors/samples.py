@@ -38,8 +38,17 @@ class LidarScans:
     stamp_ns: int
     """Time of the first beam."""
     model: LidarModel
-    ranges: NDArray[np.float32]
-    """(S, beams) m; +inf no return, -inf nearer than the least range (REP-117)."""
+    number: int
+    """Of the sweep, counted from 0."""
+    echoes: NDArray[np.float32]
+    """(S, E, beams) m, nearest first; +inf no echo, -inf nearer than the least range (REP-117)."""
+    intensities: NDArray[np.float32]
+    """(S, E, beams), 0 without an echo; (S, 0, beams) where they were not wanted."""
+
+    @property
+    def ranges(self) -> NDArray[np.float32]:
+        """(S, beams) of the first echoes, m."""
+        return self.echoes[:, 0]
 
 
 @dataclass(frozen=True)

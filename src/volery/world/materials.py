@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+import numpy as np
+
 
 class Material(IntEnum):
     """Material number of a surface; it fits a uint8."""
@@ -15,3 +17,18 @@ class Material(IntEnum):
     UAV_BODY = 4
     ROTOR = 5
     WALL = 6
+
+
+_DIFFUSE_REFLECTIVITY_905_NM = {
+    Material.NONE: 0.0,
+    Material.GROUND: 0.30,  # modelling choice: moist soil and litter
+    Material.WOOD: 0.35,  # modelling choice: bark, between dark pine and light beech
+    Material.LEAF: 0.50,  # modelling choice: green leaves on the near-infrared plateau
+    Material.UAV_BODY: 0.15,  # modelling choice: dark plastic and carbon fibre
+    Material.ROTOR: 0.05,  # modelling choice: black blades that fill a part of their disc
+    Material.WALL: 0.60,  # modelling choice: light plaster
+}
+
+REFLECTIVITY = np.array([_DIFFUSE_REFLECTIVITY_905_NM[material] for material in Material])
+"""(materials,) share of near-infrared light that a surface scatters back, by `Material`."""
+REFLECTIVITY.flags.writeable = False

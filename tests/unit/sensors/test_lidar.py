@@ -52,11 +52,13 @@ def one_solid(mesh, **options):
 
 def test_the_model_is_the_utm_30lx():
     assert MODEL.beams == 1081
-    assert MODEL.angle_increment_rad == pytest.approx(np.radians(0.25))
-    assert MODEL.time_increment_s == pytest.approx(1.7361e-5, rel=1e-4)
+    assert MODEL.scan.angle_increment_rad == pytest.approx(np.radians(0.25))
+    assert MODEL.scan.time_increment_s == pytest.approx(1.7361e-5, rel=1e-4)
     assert MODEL.sweep_duration_ns == 18_750_000
     assert (MODEL.range.min_m, MODEL.range.max_m) == (0.1, 30.0)
-    np.testing.assert_allclose(np.degrees(MODEL.angles[[0, 540, -1]]), [-135, 0, 135], atol=1e-9)
+    np.testing.assert_allclose(
+        np.degrees(MODEL.scan.angles[[0, 540, -1]]), [-135, 0, 135], atol=1e-9
+    )
 
 
 def test_exact_ranges_of_a_cylinder_and_a_plane():
@@ -71,7 +73,7 @@ def test_exact_ranges_of_a_cylinder_and_a_plane():
         ],
     )
     ranges = scan(scene)[0]
-    a = EXACT.angles
+    a = EXACT.scan.angles
     root = cylinder_radius**2 - (away * np.sin(a)) ** 2
     trunk = (root > 0) & (np.abs(a) < 1)
     ahead = np.abs(a) < np.arccos(12.0 / 30.0) - 1e-6
@@ -91,17 +93,17 @@ def test_every_beam_starts_from_the_pose_it_had(velocity, yaw_rate):
     position = np.array([0.2, -0.1, 0.3])
     mounts = stack_mounts([make_mount(position, rotations.from_rpy(0.0, 0.0, 0.4))])
     ranges = scan(scene, history=flying(velocity, yaw_rate), mounts=mounts, start_ns=start_ns)[0]
-    t = start_ns * 1e-9 + np.arange(EXACT.beams) * EXACT.time_increment_s
+    t = start_ns * 1e-9 + np.arange(EXACT.beams) * EXACT.scan.time_increment_s
     yaw = yaw_rate * t
     x = velocity[0] * t + position[0] * np.cos(yaw) - position[1] * np.sin(yaw)
-    towards = np.cos(EXACT.angles + yaw + 0.4)
+    towards = np.cos(EXACT.scan.angles + yaw + 0.4)
     with np.errstate(divide="ignore"):
         want = np.where(towards > 0, (15.0 - x) / towards, np.inf)
     seen = want < 29.9
     np.testing.assert_allclose(ranges[seen], want[seen], atol=1e-3)
     assert np.isinf(ranges[want > 30.1]).all()
     # Without the distortion the error would be far larger than that.
-    still = (15.0 - x[0]) / np.cos(EXACT.angles + yaw[0] + 0.4)
+    still = (15.0 - x[0]) / np.cos(EXACT.scan.angles + yaw[0] + 0.4)
     assert np.abs(still - want)[seen].max() > 0.05
     scene.close()
 
@@ -114,9 +116,9 @@ def test_a_nodding_mount_sees_the_ground_where_it_looks():
         history = standing([200.0, 200.0, 2.0])
         assert len(set(steps.tolist())) == 64
         ranges = scan(scene, history=history, mounts=stack_mounts([mount]), start_ns=start_ns)[0]
-        t = start_ns * 1e-9 + np.arange(EXACT.beams) * EXACT.time_increment_s
+        t = start_ns * 1e-9 + np.arange(EXACT.beams) * EXACT.scan.time_increment_s
         angle = 0.25 + 0.65 * np.sin(np.pi * t)
-        down = np.cos(EXACT.angles) * np.sin(angle)
+        down = np.cos(EXACT.scan.angles) * np.sin(angle)
         with np.errstate(divide="ignore"):
             want = np.where(down > 0, 1.9 / down, np.inf)
         seen = want < 29.5
@@ -129,9 +131,9 @@ def test_a_nodding_mount_sees_the_ground_where_it_looks():
 def test_too_near_is_minus_infinity_and_nothing_is_infinity():
     scene = one_solid(wall(0.05))
     ranges = scan(scene)[0]
-    near = np.cos(EXACT.angles) > 0.55
+    near = np.cos(EXACT.scan.angles) > 0.55
     assert np.isneginf(ranges[near]).all()
-    assert np.isposinf(ranges[np.cos(EXACT.angles) < 0]).all()
+    assert np.isposinf(ranges[np.cos(EXACT.scan.angles) < 0]).all()
     scene.close()
 
 
@@ -161,8 +163,8 @@ def test_a_passing_uav_is_seen_where_it_was():
     row = scan(scene, history=history)[0]
     middle = np.flatnonzero(np.isfinite(row)).mean()
     i = np.arange(EXACT.beams)
-    bearing = np.arctan2(-speed * i * EXACT.time_increment_s, 8.0)
-    expected = i[np.argmin(np.abs(bearing - EXACT.angles))]
+    bearing = np.arctan2(-speed * i * EXACT.scan.time_increment_s, 8.0)
+    expected = i[np.argmin(np.abs(bearing - EXACT.scan.angles))]
     assert abs(middle - expected) < 1.0
     assert expected < 538  # it is not seen where it was when the sweep began
     scene.close()
@@ -191,9 +193,9 @@ def test_dropouts_follow_range_and_incidence():
     ranges = sample_lidars(scene, MODEL, batch, standing())
     truth = scan(scene)[0].astype(float)
     for low, high in ((0.0, 20.0), (40.0, 50.0), (60.0, 68.0)):
-        angle = np.degrees(np.abs(EXACT.angles))
+        angle = np.degrees(np.abs(EXACT.scan.angles))
         beams = (angle >= low) & (angle < high)
-        grazing = 1.0 - np.cos(EXACT.angles[beams])
+        grazing = 1.0 - np.cos(EXACT.scan.angles[beams])
         keep = (1 - MODEL.dropout.far * (truth[beams] / 30.0) ** 2) * (
             1 - MODEL.dropout.grazing * grazing**4
         )
@@ -222,7 +224,7 @@ def test_mixed_pixels_lie_between_near_and_far_as_often_as_the_footprint_is_wide
     edge = int(np.flatnonzero(np.diff(truth[500:580]) < -0.5)[0]) + 500
     pair = ranges[:, edge : edge + 2]
     mixed = (pair > 5.001 * 1.0001) & (pair < 5.999)
-    footprint = MODEL.mixed_pixels.divergence_rad / MODEL.angle_increment_rad
+    footprint = MODEL.mixed_pixels.divergence_rad / MODEL.scan.angle_increment_rad
     assert mixed.sum() / scans == pytest.approx(footprint, abs=0.03)
     # The far beam is mixed with shares up to a half, uniformly: it ends in the upper half.
     far = ranges[:, edge][mixed[:, 0]]

@@ -1,0 +1,144 @@
+"""LIDAR scans as messages: LaserScan, MultiEchoLaserScan, PointCloud2.
+
+A planar scanner publishes `sensor_msgs/LaserScan`, one that tells several echoes apart a
+`sensor_msgs/MultiEchoLaserScan` besides; every other scanner publishes `sensor_msgs/PointCloud2`
+with the fields of `sensors.point_cloud.POINT`. Arrays are read-only views of the scans' own.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.graph.graph import Graph, Publisher
+from volery.graph.messages import (
+    LaserEcho,
+    LaserScan,
+    MultiEchoLaserScan,
+    PointCloud2,
+    PointField,
+    header,
+)
+from volery.sensors.lidar_model import LidarModel
+from volery.sensors.point_cloud import POINT, PointMaker
+from volery.sensors.samples import LidarScans, SensorId
+from volery.sensors.scan_patterns import PlanarScan
+
+_NO_INTENSITIES = np.zeros(0, dtype=np.float32)
+_NO_INTENSITIES.flags.writeable = False
+_DATATYPE = {"<f4": PointField.FLOAT32, "<u2": PointField.UINT16}
+_FIELDS = [
+    PointField(name, POINT.fields[name][1], _DATATYPE[POINT.fields[name][0].str], 1)
+    for name in POINT.names or ()
+    if POINT.fields is not None
+]
+
+
+def laser_frame(sensor: SensorId) -> str:
+    """Frame of a LIDAR."""
+    return f"{sensor.uav_name}/laser_{sensor.name}"
+
+
+def lidar_topic(sensor: SensorId, model: LidarModel, topic: str | None = None) -> str:
+    """Topic of a LIDAR's scans or points; `topic` is the scenario's choice below the UAV's name."""
+    if topic is None:
+        topic = f"laser/{sensor.name}/scan" if isinstance(model.scan, PlanarScan) else "points"
+    return f"/{sensor.uav_name}/{topic}"
+
+
+class LidarPublisher:
+    """Publishes the scans of all LIDARs."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self._scans: dict[SensorId, Publisher] = {}
+        self._echoes: dict[SensorId, Publisher] = {}
+        self._clouds: dict[SensorId, Publisher] = {}
+
+    def announce(self, sensor: SensorId, model: LidarModel, topic: str) -> None:
+        """Advertise what a LIDAR publishes; all echoes go to `echoes` beside a scan's topic."""
+        if not isinstance(model.scan, PlanarScan):
+            self._clouds[sensor] = self._graph.advertise(topic, PointCloud2)
+            return
+        self._scans[sensor] = self._graph.advertise(topic, LaserScan)
+        if model.echoes > 1:
+            beside = f"{topic.rsplit('/', 1)[0]}/echoes"
+            self._echoes[sensor] = self._graph.advertise(beside, MultiEchoLaserScan)
+
+    def publish(self, scans: LidarScans) -> None:
+        """Queue the messages of one sweep of a bank, where somebody receives them."""
+        if not isinstance(scans.model.scan, PlanarScan):
+            self._publish_clouds(scans)
+            return
+        for row, sensor in enumerate(scans.sensors):
+            publisher = self._scans[sensor]
+            if publisher.wanted:
+                publisher.publish(_scan_message(scans, scans.model.scan, row))
+            several = self._echoes.get(sensor)
+            if several is not None and several.wanted:
+                several.publish(_echo_message(scans, scans.model.scan, row))
+
+    def _publish_clouds(self, scans: LidarScans) -> None:
+        maker: PointMaker | None = None
+        for row, sensor in enumerate(scans.sensors):
+            publisher = self._clouds[sensor]
+            if not publisher.wanted:
+                continue
+            maker = maker or PointMaker(scans)
+            stamped = header(scans.stamp_ns, laser_frame(sensor))
+            publisher.publish(_cloud_message(stamped, maker.points(row)))
+
+
+def _scan_message(scans: LidarScans, pattern: PlanarScan, row: int) -> LaserScan:
+    intensities = scans.intensities[row]
+    return LaserScan(
+        header(scans.stamp_ns, laser_frame(scans.sensors[row])),
+        pattern.angle_min_rad,
+        pattern.angle_max_rad,
+        pattern.angle_increment_rad,
+        pattern.time_increment_s,
+        1.0 / pattern.rate_hz,
+        scans.model.range.min_m,
+        scans.model.range.max_m,
+        scans.echoes[row, 0],
+        intensities[0] if len(intensities) else _NO_INTENSITIES,
+    )
+
+
+def _echo_message(scans: LidarScans, pattern: PlanarScan, row: int) -> MultiEchoLaserScan:
+    """All echoes; a beam without any has its first range alone, +-inf."""
+    ranges = np.ascontiguousarray(scans.echoes[row].T)
+    count = np.maximum(np.isfinite(ranges).sum(axis=1), 1).tolist()
+    intensities = np.ascontiguousarray(scans.intensities[row].T)
+    for array in (ranges, intensities):
+        array.flags.writeable = False
+    return MultiEchoLaserScan(
+        header(scans.stamp_ns, laser_frame(scans.sensors[row])),
+        pattern.angle_min_rad,
+        pattern.angle_max_rad,
+        pattern.angle_increment_rad,
+        pattern.time_increment_s,
+        1.0 / pattern.rate_hz,
+        scans.model.range.min_m,
+        scans.model.range.max_m,
+        [LaserEcho(beam[:n]) for beam, n in zip(ranges, count, strict=True)],
+        [LaserEcho(beam[:n]) for beam, n in zip(intensities, count, strict=True)]
+        if intensities.size
+        else [],
+    )
+
+
+def _cloud_message(stamped: Any, points: NDArray[Any]) -> PointCloud2:
+    return PointCloud2(
+        stamped,
+        1,  # height: unorganized
+        len(points),
+        list(_FIELDS),
+        False,  # little-endian
+        POINT.itemsize,
+        POINT.itemsize * len(points),
+        points.view(np.uint8),
+        True,  # dense: no NaN
+    )

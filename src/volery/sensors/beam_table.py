@@ -1,0 +1,92 @@
+"""The beams of one sweep as kernels take them: directions, times, and the order of casting.
+
+Beams are numbered as messages list them. They are cast in packets of LANES neighbours, whatever
+their number, because rays that run close together cost half as much.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.world.embree import LANES
+
+Array = NDArray[np.float64]
+
+
+class BeamTable(NamedTuple):
+    """R rays of a sweep in the order in which they are cast, P = ceil(R / LANES) packets.
+
+    The sensor's pose is looked up at the two knots of a packet and interpolated between.
+    """
+
+    direction: Array
+    """(3, R) unit vectors in the sensor frame, FLU."""
+    fraction: Array
+    """(R,) time of a ray between its packet's knots, 0..1."""
+    knot_ns: NDArray[np.int64]
+    """(P, 2) after the start of the sweep."""
+    seen_ns: NDArray[np.int64]
+    """(P,) when a packet sees the other UAVs, after the start of the sweep."""
+    beam: NDArray[np.int64]
+    """(R,) number of a ray's beam."""
+
+
+def packets_of(rays: int) -> int:
+    """Packets that hold so many rays."""
+    return (rays + LANES - 1) // LANES
+
+
+def row_table(direction: Array, time_ns: NDArray[np.int64]) -> BeamTable:
+    """Table of a planar sweep: evenly timed beams, cast in their own order.
+
+    A packet's knots are its own first beam and that of the next packet, so that each pose is looked
+    up once.
+    """
+    beams = len(time_ns)
+    first = LANES * np.arange(packets_of(beams))
+    last = np.minimum(first + LANES, beams - 1)
+    place = np.arange(beams) % LANES
+    step = 1.0 / np.maximum(last - first, 1)
+    return BeamTable(
+        direction=np.ascontiguousarray(direction),
+        fraction=place * np.repeat(step, LANES)[:beams],
+        knot_ns=np.column_stack([time_ns[first], time_ns[last]]),
+        seen_ns=time_ns[np.minimum(first + LANES // 2, beams - 1)],
+        beam=np.arange(beams),
+    )
+
+
+def block_table(
+    direction: Array,
+    time_ns: NDArray[np.int64],
+    order: NDArray[np.int64],
+    block: NDArray[np.int64],
+) -> BeamTable:
+    """Table of beams cast in `order` (R,), a permutation of their numbers.
+
+    `block` (R,) names groups of beams that are close in time, in beam order: all packets of a block
+    share their knots, which saves looking poses up.
+    """
+    start = np.full(int(block.max()) + 1, np.iinfo(np.int64).max)
+    end = np.zeros_like(start)
+    np.minimum.at(start, block, time_ns)
+    np.maximum.at(end, block, time_ns)
+    heads = np.arange(0, len(order), LANES)
+    knots = np.column_stack(
+        [
+            np.minimum.reduceat(start[block[order]], heads),
+            np.maximum.reduceat(end[block[order]], heads),
+        ]
+    )
+    packet = np.arange(len(order)) // LANES
+    length = np.maximum(knots[:, 1] - knots[:, 0], 1)
+    return BeamTable(
+        direction=np.ascontiguousarray(direction[:, order]),
+        fraction=(time_ns[order] - knots[packet, 0]) / length[packet],
+        knot_ns=knots,
+        seen_ns=knots.sum(axis=1) // 2,
+        beam=order,
+    )
