@@ -43,6 +43,7 @@ from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe, hover_thrusts
 from volery.vehicle.battery import BatteryLevel
 from volery.vehicle.contact import IMPACT, TOUCH_DOWN, steepest_cosine
+from volery.vehicle.downwash import new_jets
 from volery.vehicle.fleet import FleetState, charge_battery, fit_rotors, new_bodies, state_of
 from volery.vehicle.plant import plant_of
 from volery.vehicle.pose_history import PoseHistory, new_history
@@ -155,7 +156,7 @@ class Fleet:
         self._uavs["pilot"] = new_pilots(attitude)
         self._uavs["model"] = rows
         self._uavs["copy"] = copies
-        self._order = np.arange(count)
+        self._jets = new_jets(count)
         self._bodies: NDArray[np.void] = self._uavs["body"]
         self._pilots: NDArray[np.void] = self._uavs["pilot"]
         for i, row in enumerate(rows):
@@ -216,7 +217,7 @@ class Fleet:
             more, written, spent = advance_fleet(
                 self._uavs,
                 self._models,
-                self._order,
+                self._jets,
                 *self._ground,
                 self.history.position,
                 self.history.attitude,

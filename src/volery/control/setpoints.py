@@ -39,17 +39,24 @@ class ControlLevel(IntEnum):
 
 PILOT = np.dtype(
     [
+        # what every step reads or writes, close together for the cache
         ("mode", "i8"),  # flight_modes.FlightMode
         ("level", "i8"),  # ControlLevel
-        ("phase", "i8"),  # of a flight mode that has several
-        ("calm_ticks", "i8"),  # guidance ticks for which a condition of the mode has held
-        ("deadline_step", "i8"),  # a velocity command holds until this step
-        ("timeout_steps", "i8"),  # ... and is renewed by this many
         ("velocity_in_heading", "?"),  # velocity_target turns with the vehicle's heading
         ("braking", "?"),  # HOLD and LAND: stop first, then lock the place
         ("turning", "?"),  # heading follows yaw_rate_target instead of heading_target
         ("saturated", "?"),  # the rotors could not give the torque wanted last
         ("spare", "u1", 4),  # no hidden padding: equal states are equal bytes
+        ("thrust", "f8"),  # N along the body's z
+        ("full_thrust", "f8"),  # N: the most that one rotor gives at the battery's present voltage
+        ("rates", "f8", 3),  # rad/s, FLU
+        ("rate_integral", "f8", 3),  # rad/s^2
+        ("rotor_reference", "f8", MAX_ROTORS),  # rad/s
+        # what guidance and attitude keep
+        ("phase", "i8"),  # of a flight mode that has several
+        ("calm_ticks", "i8"),  # guidance ticks for which a condition of the mode has held
+        ("deadline_step", "i8"),  # a velocity command holds until this step
+        ("timeout_steps", "i8"),  # ... and is renewed by this many
         ("home", "f8", 3),  # m, map: where the last take-off began
         ("return_height", "f8"),  # m, map
         ("position_target", "f8", 3),  # m, map
@@ -60,12 +67,7 @@ PILOT = np.dtype(
         ("velocity", "f8", 3),  # m/s, map: setpoint moving towards its target
         ("velocity_integral", "f8", 3),  # m/s^2
         ("attitude", "f8", 4),  # map from body
-        ("thrust", "f8"),  # N along the body's z
         ("yaw_rate", "f8"),  # rad/s, fed forward to the rates
-        ("rates", "f8", 3),  # rad/s, FLU
-        ("rate_integral", "f8", 3),  # rad/s^2
-        ("full_thrust", "f8"),  # N: the most that one rotor gives at the battery's present voltage
-        ("rotor_reference", "f8", MAX_ROTORS),  # rad/s
     ],
     align=True,
 )

@@ -14,7 +14,7 @@ from volery.control.setpoints import PILOT
 from volery.vehicle.battery import drain
 from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
-from volery.vehicle.downwash import add_downwash
+from volery.vehicle.downwash import Jets, find_downwash
 from volery.vehicle.fleet import BODY
 from volery.vehicle.ground_effect import feel_ground, feels_ground
 from volery.vehicle.kernels import accelerate, carry, meet_ground, near_ground
@@ -52,7 +52,7 @@ EVENTS_A_STEP = 4
 def advance_fleet(  # noqa: PLR0912
     uavs: NDArray[np.void],
     models: NDArray[np.void],
-    order: NDArray[np.int64],
+    jets: Jets,
     heights: Array,
     origin_x: float,
     origin_y: float,
@@ -74,7 +74,7 @@ def advance_fleet(  # noqa: PLR0912
 ) -> tuple[int, int, bool]:
     """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
 
-    order: (N,) rows in any order, kept from call to call to spare sorting. Ends early after a step in which a budget ran out, the events' buffer grew full or, with
+    jets: room for the search of neighbours (`new_jets`). Ends early after a step in which a budget ran out, the events' buffer grew full or, with
     `event_ends`, anything was noted. Returns the steps done, the events written, and whether a
     budget ran out.
     """
@@ -84,24 +84,26 @@ def advance_fleet(  # noqa: PLR0912
     rows = history_position.shape[0]
     written = 0
     spent = False
+    look = True  # whether someone may meet the jet of another since the last look
     done = 0
     room = events.shape[0] - EVENTS_A_STEP * count
     while done < steps and not spent and written <= (0 if event_ends else room):
         guiding = step % guidance_steps == 0
         turning = step % attitude_steps == 0
         row = (step + 1) % rows
-        if guiding:
-            for i in range(count):
-                air = uavs[i].body.air_velocity_map
-                air[0], air[1], air[2] = wind_x, wind_y, wind_z
-            add_downwash(uavs, models, order)
+        if guiding and look:
+            find_downwash(uavs, models, jets)
+            look = False
         for i in range(count):
             body = uavs[i].body
             pilot = uavs[i].pilot
             plant = models[uavs[i].model].plant
-            if guiding and plant.battery.capacity > 0.0 and drain(body, plant, pilot):
-                _note(events[written], step + 1, i, BATTERY_FELL, pilot.mode, 0.0, body)
-                written += 1
+            if guiding:
+                air = body.air_velocity_map
+                air[0], air[1], air[2] = wind_x, wind_y, wind_z - jets.downwash[i]
+                if plant.battery.capacity > 0.0 and drain(body, plant, pilot):
+                    _note(events[written], step + 1, i, BATTERY_FELL, pilot.mode, 0.0, body)
+                    written += 1
             if body.asleep:
                 for k in range(3):
                     body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
@@ -134,6 +136,7 @@ def advance_fleet(  # noqa: PLR0912
                     _note(events[written], step + 1, i, MODE_CHANGE, pilot.mode, 0.0, body)
                     written += 1
                 spent = spent or body.contact_budget <= 0.0 or body.separation_budget <= 0.0
+            look = look or body.downwash_budget <= 0.0
             for k in range(3):
                 history_position[row, i, k] = body.position_map[k]
             for k in range(4):
