@@ -34,6 +34,7 @@ from volery.core.errors import CommandError
 from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe, hover_thrusts
 from volery.vehicle.contact import steepest_cosine
+from volery.vehicle.downwash import new_jets
 from volery.vehicle.fleet import NEVER, FleetState, charge_battery, fit_rotors, new_bodies, state_of
 from volery.vehicle.plants import Plant, RigidBody
 from volery.vehicle.pose_history import PoseHistory, new_history
@@ -113,7 +114,7 @@ class Fleet(FleetCommands):
         uavs["turbulence"] = new_turbulence(seed, names)
         super().__init__(tuple(airframes), plants, names, uavs, dt_ns / NS_PER_S)
         self._models = models
-        self._order = np.arange(count)
+        self._jets = new_jets(count)
         self._fit_out(worn, charge)
         weight = np.array([airframe.weight for airframe in airframes])
         flying = np.array([start is FlightMode.HOLD for start in modes])
@@ -173,7 +174,7 @@ class Fleet(FleetCommands):
             more, written, spent = advance_fleet(
                 self._uavs,
                 self._models,
-                self._order,
+                self._jets,
                 *self._ground,
                 self.history.position,
                 self.history.attitude,

@@ -16,7 +16,7 @@ from volery.control.setpoints import PILOT, ControlLevel
 from volery.vehicle.battery import drain
 from volery.vehicle.compiled import apart_kernel, fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
-from volery.vehicle.downwash import add_downwash
+from volery.vehicle.downwash import Jets, find_downwash
 from volery.vehicle.fleet import BODY
 from volery.vehicle.ground_effect import feel_ground, feels_ground
 from volery.vehicle.identified import IDENTIFIED, accelerate_identified
@@ -77,7 +77,7 @@ _STOPPED = int(ControlLevel.STOPPED)
 def advance_fleet(  # noqa: PLR0912, PLR0915
     uavs: NDArray[np.void],
     models: NDArray[np.void],
-    order: NDArray[np.int64],
+    jets: Jets,
     heights: Array,
     origin_x: float,
     origin_y: float,
@@ -101,8 +101,8 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
 
     paths: segments of trajectories, see `control.follow`. references: (N, L, 6), commands of the
-    last L steps where identified plants have dead times, else of any size. order: (N,) rows in any
-    order, kept from call to call to spare sorting.
+    last L steps where identified plants have dead times, else of any size. jets: room for the
+    search of neighbours (`new_jets`).
 
     Ends early after a step in which a budget ran out, the events' buffer grew full or, with
     `event_ends`, anything was noted. Returns the steps done, the events written, and whether a
@@ -114,6 +114,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     rows = history_position.shape[0]
     written = 0
     spent = False
+    look = True  # whether someone may meet the jet of another since the last look
     done = 0
     room = events.shape[0] - EVENTS_A_STEP * count
     while done < steps and not spent and written <= (0 if event_ends else room):
@@ -123,7 +124,9 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
         if guiding:
             tick = step // guidance_steps
             refresh_air(uavs, air[0], air_nodes, grid, tick, guidance_steps * dt)
-            add_downwash(uavs, models, order)
+            if look:
+                find_downwash(uavs, models, jets)
+                look = False
         for i in range(count):
             body = uavs[i].body
             pilot = uavs[i].pilot
@@ -136,16 +139,16 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                 for k in range(3):
                     body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
             else:
-                gains = model.gains
-                estimate = body  # what control knows of the motion: for now, the truth
                 mode = pilot.mode
+                if guiding:
+                    body.air_velocity_map[2] -= jets.downwash[i]
                 if model.kind == KINEMATIC_MOTION:
                     touch = fly_kinematic(
                         body,
                         pilot,
                         plant,
                         model.kinematic,
-                        gains,
+                        model.gains,
                         paths,
                         grid,
                         steepest,
@@ -154,25 +157,18 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                         dt,
                     )
                 else:
+                    estimate = body  # what control knows of the motion: for now, the truth
                     if guiding:
-                        guide(pilot, estimate, gains, paths, step, dt)
+                        guide(pilot, estimate, model.gains, paths, step, dt)
                     if model.kind == RIGID_BODY:
                         if turning:
-                            hold_attitude(pilot, estimate, gains)
-                        hold_rates(pilot, estimate, gains, dt)
+                            hold_attitude(pilot, estimate, model.gains)
+                        hold_rates(pilot, estimate, model.gains, dt)
                         if feels_ground(body, plant):
                             feel_ground(body, plant, grid, steepest, dt)
                         accelerate(body, plant, pilot, dt)
                     else:
-                        _follow_loops(
-                            body,
-                            plant,
-                            model.identified,
-                            pilot,
-                            references[i],
-                            step,
-                            dt,
-                        )
+                        _follow_loops(body, plant, model.identified, pilot, references[i], step, dt)
                     touch = NO_TOUCH
                     if near_ground(body, dt):
                         touch = meet_ground(
@@ -190,6 +186,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                     _note(events[written], step + 1, i, MODE_CHANGE, pilot.mode, 0.0, body)
                     written += 1
                 spent = spent or body.contact_budget <= 0.0 or body.separation_budget <= 0.0
+            look = look or body.downwash_budget <= 0.0
             for k in range(3):
                 history_position[row, i, k] = body.position_map[k]
             for k in range(4):

@@ -26,8 +26,7 @@ class LidarBank:
 
     A scan is known when its sweep has ended: it is sampled `lag_ns` after its first beam, from the
     poses that the fleet's history kept. Noise follows from the number of a LIDAR's scan since its
-    start; a rosette, which never repeats, goes on by the number of the scan of them all, and warming
-    up by time.
+    start; warming up goes by the clock, and so does the pattern of a rosette, which never repeats.
     """
 
     name = "lidar"

@@ -24,13 +24,15 @@ taken in the order of places, depends on places alone.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.plant import AIR_DENSITY
+
+Array = NDArray[np.float64]
 
 SPREAD = 0.1
 """Growth of the jet's radius with depth."""
@@ -41,72 +43,118 @@ EDGE = 2.5
 _FADE_FROM = 2.0 / 3.0
 _AT_EDGE = math.exp(-EDGE * EDGE)
 _INVERSE_SLANT = 1.0 / math.sqrt(1.0 + (EDGE * SPREAD) ** 2)
-_LOOK_BEYOND = 4.0
-"""m beyond the widest jet that a look reaches."""
+_LOOK_BEYOND = 2.0
+"""m beyond the widest jet that a look reaches, and twice what may be flown until the next."""
+
+
+class Jets(NamedTuple):
+    """What a look around needs for N UAVs, kept from call to call; no state: only `order` is read
+    before it is written, and any order gives the same result.
+    """
+
+    order: NDArray[np.int64]
+    """(N,) rows, sorted by place."""
+    copy: NDArray[np.int64]
+    """(N,) copy of the scenario of UAV `order[k]`."""
+    place: Array
+    """(N, 4) its x, y, z and the radius of its jet, m."""
+    downwash: Array
+    """(N,) m/s: speed of the air downwards at each row's UAV."""
+
+
+def new_jets(count: int) -> Jets:
+    """Room for `count` UAVs."""
+    return Jets(np.arange(count), np.zeros(count, np.int64), np.zeros((count, 4)), np.zeros(count))
 
 
 @inner_kernel
-def add_downwash(uavs: NDArray[np.void], models: NDArray[np.void], order: Any) -> None:
-    """Add the jets of all UAVs to the `air_velocity_map` of those in them.
-
-    order: (N,) whole numbers, any order of the rows; left sorted by place.
-    """
+def find_downwash(uavs: NDArray[np.void], models: NDArray[np.void], jets: Jets) -> None:
+    """Fill `jets.downwash` with the speed of the jets over each UAV, at the present places."""
     count = uavs.shape[0]
     waiting = False
     for i in range(count):
+        jets.downwash[i] = 0.0
         waiting = waiting or uavs[i].body.downwash_budget <= 0.0
     if not waiting:
         return
-    _sort_by_place(uavs, order)
-    reach = 0.0
-    for m in range(models.shape[0]):
-        radius = models[m].plant.jet_radius
-        reach = max(reach, EDGE * (1.0 + SPREAD * DEPTH) * radius)
-    reach += _LOOK_BEYOND
+    reach = _LOOK_BEYOND + _line_up(uavs, models, jets)
     for k in range(count):
-        if uavs[order[k]].body.downwash_budget <= 0.0:
-            _refill_budgets(uavs, models, order, k, reach)
+        if uavs[jets.order[k]].body.downwash_budget <= 0.0:
+            _refill_budgets(uavs, jets, k, reach)
     for k in range(count):
-        body = uavs[order[k]].body
-        if body.downwash_budget <= 0.0 and not body.asleep:
-            body.air_velocity_map[2] -= _jets_over(uavs, models, order, k, reach)
+        i = jets.order[k]
+        if uavs[i].body.downwash_budget <= 0.0:
+            jets.downwash[i] = _jets_over(uavs, models, jets, k, reach)
 
 
 @inner_kernel
-def _refill_budgets(uavs: Any, models: Any, order: Any, k: int, reach: float) -> None:
-    """Share the gap to each neighbour of UAV `order[k]` between the two of them."""
-    i = order[k]
-    radius = models[uavs[i].model].plant.jet_radius
+def _line_up(uavs: Any, models: Any, jets: Jets) -> float:
+    """Sort the UAVs by copy, x, y, z; the half width of the widest jet between them, m."""
+    count = uavs.shape[0]
+    low, high, widest = math.inf, -math.inf, 0.0
+    for k in range(count):  # by insertion: from one look to the next little changes
+        i = jets.order[k]
+        body = uavs[i].body
+        x, y, z = body.position_map[0], body.position_map[1], body.position_map[2]
+        radius = models[uavs[i].model].plant.jet_radius
+        low, high, widest = min(low, z), max(high, z), max(widest, radius)
+        n = k
+        while n > 0 and _is_before(uavs[i].copy, x, y, z, jets, n - 1):
+            jets.order[n] = jets.order[n - 1]
+            jets.copy[n] = jets.copy[n - 1]
+            for c in range(4):
+                jets.place[n, c] = jets.place[n - 1, c]
+            n -= 1
+        jets.order[n] = i
+        jets.copy[n] = uavs[i].copy
+        place = jets.place[n]
+        place[0], place[1], place[2], place[3] = x, y, z, radius
+    return EDGE * (widest + SPREAD * min(high - low, DEPTH * widest))
+
+
+@inner_kernel
+def _is_before(copy: int, x: float, y: float, z: float, jets: Jets, n: int) -> bool:
+    place = jets.place[n]
+    if copy != jets.copy[n]:
+        return bool(copy < jets.copy[n])
+    if x != place[0]:
+        return bool(x < place[0])
+    if y != place[1]:
+        return bool(y < place[1])
+    return bool(z < place[2])
+
+
+@inner_kernel
+def _refill_budgets(uavs: Any, jets: Jets, k: int, reach: float) -> None:
+    """Share the gap to each neighbour of UAV number `k` in order between the two of them."""
     budget = 0.5 * _LOOK_BEYOND * _INVERSE_SLANT
-    first, last = _window(uavs, order, k, reach)
+    radius = jets.place[k, 3]
+    first, last = _window(jets, k, reach)
     for n in range(first, last):
-        j = order[n]
-        if j == i:
-            continue
-        r, s = _offset(uavs[i].body, uavs[j].body)
-        other = models[uavs[j].model].plant.jet_radius
-        half = 0.5 * min(_gap(r, s, other), _gap(r, -s, radius))
-        budget = min(budget, half)
-        uavs[j].body.downwash_budget = min(uavs[j].body.downwash_budget, half)
-    uavs[i].body.downwash_budget = budget
+        if n != k and abs(jets.place[n, 1] - jets.place[k, 1]) < reach:
+            r, s = _offset(jets, k, n)
+            half = 0.5 * min(_gap(r, s, jets.place[n, 3]), _gap(r, -s, radius))
+            budget = min(budget, half)
+            if half < _LOOK_BEYOND:
+                other = uavs[jets.order[n]].body
+                other.downwash_budget = min(other.downwash_budget, half)
+    uavs[jets.order[k]].body.downwash_budget = budget
 
 
 @inner_kernel
-def _jets_over(uavs: Any, models: Any, order: Any, k: int, reach: float) -> float:
-    """Speed of the air downwards at UAV `order[k]`, m/s, summed in the order of places."""
-    i = order[k]
+def _jets_over(uavs: Any, models: Any, jets: Jets, k: int, reach: float) -> float:
+    """Speed of the air downwards at UAV number `k` in order, m/s, summed in that order."""
     speed = 0.0
-    first, last = _window(uavs, order, k, reach)
+    first, last = _window(jets, k, reach)
     for n in range(first, last):
-        j = order[n]
-        r, s = _offset(uavs[i].body, uavs[j].body)
-        plant = models[uavs[j].model].plant
-        if j != i and _gap(r, s, plant.jet_radius) < 0.0:
+        r, s = _offset(jets, k, n)
+        if n != k and _gap(r, s, jets.place[n, 3]) < 0.0:
+            body = uavs[jets.order[n]].body
             thrust = 0.0
-            for rotor in range(plant.rotors):
-                w = uavs[j].body.rotor_speed[rotor]
-                thrust += uavs[j].body.rotor_lift[rotor] * w * w
-            speed += jet_speed(thrust, plant.jet_radius, r, s)
+            for rotor in range(models[uavs[jets.order[n]].model].plant.rotors):
+                w = body.rotor_speed[rotor]
+                thrust += body.rotor_lift[rotor] * w * w
+            speed += jet_speed(thrust, jets.place[n, 3], r, s)
     return speed
 
 
@@ -139,49 +187,21 @@ def _gap(r: float, s: float, radius: float) -> float:
 
 
 @inner_kernel
-def _offset(body: Any, other: Any) -> tuple[float, float]:
-    """How far `body` is off the vertical through `other`, and how far below it; m."""
-    dx = body.position_map[0] - other.position_map[0]
-    dy = body.position_map[1] - other.position_map[1]
-    return math.sqrt(dx * dx + dy * dy), other.position_map[2] - body.position_map[2]
+def _offset(jets: Jets, k: int, n: int) -> tuple[float, float]:
+    """How far number `k` in order is off the vertical through number `n`, and below it; m."""
+    dx = jets.place[k, 0] - jets.place[n, 0]
+    dy = jets.place[k, 1] - jets.place[n, 1]
+    return math.sqrt(dx * dx + dy * dy), jets.place[n, 2] - jets.place[k, 2]
 
 
 @inner_kernel
-def _window(uavs: Any, order: Any, k: int, reach: float) -> tuple[int, int]:
-    """Range of the ordered UAVs in the same copy within `reach` m in x of number `k`."""
-    copy, x = uavs[order[k]].copy, uavs[order[k]].body.position_map[0]
+def _window(jets: Jets, k: int, reach: float) -> tuple[int, int]:
+    """Range in order of the UAVs in the same copy within `reach` m in x of number `k`."""
+    copy, x = jets.copy[k], jets.place[k, 0]
     first = k
-    while first > 0:
-        other = uavs[order[first - 1]]
-        if other.copy != copy or x - other.body.position_map[0] > reach:
-            break
+    while first > 0 and jets.copy[first - 1] == copy and x - jets.place[first - 1, 0] <= reach:
         first -= 1
     last = k + 1
-    while last < uavs.shape[0]:
-        other = uavs[order[last]]
-        if other.copy != copy or other.body.position_map[0] - x > reach:
-            break
+    while last < len(jets.order) and jets.copy[last] == copy and jets.place[last, 0] - x <= reach:
         last += 1
     return first, last
-
-
-@inner_kernel
-def _sort_by_place(uavs: Any, order: Any) -> None:
-    """Sort by copy, x, y, z. By insertion: from one look to the next little changes."""
-    for k in range(1, uavs.shape[0]):
-        i = order[k]
-        n = k
-        while n > 0 and _before(uavs[i], uavs[order[n - 1]]):
-            order[n] = order[n - 1]
-            n -= 1
-        order[n] = i
-
-
-@inner_kernel
-def _before(a: Any, b: Any) -> bool:
-    if a.copy != b.copy:
-        return bool(a.copy < b.copy)
-    for k in range(3):
-        if a.body.position_map[k] != b.body.position_map[k]:
-            return bool(a.body.position_map[k] < b.body.position_map[k])
-    return False

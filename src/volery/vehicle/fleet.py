@@ -13,6 +13,20 @@ Array = NDArray[np.float64]
 
 BODY = np.dtype(
     [
+        # what seldom changes
+        ("touch_speed", "f8"),
+        ("last_contact_step", "i8"),
+        ("still_steps", "i8"),
+        ("battery_charge", "f8"),
+        ("battery_pair_voltage", "f8"),  # V lost over the battery's RC pair
+        ("battery_voltage", "f8"),
+        ("battery_current", "f8"),
+        ("battery_level", "i8"),
+        ("rotor_health", "f8", MAX_ROTORS),
+        # what every step reads or writes, close together for the cache
+        ("rotor_limit", "f8", MAX_ROTORS),  # rad/s that wear and battery allow
+        ("rotor_lift", "f8", MAX_ROTORS),  # N s^2: thrust over speed squared, wear and ground in it
+        ("rotor_speed", "f8", MAX_ROTORS),
         ("position_map", "f8", 3),
         ("velocity_map", "f8", 3),
         ("attitude", "f8", 4),
@@ -25,23 +39,11 @@ BODY = np.dtype(
         ("contact_budget", "f8"),
         ("separation_budget", "f8"),
         ("ground_budget", "f8"),
-        ("downwash_budget", "f8"),  # m until it may meet the air of another, vehicle.downwash
-        ("touch_speed", "f8"),
-        ("last_contact_step", "i8"),
-        ("still_steps", "i8"),
+        ("downwash_budget", "f8"),  # m until it may meet the jet of another, vehicle.downwash
         ("crashed", "?"),
         ("on_ground", "?"),
         ("asleep", "?"),
         ("spare", "u1", 5),  # no hidden padding: equal states are equal bytes
-        ("rotor_speed", "f8", MAX_ROTORS),
-        ("rotor_lift", "f8", MAX_ROTORS),  # N s^2: thrust over speed squared, wear and ground in it
-        ("rotor_limit", "f8", MAX_ROTORS),  # rad/s that wear and battery allow
-        ("rotor_health", "f8", MAX_ROTORS),
-        ("battery_charge", "f8"),
-        ("battery_pair_voltage", "f8"),  # V lost over the battery's RC pair
-        ("battery_voltage", "f8"),
-        ("battery_current", "f8"),
-        ("battery_level", "i8"),
     ],
     align=True,
 )
