@@ -247,6 +247,14 @@ class Fleet(FleetCommands):
         fit_rotors(self._bodies[i], self._models["plant"][self._uavs["model"][i]], health)
         self._bodies["ground_budget"][i] = 0.0
 
+    def displace(self, i: int, offset: ArrayLike) -> None:
+        """Put UAV `i` elsewhere at once, by `offset` (3,) m, map; its motion goes on there."""
+        offset = checked("offset", offset, (3,), MAX_COORDINATE)
+        self._bodies["position_map"][i] += offset
+        self._bodies["contact_budget"][i] = 0.0
+        self._bodies["separation_budget"][i] = 0.0
+        self._wake(i)
+
     # ------------------------------------------------------------------------------ contacts
 
     def crash(self, i: int) -> None:

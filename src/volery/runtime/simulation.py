@@ -17,6 +17,7 @@ from volery.core.clock import ns_from_s, s_from_ns
 from volery.core.errors import CommandError, ScenarioError, SnapshotError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
+from volery.engine.faults import FaultPlan
 from volery.engine.pacing import Pacer
 from volery.engine.partners import Partner
 from volery.graph.graph import Graph
@@ -38,6 +39,7 @@ from volery.runtime.snapshot import (
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
 from volery.runtime.worlds import build_forest, build_terrain
+from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario
 from volery.sensors.mount import Mount
 from volery.sensors.samples import JointAngles, Samples
@@ -112,6 +114,8 @@ class Simulation:
         self.nodes: list[Node] = []
         self._partners: list[Partner] = []
         self._open_graph(starts)
+        self._faults = FaultPlan(self._engine, names)
+        self._plan_faults()
         self._start_state = self._state()
 
     # -------------------------------------------------------------------------------------- time
@@ -200,6 +204,14 @@ class Simulation:
         action's result or error.
         """
         return self._engine.inbox.post(action)
+
+    def inject(self, fault: Fault | Mapping[str, Any]) -> None:
+        """Let something go wrong: a fault as in a scenario's `faults`, at once if its time is past.
+
+        `simulation.inject({"kind": "motor", "uav": "uav1", "rotor": 0})`. Raises `CommandError` for
+        one that cannot be.
+        """
+        self._faults.add(parse_fault(dict(fault)) if isinstance(fault, Mapping) else fault)
 
     def add_partner(
         self,
@@ -368,6 +380,13 @@ class Simulation:
                 self.nodes.append(
                     start_node(entry, context, f"/{start.name}", where, self.scenario.folder)
                 )
+
+    def _plan_faults(self) -> None:
+        for k, fault in enumerate(self.scenario.faults):
+            try:
+                self._faults.add(fault)
+            except CommandError as error:
+                raise ScenarioError(f"{self.scenario.name}: faults[{k}]: {error}") from None
 
     def _take_fingerprint(self) -> None:
         if self._digest is not None:
