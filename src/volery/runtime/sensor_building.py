@@ -78,16 +78,18 @@ class Fitted:
 
 def fit_sensors(scenario: schema.Scenario, starts: Sequence[Start]) -> list[Fitted]:
     """Every sensor of every UAV, in fleet order."""
-    return [
-        Fitted(
-            SensorId(row, start.name, spec.name),
-            spec,
-            _mount(spec),
-            stream_key(scenario.seed, f"{start.name}/{spec.kind}/{spec.name}"),
-        )
-        for row, start in enumerate(starts)
-        for spec in scenario.types[start.type_name].sensors
-    ]
+    fitted = []
+    for row, start in enumerate(starts):
+        for spec in scenario.types[start.type_name].sensors:
+            sensor = SensorId(row, start.name, spec.name)
+            key = noise_key(scenario.seed, spec.kind, sensor)
+            fitted.append(Fitted(sensor, spec, _mount(spec), key))
+    return fitted
+
+
+def noise_key(seed: int, kind: str, sensor: SensorId) -> np.uint64:
+    """Noise stream of a sensor in a run with `seed`; `kind` is the name of its bank."""
+    return stream_key(seed, f"{sensor.uav_name}/{kind}/{sensor.name}")
 
 
 def build_banks(
