@@ -1,17 +1,18 @@
 """What every kind of sensor keeps to. A new kind joins by one line in KINDS."""
 
 import copy
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from volery.core.clock import Schedule
-from volery.core.rng import stream_key
 from volery.graph.messages import typestore
-from volery.runtime.sensor_building import RESULT_OF
+from volery.runtime.sensor_building import RESULT_OF, noise_key
 from volery.sensors import model as sensor_models
 
 NS = 1_000_000_000
@@ -36,7 +37,7 @@ class Kind(NamedTuple):
     """Whether the stamp is the nominal instant, not the physics step that comes next."""
     noisy_at_rest: bool = True
     keeps_state: bool = True
-    entry: dict[str, Any] = {}
+    entry: Mapping[str, Any] = MappingProxyType({})
     """What a scenario's entry needs beyond the kind, such as a view of the ground."""
 
 
@@ -227,10 +228,6 @@ def reset(measure, kind, uavs, keys, k):
     measure.bank.reset(uavs, keys, measure.simulation.time_ns, k)
 
 
-def key_of(seed, sensor, kind):
-    return stream_key(seed, f"{sensor.uav_name}/{kind.kind}/{sensor.name}")
-
-
 @every_kind_that_keeps_state
 def test_reset_rows_start_afresh_and_others_go_on(simulate, kind):
     """Row 1 measures from k = 5 as a fresh bank of another seed does from k = 0."""
@@ -239,7 +236,7 @@ def test_reset_rows_start_afresh_and_others_go_on(simulate, kind):
     reset(fresh, kind, None, None, 0)  # odometry begins where the UAVs have settled
     for k in range(5):
         measure(k), undisturbed(k)
-    keys = np.array([key_of(77, measure.bank.sensors[1], kind)])
+    keys = np.array([noise_key(77, kind.kind, measure.bank.sensors[1])])
     reset(measure, kind, np.array([1]), keys, 5)
     for k in range(5, 10):
         samples, expected, plain = measure(k), fresh(k - 5), undisturbed(k)

@@ -99,7 +99,7 @@ def fit_sensors(scenario: schema.Scenario, starts: Sequence[Start]) -> list[Fitt
             SensorId(row, start.name, spec.name),
             spec,
             _mount(spec),
-            _stream(scenario.seed, start.name, spec),
+            noise_key(scenario.seed, spec.kind, SensorId(row, start.name, spec.name)),
             models.load(spec) if isinstance(spec, schema.LidarSensor) else None,
         )
         for row, start in enumerate(starts)
@@ -115,14 +115,15 @@ def refit(fitted: Sequence[Fitted], seed: int, first_row: int = 0) -> list[Fitte
         replace(
             sensor,
             id=replace(sensor.id, uav=sensor.id.uav + first_row),
-            key=_stream(seed, sensor.id.uav_name, sensor.spec),
+            key=noise_key(seed, sensor.spec.kind, sensor.id),
         )
         for sensor in fitted
     ]
 
 
-def _stream(seed: int, uav: str, spec: Any) -> np.uint64:
-    return stream_key(seed, f"{uav}/{spec.kind}/{spec.name}")
+def noise_key(seed: int, kind: str, sensor: SensorId) -> np.uint64:
+    """Noise stream of a sensor in a run with `seed`; `kind` is the name of its bank."""
+    return stream_key(seed, f"{sensor.uav_name}/{kind}/{sensor.name}")
 
 
 class _LidarModels:
