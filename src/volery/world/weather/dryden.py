@@ -17,9 +17,10 @@ whose states have the variances 1 (x) and 1/2 (y, and x with y) at any p. So the
 without error by their matrix exponential and the matching covariance, start in their steady state,
 and a change of height or speed rescales the output without a transient.
 
-Held over a tick, such exact samples keep the -20 dB/decade of the spectra far beyond the tick rate
-(a staircase of independent steps has the spectrum of a random walk); a linear ramp over the tick
-would lose 2/3 of the power at half the tick rate.
+Held over a tick, such exact samples keep the -20 dB/decade of the spectra beyond the tick rate (a
+staircase of independent steps has the spectrum of a random walk): measured at ticks of 8 ms, their
+power is within 8 % of the formulas up to 150 Hz. A linear ramp over the tick would leave 42 % of it
+at 62 Hz and 6 % at 100 Hz.
 """
 
 from __future__ import annotations
