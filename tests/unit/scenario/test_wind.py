@@ -60,6 +60,10 @@ def test_all_of_it():
             },
             ["gusts[0].end_s", "at least 5 s"],
         ),
+        (
+            {"gusts": [{"amplitude_m_s": [1, 0, 0], "start_s": 0, "rise_m": 0.5}]},
+            ["gusts[0].rise_m", "greater than or equal to 1"],
+        ),
         ({"gusts": [GUST] * 65}, ["world.wind.gusts", "at most 64"]),
     ],
 )
