@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from volery.scenario.base import Data, NonNegative, Positive, Vector3
+from volery.scenario.base import Data, Positive, Vector3
 
 MAX_WIND_M_S = 60.0
 """Largest component of any wind, gust or node of a field."""
@@ -43,9 +43,9 @@ class Gust(Data):
     """A 1-cosine gust that rises, stays, and falls again; its end is when it is over."""
 
     amplitude_m_s: Vector3
-    start_s: NonNegative
+    start_s: Annotated[float, Field(ge=0.0, le=1e6)]
     rise_s: Annotated[float, Field(ge=1e-3, le=1e6)] | None = None
-    rise_m: Positive | None = None
+    rise_m: Annotated[float, Field(ge=1.0, le=1e5)] | None = None
     """Instead of rise_s: length of the rise in a front that the steady wind carries."""
     end_s: Positive | None = None
     """None: the gust stays."""

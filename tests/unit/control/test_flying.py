@@ -376,7 +376,7 @@ def test_a_uav_flies_alike_in_company():
     alone = Fleet([F450], place, [LEVEL], weather=STORM)
     alone.command_position(0, (10, 20, 60), yaw=1.0)
     alone.advance(1500, ground.grid)
-    for name in ("position_map", "velocity_map", "attitude", "rotor_speed"):
+    for name in ("position_map", "velocity_map", "attitude", "rotor_speed", "air_velocity_map"):
         np.testing.assert_array_equal(
             getattr(alone.state, name)[0], getattr(many.state, name)[0], name
         )

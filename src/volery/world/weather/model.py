@@ -72,7 +72,9 @@ class Gust:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "amplitude_map", _wind("amplitude_map", self.amplitude_map))
-        object.__setattr__(self, "front_velocity_map", _wind("front", self.front_velocity_map))
+        object.__setattr__(
+            self, "front_velocity_map", _wind("front_velocity_map", self.front_velocity_map)
+        )
         _within("start_s", self.start_s, -1e9, 1e9)
         _within("rise_s", self.rise_s, 1e-3, 1e6)
         # half a microsecond of slack for times that were added up

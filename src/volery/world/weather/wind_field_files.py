@@ -23,7 +23,7 @@ Field = tuple[Array, tuple[float, float, float], tuple[float, float, float]]
 _COLUMNS = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
 _SHAPES = {"velocity_m_s": "(Z, Y, X, 3)", "origin_m": "(3,)", "spacing_m": "(3,)"}
 _SHOWN_FAULTS = 20
-_SLACK = 1e-3
+_SLACK = 1e-2
 """Share of the spacing by which a node may stand off the grid: written coordinates are rounded."""
 
 
@@ -44,7 +44,7 @@ def read_wind_field(path: Path) -> Field:
 
 def _read_npz(path: Path) -> Field:
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             held = {name: np.asarray(archive[name], np.float64) for name in _SHAPES}
     except KeyError:
         wanted = ", ".join(f"{name} {shape}" for name, shape in _SHAPES.items())
