@@ -1,14 +1,18 @@
-"""The largest fleet that flies in real time, each UAV with two scanning LIDARs.
+"""The largest fleets that fly in real time, with scanning LIDARs and their messages.
 
 The UAVs circle slowly in free places of a forest like that of the main job (same species, 5,000
-trees in 500 m x 500 m), 3 m above ground: two 1081-beam LIDARs at 40 Hz with noise and sweep
-distortion, IMU at 200 Hz, 1 kHz physics and control, every LaserScan message built.
+trees in 500 m x 500 m), 3 m above ground; IMU at 200 Hz, 1 kHz physics and control, LIDARs with
+noise and sweep distortion, every message built. `realtime_uavs` has two planar LIDARs a UAV, 1081
+beams at 40 Hz each; in `realtime_uavs_64_rings` a scanner with 64 rings of 1024 beams at 10 Hz
+takes their place.
 """
 
 from __future__ import annotations
 
 import statistics
 import time
+from collections.abc import Callable
+from typing import Any
 
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
@@ -16,36 +20,59 @@ from volery.scenario.load import parse_scenario
 _SECONDS = 2.0
 _REPEATS = 3
 _ROWS = 10
-_FIRST_GUESS = 60
-_STEP = 5
+_PLANAR: list[dict[str, Any]] = [
+    {"kind": "lidar", "name": "horizontal", "position_m": [0.0, 0.0, 0.18]},
+    {"kind": "lidar", "name": "nodding", "position_m": [0.1, 0.0, -0.08], "nodding": {}},
+]
+_RINGS: list[dict[str, Any]] = [
+    {"kind": "lidar", "name": "top", "model": "os1_64", "position_m": [0.0, 0.0, 0.18]}
+]
 
 
 def measure() -> dict[str, float]:
     """Figures of the bench `fleet`."""
-    at_sixty = real_time_factor(_FIRST_GUESS)
-    # Wall time grows in proportion to the fleet; start there and step down to what holds.
-    uavs = max(_STEP, round(_FIRST_GUESS * at_sixty / _STEP) * _STEP + _STEP)
-    factor = real_time_factor(uavs)
-    while factor < 1.0 and uavs > _STEP:
-        uavs -= _STEP
-        factor = real_time_factor(uavs)
+    at_sixty = real_time_factor(60)
+    uavs, factor = largest(real_time_factor, first=round(60 * at_sixty), step=5)
+    rings, rings_factor = largest(lambda n: real_time_factor(n, rings=True), first=8, step=1)
     return {
         "realtime_uavs": float(uavs),
         "real_time_factor_there": factor,
         "real_time_factor_60_uavs": at_sixty,
+        "realtime_uavs_64_rings": float(rings),
+        "real_time_factor_there_64_rings": rings_factor,
     }
 
 
-def real_time_factor(uavs: int) -> float:
-    """Median real-time factor of a fleet of `uavs`."""
-    with Simulation(parse_scenario(_scenario(uavs), where="bench fleet")) as simulation:
+def largest(factor_of: Callable[[int], float], *, first: int, step: int) -> tuple[int, float]:
+    """Largest multiple of `step` whose factor is at least 1, and that factor; (0, 0) if none is.
+
+    Wall time grows about in proportion to the fleet, so each measurement points to where to look
+    next, up or down; the search ends between a fleet that holds and the next one, which does not.
+    """
+    holds, held, fails = 0, 0.0, 1 << 30
+    uavs = max(step, first // step * step)
+    while fails - holds > step:
+        factor = factor_of(uavs)
+        if factor >= 1.0:
+            holds, held = uavs, factor
+        else:
+            fails = uavs
+        aim = int(uavs * factor) // step * step
+        uavs = min(max(aim, holds + step), fails - step)
+    return holds, held
+
+
+def real_time_factor(uavs: int, *, rings: bool = False) -> float:
+    """Median real-time factor of a fleet of `uavs`, with two planar LIDARs or one of 64 rings."""
+    scenario = parse_scenario(_scenario(uavs, _RINGS if rings else _PLANAR), where="bench fleet")
+    with Simulation(scenario) as simulation:
         received = 0
 
         def count(_message: object) -> None:
             nonlocal received
             received += 1
 
-        for topic in simulation.mounts:
+        for topic in (*simulation.mounts, *simulation.cloud_mounts):
             simulation.graph.subscribe(topic, count)
         simulation.run(2.5)  # climb
         for uav in simulation.uavs.values():
@@ -57,18 +84,13 @@ def real_time_factor(uavs: int) -> float:
             before = time.perf_counter()
             simulation.run(_SECONDS)
             factors.append(_SECONDS / (time.perf_counter() - before))
-        expected = 2 * 40 * uavs * _SECONDS * _REPEATS
+        expected = (10 if rings else 2 * 40) * uavs * _SECONDS * _REPEATS
         if abs(received - expected) > 4 * uavs:
             raise AssertionError(f"{received} scans instead of {expected:.0f}")
         return statistics.median(factors)
 
 
-def _scenario(uavs: int) -> dict[str, object]:
-    sensors = [
-        {"kind": "lidar", "name": "horizontal", "position_m": [0.0, 0.0, 0.18]},
-        {"kind": "lidar", "name": "nodding", "position_m": [0.1, 0.0, -0.08], "nodding": {}},
-        {"kind": "imu"},
-    ]
+def _scenario(uavs: int, lidars: list[dict[str, Any]]) -> dict[str, object]:
     rows = min(_ROWS, uavs)
     groups = [
         {
@@ -95,7 +117,7 @@ def _scenario(uavs: int) -> dict[str, object]:
         },
         "types": {
             "surveyor": {
-                "sensors": sensors,
+                "sensors": [*lidars, {"kind": "imu"}],
                 "flight": {"take_off_altitude_m": 3.0, "command_timeout_s": 60.0},
             }
         },

@@ -48,6 +48,12 @@ def lidar_topic(sensor: SensorId, model: LidarModel, topic: str | None = None) -
     return f"/{sensor.uav_name}/{topic}"
 
 
+def cloud_points(message: Any) -> NDArray[Any]:
+    """Points of one of our own PointCloud2s, (N,) of `POINT`; a view."""
+    points: NDArray[Any] = np.asarray(message.data).view(POINT)
+    return points
+
+
 class LidarPublisher:
     """Publishes the scans of all LIDARs."""
 

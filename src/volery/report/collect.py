@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
+from volery.graph.lidar_publishing import cloud_points
 from volery.report.flight_data import (
     FlightData,
     FlightEvent,
@@ -74,12 +75,15 @@ class FlightCollector:
         for name, uav in self._uavs.items():
             graph.subscribe(f"/{name}/ground_truth/odom", self._track(uav), "nav_msgs/msg/Odometry")
         mounts: Mapping[str, Any] = simulation.mounts
+        clouds: Mapping[str, Any] = simulation.cloud_mounts
         weights = {t: NODDING_WEIGHT if m.nods else 1.0 for t, m in mounts.items()}
-        for topic, mount in mounts.items():
+        weights |= dict.fromkeys(clouds, 1.0)
+        for topic, mount in {**mounts, **clouds}.items():
             uav = self._uavs[topic.split("/")[1]]
             rate_hz = SCANS_PER_S * weights[topic] / sum(weights.values())
             receive = self._scan(uav, mount, round(NS_PER_S / rate_hz))
-            graph.subscribe(topic, receive, "sensor_msgs/msg/LaserScan")
+            kind = "PointCloud2" if topic in clouds else "LaserScan"
+            graph.subscribe(topic, receive, f"sensor_msgs/msg/{kind}")
 
     def _track(self, uav: _Uav) -> Callable[[Published], None]:
         def receive(published: Published) -> None:
@@ -194,31 +198,48 @@ class FlightCollector:
 
 
 def scan_points(scan: Any, mount: Any, poses: deque[tuple[int, Any]]) -> NDArray[np.float64] | None:
-    """Map points (n, 3) of a LaserScan, each beam cast from the pose it had; None without poses.
+    """Map points (n, 3) of a LaserScan or PointCloud2; None without poses.
 
-    Each beam is placed from the body's poses at the first and at the last beam, which come from
-    `poses` (time in ns, geometry_msgs/Pose), and the two places are interpolated.
+    Each beam is placed from the body's poses at the start and at the end of the sweep, which come
+    from `poses` (time in ns, geometry_msgs/Pose), and the two places are interpolated.
     """
     start_ns, end_ns = _stamp_ns(scan), _end_ns(scan)
     if not poses or poses[0][0] > start_ns:
         return None
+    along, fraction = _beams_of_cloud(scan) if _is_cloud(scan) else _beams_of_scan(scan)
+    ends = (_pose_at(poses, start_ns), _pose_at(poses, end_ns))
+    nod = _nodding_angles(mount, start_ns, end_ns, fraction)
+    if nod is not None:
+        # about the sensor's y axis, positive looks down
+        x, y, z = along.T
+        along = np.stack(
+            [x * np.cos(nod) + z * np.sin(nod), y, z * np.cos(nod) - x * np.sin(nod)], -1
+        )
+    in_body = along @ rotations.matrix(mount.attitude_body).T + np.asarray(mount.position_body)
+    # a sweep turns the body by a few hundredths of a radian: points may be interpolated
+    first, last = (p + in_body @ rotations.matrix(q).T for p, q in ends)
+    return np.asarray(first + fraction[:, None] * (last - first))
+
+
+def _beams_of_scan(scan: Any) -> tuple[Array, Array]:
+    """Returns of a LaserScan in the sensor frame (n, 3) and their share of the sweep's time (n,)."""
     ranges = np.asarray(scan.ranges, dtype=np.float64)
     beams = np.flatnonzero(
         (ranges >= scan.range_min) & (ranges <= min(scan.range_max, MAX_RANGE_M))
     )
-    fraction = (beams / max(len(ranges) - 1, 1))[:, None]
-    ends = (_pose_at(poses, start_ns), _pose_at(poses, end_ns))
     azimuth = scan.angle_min + scan.angle_increment * beams
     reach = ranges[beams]
     along = np.stack([reach * np.cos(azimuth), reach * np.sin(azimuth), np.zeros(len(beams))], -1)
-    nod = _nodding_angles(mount, start_ns, end_ns, fraction[:, 0])
-    if nod is not None:
-        # about the sensor's y axis, positive looks down
-        along = np.stack([along[:, 0] * np.cos(nod), along[:, 1], -along[:, 0] * np.sin(nod)], -1)
-    in_body = along @ rotations.matrix(mount.attitude_body).T + np.asarray(mount.position_body)
-    # a sweep turns the body by a few hundredths of a radian: points may be interpolated
-    first, last = (p + in_body @ rotations.matrix(q).T for p, q in ends)
-    return np.asarray(first + fraction * (last - first))
+    return along, beams / max(len(ranges) - 1, 1)
+
+
+def _beams_of_cloud(cloud: Any) -> tuple[Array, Array]:
+    """Points of a PointCloud2 in the sensor frame (n, 3) and their share of the sweep's time (n,)."""
+    points = cloud_points(cloud)
+    along = np.stack([points[name].astype(np.float64) for name in ("x", "y", "z")], -1)
+    near = np.linalg.norm(along, axis=1) <= MAX_RANGE_M
+    time = points["time"].astype(np.float64)
+    return along[near], time[near] / max(time.max(initial=0.0), 1e-9)
 
 
 def _nodding_angles(mount: Any, start_ns: int, end_ns: int, fraction: Array) -> Array | None:
@@ -254,8 +275,15 @@ def _stamp_ns(message: Any) -> int:
 
 
 def _end_ns(scan: Any) -> int:
-    sweep_s = float((len(scan.ranges) - 1) * scan.time_increment)
+    if _is_cloud(scan):
+        sweep_s = float(cloud_points(scan)["time"].max(initial=0.0))
+    else:
+        sweep_s = float((len(scan.ranges) - 1) * scan.time_increment)
     return _stamp_ns(scan) + round(sweep_s * NS_PER_S)
+
+
+def _is_cloud(message: Any) -> bool:
+    return hasattr(message, "point_step")
 
 
 def _event(event: Any) -> FlightEvent:

@@ -29,6 +29,7 @@ class FakeSimulation:
         self.graph = Graph(lambda: self.time_ns)
         self.uav_names = tuple(f"uav{k + 1}" for k in range(scenario.uav_count))
         self.mounts = {SCAN: make_mount((0.0, 0.0, 0.1))}
+        self.cloud_mounts = {}
         self.terrain = Terrain.flat(100.0, 0.0, (-50.0, -50.0))
         self.forest = None
         self.events: list[Event] = []
