@@ -33,8 +33,8 @@ DEFAULT_RETURN_HEIGHT_M = 10.0
 class FleetCommands:
     """What UAVs can be told; `Fleet` adds time and state.
 
-    airframes, plants, names: one a UAV. uavs: (N,) rows of `step.UAV`. dt: physics step, s. A command acts
-    from the next step; one that is refused changes nothing.
+    airframes, plants, names: one a UAV. uavs: (N,) rows of `step.UAV`. dt: physics step, s. A
+    command acts from the next step; one that is refused changes nothing.
     """
 
     def __init__(

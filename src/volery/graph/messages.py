@@ -37,6 +37,8 @@ Range = _ros2.sensor_msgs__msg__Range
 Header = _ros2.std_msgs__msg__Header
 String = _ros2.std_msgs__msg__String
 TFMessage = _ros2.tf2_msgs__msg__TFMessage
+MultiDOFJointTrajectory = _ros2.trajectory_msgs__msg__MultiDOFJointTrajectory
+MultiDOFJointTrajectoryPoint = _ros2.trajectory_msgs__msg__MultiDOFJointTrajectoryPoint
 
 _DEFINITIONS = Path(__file__).parent / "definitions"
 _SERVICES = {"Trigger.srv": "std_srvs/srv/Trigger"}

@@ -26,6 +26,7 @@ from volery.runtime.command_door import open_commands
 from volery.runtime.digest import Digest
 from volery.runtime.node_loading import start_node
 from volery.runtime.placement import Start, place_uavs
+from volery.runtime.plant_building import plant_of_type
 from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
@@ -312,6 +313,7 @@ def _make_fleet(scenario: Scenario, starts: tuple[Start, ...]) -> Fleet:
         dt_ns=1_000_000_000 // scenario.physics.rate_hz,
         on_contact=scenario.physics.on_contact,
         names=[start.name for start in starts],
+        plants=[plant_of_type(scenario, start.type_name, start.airframe) for start in starts],
         mode=[FlightMode.LANDED if start.on_ground else FlightMode.HOLD for start in starts],
     )
 
