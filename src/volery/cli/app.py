@@ -136,6 +136,19 @@ def bench(
 
 @app.command()
 @guarded
+def identify(
+    airframe: Annotated[str, typer.Argument(help="A shipped airframe, or a TOML file.")],
+    out: Annotated[Path, typer.Option(help="The data file to write.")],
+    order: Annotated[int, typer.Option(min=1, max=2, help="Of the roll and pitch loops.")] = 2,
+) -> None:
+    """Fit the identified plant to an airframe's rigid body and write it as a data file."""
+    from volery.cli.identifying import identify_and_write
+
+    identify_and_write(airframe, out, order)
+
+
+@app.command()
+@guarded
 def doctor() -> None:
     """Check this machine and installation; each line is ok or says how to mend it."""
     from volery.cli.doctor import examine

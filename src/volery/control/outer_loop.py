@@ -5,7 +5,9 @@ do, it is the same law without its share of the position. What the airframe's ro
 speed is fed forward with the acceleration (M. Faessler et al., arXiv 1712.02402). Height has
 priority: where thrust or tilt are at their limits the horizontal acceleration gives way. Integrals
 are accelerations that answer what pushes steadily: they stop where they would push further into a
-limit, are bounded, and pass from one law to the other as they are.
+limit, are bounded, and pass from one law to the other as they are. Farther than its leash from the
+reference's place a vehicle shall come back at a steady speed: there the integrals learn from what
+is missing to that speed, since the distance would wind them up.
 """
 
 from __future__ import annotations
@@ -16,6 +18,9 @@ from typing import Any
 from volery.vehicle.airframe import GRAVITY
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.rigid import four, three
+
+_FAR = 0.999
+"""Share of the leash from which a reference counts as at its end."""
 
 
 @inner_kernel
@@ -37,19 +42,25 @@ def track(
     ex, ey, ez = _velocity_error(pilot, estimate)
     ix, iy, iz = three(pilot.velocity_integral)
     if level_placed:
-        ax, ay = fx + gains.level_velocity * ex + ix, fy + gains.level_velocity * ey + iy
-        ex, ey = _level_error(pilot, estimate, gains)
-        ax += gains.level_position * ex
-        ay += gains.level_position * ey
+        fx += gains.level_velocity * ex + ix
+        fy += gains.level_velocity * ey + iy
+        vx, vy = ex, ey
+        ex, ey, far = _level_error(pilot, estimate, gains)
+        ax, ay = fx + gains.level_position * ex, fy + gains.level_position * ey
+        if far:
+            share = gains.level_velocity / gains.level_position
+            ex += share * vx
+            ey += share * vy
         level_learning = gains.level_integral
     else:
         ax, ay = fx + gains.velocity * ex + ix, fy + gains.velocity * ey + iy
         level_learning = gains.velocity_integral
     if height_placed:
-        az = fz + gains.height_velocity * ez + iz + GRAVITY
-        ez = pilot.position[2] - estimate.position_map[2]
-        ez = min(max(ez, -gains.height_leash), gains.height_leash)
-        az += gains.height_position * ez
+        vz = ez
+        ez, far = _height_error(pilot, estimate, gains)
+        az = fz + gains.height_velocity * vz + gains.height_position * ez + iz + GRAVITY
+        if far:
+            ez += gains.height_velocity / gains.height_position * vz
         learning = gains.height_integral
     else:
         az = fz + gains.vertical * ez + iz + GRAVITY
@@ -85,13 +96,21 @@ def _velocity_error(pilot: Any, estimate: Any) -> tuple[float, float, float]:
 
 
 @inner_kernel
-def _level_error(pilot: Any, estimate: Any, gains: Any) -> tuple[float, float]:
-    """Way (m) to the reference's place; farther than the leash it counts as that."""
+def _level_error(pilot: Any, estimate: Any, gains: Any) -> tuple[float, float, bool]:
+    """Way (m) to the reference's place, no longer than the leash; whether it is at its end."""
     ex = pilot.position[0] - estimate.position_map[0]
     ey = pilot.position[1] - estimate.position_map[1]
     size = math.sqrt(ex * ex + ey * ey)
     share = gains.level_leash / size if size > gains.level_leash else 1.0
-    return share * ex, share * ey
+    return share * ex, share * ey, size > _FAR * gains.level_leash
+
+
+@inner_kernel
+def _height_error(pilot: Any, estimate: Any, gains: Any) -> tuple[float, bool]:
+    """Like `_level_error`, upwards."""
+    ez = pilot.position[2] - estimate.position_map[2]
+    limit = gains.height_leash
+    return min(max(ez, -limit), limit), abs(ez) > _FAR * limit
 
 
 @inner_kernel

@@ -47,6 +47,8 @@ Temperature = _ros2.sensor_msgs__msg__Temperature
 Header = _ros2.std_msgs__msg__Header
 String = _ros2.std_msgs__msg__String
 TFMessage = _ros2.tf2_msgs__msg__TFMessage
+MultiDOFJointTrajectory = _ros2.trajectory_msgs__msg__MultiDOFJointTrajectory
+MultiDOFJointTrajectoryPoint = _ros2.trajectory_msgs__msg__MultiDOFJointTrajectoryPoint
 
 _DEFINITIONS = Path(__file__).parent / "definitions"
 _SERVICES = {"Trigger.srv": "std_srvs/srv/Trigger"}

@@ -10,6 +10,7 @@ from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.core.errors import DataFileError
 from volery.runtime.placement import Start, place_uavs
+from volery.runtime.plant_building import plant_of_type
 from volery.runtime.worlds import build_weather
 from volery.scenario.schema import Scenario
 from volery.vehicle.airframe import Airframe, load_airframe
@@ -45,6 +46,9 @@ def build_fleet(
         on_contact=scenario.physics.on_contact,
         names=names,
         mode=[FlightMode.LANDED if start.on_ground else FlightMode.HOLD for start in starts],
+        plants=[plant_of_type(scenario, start.type_name, start.airframe) for start in starts],
+        wear=[scenario.types[start.type_name].wear for start in starts],
+        battery_charge=[scenario.types[start.type_name].battery_charge for start in starts],
         weather=build_weather(scenario),
         seed=scenario.seed,
         copies=np.repeat(np.arange(copies), len(starts) // copies),

@@ -8,18 +8,20 @@ from typing import Any
 from volery.control.flight_modes import FlightMode
 from volery.core.errors import CommandError
 from volery.graph.graph import Graph
-from volery.graph.messages import Published, Twist, message_type
+from volery.graph.messages import MultiDOFJointTrajectory, Published, Twist, message_type
+from volery.runtime.trajectory_messages import follow_message
 from volery.runtime.uav import Uav
 
 _TRIGGER = "std_srvs/srv/Trigger"
 
 
 def open_commands(graph: Graph, uav: Uav) -> None:
-    """Listen to `/uavN/cmd_vel` and offer take_off, hold, land and return_home for one UAV.
+    """Listen to `/uavN/cmd_vel` and `/uavN/trajectory`, offer the services of one UAV.
 
-    A Twist is taken in the level heading frame. During take-off and on the ground it is ignored,
-    and so is one that is no velocity: a refused command on a topic has nobody to tell. Services
-    answer with `success` and a reason.
+    A Twist is taken in the level heading frame, a trajectory as `follow_message` says. During
+    take-off and on the ground they are ignored, and so are those that are none: a refused command
+    on a topic has nobody to tell. The services take_off, hold, land and return_home answer with
+    `success` and a reason.
     """
     response_type = message_type(f"{_TRIGGER}_Response")
 
@@ -29,6 +31,14 @@ def open_commands(graph: Graph, uav: Uav) -> None:
         linear, angular = published.message.linear, published.message.angular
         try:
             uav.command_velocity([linear.x, linear.y, linear.z], angular.z)
+        except (CommandError, AttributeError):
+            return
+
+    def on_trajectory(published: Published) -> None:
+        if uav.mode is FlightMode.TAKE_OFF:
+            return
+        try:
+            follow_message(uav, published.message)
         except (CommandError, AttributeError):
             return
 
@@ -43,6 +53,7 @@ def open_commands(graph: Graph, uav: Uav) -> None:
         return handle
 
     graph.subscribe(f"/{uav.name}/cmd_vel", on_twist, Twist)
+    graph.subscribe(f"/{uav.name}/trajectory", on_trajectory, MultiDOFJointTrajectory)
     actions: dict[str, Callable[[], None]] = {
         "take_off": uav.take_off,
         "hold": uav.hold,

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
+from volery.control.trajectory import Trajectory
 from volery.scenario.schema import Flight
 
 Array = NDArray[np.float64]
@@ -74,6 +75,10 @@ class Uav:
         """Fly to `position_map` (3,) m and hold there; `yaw` in rad, None keeps the heading."""
         self._fleet.command_position(self._row, position_map, yaw)
 
+    def follow(self, trajectory: Trajectory) -> None:
+        """Fly along `trajectory`, whose times count from now, then hold at its end."""
+        self._fleet.command_trajectory(self._row, trajectory)
+
     def land(self) -> None:
         """Descend here and stop the rotors on the ground."""
         self._fleet.land(self._row)
@@ -94,6 +99,33 @@ class Uav:
     def command_velocity_map(self, velocity: ArrayLike, yaw_rate: float = 0.0) -> None:
         """Fly at `velocity` (3,) m/s in the map, turning at `yaw_rate` rad/s."""
         self._fleet.command_velocity_map(self._row, velocity, yaw_rate)
+
+    def command_setpoint(
+        self,
+        position_map: ArrayLike,
+        velocity_map: ArrayLike = (0.0, 0.0, 0.0),
+        acceleration_map: ArrayLike = (0.0, 0.0, 0.0),
+        yaw: float | None = None,
+        yaw_rate: float = 0.0,
+    ) -> None:
+        """Be at a place now, with this velocity and acceleration: a point of a trajectory.
+
+        (3,) m, m/s, m/s^2; rad, None keeps the heading; rad/s. Moves on by itself until the next
+        one, or holds after the scenario's `command_timeout_s`.
+        """
+        self._fleet.command_setpoint(
+            self._row, position_map, velocity_map, acceleration_map, yaw, yaw_rate
+        )
+
+    def command_pose(
+        self,
+        position_map: ArrayLike,
+        attitude: ArrayLike,
+        velocity_map: ArrayLike = (0.0, 0.0, 0.0),
+        omega_body: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Stand at a pose (m; x y z w, map from body) with the next step; kinematic UAVs only."""
+        self._fleet.command_pose(self._row, position_map, attitude, velocity_map, omega_body)
 
     def command_attitude(self, attitude: ArrayLike, thrust: float) -> None:
         """Hold `attitude` (4,) with `thrust` N along the body's z axis."""

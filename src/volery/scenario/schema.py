@@ -186,6 +186,7 @@ _TAKEN_NAMES = (
     "odom",
     "return_home",
     "take_off",
+    "trajectory",
 )
 """Frames, topics and services of a UAV that no sensor may take."""
 
@@ -221,10 +222,24 @@ class RotorWear(Data):
     """Of the times in which it speeds up and slows down."""
 
 
+class KinematicMotion(Data):
+    """How a kinematic UAV answers velocity commands."""
+
+    time_constant_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    """First-order lag of velocity and yaw rate; 0: at once."""
+    limited: bool = False
+    """Whether the airframe's limits of speed, climb, descent and yaw rate bind it."""
+
+
 class UavType(Data):
     """What a UAV is made of and what runs on it."""
 
     airframe: str = "f450"
+    plant: Literal["rigid_body", "identified", "kinematic"] = "rigid_body"
+    """What turns commands into motion; the airframe gives size and limits to all of them."""
+    identified_model: str | None = None
+    """Model of an identified plant: a shipped name or a .toml path; None: the airframe's name."""
+    kinematic: KinematicMotion = KinematicMotion()
     wear: tuple[RotorWear, ...] = ()
     """One a rotor, in the order of the airframe; none: all are new."""
     battery_charge: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
@@ -232,6 +247,14 @@ class UavType(Data):
     flight: Flight = Flight()
     sensors: tuple[Sensor, ...] = ()
     nodes: tuple[NodeEntry, ...] = ()
+
+    @model_validator(mode="after")
+    def _settings_are_of_the_plant(self) -> Self:
+        if self.identified_model is not None and self.plant != "identified":
+            raise ValueError(f"identified_model needs plant = \"identified\", not '{self.plant}'")
+        if self.kinematic != KinematicMotion() and self.plant != "kinematic":
+            raise ValueError(f"[kinematic] needs plant = \"kinematic\", not '{self.plant}'")
+        return self
 
     @model_validator(mode="after")
     def _sensor_names_are_unique(self) -> Self:

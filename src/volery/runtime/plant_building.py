@@ -1,0 +1,24 @@
+"""The plant of each type of UAV."""
+
+from __future__ import annotations
+
+from volery.core.errors import DataFileError
+from volery.scenario.schema import Scenario
+from volery.vehicle.airframe import Airframe
+from volery.vehicle.identified import load_identified
+from volery.vehicle.kinematic import Kinematic
+from volery.vehicle.plants import Plant, RigidBody
+
+
+def plant_of_type(scenario: Scenario, type_name: str, airframe: Airframe) -> Plant:
+    """Plant of the UAVs of a type; `DataFileError` where its model is missing or broken."""
+    kind = scenario.types[type_name]
+    if kind.plant == "rigid_body":
+        return RigidBody()
+    if kind.plant == "kinematic":
+        return Kinematic(kind.kinematic.time_constant_s, kind.kinematic.limited)
+    try:
+        return load_identified(kind.identified_model or airframe.name, scenario.folder)
+    except DataFileError as error:
+        key = f"{scenario.name}: types.{type_name}.identified_model"
+        raise DataFileError(f"{key}: {error}") from None
