@@ -52,7 +52,7 @@ KINDS = [
     Kind("barometer", ("pressure", "pressure/temperature"), 50.0, "Barometer", "barometer_px4"),
     Kind("magnetometer", ("mag",), 100.0, "Magnetometer", "magnetometer_px4"),
     Kind("lidar", ("laser/horizontal/scan",), 40.0, "Hokuyo", "utm_30lx", 18_750_000, True,
-         keeps_state=False, entry=LEANT),
+         entry=LEANT),
 ]  # fmt: skip
 
 every_kind = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.kind)
