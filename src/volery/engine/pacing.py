@@ -1,48 +1,155 @@
-"""Simulated time against wall time: real time, any factor, or as fast as possible."""
+"""Simulated time against wall time: paused, single steps, real time, any factor, or at full speed.
+
+The thread that runs a simulation asks its `Pacer` how many steps to make and lets itself be held
+back by it; any thread may pause it, let it go on or change its speed meanwhile. What a run computes
+depends on none of that.
+"""
 
 from __future__ import annotations
 
+import threading
 import time
 
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
 
 _SLICE_S = 0.005
-_LONGEST_SLEEP_S = 0.05
+_FULL_SPEED_SLICE = 100
+"""Steps between two looks at what other threads want, at full speed or one step after another."""
+_LONGEST_WAIT_S = 0.05
+_SLACK_S = 0.25
+"""A run that falls behind by more does not rush afterwards to catch up."""
 
 
 class Pacer:
-    """Holds a run at `speed` times real time; None lets it run as fast as it can.
+    """How fast a simulation runs. All but `begin`, `next_steps` and `wait` may be called anywhere.
 
-    A run that falls behind does not rush afterwards to catch up more than `_SLACK_S`.
+    Starts unpaused and at full speed.
     """
 
-    _SLACK_S = 0.25
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._woken = False
+        self._paused = False
+        self._speed: float | None = None
+        self._steps = 0  # single ones asked for and not made yet
+        self._reached_ns = 0
+        self._wall_start = 0.0  # `_sim_start_ns` was, or is, due at this wall time
+        self._sim_start_ns = 0
+        self._paused_s = 0.0
 
-    def __init__(self, speed: float | None, start_ns: int) -> None:
+    # ------------------------------------------------------------------------------- any thread
+
+    @property
+    def paused(self) -> bool:
+        """Whether the run is held where it is."""
+        return self._paused
+
+    @property
+    def speed(self) -> float | None:
+        """Factor of real time, None for as fast as possible."""
+        return self._speed
+
+    @property
+    def paused_s(self) -> float:
+        """Wall seconds that runs have been paused in all."""
+        return self._paused_s
+
+    def pause(self) -> None:
+        """Hold the run after the slice in progress; nothing where it is paused already."""
+        with self._changed:
+            self._paused = True
+            self._changed.notify()
+
+    def resume(self) -> None:
+        """Go on at the speed from before the pause; what was missed is not caught up."""
+        with self._changed:
+            self._paused = False
+            self._steps = 0
+            self._restart()
+
+    def set_speed(self, speed: float | None) -> None:
+        """Run at `speed` times real time from here on, None for as fast as possible."""
         if speed is not None and not 0.0 < speed < 1e6:
             raise CommandError(f"speed must be a positive factor of real time, not {speed}")
-        self._speed = speed
-        self._wall_start = time.perf_counter()
-        self._sim_start_ns = start_ns
+        with self._changed:
+            if speed != self._speed:
+                self._speed = speed
+                self._restart()
 
-    def slice_ns(self) -> int | None:
-        """Longest piece to simulate at once, None for no limit."""
-        if self._speed is None:
-            return None
-        return max(1, round(_SLICE_S * self._speed * NS_PER_S))
+    def single_steps(self, steps: int) -> None:
+        """Let a paused run make that many physics steps more and wait again."""
+        if steps < 1:
+            raise CommandError(f"a single step is at least 1 step, not {steps}")
+        with self._changed:
+            if not self._paused:
+                raise CommandError("single steps are made while paused; call pause() first")
+            self._steps += steps
+            self._changed.notify()
+
+    def wake(self) -> None:
+        """End the present `wait`: there is something to do for the thread that runs."""
+        with self._changed:
+            self._woken = True
+            self._changed.notify()
+
+    # ------------------------------------------------------------------- the thread that runs
+
+    def begin(self, speed: float | None, time_ns: int) -> None:
+        """Start a run at simulated `time_ns`; a pause stays one."""
+        self.set_speed(speed)
+        with self._changed:
+            self._reached_ns = time_ns
+            self._restart()
+
+    def next_steps(self, dt_ns: int) -> int:
+        """Physics steps of `dt_ns` to make before the next `wait`; 0 while paused."""
+        with self._changed:
+            if self._paused:
+                steps = min(self._steps, _FULL_SPEED_SLICE)
+                self._steps -= steps
+                return steps
+            if self._speed is None:
+                return _FULL_SPEED_SLICE
+            return max(1, round(_SLICE_S * self._speed * NS_PER_S) // dt_ns)
 
     def wait(self, time_ns: int) -> bool:
-        """Sleep towards the wall time of `time_ns`, at most a moment; whether more is to be waited.
+        """Hold the run at simulated `time_ns`, at most a moment; whether it must be held further.
 
-        The moments let a caller tell its progress, and a user stop, in very slow runs.
+        The moments let the caller tell its progress, do what was posted, and a user stop.
         """
-        if self._speed is None:
-            return False
-        due = self._wall_start + (time_ns - self._sim_start_ns) / NS_PER_S / self._speed
-        ahead = due - time.perf_counter()
-        if ahead > 0.0:
-            time.sleep(min(ahead, _LONGEST_SLEEP_S))
-        elif ahead < -self._SLACK_S:
-            self._wall_start -= ahead + self._SLACK_S
-        return ahead > _LONGEST_SLEEP_S
+        with self._changed:
+            self._reached_ns = time_ns
+            if not self._woken:
+                self._wait_a_moment()
+            self._woken = False
+            return self._must_wait()
+
+    def _must_wait(self) -> bool:
+        if self._paused:
+            return self._steps == 0
+        return self._speed is not None and self._ahead_s(self._speed) > 0.0
+
+    def _wait_a_moment(self) -> None:
+        if self._paused:
+            if self._steps == 0:
+                before = time.perf_counter()
+                self._changed.wait(_LONGEST_WAIT_S)
+                self._paused_s += time.perf_counter() - before
+        elif self._speed is not None:
+            ahead = self._ahead_s(self._speed)
+            if ahead > 0.0:
+                self._changed.wait(min(ahead, _LONGEST_WAIT_S))
+            elif ahead < -_SLACK_S:
+                self._wall_start -= ahead + _SLACK_S
+
+    def _ahead_s(self, speed: float) -> float:
+        """Wall seconds until the simulated time that has been reached is due."""
+        due = self._wall_start + (self._reached_ns - self._sim_start_ns) / NS_PER_S / speed
+        return due - time.perf_counter()
+
+    def _restart(self) -> None:
+        """Count due times from here and now."""
+        self._wall_start = time.perf_counter()
+        self._sim_start_ns = self._reached_ns
+        self._changed.notify()

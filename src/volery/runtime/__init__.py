@@ -6,7 +6,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from volery.runtime.simulation import Progress, Simulation
+    from volery.runtime.progress import Progress
+    from volery.runtime.simulation import Simulation
 
 __all__ = ["Progress", "Simulation"]
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -28,6 +26,7 @@ from volery.runtime.command_door import open_commands
 from volery.runtime.digest import Digest
 from volery.runtime.node_loading import start_node
 from volery.runtime.placement import Start
+from volery.runtime.progress import Progress, ProgressTeller
 from volery.runtime.sensor_building import RESULT_OF, Fitted, build_banks, fit_sensors, refit
 from volery.runtime.snapshot import (
     Snapshot,
@@ -49,21 +48,6 @@ from volery.world.weather import Weather
 
 _CLOCK_PERIOD_S = 0.01
 _DIGEST_PERIOD_S = 0.01
-_PROGRESS_PERIOD_S = 0.1
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a run has come."""
-
-    time_s: float
-    duration_s: float
-    wall_s: float
-
-    @property
-    def real_time_factor(self) -> float:
-        """Simulated over wall time of this run."""
-        return self.time_s / self.wall_s if self.wall_s > 0.0 else 0.0
 
 
 class Simulation:
@@ -83,6 +67,7 @@ class Simulation:
         self.scene = Scene(self.terrain, self.forest, threads=threads)
         self._closed = False
         self._owed_ns = 0
+        self._pacer = Pacer()
         self._digest: Digest | None = None
         self._events: list[Event] = []
 
@@ -153,34 +138,71 @@ class Simulation:
     ) -> None:
         """Advance by `seconds`, or to the scenario's end.
 
-        `speed` is a factor of real time, None runs as fast as possible. `on_progress` is called
-        about ten times a second of wall time. Parts of a physics step are owed to the next call, so
-        that many short runs come as far as a long one.
+        `speed` is a factor of real time, None runs as fast as possible; `pause`, `single_step` and
+        `set_speed` change that from another thread or from `on_progress`, which is called about ten
+        times a second of wall time, also while paused. Parts of a physics step are owed to the next
+        call, so that many short runs come as far as a long one.
         """
         self._check_open()
         if seconds is not None and not (math.isfinite(seconds) and seconds >= 0.0):
             raise CommandError(f"seconds must be finite and not negative, not {seconds}")
         left = self.scenario.duration_s - self.time_s if seconds is None else seconds
-        start_s, start_ns = self.time_s, self.time_ns
+        start_s = self.time_s
         end_step = self._fleet.step + self._whole_steps(left, seconds is None)
         until = self._has_ended if seconds is None else None
-        pacer = Pacer(speed, start_ns)
-        slice_steps = _slice_steps(pacer.slice_ns(), self._fleet.dt_ns)
-        wall_start = time.perf_counter()
-        told = wall_start
-        while self._fleet.step < end_step:
-            self._engine.advance_to(min(end_step, self._fleet.step + slice_steps), until=until)
-            ended = until is not None and until()
-            last = ended or self._fleet.step >= end_step
-            waiting = True
-            while waiting:
-                waiting = pacer.wait(self.time_ns)
-                now = time.perf_counter()
-                if on_progress is not None and (now - told >= _PROGRESS_PERIOD_S or last):
-                    told = now
-                    on_progress(Progress(self.time_s - start_s, left, now - wall_start))
-            if ended:
-                break
+        pacer = self._pacer
+        pacer.begin(speed, self.time_ns)
+        teller = ProgressTeller(on_progress, left, pacer)
+        over = self._fleet.step >= end_step
+        while not over:
+            steps = pacer.next_steps(self._fleet.dt_ns)
+            if steps:
+                self._engine.advance_to(min(end_step, self._fleet.step + steps), until=until)
+            over = self._fleet.step >= end_step or (until is not None and until())
+            while pacer.wait(self.time_ns) and not (over and pacer.paused):
+                # What nodes answer is delivered with the next tick, as it would be without a wait.
+                self._engine.inbox.work_off()
+                teller.tell(self.time_s - start_s)
+            teller.tell(self.time_s - start_s, last=over)
+
+    # The seven below may be called by any thread, while the simulation runs or not.
+
+    @property
+    def paused(self) -> bool:
+        """Whether a run is held, or would be held where it starts."""
+        return self._pacer.paused
+
+    @property
+    def paused_s(self) -> float:
+        """Wall seconds that runs have been paused in all."""
+        return self._pacer.paused_s
+
+    @property
+    def speed(self) -> float | None:
+        """Factor of real time of the present or last run, None for as fast as possible."""
+        return self._pacer.speed
+
+    def pause(self) -> None:
+        """Hold the run between two ticks, and later ones at their start, until `resume`.
+
+        `post`ed actions are still done; results do not depend on pauses.
+        """
+        self._pacer.pause()
+
+    def resume(self) -> None:
+        """Go on after a pause, without catching up what was missed."""
+        self._pacer.resume()
+
+    def set_speed(self, speed: float | None) -> None:
+        """Change the present run's factor of real time; None goes as fast as possible."""
+        self._pacer.set_speed(speed)
+
+    def single_step(self, steps: int = 1) -> None:
+        """Let a paused run advance by physics steps and wait again; `CommandError` if not paused.
+
+        Returns at once: the thread that runs makes the steps. Where none does, use `step`.
+        """
+        self._pacer.single_steps(steps)
 
     @property
     def weather(self) -> Weather:
@@ -198,12 +220,14 @@ class Simulation:
         self._engine.gust_now(amplitude_map, rise_s, lasts_s)
 
     def post(self, action: Callable[[], Any]) -> Future[Any]:
-        """Have `action()` called by the simulation's thread before its next tick.
+        """Have `action()` called by the simulation's thread before its next tick, or while paused.
 
-        The only call that other threads may make while the simulation runs; the future holds the
-        action's result or error.
+        The only way for other threads to touch what is simulated; the future holds the action's
+        result or error.
         """
-        return self._engine.inbox.post(action)
+        future = self._engine.inbox.post(action)
+        self._pacer.wake()
+        return future
 
     def inject(self, fault: Fault | Mapping[str, Any]) -> None:
         """Let something go wrong: a fault as in a scenario's `faults`, at once if its time is past.
@@ -435,8 +459,3 @@ def _lidar_mounts(fitted: list[Fitted], *, planar: bool) -> Mapping[str, Mount]:
             if sensor.lidar is not None and isinstance(sensor.lidar.scan, PlanarScan) == planar
         }
     )
-
-
-def _slice_steps(slice_ns: int | None, dt_ns: int) -> int:
-    """Physics steps between two looks at the wall clock."""
-    return 100 if slice_ns is None else max(1, slice_ns // dt_ns)

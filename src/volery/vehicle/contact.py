@@ -10,7 +10,7 @@ is lifted gently. Impulses need no stiffness to be tuned: 27 g and 20 kg rest al
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,17 @@ from volery.vehicle.rigid import matrix_of, three
 from volery.world.terrain import Terrain, TerrainGrid, terrain_height, terrain_normal
 
 Array = NDArray[np.float64]
+Three: TypeAlias = tuple[float, float, float]
+Six: TypeAlias = tuple[float, float, float, float, float, float]
+"""Velocity (m/s) and rates (rad/s) in the body frame."""
+Nine: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
+"""Rotation matrix, map from body, row by row."""
 
-SCRATCH_SHAPE = (MAX_CONTACTS, 12)
+# A row of the scratch memory is one contact, in the body frame: the point (m), the ground's normal,
+# the mass that an impulse along it moves (kg), the speed along it that is wanted (m/s), the
+# impulses so far along it and across it (N s).
+_POINT, _NORMAL, _MASS, _WANTED, _PUSH, _GRIP, _ROW = 0, 3, 6, 7, 8, 9, 12
+SCRATCH_SHAPE = (MAX_CONTACTS, _ROW)
 SWEEPS = 24
 """At most; sweeps end when no velocity changes by more than `_SETTLED`."""
 _SETTLED = 1e-7
@@ -35,6 +44,8 @@ _LIFT_SPEED = 1.0
 """m/s at which a sunken point is lifted at most."""
 _TOUCHING = 2e-3
 """m within which a point counts as touching."""
+_NO_SLIDE = 1e-12
+"""m/s below which a point does not slide."""
 _REBOUND_SPEED = 0.5
 """m/s of approach below which nothing rebounds."""
 _COS_UPRIGHT = 0.5
@@ -69,7 +80,7 @@ def standing_pose(airframe: Airframe, terrain: Terrain, x: float, y: float, yaw:
 
 
 @inner_kernel
-def resolve_contact(  # noqa: PLR0915
+def resolve_contact(
     body: Any, plant: Any, grid: TerrainGrid, bounce: bool, scratch: Array, dt: float
 ) -> float:
     """Change the body's velocity and rates so that nothing goes below the ground.
@@ -78,25 +89,48 @@ def resolve_contact(  # noqa: PLR0915
     scratch: `SCRATCH_SHAPE`. Returns the greatest speed of approach (m/s, along the normal), or -1
     where nothing touches.
     """
-    r00, r01, r02, r10, r11, r12, r20, r21, r22 = matrix_of(
-        body.attitude[0], body.attitude[1], body.attitude[2], body.attitude[3]
-    )
+    turn = matrix_of(body.attitude[0], body.attitude[1], body.attitude[2], body.attitude[3])
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = turn
     vx, vy, vz = three(body.velocity_map)
     ux = r00 * vx + r10 * vy + r20 * vz
     uy = r01 * vx + r11 * vy + r21 * vz
     uz = r02 * vx + r12 * vy + r22 * vz
     ox, oy, oz = three(body.omega_body)
-    light = plant.inverse_mass
-    jx, jy, jz = three(plant.inverse_inertia)
+    motion = ux, uy, uz, ox, oy, oz
 
+    active, approach = _list_contacts(body, plant, grid, turn, motion, bounce, scratch, dt)
+    if active == 0:
+        return approach
+    ux, uy, uz, ox, oy, oz = _settled(plant, scratch, active, motion)
+
+    body.velocity_map[0] = r00 * ux + r01 * uy + r02 * uz
+    body.velocity_map[1] = r10 * ux + r11 * uy + r12 * uz
+    body.velocity_map[2] = r20 * ux + r21 * uy + r22 * uz
+    body.omega_body[0], body.omega_body[1], body.omega_body[2] = ox, oy, oz
+    return approach
+
+
+@inner_kernel
+def _list_contacts(
+    body: Any,
+    plant: Any,
+    grid: TerrainGrid,
+    turn: Nine,
+    motion: Six,
+    bounce: bool,
+    scratch: Array,
+    dt: float,
+) -> tuple[int, float]:
+    """Write the points that touch, or would within the step, into `scratch`.
+
+    Returns their number and the greatest speed of approach, m/s, -1 where there are none.
+    """
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = turn
+    ux, uy, uz, ox, oy, oz = motion
     active = 0
     approach = -1.0
     for k in range(plant.contacts):
-        px, py, pz = (
-            plant.contact_point[k, 0],
-            plant.contact_point[k, 1],
-            plant.contact_point[k, 2],
-        )
+        px, py, pz = three(plant.contact_point[k])
         x = body.position_map[0] + r00 * px + r01 * py + r02 * pz
         y = body.position_map[1] + r10 * px + r11 * py + r12 * pz
         z = body.position_map[2] + r20 * px + r21 * py + r22 * pz
@@ -110,75 +144,116 @@ def resolve_contact(  # noqa: PLR0915
         if gap > _TOUCHING and gap > closing * dt:
             continue
         approach = max(approach, closing, 0.0)
-        wanted = -gap / dt
-        if gap < 0.0:
-            wanted = min(max(-gap - _SLOP, 0.0) * _LIFT_SHARE / dt, _LIFT_SPEED)
-        if closing > _REBOUND_SPEED and (bounce or body.crashed):
-            wanted = max(wanted, plant.restitution * closing)
         row = scratch[active]
-        row[0], row[1], row[2] = px, py, pz
-        row[3], row[4], row[5] = bx, by, bz
-        row[6] = 1.0 / (light + wx * wx * jx + wy * wy * jy + wz * wz * jz)
-        row[7] = wanted
-        row[8] = 0.0
-        row[9] = row[10] = row[11] = 0.0
+        row[_POINT], row[_POINT + 1], row[_POINT + 2] = px, py, pz
+        row[_NORMAL], row[_NORMAL + 1], row[_NORMAL + 2] = bx, by, bz
+        row[_MASS] = 1.0 / _ease(plant, wx, wy, wz)
+        row[_WANTED] = _wanted_speed(plant, gap, closing, bounce or body.crashed, dt)
+        row[_PUSH] = 0.0
+        row[_GRIP] = row[_GRIP + 1] = row[_GRIP + 2] = 0.0
         active += 1
-    if active == 0:
-        return -1.0
+    return active, approach
 
+
+@inner_kernel
+def _wanted_speed(plant: Any, gap: float, closing: float, rebounds: bool, dt: float) -> float:
+    """Speed along the normal, m/s, that a point shall have at least after the step."""
+    wanted = -gap / dt
+    if gap < 0.0:
+        wanted = min(max(-gap - _SLOP, 0.0) * _LIFT_SHARE / dt, _LIFT_SPEED)
+    if closing > _REBOUND_SPEED and rebounds:
+        wanted = max(wanted, plant.restitution * closing)
+    return wanted
+
+
+@inner_kernel
+def _settled(plant: Any, scratch: Array, active: int, motion: Six) -> Six:
+    """Motion after sweeps over the contacts that end when the impulses agree with each other."""
+    ux, uy, uz, ox, oy, oz = motion
     for _ in range(SWEEPS):
         change = 0.0
         for k in range(active):
             row = scratch[k]
             px, py, pz = three(row)
-            bx, by, bz = row[3], row[4], row[5]
+            bx, by, bz = row[_NORMAL], row[_NORMAL + 1], row[_NORMAL + 2]
             # along the normal: never pulling
             sx, sy, sz = ux + oy * pz - oz * py, uy + oz * px - ox * pz, uz + ox * py - oy * px
-            push = max(row[8] + row[6] * (row[7] - (sx * bx + sy * by + sz * bz)), 0.0)
-            step = push - row[8]
-            row[8] = push
-            fx, fy, fz = step * bx, step * by, step * bz
-            ux += fx * light
-            uy += fy * light
-            uz += fz * light
-            ox += (py * fz - pz * fy) * jx
-            oy += (pz * fx - px * fz) * jy
-            oz += (px * fy - py * fx) * jz
-            change = max(change, abs(step) * light)
-            # across it: against sliding, within the cone
+            push = row[_PUSH] + row[_MASS] * (row[_WANTED] - (sx * bx + sy * by + sz * bz))
+            push = max(push, 0.0)
+            step = push - row[_PUSH]
+            row[_PUSH] = push
+            ux, uy, uz, ox, oy, oz = _after_impulse(
+                plant, px, py, pz, ux, uy, uz, ox, oy, oz, step * bx, step * by, step * bz
+            )
+            change = max(change, abs(step) * plant.inverse_mass)
+            # across it: against sliding
             sx, sy, sz = ux + oy * pz - oz * py, uy + oz * px - ox * pz, uz + ox * py - oy * px
             along = sx * bx + sy * by + sz * bz
             sx -= along * bx
             sy -= along * by
             sz -= along * bz
             slide = math.sqrt(sx * sx + sy * sy + sz * sz)
-            if slide < 1e-12:
+            if slide < _NO_SLIDE:
                 continue
-            dx, dy, dz = sx / slide, sy / slide, sz / slide
-            wx, wy, wz = py * dz - pz * dy, pz * dx - px * dz, px * dy - py * dx
-            hold = slide / (light + wx * wx * jx + wy * wy * jy + wz * wz * jz)
-            gx, gy, gz = row[9] - hold * dx, row[10] - hold * dy, row[11] - hold * dz
-            size = math.sqrt(gx * gx + gy * gy + gz * gz)
-            most = plant.friction * push
-            if size > most:
-                gx, gy, gz = gx * most / size, gy * most / size, gz * most / size
-            fx, fy, fz = gx - row[9], gy - row[10], gz - row[11]
-            row[9], row[10], row[11] = gx, gy, gz
-            ux += fx * light
-            uy += fy * light
-            uz += fz * light
-            ox += (py * fz - pz * fy) * jx
-            oy += (pz * fx - px * fz) * jy
-            oz += (px * fy - py * fx) * jz
-            change = max(change, math.sqrt(fx * fx + fy * fy + fz * fz) * light)
+            fx, fy, fz = _grip(plant, row, sx / slide, sy / slide, sz / slide, slide)
+            ux, uy, uz, ox, oy, oz = _after_impulse(
+                plant, px, py, pz, ux, uy, uz, ox, oy, oz, fx, fy, fz
+            )
+            change = max(change, math.sqrt(fx * fx + fy * fy + fz * fz) * plant.inverse_mass)
         if change < _SETTLED:
             break
+    return ux, uy, uz, ox, oy, oz
 
-    body.velocity_map[0] = r00 * ux + r01 * uy + r02 * uz
-    body.velocity_map[1] = r10 * ux + r11 * uy + r12 * uz
-    body.velocity_map[2] = r20 * ux + r21 * uy + r22 * uz
-    body.omega_body[0], body.omega_body[1], body.omega_body[2] = ox, oy, oz
-    return approach
+
+@inner_kernel
+def _grip(plant: Any, row: Array, dx: float, dy: float, dz: float, slide: float) -> Three:
+    """Impulse, N s, against sliding at `slide` m/s along d, within Coulomb's cone; notes it."""
+    px, py, pz = three(row)
+    wx, wy, wz = py * dz - pz * dy, pz * dx - px * dz, px * dy - py * dx
+    hold = slide / _ease(plant, wx, wy, wz)
+    gx, gy, gz = row[_GRIP] - hold * dx, row[_GRIP + 1] - hold * dy, row[_GRIP + 2] - hold * dz
+    size = math.sqrt(gx * gx + gy * gy + gz * gz)
+    most = plant.friction * row[_PUSH]
+    if size > most:
+        gx, gy, gz = gx * most / size, gy * most / size, gz * most / size
+    fx, fy, fz = gx - row[_GRIP], gy - row[_GRIP + 1], gz - row[_GRIP + 2]
+    row[_GRIP], row[_GRIP + 1], row[_GRIP + 2] = gx, gy, gz
+    return fx, fy, fz
+
+
+@inner_kernel
+def _ease(plant: Any, wx: float, wy: float, wz: float) -> Any:
+    """How easily an impulse moves its point along itself, 1/kg; w: its lever arm, m."""
+    jx, jy, jz = three(plant.inverse_inertia)
+    return plant.inverse_mass + wx * wx * jx + wy * wy * jy + wz * wz * jz
+
+
+@inner_kernel
+def _after_impulse(
+    plant: Any,
+    px: float,
+    py: float,
+    pz: float,
+    ux: float,
+    uy: float,
+    uz: float,
+    ox: float,
+    oy: float,
+    oz: float,
+    fx: float,
+    fy: float,
+    fz: float,
+) -> Six:
+    """Velocity u and rates o after an impulse f, N s, at the point p."""
+    light = plant.inverse_mass
+    jx, jy, jz = three(plant.inverse_inertia)
+    ux += fx * light
+    uy += fy * light
+    uz += fz * light
+    ox += (py * fz - pz * fy) * jx
+    oy += (pz * fx - px * fz) * jy
+    oz += (px * fy - py * fx) * jz
+    return ux, uy, uz, ox, oy, oz
 
 
 @inner_kernel

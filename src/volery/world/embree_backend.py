@@ -11,14 +11,8 @@ from volery.core.workers import Workers, new_counter
 from volery.world import embree
 from volery.world.point_query import callback_address, nearest_points, new_query_memory
 from volery.world.scene_content import BodyShape, SceneContent
-from volery.world.scene_kernels import (
-    CHUNK,
-    BodyTable,
-    SceneHandle,
-    cast_rays,
-    find_occluded,
-    thread_block,
-)
+from volery.world.scene_kernels import CHUNK, cast_rays, find_occluded
+from volery.world.scene_memory import BodyTable, SceneHandle, thread_block
 
 FEW_RAYS = 5000
 """A batch up to this size is cast by the calling thread alone: waking another costs more."""

@@ -18,7 +18,7 @@ from volery.core.workers import Workers
 from volery.world.mesh import Mesh, concatenate
 from volery.world.point_query import nearest_in_all
 from volery.world.scene_content import BodyShape, SceneContent
-from volery.world.scene_kernels import BodyTable, SceneHandle
+from volery.world.scene_memory import BodyTable, SceneHandle
 
 _SHORT_OF_TARGET_M = 1e-4
 

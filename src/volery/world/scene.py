@@ -21,7 +21,7 @@ from volery.world.embree_backend import EmbreeBackend
 from volery.world.embreex_fallback import EmbreexBackend
 from volery.world.materials import Material
 from volery.world.scene_content import BodyShape, SceneContent, Solid, collect
-from volery.world.scene_kernels import BodyTable, SceneHandle
+from volery.world.scene_memory import BodyTable, SceneHandle
 from volery.world.terrain import Terrain
 from volery.world.trees.model import DetailLevel
 

@@ -1,0 +1,108 @@
+"""Pacing alone: what it allows, how long it waits, what other threads may change."""
+
+import threading
+import time
+
+import pytest
+
+from volery.core.errors import CommandError
+from volery.engine.pacing import Pacer
+
+MS = 1_000_000
+
+
+@pytest.fixture
+def pacer():
+    made = Pacer()
+    made.begin(None, 0)
+    return made
+
+
+def held_s(pacer, time_ns):
+    """Wall seconds that the run is held at a simulated time."""
+    start = time.perf_counter()
+    while pacer.wait(time_ns):
+        pass
+    return time.perf_counter() - start
+
+
+def test_full_speed_waits_for_nothing(pacer):
+    assert pacer.next_steps(MS) > 10
+    assert held_s(pacer, 10**12) < 0.05
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 4.0])
+def test_a_factor_of_real_time(pacer, speed):
+    pacer.set_speed(speed)
+    assert pacer.next_steps(MS) == max(1, round(5 * speed))
+    sim_ns = round(0.2 * speed * 1e9)
+    assert held_s(pacer, sim_ns) == pytest.approx(0.2, abs=0.1)
+
+
+def test_slices_are_at_least_a_step(pacer):
+    pacer.set_speed(1e-3)
+    assert pacer.next_steps(MS) == 1
+
+
+def test_a_paused_run_makes_the_steps_asked_for(pacer):
+    pacer.pause()
+    assert pacer.paused
+    assert pacer.next_steps(MS) == 0
+    assert pacer.wait(0)
+    pacer.single_steps(2)
+    pacer.single_steps(1)
+    assert not pacer.wait(0)
+    assert pacer.next_steps(MS) == 3
+    assert pacer.next_steps(MS) == 0
+    pacer.single_steps(250)
+    made = [pacer.next_steps(MS) for _ in range(4)]
+    assert sum(made) == 250
+    assert max(made) <= 100  # a resume in between is not kept waiting
+    pacer.resume()
+    assert not pacer.wait(0)
+
+
+def test_steps_not_made_are_forgotten_by_resume(pacer):
+    pacer.pause()
+    pacer.single_steps(5)
+    pacer.resume()
+    pacer.pause()
+    assert pacer.next_steps(MS) == 0
+
+
+def test_nothing_is_caught_up_after_a_pause_or_a_change(pacer):
+    pacer.set_speed(1.0)
+    pacer.wait(0)
+    pacer.pause()
+    time.sleep(0.15)
+    pacer.resume()
+    assert held_s(pacer, 100 * MS) == pytest.approx(0.1, abs=0.04)
+    pacer.set_speed(2.0)
+    assert held_s(pacer, 300 * MS) == pytest.approx(0.1, abs=0.04)
+
+
+def test_other_threads_end_a_wait_at_once(pacer):
+    for change in (pacer.resume, pacer.wake, lambda: pacer.single_steps(1)):
+        pacer.pause()
+        threading.Timer(0.01, change).start()
+        start = time.perf_counter()
+        pacer.wait(0)
+        assert time.perf_counter() - start < 0.045
+
+
+def test_pauses_are_measured(pacer):
+    pacer.pause()
+    for _ in range(3):
+        pacer.wait(0)
+    assert pacer.paused_s == pytest.approx(0.15, abs=0.1)
+
+
+def test_refusals(pacer):
+    for speed in (0.0, -1.0, float("nan"), 1e6):
+        with pytest.raises(CommandError, match="positive factor"):
+            pacer.set_speed(speed)
+    with pytest.raises(CommandError, match="while paused"):
+        pacer.single_steps(1)
+    pacer.pause()
+    with pytest.raises(CommandError, match="at least 1"):
+        pacer.single_steps(0)
