@@ -6,14 +6,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from volery.runtime.copies import Copies
     from volery.runtime.progress import Progress
     from volery.runtime.simulation import Simulation
 
-__all__ = ["Progress", "Simulation"]
+__all__ = ["Copies", "Progress", "Simulation"]
+
+_HOMES = {
+    "Copies": "volery.runtime.copies",
+    "Progress": "volery.runtime.progress",
+    "Simulation": "volery.runtime.simulation",
+}
 
 
 def __getattr__(name: str) -> Any:
-    """Import the simulation when it is asked for, not with its neighbours."""
-    if name in __all__:
-        return getattr(import_module("volery.runtime.simulation"), name)
+    """Import what is asked for, not its neighbours with it."""
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'volery.runtime' has no attribute '{name}'")

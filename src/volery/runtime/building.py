@@ -59,11 +59,12 @@ def build_fleet(
     return fleet
 
 
-def add_bodies(scene: Scene, starts: Sequence[Start]) -> None:
-    """Make the UAVs' bodies visible to sensors."""
+def add_bodies(scene: Scene, starts: Sequence[Start], *, copies: int = 1) -> None:
+    """Make the UAVs' bodies visible to the sensors of their own copy."""
     kinds = {start.airframe.name: start.airframe for start in starts}
     order = list(kinds)
     scene.set_bodies(
         [body_shape(airframe) for airframe in kinds.values()],
         [order.index(start.airframe.name) for start in starts],
+        copies=copies,
     )

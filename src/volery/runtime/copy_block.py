@@ -58,7 +58,7 @@ class CopyBlock:
         names = tuple(f"{k}/{start.name}" for k in range(copies) for start in self._starts)
         self.fleet = build_fleet(scenario, everyone, names, copies=copies)
         self._scene = scene.twin()
-        add_bodies(self._scene, everyone)
+        add_bodies(self._scene, everyone, copies=copies)
         self._fitted = fit_sensors(scenario, self._starts)
         fitted = [f for k in range(copies) for f in self._fit(k)]
         self._engine = Engine(

@@ -40,19 +40,15 @@ def _near_scan(
     a = sensor_frame(batch, scan, history, start)
     b = sensor_frame(batch, scan, history, start + lidar.sweep_ns)
     m = _CURVE_MARGIN_M
-    count = near_bodies(
+    count: int = near_bodies(
         scene.bodies,
         (min(a[0], b[0]) - m, min(a[1], b[1]) - m, min(a[2], b[2]) - m),
         (max(a[0], b[0]) + m, max(a[1], b[1]) + m, max(a[2], b[2]) + m),
         lidar.range_max,
+        batch.uav[scan],
         near,
     )
-    kept = 0
-    for n in range(count):
-        if near[n] != batch.uav[scan]:
-            near[kept] = near[n]
-            kept += 1
-    return kept
+    return count
 
 
 @inner_kernel

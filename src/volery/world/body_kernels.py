@@ -61,11 +61,19 @@ def near_bodies(
     low: tuple[float, float, float],
     high: tuple[float, float, float],
     reach: float,
+    uav: int,
     near: NDArray[np.int32],
 ) -> int:
-    """List the bodies that rays from the box `low`..`high` may touch; their number."""
+    """List the bodies that rays from the box `low`..`high` may touch; their number.
+
+    uav: whose rays they are, -1 for rays of nobody or of several.
+    """
     count = 0
-    for i in range(bodies.scene.shape[0]):
+    first = 0 if uav < 0 else uav - uav % bodies.crew
+    last = bodies.scene.shape[0] if uav < 0 else first + bodies.crew
+    for i in range(first, last):
+        if i == uav:
+            continue
         squared = 0.0
         for j in range(3):
             a, b = bodies.start[i, j], bodies.end[i, j]
@@ -116,7 +124,15 @@ def _rotation(
 
 
 @inner_kernel
-def _into_body(block: RayBlock, p: int, lanes: int, row: int, pose: tuple[float, ...]) -> None:
+def _sees(bodies: BodyTable, uav: int, row: int) -> bool:
+    """Whether rays of `uav` (-1: of nobody) may meet the body of UAV `row`."""
+    return bool(uav < 0 or (uav != row and uav // bodies.crew == row // bodies.crew))
+
+
+@inner_kernel
+def _into_body(
+    bodies: BodyTable, block: RayBlock, p: int, lanes: int, row: int, pose: tuple[float, ...]
+) -> None:
     """Fill the body-frame packet; lanes that do not see this body stay masked."""
     x, y, z, qx, qy, qz, qw = pose
     a, b, c = _rotation(qx, qy, qz, qw)
@@ -129,7 +145,7 @@ def _into_body(block: RayBlock, p: int, lanes: int, row: int, pose: tuple[float,
             out[DIRECTION + j, k] = a[j] * dx + b[j] * dy + c[j] * dz
         out[FAR, k] = rays[FAR, k]
         block.body_words[GEOMETRY, k] = _INVALID
-        block.body_valid[k] = -1 if k < lanes and block.skip[p, k] != row else 0
+        block.body_valid[k] = -1 if k < lanes and _sees(bodies, block.skip[p, k], row) else 0
 
 
 @inner_kernel
@@ -140,7 +156,7 @@ def cast_at_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: i
     rays = block.rays[p]
     if not _may_touch(rays, lanes, pose[0], pose[1], pose[2], bodies.radius[row]):
         return
-    _into_body(block, p, lanes, row, pose)
+    _into_body(scene.bodies, block, p, lanes, row, pose)
     found = block.body_rays
     intersect_packet(block.body_valid.ctypes.data, bodies.scene[row], found.ctypes.data, 0)
     a, b, c = _rotation(pose[3], pose[4], pose[5], pose[6])
@@ -164,7 +180,7 @@ def hide_behind_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, ro
     rays, found, sees = block.rays[p], block.body_rays, block.body_valid
     if not _may_touch(rays, lanes, pose[0], pose[1], pose[2], scene.bodies.radius[row]):
         return
-    _into_body(block, p, lanes, row, pose)
+    _into_body(scene.bodies, block, p, lanes, row, pose)
     for k in range(lanes):
         if block.valid[k] == 0 or rays[FAR, k] < 0.0:
             sees[k] = 0

@@ -110,7 +110,8 @@ class EmbreexBackend:
         material[hit] = handle.material[blocks[:, 0], blocks[:, 1]]
         bodies = handle.bodies
         for row in range(len(bodies.scene)):
-            sees = np.broadcast_to(exclude != row, len(origins))
+            own_copy = exclude // bodies.crew == row // bodies.crew
+            sees = np.broadcast_to((exclude < 0) | ((exclude != row) & own_copy), len(origins))
             rows, o, d, turn = _in_body(bodies, row, sees, origins, directions, fraction, distance)
             hit, t, n, block = self._shapes[bodies.scene[row]].cast(o, d, distance[rows])
             rows = rows[hit]

@@ -64,6 +64,7 @@ def _no_bodies() -> BodyTable:
         material=np.zeros((0, 1), dtype=np.uint8),
         start=np.zeros((0, 7)),
         end=np.zeros((0, 7)),
+        crew=1,
     )
 
 
@@ -136,10 +137,13 @@ class Scene:
             return self.solids[instance - 1 - self._content.trees].name
         return f"uav{instance - self.moving_offset + 1}"
 
-    def set_bodies(self, shapes: Sequence[BodyShape], shape_index: ArrayLike) -> None:
+    def set_bodies(
+        self, shapes: Sequence[BodyShape], shape_index: ArrayLike, *, copies: int = 1
+    ) -> None:
         """Make one moving body for each entry of `shape_index` (N,); place them with move_bodies.
 
-        Until then they are far below the map.
+        Until then they are far below the map. `copies`: of how many independent copies of a
+        scenario they are, one copy after the other; a UAV's rays see its own copy alone.
         """
         index = np.asarray(shape_index, dtype=np.int64).reshape(-1)
         if index.size and (index.min() < 0 or index.max() >= len(shapes)):
@@ -156,6 +160,7 @@ class Scene:
             material=np.ascontiguousarray(materials[index]),
             start=pose,
             end=pose.copy(),
+            crew=max(len(index) // copies, 1),
         )
 
     def move_bodies(

@@ -149,7 +149,7 @@ def _near_chunk(
         x0, x1 = min(x0, origins[i, 0]), max(x1, origins[i, 0])
         y0, y1 = min(y0, origins[i, 1]), max(y1, origins[i, 1])
         z0, z1 = min(z0, origins[i, 2]), max(z1, origins[i, 2])
-    return near_bodies(scene.bodies, (x0, y0, z0), (x1, y1, z1), reach, near)
+    return near_bodies(scene.bodies, (x0, y0, z0), (x1, y1, z1), reach, -1, near)
 
 
 @inner_kernel

@@ -29,6 +29,8 @@ class BodyTable(NamedTuple):
     """(N, 7) x y z qx qy qz qw at fraction 0 of the interval that rays may look into."""
     end: NDArray[np.float64]
     """(N, 7) the same at fraction 1: the newest pose."""
+    crew: int
+    """UAVs of one copy of a scenario: a UAV's rays see the others of its own copy alone."""
 
 
 class SceneHandle(NamedTuple):

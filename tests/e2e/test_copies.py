@@ -1,0 +1,159 @@
+"""Independent copies of a scenario: each is the simulation of its own seed."""
+
+import numpy as np
+import pytest
+
+from volery.core.errors import CommandError, ScenarioError
+from volery.runtime import Copies
+from volery.scenario.load import parse_scenario
+
+STATES = ("position_map", "velocity_map", "attitude", "omega_body", "rotor_speed")
+
+
+@pytest.fixture
+def pair_data(flat_data):
+    """Two UAVs that see each other, with noise, wind and turbulence."""
+    flat_data["world"] = {
+        "seed": 5,
+        "wind": {"velocity_m_s": [3.0, 0.0, 0.0], "turbulence": "moderate"},
+    }
+    flat_data["types"]["f450"]["sensors"].append(
+        {"kind": "lidar", "name": "horizontal", "position_m": [0.0, 0.0, 0.18]}
+    )
+    flat_data["uavs"] = [
+        {"type": "f450", "position_m": [0.0, 0.0, 4.0]},
+        {"type": "f450", "position_m": [4.0, 0.0, 4.2]},
+    ]
+    return flat_data
+
+
+def make(data, count, **options):
+    return Copies(parse_scenario(data), count, **options)
+
+
+def states(source, copy):
+    """States (n, ...) of one copy."""
+    found = source.state()
+    return {name: getattr(found, name)[copy] for name in STATES}
+
+
+def alone(simulate, data, seed, seconds, velocity):
+    """States and last measurements of the plain simulation with that seed."""
+    simulation = simulate({**data, "seed": seed})
+    last = {}
+    simulation.graph.subscribe(
+        "/uav2/imu", lambda p: last.update(force=p.message.linear_acceleration.x)
+    )
+    simulation.graph.subscribe(
+        "/uav1/laser/horizontal/scan", lambda p: last.update(ranges=p.message.ranges)
+    )
+    for uav in simulation.uavs.values():
+        uav.command_velocity(velocity)
+    simulation.run(seconds)
+    found = simulation._fleet.state
+    return {name: np.array(getattr(found, name)) for name in STATES}, last
+
+
+def assert_same(found, expected):
+    for name in STATES:
+        np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
+
+
+def test_every_copy_is_the_simulation_of_its_seed(simulate, pair_data):
+    velocity = [1.0, 0.3, 0.1]
+    with make(pair_data, 3, seeds=[7, 8, 9], threads=2) as copies:
+        copies.command_velocity(velocity)
+        copies.run(0.35)
+        for copy, seed in enumerate((7, 8, 9)):
+            expected, last = alone(simulate, pair_data, seed, 0.35, velocity)
+            assert_same(states(copies, copy), expected)
+            force = copies.reading("uav2", "imu")["specific_force"][copy, 0]
+            assert force == last["force"]
+            ranges = copies.reading("uav1", "horizontal")["ranges"][copy]
+            np.testing.assert_array_equal(ranges.ravel(), last["ranges"].ravel())
+        assert len({copies.reading("uav2", "imu")["specific_force"][k, 0] for k in range(3)}) == 3
+
+
+def test_reset_copies_are_fresh_ones_and_the_others_fly_on(simulate, pair_data):
+    velocity = [0.5, -0.2, 0.0]
+    with (
+        make(pair_data, 4, threads=2) as copies,
+        make(pair_data, 4, threads=1) as undisturbed,
+    ):
+        for each in (copies, undisturbed):
+            each.command_velocity(velocity)
+            each.run(0.4)
+        assert copies.common_period_s == pytest.approx(0.2)
+        copies.reset([0, 2], seeds=[70, 71])
+        np.testing.assert_allclose(copies.age_s, [0.0, 0.4, 0.0, 0.4])
+        for each in (copies, undisturbed):
+            each.command_velocity(velocity)
+            each.run(0.35)
+        for copy in (1, 3):
+            assert_same(states(copies, copy), states(undisturbed, copy))
+        for copy, seed in ((0, 70), (2, 71)):
+            expected, last = alone(simulate, pair_data, seed, 0.35, velocity)
+            assert_same(states(copies, copy), expected)
+            assert copies.reading("uav2", "imu")["specific_force"][copy, 0] == last["force"]
+            ranges = copies.reading("uav1", "horizontal")["ranges"][copy]
+            np.testing.assert_array_equal(ranges.ravel(), last["ranges"].ravel())
+
+
+def test_threads_change_nothing(pair_data):
+    found = []
+    for threads in (1, 2, 3):
+        with make(pair_data, 5, threads=threads) as copies:
+            copies.command_velocity([1.0, 0.0, 0.0])
+            copies.run(0.3)
+            found.append(copies.state().position_map)
+    np.testing.assert_array_equal(found[0], found[1])
+    np.testing.assert_array_equal(found[0], found[2])
+
+
+def test_states_are_taken_back(pair_data):
+    with make(pair_data, 3) as copies:
+        copies.run(0.21)
+        kept = copies.get_state()
+        copies.run(0.2)
+        first = copies.state().position_map
+        copies.reset([1])
+        copies.set_state(kept)
+        copies.run(0.2)
+        np.testing.assert_array_equal(copies.state().position_map, first)
+
+
+def test_copies_do_not_collide_with_each_other(pair_data):
+    pair_data["types"]["f450"]["sensors"] = []
+    with make(pair_data, 3, threads=1) as copies:
+        copies.uav(1, "uav1").command_velocity_map([6.0, 0.0, 0.3])
+        copies.run(1.5)
+        events = copies.drain_events()
+    hits = [e for e in events if str(e.event.kind) == "collision"]
+    assert {e.copy for e in hits} == {1}
+    assert {(e.event.uav, e.event.partner) for e in hits} == {("uav1", "uav2"), ("uav2", "uav1")}
+
+
+def test_mass_command_is_the_same_as_single_ones(pair_data):
+    with make(pair_data, 2) as one, make(pair_data, 2) as other:
+        velocity = np.arange(12.0).reshape(2, 2, 3) / 10.0
+        one.command_velocity(velocity, 0.3)
+        for copy in range(2):
+            for k, name in enumerate(other.uav_names):
+                other.uav(copy, name).command_velocity(velocity[copy, k], 0.3)
+        one.run(0.3)
+        other.run(0.3)
+        np.testing.assert_array_equal(one.state().position_map, other.state().position_map)
+
+
+def test_impossible_requests_are_refused(flat_data):
+    with pytest.raises(ScenarioError, match="at least 1 copy"):
+        make(flat_data, 0)
+    with pytest.raises(ScenarioError, match="2 copies need as many seeds, not 1"):
+        make(flat_data, 2, seeds=[1])
+    with make(flat_data, 2) as copies:
+        with pytest.raises(CommandError, match="numbered 0 to 1"):
+            copies.reset([2])
+        with pytest.raises(CommandError, match="no sensor 'radar' of 'uav1'; known: uav1 imu"):
+            copies.reading("uav1", "radar")
+        with pytest.raises(CommandError, match="finite"):
+            copies.command_velocity([np.nan, 0.0, 0.0])
