@@ -31,3 +31,7 @@ class NodeError(VoleryError):
 
 class CommandError(VoleryError):
     """A command is refused: not finite, out of range, or impossible in the present mode."""
+
+
+class EstimatorError(VoleryError):
+    """An estimator is given what it cannot use: wrong shape, unknown row, a reading out of order."""
