@@ -5,6 +5,7 @@ import numpy as np
 from volery.core import rotations
 
 GRAVITY = 9.80665
+UP = np.array([0.0, 0.0, GRAVITY])
 FIELD = np.array([1.13e-6, 2.161e-5, -4.302e-5])
 
 
@@ -12,6 +13,8 @@ class Motion:
     """Each of N vehicles on a figure of eight of its own, turning and tilting all the while."""
 
     def __init__(self, count, seed, speed=8.0):
+        self.last = None
+        self.count = count
         draw = np.random.default_rng(seed)
         self.amplitude = draw.uniform(0.7, 1.3, (3, count)) * np.array([[20.0], [12.0], [3.0]])
         pulse = speed / self.amplitude[0]
@@ -22,6 +25,12 @@ class Motion:
         self.turn_phase = draw.uniform(0, 2 * np.pi, (3, count))
 
     def at(self, t):
+        """As `moving`, computed once an instant."""
+        if self.last is None or self.last[0] != t:
+            self.last = t, self.moving(t)
+        return self.last[1]
+
+    def moving(self, t):
         """Position, velocity, attitude, rates in the body, acceleration and specific force."""
         a, w, p = self.amplitude, self.pulse, self.phase
         position = (a * np.sin(w * t + p)).T
@@ -38,11 +47,25 @@ class Motion:
             ],
             axis=1,
         )
-        force = rotations.rotate(rotations.conjugate(attitude), acceleration + [0, 0, GRAVITY])
+        force = rotations.rotate(rotations.conjugate(attitude), acceleration + UP)
         return position, velocity, attitude, omega, force
 
     def omega_rate(self, t, h=1e-4):
-        return (self.at(t + h)[3] - self.at(t - h)[3]) / (2 * h)
+        return (self.moving(t + h)[3] - self.moving(t - h)[3]) / (2 * h)
+
+
+class Straight:
+    """East at a constant speed, level, all alike."""
+
+    def __init__(self, count, speed):
+        self.count, self.speed = count, speed
+
+    def at(self, t):
+        n = self.count
+        level, force = np.tile(rotations.IDENTITY, (n, 1)), np.tile([0, 0, GRAVITY], (n, 1))
+        position, velocity = np.zeros((n, 3)), np.zeros((n, 3))
+        position[:, 0], velocity[:, 0] = self.speed * t, self.speed
+        return position, velocity, level, np.zeros((n, 3)), force
 
 
 class GaussMarkov:
@@ -66,7 +89,7 @@ class Sensors:
 
     def __init__(self, motion, settings, seed, arms=None):
         self.motion, self.settings = motion, settings
-        self.count = motion.phase.shape[1]
+        self.count = motion.count
         self.draw = draw = np.random.default_rng(seed)
         self.dt = dt = 1 / self.RATE
         s, n = settings, self.count
@@ -101,12 +124,10 @@ class Sensors:
 
     def imu(self, t):
         _, _, _, omega, force = self.motion.at(t)
-        arm = np.broadcast_to(self._arm("imu"), omega.shape)
-        force = (
-            force
-            + np.cross(self.motion.omega_rate(t), arm)
-            + np.cross(omega, np.cross(omega, arm))
-        )
+        arm = self._arm("imu")
+        if arm.any():
+            swing = np.cross(omega, np.cross(omega, arm))
+            force = force + np.cross(self.motion.omega_rate(t), arm) + swing
         self.true_gyro_bias, self.true_accel_bias = self.gyro_bias.step(), self.accel_bias.step()
         noise = self.draw.normal(size=(2, self.count, 3))
         return (

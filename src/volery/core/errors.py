@@ -34,4 +34,4 @@ class CommandError(VoleryError):
 
 
 class EstimatorError(VoleryError):
-    """An estimator is given what it cannot use: wrong shape, unknown row, a reading out of order."""
+    """An estimator is given what it cannot use: wrong shape, unknown row, wrong order."""

@@ -67,7 +67,7 @@ def carry(P: Array, flow: Any, tuning: Any, keep: Array) -> None:
 
 @part_kernel
 def decay(tuning: Any, duration: float, keep: Array) -> None:
-    """keep (STATES,): share of each state's mean that is left after `duration` s."""
+    """Keep (STATES,): share of each state's mean that is left after `duration` s."""
     for i in range(GYRO_BIAS):
         keep[i] = 1.0
     gyro = math.exp(-tuning.bias_rate[0] * duration)
@@ -133,7 +133,10 @@ def _mirror(P: Array) -> None:
 
 @part_kernel
 def normalised_innovation(P: Array, rows: int, work: Any) -> float:
-    """r' S^-1 r of up to three numbers, S = H P H' + R; work: a `WORK` with H, residual, variance."""
+    """Squared innovation r' S^-1 r of up to three numbers, with S = H P H' + R.
+
+    work: a `WORK` with H, residual and variance.
+    """
     s, y = work.square, work.whitened
     total = 0.0
     for i in range(rows):
@@ -183,7 +186,7 @@ def correct(P: Array, rows: int, work: Any) -> None:
 
 @inner_kernel
 def _times(P: Array, h: Array, out: Array) -> None:
-    """out = P h, for an h of mostly zeros."""
+    """Out = P h, for an h of mostly zeros."""
     for k in range(STATES):
         out[k] = 0.0
     for i in range(STATES):

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.control.estimator.alignment import start_covariance
-from volery.control.estimator.filter_kernels import (
-    enqueue_rows,
-    predict_rows,
-    present_covariances,
-)
+from volery.control.estimator.checks import checked_rows, each_of, shaped
+from volery.control.estimator.filter_kernels import predict_rows
+from volery.control.estimator.present_kernels import present_covariances
+from volery.control.estimator.queue_kernels import enqueue_rows
 from volery.control.estimator.records import (
     FILTER,
     GNSS,
@@ -33,39 +32,14 @@ from volery.control.estimator.records import (
     tuning_of,
 )
 from volery.control.estimator.settings import EstimatorSettings, Mounting, StartSigmas
+from volery.control.estimator.views import Estimate, Gate
 from volery.core import rotations
 from volery.core.errors import EstimatorError
 
 Array = NDArray[np.float64]
+_AT_CENTRE = Mounting()
+_IN_THE_AIR = StartSigmas()
 Rows = NDArray[np.int64]
-
-
-class Estimate(NamedTuple):
-    """Views of what the filters believe of the present, rows of UAVs, at the centre of mass."""
-
-    position_map: Array
-    """(N, 3) m."""
-    velocity_map: Array
-    """(N, 3) m/s."""
-    attitude: Array
-    """(N, 4) unit quaternions, map from body."""
-    omega_body: Array
-    """(N, 3) rad/s, FLU, without the gyroscope's bias."""
-    gyro_bias: Array
-    """(N, 3) rad/s, body axes."""
-    accel_bias: Array
-    """(N, 3) m/s^2, body axes."""
-
-
-class Gate(NamedTuple):
-    """How one aid fared since the start, rows of UAVs."""
-
-    innovation: Array
-    """(N,) the latest normalised squared innovation, fused or not."""
-    accepted: NDArray[np.int64]
-    """(N,)."""
-    rejected: NDArray[np.int64]
-    """(N,)."""
 
 
 class Estimator:
@@ -90,12 +64,12 @@ class Estimator:
         velocity: ArrayLike,
         attitude: ArrayLike,
         stamp_ns: int = 0,
-        mounting: Mounting | Sequence[Mounting] = Mounting(),
-        start: StartSigmas | Sequence[StartSigmas] = StartSigmas(),
+        mounting: Mounting | Sequence[Mounting] = _AT_CENTRE,
+        start: StartSigmas | Sequence[StartSigmas] = _IN_THE_AIR,
     ) -> None:
-        self._settings = _each(settings, EstimatorSettings, count, "settings")
-        mountings = _each(mounting, Mounting, count, "mounting")
-        self._start = _each(start, StartSigmas, count, "start")
+        self._settings = each_of(settings, EstimatorSettings, count, "settings")
+        mountings = each_of(mounting, Mounting, count, "mounting")
+        self._start = each_of(start, StartSigmas, count, "start")
         longest = max(s.horizon_s * s.imu_rate_hz for s in self._settings)
         self._filters = np.zeros(count, FILTER)
         self._rings = np.zeros((count, math.ceil(longest) + 2), READING)
@@ -131,21 +105,21 @@ class Estimator:
 
         position (S, 3), velocity (S, 3), attitude (S, 4); start: None keeps the UAV's own.
         """
-        rows = self._checked_rows(rows)
-        position = _shaped("position", position, (len(rows), 3))
-        velocity = _shaped("velocity", velocity, (len(rows), 3))
-        attitude = _shaped("attitude", attitude, (len(rows), 4))
-        lengths = np.linalg.norm(attitude, axis=1)
+        rows = checked_rows(rows, len(self))
+        position = shaped("position", position, (len(rows), 3))
+        velocity = shaped("velocity", velocity, (len(rows), 3))
+        quaternions = shaped("attitude", attitude, (len(rows), 4))
+        lengths = np.linalg.norm(quaternions, axis=1)
         if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
             raise EstimatorError("position and velocity of a start must be finite")
         if not (np.abs(lengths - 1.0) < 0.1).all():
             raise EstimatorError("attitudes of a start must be unit quaternions")
-        attitude = attitude / lengths[:, None]
+        quaternions = quaternions / lengths[:, None]
         self._filters[rows] = np.zeros(1, FILTER)
         self._rings[rows] = np.zeros(1, READING)
         self._queues[rows] = np.zeros(1, MEASUREMENT)
         for i, row in enumerate(rows):
-            self._begin(row, position[i], velocity[i], attitude[i], start or self._start[row])
+            self._begin(row, position[i], velocity[i], quaternions[i], start or self._start[row])
         self._filters["newest_ns"][rows] = stamp_ns
         self._filters["reading"]["stamp_ns"][rows] = stamp_ns
         self._filters["rejected_since_ns"][rows] = -1
@@ -154,9 +128,9 @@ class Estimator:
         self, rows: ArrayLike, stamp_ns: int, angular_velocity: ArrayLike, specific_force: ArrayLike
     ) -> None:
         """Take readings of the IMU: (S, 3) rad/s and (S, 3) m/s^2 in the sensors' axes."""
-        rows = self._checked_rows(rows)
-        gyro = _shaped("angular_velocity", angular_velocity, (len(rows), 3))
-        accel = _shaped("specific_force", specific_force, (len(rows), 3))
+        rows = checked_rows(rows, len(self))
+        gyro = shaped("angular_velocity", angular_velocity, (len(rows), 3))
+        accel = shaped("specific_force", specific_force, (len(rows), 3))
         served = predict_rows(
             self._filters,
             self._tunings,
@@ -188,10 +162,10 @@ class Estimator:
 
         variances: (6,) or (S, 6), position then velocity; inf marks what a receiver does not tell.
         """
-        rows = self._checked_rows(rows)
+        rows = checked_rows(rows, len(self))
         values = np.zeros((len(rows), 7))
-        values[:, :3] = _shaped("position_enu", position_enu, (len(rows), 3))
-        values[:, 3:6] = _shaped("velocity_enu", velocity_enu, (len(rows), 3))
+        values[:, :3] = shaped("position_enu", position_enu, (len(rows), 3))
+        values[:, 3:6] = shaped("velocity_enu", velocity_enu, (len(rows), 3))
         self._enqueue(rows, stamp_ns, GNSS, values, variances, valid)
 
     def fuse_pressure_height(
@@ -250,10 +224,10 @@ class Estimator:
         variances: (6,) or (S, 6): x, y, z, m^2, and rotations about the map's axes, rad^2; inf in
         either half leaves that half out.
         """
-        rows = self._checked_rows(rows)
+        rows = checked_rows(rows, len(self))
         values = np.zeros((len(rows), 7))
-        values[:, :3] = _shaped("position", position, (len(rows), 3))
-        values[:, 3:] = rotations.normalize(_shaped("attitude", attitude, (len(rows), 4)))
+        values[:, :3] = shaped("position", position, (len(rows), 3))
+        values[:, 3:] = rotations.normalize(shaped("attitude", attitude, (len(rows), 4)))
         self._enqueue(rows, stamp_ns, POSE, values, variances, valid)
 
     def fuse_velocity(
@@ -268,9 +242,9 @@ class Estimator:
 
         variances: (3,) or (S, 3).
         """
-        rows = self._checked_rows(rows)
+        rows = checked_rows(rows, len(self))
         values = np.zeros((len(rows), 7))
-        values[:, 3:6] = _shaped("velocity_map", velocity_map, (len(rows), 3))
+        values[:, 3:6] = shaped("velocity_map", velocity_map, (len(rows), 3))
         six = np.zeros((len(rows), 6))
         six[:, 3:] = variances
         self._enqueue(rows, stamp_ns, STATED_VELOCITY, values, six, valid)
@@ -281,7 +255,7 @@ class Estimator:
         Position and velocity are errors in the map, attitude a rotation vector in the map (true =
         exp(error) * estimated).
         """
-        rows = self._checked_rows(rows)
+        rows = checked_rows(rows, len(self))
         out = np.empty((len(rows), STATES * STATES))
         present_covariances(self._filters, self._tunings, self._rings, rows, self._work, out)
         return out.reshape(-1, STATES, STATES)
@@ -322,9 +296,7 @@ class Estimator:
         arm = rotations.rotate(attitude, self._tunings["imu_arm"][row])
         own["position_map"], own["velocity_map"], own["attitude"] = position, velocity, attitude
         own["position"], own["velocity"], own["rotation"] = position + arm, velocity, attitude
-        own["covariance"] = start_covariance(
-            self._settings[row], start, attitude
-        ).ravel()
+        own["covariance"] = start_covariance(self._settings[row], start, attitude).ravel()
 
     def _fuse_columns(
         self,
@@ -335,7 +307,7 @@ class Estimator:
         variance: ArrayLike,
         valid: ArrayLike | None,
     ) -> None:
-        rows = self._checked_rows(rows)
+        rows = checked_rows(rows, len(self))
         values, variances = np.zeros((len(rows), 7)), np.zeros((len(rows), 6))
         for k, column in enumerate(columns):
             values[:, k] = column
@@ -352,9 +324,10 @@ class Estimator:
         valid: ArrayLike | None,
     ) -> None:
         variances = np.ascontiguousarray(np.broadcast_to(variances, (len(rows), 6)), np.float64)
-        told = np.isfinite(values).all(axis=1) & (variances >= 0.0).all(axis=1)
+        told: NDArray[np.bool_] = np.isfinite(values).all(axis=1)
+        told &= (variances >= 0.0).all(axis=1)
         if valid is not None:
-            told = told & np.asarray(valid, dtype=np.bool_)
+            told &= np.asarray(valid, dtype=np.bool_)
         enqueue_rows(
             self._filters,
             self._tunings,
@@ -366,23 +339,3 @@ class Estimator:
             variances,
             told,
         )
-
-    def _checked_rows(self, rows: ArrayLike) -> Rows:
-        checked = np.ascontiguousarray(np.atleast_1d(rows), np.int64)
-        if len(checked) and not (0 <= checked.min() and checked.max() < len(self)):
-            raise EstimatorError(f"rows {checked.tolist()} are not all in 0 to {len(self) - 1}")
-        return checked
-
-
-def _each(given: Any, kind: type[Any], count: int, what: str) -> list[Any]:
-    each = [given] * count if isinstance(given, kind) else list(given)
-    if len(each) != count:
-        raise EstimatorError(f"{what}: one for all or {count} are needed, not {len(each)}")
-    return each
-
-
-def _shaped(what: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    array = np.ascontiguousarray(value, np.float64)
-    if array.shape != shape:
-        raise EstimatorError(f"{what} must have shape {shape}, not {array.shape}")
-    return array

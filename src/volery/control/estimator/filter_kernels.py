@@ -1,4 +1,4 @@
-"""The filter's steps for rows of UAVs: a reading of the IMU, a measurement, the present covariance.
+"""The filter's step for rows of UAVs: take a reading of the IMU, fuse what is due.
 
 The filter proper runs at a horizon a fixed time behind the present, where every measurement can be
 fused at its own time and in order, however late it arrived. The present is that state, carried on
@@ -22,12 +22,11 @@ from volery.control.estimator.covariance_kernels import (
     decay,
     forget_place,
     normalised_innovation,
-    transform,
-    transpose,
     turn_errors,
 )
 from volery.control.estimator.measurement_kernels import linearise
 from volery.control.estimator.motion_kernels import flow_on, motion_at_horizon, still, travelled
+from volery.control.estimator.present_kernels import renew_present
 from volery.control.estimator.records import (
     ACCEL_BIAS,
     GNSS,
@@ -36,10 +35,9 @@ from volery.control.estimator.records import (
     PARTS,
     PRESSURE_OFFSET,
     ROTATION,
-    STATES,
     VELOCITY,
 )
-from volery.core.rotation_kernels import cross, rotate_vector
+from volery.core.rotation_kernels import rotate_vector
 from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.rigid import four, three
 
@@ -67,8 +65,8 @@ def predict_rows(
 ) -> int:
     """Take a reading of the IMU of each of `rows` (S,), in sensor axes (S, 3).
 
-    rings: (N, readings); queues: (N, QUEUE); works: (1,). Returns how many rows were served before one that has
-    a reading of this or a later time already.
+    rings: (N, readings); queues: (N, QUEUE); works: (1,). Returns how many rows were
+    served before one that has a reading of this or a later time already.
     """
     work = works[0]
     capacity = rings.shape[1]
@@ -93,7 +91,7 @@ def predict_rows(
             state.first_reading = (state.first_reading + 1) % capacity
             state.waiting_readings -= 1
             _fuse_due(state, tuning, queue, work)
-        _renew_present(state, tuning, ring)
+        renew_present(state, tuning, ring)
     return len(rows)
 
 
@@ -231,135 +229,3 @@ def take_over(state: Any, error: Array) -> None:
     state.rotation[2], state.rotation[3] = qz / length, qw / length
     if size > _LARGE_TURN:
         turn_errors(state.covariance, rx, ry, rz)
-
-
-@part_kernel
-def _renew_present(state: Any, tuning: Any, ring: Any) -> None:
-    """The state at the newest reading, at the centre of mass."""
-    motion = motion_at_horizon(state)
-    gyro_bias, accel_bias = three(state.gyro_bias), three(state.accel_bias)
-    before = state.reading
-    slot = state.first_reading
-    for _ in range(state.waiting_readings):
-        reading = ring[slot]
-        motion = travelled(motion, before, reading, gyro_bias, accel_bias)
-        before = reading
-        slot = slot + 1 if slot + 1 < len(ring) else 0
-    for k in range(4):
-        state.attitude[k] = motion[2][k]
-    gx, gy, gz = three(before.gyro)
-    state.omega_body[0] = gx - gyro_bias[0]
-    state.omega_body[1] = gy - gyro_bias[1]
-    state.omega_body[2] = gz - gyro_bias[2]
-    arm, swing = _arm_and_swing(state, tuning)
-    for k in range(3):
-        state.position_map[k] = motion[0][k] - arm[k]
-        state.velocity_map[k] = motion[1][k] - swing[k]
-
-
-@inner_kernel
-def _arm_and_swing(
-    state: Any, tuning: Any
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """From centre of mass to IMU, m, and its speed relative to it, m/s; map, present."""
-    x, y, z, w = four(state.attitude)
-    ax, ay, az = three(tuning.imu_arm)
-    wx, wy, wz = three(state.omega_body)
-    sx, sy, sz = cross(wx, wy, wz, ax, ay, az)
-    return rotate_vector(x, y, z, w, ax, ay, az), rotate_vector(x, y, z, w, sx, sy, sz)
-
-
-@fused_kernel
-def enqueue_rows(
-    filters: Records,
-    tunings: Records,
-    queues: Records,
-    rows: Rows,
-    stamp_ns: int,
-    kind: int,
-    values: Array,
-    variances: Array,
-    valid: NDArray[np.bool_],
-) -> None:
-    """Let measurements wait for the horizon, sorted by stamp: values (S, 7), variances (S, 6).
-
-    One that is too late, or finds the queue full, is counted as dropped.
-    """
-    for s in range(len(rows)):
-        if not valid[s]:
-            continue
-        state, queue = filters[rows[s]], queues[rows[s]]
-        late = stamp_ns < state.reading.stamp_ns - tunings[rows[s]].lateness_ns
-        if late or state.waiting_measurements == len(queue):
-            state.dropped += 1
-            continue
-        place = state.waiting_measurements
-        first = state.first_measurement
-        while place > 0 and queue[(first + place - 1) % len(queue)].stamp_ns > stamp_ns:
-            queue[(first + place) % len(queue)] = queue[(first + place - 1) % len(queue)]
-            place -= 1
-        entry = queue[(first + place) % len(queue)]
-        entry.stamp_ns = stamp_ns
-        entry.kind = kind
-        for k in range(7):
-            entry.value[k] = values[s, k]
-        for k in range(6):
-            entry.variance[k] = variances[s, k]
-        state.waiting_measurements += 1
-
-
-@fused_kernel
-def present_covariances(
-    filters: Records, tunings: Records, rings: Records, rows: Rows, works: Records, out: Array
-) -> None:
-    """Covariance out (S, STATES^2) of the present, of the centre of mass; works: (1,)."""
-    work = works[0]
-    flow, keep = work.flow, work.keep
-    for s in range(len(rows)):
-        state, tuning, ring = filters[rows[s]], tunings[rows[s]], rings[rows[s]]
-        P = out[s]
-        for i in range(STATES * STATES):
-            P[i] = state.covariance[i]
-        _copy_flow(flow, state.flow)
-        gyro_bias, accel_bias = three(state.gyro_bias), three(state.accel_bias)
-        motion = motion_at_horizon(state)
-        before = state.reading
-        for n in range(state.waiting_readings):
-            reading = ring[(state.first_reading + n) % len(ring)]
-            after = travelled(motion, before, reading, gyro_bias, accel_bias)
-            flow_on(flow, (reading.stamp_ns - before.stamp_ns) * 1e-9, motion, after)
-            motion = after
-            before = reading
-        decay(tuning, flow.duration, keep)
-        carry(P, flow, tuning, keep)
-        _lever(state, tuning, flow)
-        transform(P, flow)
-        transpose(P)
-        transform(P, flow)
-
-
-@inner_kernel
-def _copy_flow(target: Any, source: Any) -> None:
-    target.duration = source.duration
-    for i in range(3):
-        target.speed[i], target.way[i] = source.speed[i], source.way[i]
-        for j in range(3):
-            target.turn[i, j], target.turn_way[i, j] = source.turn[i, j], source.turn_way[i, j]
-            target.gyro_speed[i, j] = source.gyro_speed[i, j]
-            target.gyro_way[i, j] = source.gyro_way[i, j]
-
-
-@part_kernel
-def _lever(state: Any, tuning: Any, flow: Any) -> None:
-    """As a `FLOW`, the way from the errors of the IMU's motion to those of the centre of mass."""
-    still(flow)
-    arm, swing = _arm_and_swing(state, tuning)
-    x, y, z, w = four(state.attitude)
-    ax, ay, az = three(tuning.imu_arm)
-    for k in range(3):
-        flow.way[k] = -arm[k]
-        flow.speed[k] = -swing[k]
-        # -R [arm]x: a bias of the gyroscope swings the arm
-        sx, sy, sz = cross(ax, ay, az, 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
-        sx, sy, sz = rotate_vector(x, y, z, w, -sx, -sy, -sz)
-        flow.gyro_speed[0, k], flow.gyro_speed[1, k], flow.gyro_speed[2, k] = sx, sy, sz

@@ -37,7 +37,9 @@ _OFFSET_0 = PRESSURE_OFFSET
 
 
 @part_kernel
-def linearise(state: Any, tuning: Any, measured: Any, part: int, work: Any) -> int:
+def linearise(  # noqa: PLR0911
+    state: Any, tuning: Any, measured: Any, part: int, work: Any
+) -> int:
     """Fill residual, its Jacobian H and noise variance of a `WORK`; returns the rows filled.
 
     state: a `FILTER` at its horizon; measured: a `MEASUREMENT`; part: 0 or 1. No rows: this part is

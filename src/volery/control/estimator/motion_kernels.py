@@ -23,7 +23,9 @@ Motion = tuple[Vector, Vector, Quaternion, Vector]
 
 
 @inner_kernel
-def travelled(motion: Motion, before: Any, reading: Any, gyro_bias: Vector, accel: Vector) -> Motion:
+def travelled(
+    motion: Motion, before: Any, reading: Any, gyro_bias: Vector, accel: Vector
+) -> Motion:
     """The motion at `reading`, from that at the reading `before`.
 
     Readings are momentary values: their mean stands for the time between them. accel: bias of the

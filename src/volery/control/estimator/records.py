@@ -184,7 +184,9 @@ def tuning_of(settings: EstimatorSettings, mounting: Mounting) -> NDArray[np.voi
     row["range_arm"] = np.array(mounting.range_position_body) - imu
     row["imu_attitude"] = rotations.normalize(mounting.imu_attitude_body)
     row["magnetic_attitude"] = rotations.normalize(mounting.magnetometer_attitude_body)
-    row["range_axis"] = np.array(mounting.range_axis_body) / np.linalg.norm(mounting.range_axis_body)
+    row["range_axis"] = np.array(mounting.range_axis_body) / np.linalg.norm(
+        mounting.range_axis_body
+    )
     row["range_half_cone"] = settings.range_half_cone_rad
     row["range_largest_tilt"] = settings.range_largest_tilt_rad
     row["ground_variance"] = settings.ground_sigma_m**2

@@ -52,7 +52,7 @@ class EstimatorSettings(BaseModel):
     """East, north, up; T, or any other unit that the magnetometer reports. Default: 48 uT, inclined
     by 63.3 deg and declined by 3 deg, as at the origin of PX4's simulated world."""
     magnetic_strength_tolerance: PositiveFloat = 0.3
-    """A field stronger or weaker by this share is a disturbance, not a compass (modelling choice)."""
+    """A field stronger or weaker by this share is a disturbance (modelling choice)."""
     heading_offset_sigma_rad: NonNegativeFloat = 0.02
     """Slow heading error of the magnetometer: hard iron, declination (modelling choice)."""
     heading_offset_correlation_s: PositiveFloat = 600.0
@@ -75,7 +75,7 @@ class EstimatorSettings(BaseModel):
 
 @dataclass(frozen=True)
 class Mounting:
-    """Where the sensors of one UAV sit, from its centre of mass, m, and how they are turned (FLU)."""
+    """Where the sensors of one UAV sit, m from its centre of mass, and how they are turned; FLU."""
 
     imu_position_body: Vector = (0.0, 0.0, 0.0)
     imu_attitude_body: Quaternion = (0.0, 0.0, 0.0, 1.0)
@@ -92,7 +92,7 @@ class StartSigmas:
     """How well the state is known at the start, one standard deviation (modelling choices).
 
     With `aligned` the attitude comes from `align_at_rest`: its errors then follow from those of
-    accelerometer and magnetometer, and only `tilt_rad` and `heading_rad` of averaged noise are added.
+    accelerometer and magnetometer; `tilt_rad` and `heading_rad` are what averaged noise adds.
     """
 
     position_m: Vector = (0.5, 0.5, 0.5)
@@ -102,5 +102,8 @@ class StartSigmas:
     aligned: bool = False
 
 
-AT_REST = StartSigmas(velocity_m_s=(0.01, 0.01, 0.01), tilt_rad=1e-3, heading_rad=5e-3, aligned=True)
-"""On the ground, attitude from `align_at_rest` over about a second."""
+AT_REST = StartSigmas(
+    velocity_m_s=(0.01, 0.01, 0.01), tilt_rad=2e-3, heading_rad=5e-3, aligned=True
+)
+"""On the ground, attitude from `align_at_rest` over about a second. The tilt covers averaged noise
+and what the filter's first order leaves out: heading error times accelerometer bias."""
