@@ -127,7 +127,11 @@ class Estimator:
     def predict(
         self, rows: ArrayLike, stamp_ns: int, angular_velocity: ArrayLike, specific_force: ArrayLike
     ) -> None:
-        """Take readings of the IMU: (S, 3) rad/s and (S, 3) m/s^2 in the sensors' axes."""
+        """Take readings of the IMU: (S, 3) rad/s and (S, 3) m/s^2 in the sensors' axes.
+
+        Raises EstimatorError at a row whose last reading is not earlier; those before it have taken
+        theirs.
+        """
         rows = checked_rows(rows, len(self))
         gyro = shaped("angular_velocity", angular_velocity, (len(rows), 3))
         accel = shaped("specific_force", specific_force, (len(rows), 3))
@@ -324,10 +328,10 @@ class Estimator:
         valid: ArrayLike | None,
     ) -> None:
         variances = np.ascontiguousarray(np.broadcast_to(variances, (len(rows), 6)), np.float64)
-        told: NDArray[np.bool_] = np.isfinite(values).all(axis=1)
-        told &= (variances >= 0.0).all(axis=1)
+        finite = np.isfinite(values).all(axis=1)
+        told = np.atleast_1d(finite & (variances >= 0.0).all(axis=1))
         if valid is not None:
-            told &= np.asarray(valid, dtype=np.bool_)
+            told = np.atleast_1d(told & np.asarray(valid, dtype=np.bool_))
         enqueue_rows(
             self._filters,
             self._tunings,

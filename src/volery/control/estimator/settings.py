@@ -70,7 +70,7 @@ class EstimatorSettings(BaseModel):
     """Largest one of three numbers, with about the same probability of a false alarm."""
     restart_after_s: PositiveFloat = 7.0
     """After rejecting all GNSS positions for this long the filter believes the receiver again and
-    restarts position and velocity (PX4's EKF2 resets after 7 s)."""
+    restarts position and velocity from a fix that tells both (PX4's EKF2 resets after 7 s)."""
 
 
 @dataclass(frozen=True)
