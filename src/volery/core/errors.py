@@ -39,3 +39,7 @@ class SnapshotError(VoleryError):
 
 class PartnerError(VoleryError):
     """A lock-step partner did not answer in time, or spoke out of turn."""
+
+
+class EstimatorError(VoleryError):
+    """An estimator is given what it cannot use: wrong shape, unknown row, wrong order."""

@@ -1,0 +1,92 @@
+"""How far estimates are from the truth, and what ROS is told of how far they may be."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.estimator.records import GYRO_BIAS, POSITION, ROTATION, VELOCITY
+from volery.core import rotations
+
+Array = NDArray[np.float64]
+
+
+class MotionState(Protocol):
+    """Rows of motion: an `Estimate`, or a fleet's true state."""
+
+    @property
+    def position_map(self) -> Array:
+        """(N, 3) m."""
+
+    @property
+    def velocity_map(self) -> Array:
+        """(N, 3) m/s."""
+
+    @property
+    def attitude(self) -> Array:
+        """(N, 4) map from body."""
+
+    @property
+    def omega_body(self) -> Array:
+        """(N, 3) rad/s, FLU."""
+
+
+class EstimationError(NamedTuple):
+    """What to add to the truth for the estimate; changes slowly, and not as the vehicle turns."""
+
+    position_map: Array
+    """(N, 3) m: estimate = truth + this."""
+    velocity_map: Array
+    """(N, 3) m/s, likewise."""
+    rotation_map: Array
+    """(N, 4): estimated attitude = this * true attitude."""
+    omega_body: Array
+    """(N, 3) rad/s: estimate = truth + this."""
+
+
+def estimation_error(estimate: MotionState, truth: MotionState) -> EstimationError:
+    """Error of estimates of rows of UAVs at one instant."""
+    rotation = rotations.multiply(estimate.attitude, rotations.conjugate(truth.attitude))
+    return EstimationError(
+        estimate.position_map - truth.position_map,
+        estimate.velocity_map - truth.velocity_map,
+        np.where(rotation[..., 3:] < 0.0, -rotation, rotation),
+        estimate.omega_body - truth.omega_body,
+    )
+
+
+def pose_covariance(covariance: Array) -> Array:
+    """(S, 6, 6) as nav_msgs/Odometry orders it: x, y, z, m^2, rotations about the map's axes.
+
+    covariance: (S, STATES, STATES), of `Estimator.covariance`.
+    """
+    pick = np.r_[POSITION : POSITION + 3, ROTATION : ROTATION + 3]
+    return np.asarray(covariance[:, pick[:, None], pick])
+
+
+def twist_covariance(
+    covariance: Array, velocity_map: Array, attitude: Array, gyro_variance: Array | float
+) -> Array:
+    """(S, 6, 6) of the twist in the body: velocity, then rates.
+
+    covariance: (S, STATES, STATES); velocity_map (S, 3); attitude (S, 4); gyro_variance: () or
+    (S,), rad^2/s^2, of the noise of one reading.
+    """
+    turn = np.swapaxes(rotations.matrix(attitude), 1, 2)
+    jacobian = np.zeros((len(covariance), 6, covariance.shape[1]))
+    jacobian[:, :3, VELOCITY : VELOCITY + 3] = turn
+    # a wrong attitude shows a right velocity in wrong axes
+    jacobian[:, :3, ROTATION : ROTATION + 3] = turn @ _skew(velocity_map)
+    jacobian[:, 3:, GYRO_BIAS : GYRO_BIAS + 3] = -np.eye(3)
+    out = jacobian @ covariance @ np.swapaxes(jacobian, 1, 2)
+    out[:, range(3, 6), range(3, 6)] += np.reshape(gyro_variance, (-1, 1))
+    return np.asarray(out)
+
+
+def _skew(v: Array) -> Array:
+    """(S, 3, 3), with skew(v) u = v x u."""
+    x, y, z = v.T
+    o = np.zeros_like(x)
+    return np.array([[o, -z, y], [z, o, -x], [-y, x, o]]).transpose(2, 0, 1)

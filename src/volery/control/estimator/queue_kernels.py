@@ -1,0 +1,61 @@
+"""Measurements wait for the horizon, in the order of their time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.vehicle.compiled import fused_kernel, inner_kernel
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+Records = NDArray[np.void]
+
+
+@fused_kernel
+def enqueue_rows(
+    filters: Records,
+    tunings: Records,
+    queues: Records,
+    rows: Rows,
+    stamp_ns: int,
+    kind: int,
+    values: Array,
+    variances: Array,
+    valid: NDArray[np.bool_],
+) -> None:
+    """Let measurements wait for the horizon, sorted by stamp, then kind.
+
+    values (S, 7), variances (S, 6). One that is too late, or finds the queue full, is counted as
+    dropped.
+    """
+    for s in range(len(rows)):
+        if not valid[s]:
+            continue
+        state, queue = filters[rows[s]], queues[rows[s]]
+        late = stamp_ns < state.reading.stamp_ns - tunings[rows[s]].lateness_ns
+        if late or state.waiting_measurements == len(queue):
+            state.dropped += 1
+            continue
+        place = state.waiting_measurements
+        first = state.first_measurement
+        while place > 0 and _is_later(queue[(first + place - 1) % len(queue)], stamp_ns, kind):
+            queue[(first + place) % len(queue)] = queue[(first + place - 1) % len(queue)]
+            place -= 1
+        entry = queue[(first + place) % len(queue)]
+        entry.stamp_ns = stamp_ns
+        entry.kind = kind
+        for k in range(7):
+            entry.value[k] = values[s, k]
+        for k in range(6):
+            entry.variance[k] = variances[s, k]
+        state.waiting_measurements += 1
+
+
+@inner_kernel
+def _is_later(entry: Any, stamp_ns: int, kind: int) -> bool:
+    if entry.stamp_ns == stamp_ns:
+        return bool(entry.kind > kind)
+    return bool(entry.stamp_ns > stamp_ns)

@@ -1,0 +1,109 @@
+"""What the estimator assumes: noise of its sensors, where they are mounted, how well it starts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat
+
+Vector = tuple[float, float, float]
+NonNegativeVector = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
+Quaternion = tuple[float, float, float, float]
+
+
+class EstimatorSettings(BaseModel):
+    """Noise models and limits of one UAV's filter.
+
+    The keys of the IMU are those of an IMU's data file, so that a sensor's own numbers can be
+    passed on; the defaults are the ADIS16448's as RotorS simulates it.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    gyro_noise_density_rad_s_sqrt_hz: PositiveFloat = 3.394e-4
+    gyro_random_walk_rad_s2_sqrt_hz: NonNegativeFloat = 3.879e-5
+    gyro_bias_correlation_s: PositiveFloat = 1000.0
+    gyro_turn_on_bias_rad_s: NonNegativeFloat = 0.00873
+    accel_noise_density_m_s2_sqrt_hz: PositiveFloat = 0.004
+    accel_random_walk_m_s3_sqrt_hz: NonNegativeFloat = 0.006
+    accel_bias_correlation_s: PositiveFloat = 300.0
+    accel_turn_on_bias_m_s2: NonNegativeFloat = 0.196
+    imu_rate_hz: PositiveFloat = 200.0
+    """Sizes the buffer; faster readings only shorten the horizon."""
+
+    horizon_s: NonNegativeFloat = 0.13
+    """How far behind the present measurements are fused; no sensor's delay should be longer.
+    Default: the 120 ms of PX4's simulated GNSS receiver and two IMU periods."""
+    lateness_s: NonNegativeFloat = 0.02
+    """A measurement that is older than the horizon by more is dropped (modelling choice)."""
+
+    gnss_offset_sigma_m: NonNegativeVector = (0.5, 0.5, 0.8)
+    """East, north, up: slow part of a receiver's position error, which its stated variances do not
+    show as such (modelling choice, within the 1 m that PX4's simulated receiver states)."""
+    gnss_offset_correlation_s: PositiveFloat = 60.0
+    """Correlation time of that part (PX4's simulated receiver)."""
+    pressure_offset_sigma_m: NonNegativeFloat = 20.0
+    """Datum of the pressure height at the start; 20 m is 2.4 hPa of weather (modelling choice)."""
+    pressure_drift_m_sqrt_s: NonNegativeFloat = 0.05
+    """Its random walk: 3 m in an hour of changing weather (modelling choice)."""
+    magnetic_field_map: Vector = (1.13e-6, 2.161e-5, -4.302e-5)
+    """East, north, up; T, or any other unit that the magnetometer reports. Default: 48 uT, inclined
+    by 63.3 deg and declined by 3 deg, as at the origin of PX4's simulated world."""
+    magnetic_strength_tolerance: PositiveFloat = 0.3
+    """A field stronger or weaker by this share is a disturbance (modelling choice)."""
+    heading_offset_sigma_rad: NonNegativeFloat = 0.02
+    """Slow heading error of the magnetometer: hard iron, declination (modelling choice)."""
+    heading_offset_correlation_s: PositiveFloat = 600.0
+    """Correlation time of PX4's simulated magnetometer."""
+    range_half_cone_rad: NonNegativeFloat = math.radians(12.0)
+    """A sonar hears the ground straight below while it is tilted by no more than this."""
+    range_largest_tilt_rad: Annotated[float, Field(gt=0.0, lt=1.5)] = math.radians(25.0)
+    """Beyond, ranges are not used (modelling choice)."""
+    ground_sigma_m: NonNegativeFloat = 0.05
+    """How far flat ground is from flat (modelling choice)."""
+
+    gate_1: PositiveFloat = 25.0
+    """Largest normalised squared innovation of one number: five sigma, as PX4 gates."""
+    gate_3: PositiveFloat = 32.0
+    """Largest one of three numbers, with about the same probability of a false alarm."""
+    restart_after_s: PositiveFloat = 7.0
+    """After rejecting all GNSS positions for this long the filter believes the receiver again and
+    restarts position and velocity from a fix that tells both (PX4's EKF2 resets after 7 s)."""
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """Where the sensors of one UAV sit, m from its centre of mass, and how they are turned; FLU."""
+
+    imu_position_body: Vector = (0.0, 0.0, 0.0)
+    imu_attitude_body: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    gnss_position_body: Vector = (0.0, 0.0, 0.0)
+    barometer_position_body: Vector = (0.0, 0.0, 0.0)
+    magnetometer_attitude_body: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    range_position_body: Vector = (0.0, 0.0, 0.0)
+    range_axis_body: Vector = (0.0, 0.0, -1.0)
+    """Unit vector along which the range finder looks."""
+
+
+@dataclass(frozen=True)
+class StartSigmas:
+    """How well the state is known at the start, one standard deviation (modelling choices).
+
+    With `aligned` the attitude comes from `align_at_rest`: its errors then follow from those of
+    accelerometer and magnetometer; `tilt_rad` and `heading_rad` are what averaged noise adds.
+    """
+
+    position_m: Vector = (0.5, 0.5, 0.5)
+    velocity_m_s: Vector = (0.1, 0.1, 0.1)
+    tilt_rad: float = 0.02
+    heading_rad: float = 0.05
+    aligned: bool = False
+
+
+AT_REST = StartSigmas(
+    velocity_m_s=(0.01, 0.01, 0.01), tilt_rad=2e-3, heading_rad=5e-3, aligned=True
+)
+"""On the ground, attitude from `align_at_rest` over about a second. The tilt covers averaged noise
+and what the filter's first order leaves out: heading error times accelerometer bias."""
