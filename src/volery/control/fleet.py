@@ -41,6 +41,7 @@ from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
 from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe, hover_thrusts
+from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.battery import BatteryLevel
 from volery.vehicle.contact import IMPACT, TOUCH_DOWN, steepest_cosine
 from volery.vehicle.downwash import new_jets
@@ -149,7 +150,9 @@ class Fleet:
         )
         worn = [tuple(one) for one in wear or [()] * count]
         _check_wear(self.names, self.airframes, worn)
-        charge = checked_within("battery_charge", np.broadcast_to(battery_charge, count), (count,), 1.0)
+        charge = checked_within(
+            "battery_charge", np.broadcast_to(battery_charge, count), (count,), 1.0
+        )
         self._models, rows = _model_table(self.airframes, worn, self._dt)
         self._uavs = np.zeros(count, UAV)
         self._uavs["body"] = new_bodies(position, attitude)
@@ -593,9 +596,9 @@ def _model_table(
             distinct.append((airframe, wear))
         rows.append(kinds[key])
     models = np.zeros(len(distinct), MODEL)
-    tick = steps_of(GUIDANCE_PERIOD_S, dt) * dt
+    period = BATTERY_TICKS * steps_of(GUIDANCE_PERIOD_S, dt) * dt
     for row, (airframe, wear) in enumerate(distinct):
-        models["plant"][row] = plant_of(airframe, dt, tick, wear)[0]
+        models["plant"][row] = plant_of(airframe, dt, period, wear)[0]
         models["gains"][row] = gains_of(airframe, dt)[0]
     return models, rows
 

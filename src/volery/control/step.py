@@ -11,6 +11,7 @@ from volery.control.flight_modes import CRASHED, guide, stop
 from volery.control.gains import GAINS
 from volery.control.rates_attitude import hold_attitude, hold_rates
 from volery.control.setpoints import PILOT
+from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.battery import drain
 from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
@@ -89,6 +90,7 @@ def advance_fleet(  # noqa: PLR0912
     room = events.shape[0] - EVENTS_A_STEP * count
     while done < steps and not spent and written <= (0 if event_ends else room):
         guiding = step % guidance_steps == 0
+        draining = step % (guidance_steps * BATTERY_TICKS) == 0
         turning = step % attitude_steps == 0
         row = (step + 1) % rows
         if guiding and look:
@@ -101,9 +103,9 @@ def advance_fleet(  # noqa: PLR0912
             if guiding:
                 air = body.air_velocity_map
                 air[0], air[1], air[2] = wind_x, wind_y, wind_z - jets.downwash[i]
-                if plant.battery.capacity > 0.0 and drain(body, plant, pilot):
-                    _note(events[written], step + 1, i, BATTERY_FELL, pilot.mode, 0.0, body)
-                    written += 1
+            if draining and plant.battery.capacity > 0.0 and drain(body, plant, pilot):
+                _note(events[written], step + 1, i, BATTERY_FELL, pilot.mode, 0.0, body)
+                written += 1
             if body.asleep:
                 for k in range(3):
                     body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0

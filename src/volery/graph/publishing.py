@@ -6,6 +6,7 @@ A message is built only where somebody receives it. Its arrays are read-only and
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
@@ -17,6 +18,7 @@ from volery.core import rotations
 from volery.engine.events import Event
 from volery.graph.graph import Graph, Publisher
 from volery.graph.messages import (
+    BatteryState,
     Clock,
     Imu,
     JointState,
@@ -39,6 +41,7 @@ from volery.graph.messages import (
 )
 from volery.sensors.mount import Mount
 from volery.sensors.samples import (
+    BatteryReadings,
     ImuReadings,
     JointAngles,
     LidarScans,
@@ -47,6 +50,7 @@ from volery.sensors.samples import (
     Samples,
     SensorId,
 )
+from volery.vehicle.battery import BatteryLevel
 
 Array = NDArray[np.float64]
 
@@ -88,6 +92,7 @@ class GraphPublisher:
             RangeReadings: self._ranges,
             OdometryReadings: self._odometry,
             JointAngles: self._joints,
+            BatteryReadings: self._batteries,
         }
 
     def announce(self, sensor: SensorId, kind: type[Any], mount: Mount) -> None:
@@ -104,6 +109,8 @@ class GraphPublisher:
             self._advertise(_odometry_topic(sensor), Odometry)
             if sensor.name == "odom":
                 self._static.append(_fixed_frame("map", f"{sensor.uav_name}/odom"))
+        elif kind is BatteryReadings:
+            self._advertise(f"/{sensor.uav_name}/{sensor.name}", BatteryState)
         else:
             self._advertise(
                 f"/{sensor.uav_name}/{sensor.name}", Imu if kind is ImuReadings else Range
@@ -254,9 +261,41 @@ class GraphPublisher:
         if transforms:
             self._tf.publish(TFMessage(transforms))
 
+    def _batteries(self, readings: BatteryReadings) -> None:
+        for i, sensor in enumerate(readings.sensors):
+            publisher = self._publishers[f"/{sensor.uav_name}/{sensor.name}"]
+            if publisher.wanted:
+                publisher.publish(_battery_state(readings, i))
+
     def _advertise(self, topic: str, message_class: type[Any]) -> None:
         if topic not in self._publishers:
             self._publishers[topic] = self._graph.advertise(topic, message_class)
+
+
+def _battery_state(readings: BatteryReadings, i: int) -> BatteryState:
+    """By the rules of sensor_msgs: current below 0 while it discharges, NaN for what is unknown."""
+    cells = int(readings.cells[i])
+    voltage, share = float(readings.voltage[i]), float(readings.charge[i])
+    capacity = float(readings.capacity_ah[i])
+    dead = readings.level[i] == BatteryLevel.EMPTY
+    return BatteryState(
+        header(readings.stamp_ns, f"{readings.sensors[i].uav_name}/base_link"),
+        voltage,
+        math.nan,
+        -float(readings.current[i]),
+        share * capacity,
+        capacity,
+        capacity,
+        share,
+        BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
+        BatteryState.POWER_SUPPLY_HEALTH_DEAD if dead else BatteryState.POWER_SUPPLY_HEALTH_GOOD,
+        BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO,
+        True,
+        _read_only(np.full(cells, voltage / cells, dtype=np.float32)),
+        _read_only(np.full(cells, np.nan, dtype=np.float32)),
+        "",
+        "",
+    )
 
 
 def _odometry_topic(sensor: SensorId) -> str:

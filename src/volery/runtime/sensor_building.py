@@ -19,6 +19,7 @@ from volery.core.rng import stream_key
 from volery.engine.engine import SensorBank
 from volery.runtime.placement import Start
 from volery.scenario import schema
+from volery.sensors.battery import BatteryBank
 from volery.sensors.imu import ImuBank, load_imu_model
 from volery.sensors.joints import JointBank
 from volery.sensors.lidar_bank import LidarBank
@@ -90,6 +91,7 @@ class _Builder:
             "sonar": self._sonar,
             "odometry": self._odometry,
             "ground_truth": self._ground_truth,
+            "battery": self._battery,
         }
         try:
             return by_kind[group[0].spec.kind](group)
@@ -125,6 +127,9 @@ class _Builder:
 
     def _ground_truth(self, group: list[Fitted]) -> SensorBank:
         return GroundTruthBank(_schedule(group), _ids(group))
+
+    def _battery(self, group: list[Fitted]) -> SensorBank:
+        return BatteryBank(_schedule(group), _ids(group), self._fleet)
 
 
 def _mount(spec: Any) -> Mount:

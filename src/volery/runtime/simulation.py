@@ -33,6 +33,7 @@ from volery.runtime.worlds import build_forest, build_terrain
 from volery.scenario.schema import Scenario
 from volery.sensors.mount import Mount
 from volery.sensors.samples import (
+    BatteryReadings,
     ImuReadings,
     JointAngles,
     LidarScans,
@@ -53,6 +54,7 @@ _RESULT_OF = {
     "sonar": RangeReadings,
     "odometry": OdometryReadings,
     "ground_truth": OdometryReadings,
+    "battery": BatteryReadings,
 }
 
 
@@ -264,6 +266,12 @@ class Simulation:
             except DataFileError as error:
                 key = f"{self.scenario.name}: types.{name}.airframe"
                 raise DataFileError(f"{key}: {error}") from None
+            rotors = len(airframes[name].rotors.places)
+            if len(kind.wear) not in (0, rotors):
+                raise ScenarioError(
+                    f"{self.scenario.name}: types.{name}.wear has {len(kind.wear)} entries; "
+                    f"{kind.airframe} has {rotors} rotors, and needs one for each, or none"
+                )
         return place_uavs(self.scenario, airframes, self.scene, self.terrain)
 
     def _open_graph(self, starts: tuple[Start, ...]) -> None:
@@ -313,6 +321,8 @@ def _make_fleet(scenario: Scenario, starts: tuple[Start, ...]) -> Fleet:
         on_contact=scenario.physics.on_contact,
         names=[start.name for start in starts],
         mode=[FlightMode.LANDED if start.on_ground else FlightMode.HOLD for start in starts],
+        wear=[scenario.types[start.type_name].wear for start in starts],
+        battery_charge=[scenario.types[start.type_name].battery_charge for start in starts],
     )
 
 

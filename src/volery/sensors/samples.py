@@ -98,7 +98,29 @@ class JointAngles:
     """(S,) rad/s."""
 
 
-Samples: TypeAlias = LidarScans | ImuReadings | RangeReadings | OdometryReadings | JointAngles
+@dataclass(frozen=True)
+class BatteryReadings:
+    """What battery monitors tell."""
+
+    sensors: tuple[SensorId, ...]
+    stamp_ns: int
+    voltage: Array
+    """(S,) V under load."""
+    current: Array
+    """(S,) A out of the battery."""
+    charge: Array
+    """(S,) share of the capacity that is left."""
+    capacity_ah: Array
+    """(S,) A h."""
+    cells: NDArray[np.int64]
+    """(S,) in series."""
+    level: NDArray[np.int64]
+    """(S,) `vehicle.battery.BatteryLevel`."""
+
+
+Samples: TypeAlias = (
+    LidarScans | ImuReadings | RangeReadings | OdometryReadings | JointAngles | BatteryReadings
+)
 
 
 def owned(array: NDArray[Any]) -> NDArray[Any]:

@@ -61,7 +61,8 @@ def air_wrench(
 @inner_kernel
 def _speed_at_mid_step(body: Any, plant: Any, command: Any, r: int) -> float:
     """Speed of rotor `r` half a step on, rad/s; its speed in `body` moves on by a whole step."""
-    wanted = min(command.rotor_reference[r], body.rotor_limit[r])
+    wanted = min(command.rotor_reference[r], body.speed_limit)
+    wanted = wanted if body.rotor_lift[r] > 0.0 else 0.0  # a lost one stops
     lead = body.rotor_speed[r] - wanted
     rising = lead < 0.0
     body.rotor_speed[r] = wanted + lead * (plant.rise[r] if rising else plant.fall[r])

@@ -46,6 +46,9 @@ _INVERSE_SLANT = 1.0 / math.sqrt(1.0 + (EDGE * SPREAD) ** 2)
 _LOOK_BEYOND = 2.0
 """m beyond the widest jet that a look reaches, and twice what may be flown until the next."""
 
+_REFILL_BELOW = 0.25
+"""m: who has less left looks around when somebody must, so that looks come together."""
+
 
 class Jets(NamedTuple):
     """What a look around needs for N UAVs, kept from call to call; no state: only `order` is read
@@ -63,9 +66,7 @@ class Jets(NamedTuple):
 
 def new_jets(count: int) -> Jets:
     """Room for `count` UAVs."""
-    return Jets(
-        np.arange(count), np.zeros(count, np.int64), np.zeros((count, 4)), np.zeros(count)
-    )
+    return Jets(np.arange(count), np.zeros(count, np.int64), np.zeros((count, 4)), np.zeros(count))
 
 
 @inner_kernel
@@ -80,7 +81,7 @@ def find_downwash(uavs: NDArray[np.void], models: NDArray[np.void], jets: Jets) 
         return
     reach = _LOOK_BEYOND + _line_up(uavs, models, jets)
     for k in range(count):
-        if uavs[jets.order[k]].body.downwash_budget <= 0.0:
+        if uavs[jets.order[k]].body.downwash_budget < _REFILL_BELOW:
             _refill_budgets(uavs, jets, k, reach)
     for k in range(count):
         i = jets.order[k]
@@ -203,10 +204,6 @@ def _window(jets: Jets, k: int, reach: float) -> tuple[int, int]:
     while first > 0 and jets.copy[first - 1] == copy and x - jets.place[first - 1, 0] <= reach:
         first -= 1
     last = k + 1
-    while (
-        last < len(jets.order)
-        and jets.copy[last] == copy
-        and jets.place[last, 0] - x <= reach
-    ):
+    while last < len(jets.order) and jets.copy[last] == copy and jets.place[last, 0] - x <= reach:
         last += 1
     return first, last
