@@ -50,7 +50,7 @@ EVENTS_A_STEP = 4
 
 
 @fused_kernel
-def advance_fleet(  # noqa: PLR0912
+def advance_fleet(  # noqa: PLR0912, PLR0915
     uavs: NDArray[np.void],
     models: NDArray[np.void],
     jets: Jets,
@@ -75,9 +75,9 @@ def advance_fleet(  # noqa: PLR0912
 ) -> tuple[int, int, bool]:
     """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
 
-    jets: room for the search of neighbours (`new_jets`). Ends early after a step in which a budget ran out, the events' buffer grew full or, with
-    `event_ends`, anything was noted. Returns the steps done, the events written, and whether a
-    budget ran out.
+    jets: room for the search of neighbours (`new_jets`). Ends early after a step in which a budget
+    ran out, the events' buffer grew full or, with `event_ends`, anything was noted. Returns the
+    steps done, the events written, and whether a budget ran out.
     """
     grid = TerrainGrid(heights, origin_x, origin_y, spacing)
     scratch = np.empty(SCRATCH_SHAPE)

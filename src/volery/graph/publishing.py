@@ -291,11 +291,17 @@ def _battery_state(readings: BatteryReadings, i: int) -> BatteryState:
         BatteryState.POWER_SUPPLY_HEALTH_DEAD if dead else BatteryState.POWER_SUPPLY_HEALTH_GOOD,
         BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO,
         True,
-        _read_only(np.full(cells, voltage / cells, dtype=np.float32)),
-        _read_only(np.full(cells, np.nan, dtype=np.float32)),
+        _same(cells, voltage / cells),
+        _same(cells, math.nan),
         "",
         "",
     )
+
+
+def _same(count: int, value: float) -> NDArray[np.float32]:
+    array = np.full(count, value, dtype=np.float32)
+    array.flags.writeable = False
+    return array
 
 
 def _odometry_topic(sensor: SensorId) -> str:

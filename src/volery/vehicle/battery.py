@@ -106,7 +106,7 @@ def open_circuit_voltage(battery: Battery, charge: float) -> float:
 def battery_row(
     battery: Battery | None, max_speed_rad_s: float, period_s: float
 ) -> NDArray[np.void]:
-    """The (1,) `BATTERY` row of a battery brought up to date each `period_s`; None: ideal supply."""
+    """The (1,) `BATTERY` row of a battery updated each `period_s`; None: ideal supply."""
     row = np.zeros(1, BATTERY)
     if battery is None:
         return row
@@ -126,10 +126,10 @@ def battery_row(
 
 @inner_kernel
 def drain(body: Any, plant: Any, command: Any) -> bool:
-    """Take the charge of one update out of a `BODY`'s battery and limit its rotors; whether a level fell.
+    """Take the charge of one update out of a `BODY`'s battery; whether it fell to a lower level.
 
     plant: a `PLANT` with a battery. command: a record with `full_thrust`, N, the most that a rotor
-    gives now; the mixer shares out no more.
+    can give now; control asks for no more.
     """
     battery = plant.battery
     power = battery.avionics
@@ -157,7 +157,6 @@ def drain(body: Any, plant: Any, command: Any) -> bool:
     fell = level > body.battery_level
     body.battery_level = level
     limit = 0.0 if level == _EMPTY else min(plant.max_speed, voltage * battery.speed_a_volt)
-    body.speed_limit = limit
     command.full_thrust = plant.thrust_constant * limit * limit
     return bool(fell)
 

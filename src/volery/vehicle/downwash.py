@@ -51,8 +51,10 @@ _REFILL_BELOW = 0.25
 
 
 class Jets(NamedTuple):
-    """What a look around needs for N UAVs, kept from call to call; no state: only `order` is read
-    before it is written, and any order gives the same result."""
+    """What a look around needs for N UAVs, kept from call to call.
+
+    No state: only `order` is read before it is written, and any order gives the same result.
+    """
 
     order: NDArray[np.int64]
     """(N,) rows, sorted by place."""

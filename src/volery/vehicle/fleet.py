@@ -23,10 +23,10 @@ BODY = np.dtype(
         ("battery_current", "f8"),
         ("battery_level", "i8"),
         ("rotor_health", "f8", MAX_ROTORS),
+        ("rotor_lift", "f8", MAX_ROTORS),  # N s^2: thrust over speed squared, wear and ground in it
         ("free_acceleration", "f8", 3),  # on the ground, acceleration_map without its push ...
         ("free_angular_acceleration", "f8", 3),  # ... and likewise
         # what every step reads or writes, close together for the cache
-        ("rotor_lift", "f8", MAX_ROTORS),  # N s^2: thrust over speed squared, wear and ground in it
         ("rotor_speed", "f8", MAX_ROTORS),
         ("position_map", "f8", 3),
         ("velocity_map", "f8", 3),
@@ -35,7 +35,6 @@ BODY = np.dtype(
         ("air_velocity_map", "f8", 3),
         ("acceleration_map", "f8", 3),
         ("angular_acceleration_body", "f8", 3),
-        ("speed_limit", "f8"),  # rad/s that the battery allows all rotors
         ("contact_budget", "f8"),
         ("separation_budget", "f8"),
         ("ground_budget", "f8"),
@@ -43,7 +42,8 @@ BODY = np.dtype(
         ("crashed", "?"),
         ("on_ground", "?"),
         ("asleep", "?"),
-        ("spare", "u1", 5),  # no hidden padding: equal states are equal bytes
+        ("altered", "?"),  # some rotor_lift is not that of a new rotor far from the ground
+        ("spare", "u1", 4),  # no hidden padding: equal states are equal bytes
     ],
     align=True,
 )
@@ -115,12 +115,12 @@ def fit_rotors(body: np.void, plant: np.void, health: ArrayLike) -> None:
     count = int(plant["rotors"])
     body["rotor_health"][:count] = health
     body["rotor_lift"][:count] = plant["thrust_constant"] * np.asarray(health)
+    body["altered"] = (np.asarray(health) != 1.0).any()
 
 
 def charge_battery(body: np.void, plant: np.void, charge: float) -> None:
     """Give a `BODY` record a rested battery of its `PLANT` with `charge` from 0 to 1."""
     battery = plant["battery"]
-    body["speed_limit"] = plant["max_speed"]
     body["battery_charge"] = charge
     body["battery_pair_voltage"] = body["battery_current"] = 0.0
     body["battery_level"] = 0

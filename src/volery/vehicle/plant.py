@@ -68,7 +68,8 @@ def plant_of(
 ) -> NDArray[np.void]:
     """The (1,) `PLANT` row of an airframe stepped by `dt` s, its battery each `battery_period` s.
 
-    wear: one a rotor, or none at all. The thrust that wear leaves is a state (`BODY`'s rotor_health), not part of this row.
+    wear: one a rotor, or none at all. The thrust that wear leaves is a state (`BODY`'s
+    rotor_health), not part of this row.
     """
     row = np.zeros(1, PLANT)
     body, ground = airframe.body, airframe.ground
