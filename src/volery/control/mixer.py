@@ -3,8 +3,8 @@
 Thrusts are `allocation_matrix` times (thrust, torques). Where that leaves a rotor's range, the
 vehicle keeps its attitude first: roll and pitch are scaled only where they alone exceed the range,
 thrust then moves to where roll and pitch fit, and yaw gets what room is left.
-A battery that sags leaves the rotors less: the mixer shares out `pilot.full_thrust`, as an autopilot
-does whose outputs are shares of the present full throttle.
+A battery that sags leaves the rotors less: the mixer shares out `pilot.full_thrust`, as an
+autopilot does whose outputs are shares of the present full throttle.
 """
 
 from __future__ import annotations

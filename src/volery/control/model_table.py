@@ -12,6 +12,7 @@ from volery.control.step import MODEL
 from volery.core.errors import CommandError
 from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe
+from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.identified import REFERENCE_COLUMNS, IdentifiedModel, identified_row
 from volery.vehicle.kinematic import Kinematic, kinematic_row
 from volery.vehicle.plant import plant_of
@@ -40,9 +41,9 @@ def model_table(
             distinct.append((airframe, plant, wear))
         rows.append(numbers[key])
     models = np.zeros(len(distinct), MODEL)
-    tick = steps_of(GUIDANCE_PERIOD_S, dt) * dt
+    period = BATTERY_TICKS * steps_of(GUIDANCE_PERIOD_S, dt) * dt
     for row, (airframe, plant, wear) in enumerate(distinct):
-        models["plant"][row] = plant_of(airframe, dt, tick, wear)[0]
+        models["plant"][row] = plant_of(airframe, dt, period, wear)[0]
         models["gains"][row] = gains_of(airframe, dt)[0]
         models["kind"][row] = kind_of(plant)
         if isinstance(plant, IdentifiedModel):

@@ -29,9 +29,9 @@ def hold_rates(pilot: Any, estimate: Any, gains: Any, dt: float) -> None:
     estimate: a record with `omega_body`.
     """
     if pilot.level <= _ROTORS:
-        if pilot.level == _STOPPED:
-            for r in range(gains.rotors):
-                pilot.rotor_reference[r] = 0.0
+        most = 0.0 if pilot.level == _STOPPED else _full_speed(pilot, gains)
+        for r in range(gains.rotors):
+            pilot.rotor_reference[r] = min(pilot.rotor_reference[r], most)
         return
     ox, oy, oz = three(estimate.omega_body)
     ix, iy, iz = three(gains.inertia)
@@ -39,6 +39,12 @@ def hold_rates(pilot: Any, estimate: Any, gains: Any, dt: float) -> None:
     ty = iy * _angular_acceleration(pilot, gains, 1, oy, dt) + (ix - iz) * oz * ox
     tz = iz * _angular_acceleration(pilot, gains, 2, oz, dt) + (iy - ix) * ox * oy
     mix(gains, pilot.thrust, tx, ty, tz, pilot)
+
+
+@inner_kernel
+def _full_speed(pilot: Any, gains: Any) -> float:
+    """Speed of a rotor that gives all it can, rad/s."""
+    return math.sqrt(pilot.full_thrust * gains.inverse_thrust_constant)
 
 
 @inner_kernel

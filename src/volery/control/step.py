@@ -13,6 +13,7 @@ from volery.control.gains import GAINS
 from volery.control.kinematic_flight import fly_kinematic
 from volery.control.rates_attitude import hold_attitude, hold_rates
 from volery.control.setpoints import PILOT, ControlLevel
+from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.battery import drain
 from volery.vehicle.compiled import apart_kernel, fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
@@ -119,6 +120,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     room = events.shape[0] - EVENTS_A_STEP * count
     while done < steps and not spent and written <= (0 if event_ends else room):
         guiding = step % guidance_steps == 0
+        draining = step % (guidance_steps * BATTERY_TICKS) == 0
         turning = step % attitude_steps == 0
         row = (step + 1) % rows
         if guiding:
@@ -132,7 +134,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
             pilot = uavs[i].pilot
             model = models[uavs[i].model]
             plant = model.plant
-            if guiding and plant.battery.capacity > 0.0 and drain(body, plant, pilot):
+            if draining and plant.battery.capacity > 0.0 and drain(body, plant, pilot):
                 _note(events[written], step + 1, i, BATTERY_FELL, pilot.mode, 0.0, body)
                 written += 1
             if body.asleep:

@@ -18,6 +18,8 @@ class EventKind(StrEnum):
     """Touched a tree, another solid or another UAV."""
     MODE = "mode"
     """Changed its flight mode."""
+    BATTERY = "battery"
+    """Its battery ran low, critical or empty."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class Event:
         x, y, z = self.position_map
         where = f"at ({x:.1f}, {y:.1f}, {z:.1f}) m"
         time = f"{s_from_ns(self.time_ns):.3f} s"
-        if self.kind is EventKind.MODE:
+        if self.kind in (EventKind.MODE, EventKind.BATTERY):
             return f"{time}  {self.uav} {self.detail} {where}"
         what = {
             EventKind.TOUCH_DOWN: "touched down",

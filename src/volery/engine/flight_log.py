@@ -13,6 +13,7 @@ _KINDS = {
     FleetEventKind.TOUCH_DOWN: EventKind.TOUCH_DOWN,
     FleetEventKind.IMPACT: EventKind.IMPACT,
     FleetEventKind.MODE: EventKind.MODE,
+    FleetEventKind.BATTERY: EventKind.BATTERY,
 }
 
 
@@ -26,12 +27,16 @@ def drain(fleet: Fleet, names: tuple[str, ...]) -> Iterator[Event]:
 
 def _event(noted: FleetEvent, name: str, dt_ns: int) -> Event:
     kind = _KINDS[noted.kind]
+    detail = {
+        EventKind.MODE: f"changed to {noted.mode.name}",
+        EventKind.BATTERY: f"battery {noted.battery_level.name.lower()}",
+    }.get(kind, "")
     return Event(
         noted.step * dt_ns,
         name,
         kind,
         noted.position_map,
         noted.speed_m_s,
-        partner="" if kind is EventKind.MODE else "ground",
-        detail=f"changed to {noted.mode.name}" if kind is EventKind.MODE else "",
+        partner="" if detail else "ground",
+        detail=detail,
     )

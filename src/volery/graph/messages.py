@@ -32,6 +32,7 @@ Vector3 = _ros2.geometry_msgs__msg__Vector3
 Odometry = _ros2.nav_msgs__msg__Odometry
 Clock = _ros2.rosgraph_msgs__msg__Clock
 FluidPressure = _ros2.sensor_msgs__msg__FluidPressure
+BatteryState = _ros2.sensor_msgs__msg__BatteryState
 Imu = _ros2.sensor_msgs__msg__Imu
 JointState = _ros2.sensor_msgs__msg__JointState
 LaserEcho = _ros2.sensor_msgs__msg__LaserEcho

@@ -6,6 +6,7 @@ A message is built only where somebody receives it. Its arrays are read-only and
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
@@ -18,6 +19,7 @@ from volery.engine.events import Event
 from volery.graph.graph import Graph, Publisher
 from volery.graph.lidar_publishing import LidarPublisher, laser_frame
 from volery.graph.messages import (
+    BatteryState,
     Clock,
     Imu,
     JointState,
@@ -41,6 +43,7 @@ from volery.graph.navigation_messages import CHANNELS
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
 from volery.sensors.samples import (
+    BatteryReadings,
     ImuReadings,
     JointAngles,
     LidarScans,
@@ -49,6 +52,7 @@ from volery.sensors.samples import (
     Samples,
     SensorId,
 )
+from volery.vehicle.battery import BatteryLevel
 
 Array = NDArray[np.float64]
 
@@ -81,6 +85,7 @@ class GraphPublisher:
             OdometryReadings: self._odometry,
             JointAngles: self._joints,
             **dict.fromkeys(CHANNELS, self._by_channel),
+            BatteryReadings: self._batteries,
         }
 
     def announce(self, sensor: SensorId, kind: type[Any], mount: Mount) -> None:
@@ -93,6 +98,8 @@ class GraphPublisher:
             self._advertise(_odometry_topic(sensor), Odometry)
             if sensor.name == "odom":
                 self._static.append(_fixed_frame("map", f"{sensor.uav_name}/odom"))
+        elif kind is BatteryReadings:
+            self._advertise(f"/{sensor.uav_name}/{sensor.name}", BatteryState)
         else:
             if kind in CHANNELS:
                 for channel in CHANNELS[kind]:
@@ -250,9 +257,47 @@ class GraphPublisher:
                     if message is not None:
                         publisher.publish(message)
 
+    def _batteries(self, readings: BatteryReadings) -> None:
+        for i, sensor in enumerate(readings.sensors):
+            publisher = self._publishers[f"/{sensor.uav_name}/{sensor.name}"]
+            if publisher.wanted:
+                publisher.publish(_battery_state(readings, i))
+
     def _advertise(self, topic: str, message_class: type[Any]) -> None:
         if topic not in self._publishers:
             self._publishers[topic] = self._graph.advertise(topic, message_class)
+
+
+def _battery_state(readings: BatteryReadings, i: int) -> BatteryState:
+    """By the rules of sensor_msgs: current below 0 while it discharges, NaN for what is unknown."""
+    cells = int(readings.cells[i])
+    voltage, share = float(readings.voltage[i]), float(readings.charge[i])
+    capacity = float(readings.capacity_ah[i])
+    dead = readings.level[i] == BatteryLevel.EMPTY
+    return BatteryState(
+        header(readings.stamp_ns, f"{readings.sensors[i].uav_name}/base_link"),
+        voltage,
+        math.nan,
+        -float(readings.current[i]),
+        share * capacity,
+        capacity,
+        capacity,
+        share,
+        BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
+        BatteryState.POWER_SUPPLY_HEALTH_DEAD if dead else BatteryState.POWER_SUPPLY_HEALTH_GOOD,
+        BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO,
+        True,
+        _same(cells, voltage / cells),
+        _same(cells, math.nan),
+        "",
+        "",
+    )
+
+
+def _same(count: int, value: float) -> NDArray[np.float32]:
+    array = np.full(count, value, dtype=np.float32)
+    array.flags.writeable = False
+    return array
 
 
 def _odometry_topic(sensor: SensorId) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
-from volery.core.errors import DataFileError
+from volery.core.errors import DataFileError, ScenarioError
 from volery.runtime.placement import Start, place_uavs
 from volery.runtime.plant_building import plant_of_type
 from volery.runtime.worlds import build_weather
@@ -28,6 +28,12 @@ def place(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[Start, ..
         except DataFileError as error:
             key = f"{scenario.name}: types.{name}.airframe"
             raise DataFileError(f"{key}: {error}") from None
+        rotors = len(airframes[name].rotors.places)
+        if len(kind.wear) not in (0, rotors):
+            raise ScenarioError(
+                f"{scenario.name}: types.{name}.wear has {len(kind.wear)} entries; "
+                f"{kind.airframe} has {rotors} rotors, and needs one for each, or none"
+            )
     return place_uavs(scenario, airframes, scene, terrain)
 
 

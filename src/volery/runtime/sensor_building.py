@@ -23,6 +23,7 @@ from volery.runtime.placement import Start
 from volery.scenario import schema
 from volery.sensors.bank import Bank
 from volery.sensors.barometer import BarometerBank, load_barometer_model
+from volery.sensors.battery import BatteryBank
 from volery.sensors.faults import FaultableBank
 from volery.sensors.gnss import GnssBank, load_gnss_model
 from volery.sensors.imu import ImuBank, load_imu_model
@@ -33,6 +34,7 @@ from volery.sensors.magnetometer import MagnetometerBank, load_magnetometer_mode
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.odometry import GroundTruthBank, OdometryBank, load_odometry_model
 from volery.sensors.samples import (
+    BatteryReadings,
     GnssReadings,
     ImuReadings,
     JointAngles,
@@ -57,6 +59,7 @@ RESULT_OF: dict[str, type[Samples]] = {
     "gnss": GnssReadings,
     "barometer": PressureReadings,
     "magnetometer": MagneticReadings,
+    "battery": BatteryReadings,
 }
 """What each kind of sensor measures."""
 
@@ -195,6 +198,7 @@ class _Builder:
             "gnss": self._gnss,
             "barometer": self._barometer,
             "magnetometer": self._magnetometer,
+            "battery": self._battery,
         }
         try:
             return by_kind[group[0].spec.kind](group)
@@ -257,6 +261,9 @@ class _Builder:
         _, turns = _places(group)
         field = magnetic_field_map(self._world)
         return MagnetometerBank(model, _schedule(group), _ids(group), turns, _keys(group), field)
+
+    def _battery(self, group: list[Fitted]) -> Bank:
+        return BatteryBank(_schedule(group), _ids(group), self._fleet)
 
 
 def _wants_intensities(spec: schema.LidarSensor, model: LidarModel) -> bool:

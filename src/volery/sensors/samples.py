@@ -170,6 +170,28 @@ class MagneticReadings:
     field_variance: float
 
 
+@dataclass(frozen=True)
+class BatteryReadings:
+    """What battery monitors tell."""
+
+    MEASURED: ClassVar[dict[str, int]] = {"voltage": 1, "current": 1}
+
+    sensors: tuple[SensorId, ...]
+    stamp_ns: int
+    voltage: Array
+    """(S,) V under load."""
+    current: Array
+    """(S,) A out of the battery."""
+    charge: Array
+    """(S,) share of the capacity that is left."""
+    capacity_ah: Array
+    """(S,) A h."""
+    cells: NDArray[np.int64]
+    """(S,) in series."""
+    level: NDArray[np.int64]
+    """(S,) `vehicle.battery.BatteryLevel`."""
+
+
 Samples: TypeAlias = (
     LidarScans
     | ImuReadings
@@ -179,6 +201,7 @@ Samples: TypeAlias = (
     | GnssReadings
     | PressureReadings
     | MagneticReadings
+    | BatteryReadings
 )
 
 

@@ -47,7 +47,7 @@ def air_wrench(
     rates, both FLU and at mid-step.
     Returns (fx, fy, fz, tx, ty, tz) in N and N m.
     """
-    if plant.upright:
+    if plant.upright and not body.altered:
         fx, fy, fz, tx, ty, tz = upright_rotors(body, plant, command, vx, vy, vz, ox, oy, oz)
     else:
         fx, fy, fz, tx, ty, tz = leaning_rotors(body, plant, command, vx, vy, vz, ox, oy, oz)
@@ -59,9 +59,8 @@ def air_wrench(
 
 
 @inner_kernel
-def _speed_at_mid_step(body: Any, plant: Any, command: Any, r: int) -> float:
+def _speed_at_mid_step(body: Any, plant: Any, wanted: float, r: int) -> float:
     """Speed of rotor `r` half a step on, rad/s; its speed in `body` moves on by a whole step."""
-    wanted = min(command.rotor_reference[r], body.rotor_limit[r])
     lead = body.rotor_speed[r] - wanted
     rising = lead < 0.0
     body.rotor_speed[r] = wanted + lead * (plant.rise[r] if rising else plant.fall[r])
@@ -81,11 +80,13 @@ def leaning_rotors(
     oy: float,
     oz: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """Force and torque of rotors with any places and axes."""
+    """Force and torque of rotors with any places, axes and thrust constants."""
     loss, roll = plant.rotor_drag, plant.rolling
     fx = fy = fz = tx = ty = tz = 0.0
     for r in range(plant.rotors):
-        w = _speed_at_mid_step(body, plant, command, r)
+        lift = body.rotor_lift[r]
+        wanted = command.rotor_reference[r] if lift > 0.0 else 0.0  # a lost motor stops
+        w = _speed_at_mid_step(body, plant, wanted, r)
         px, py, pz = plant.rotor_x[r], plant.rotor_y[r], plant.rotor_z[r]
         ax, ay, az = plant.rotor_axis[r, 0], plant.rotor_axis[r, 1], plant.rotor_axis[r, 2]
         hx = vx + oy * pz - oz * py
@@ -95,7 +96,7 @@ def leaning_rotors(
         hx -= along * ax
         hy -= along * ay
         hz -= along * az
-        thrust = body.rotor_lift[r] * w * w * max(1.0 - abs(along) * _INVERSE_INFLOW, 0.0)
+        thrust = lift * w * w * max(1.0 - abs(along) * _INVERSE_INFLOW, 0.0)
         gx = thrust * ax - loss * w * hx
         gy = thrust * ay - loss * w * hy
         gz = thrust * az - loss * w * hz
@@ -122,18 +123,19 @@ def upright_rotors(
     oy: float,
     oz: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """`leaning_rotors` where every axis is the body's z and all hubs lie at one height.
+    """`leaning_rotors` for axes along the body's z, hubs at one height and thrusts unaltered.
 
     Drag and rolling moment are linear in the hubs' velocities, so their sums need only the moments
     of the speeds over the rotors: w, w x, w y, w (x^2 + y^2), and with the spins s w, s w x, s w y.
     """
+    constant = plant.thrust_constant
     w0 = wx = wy = wrr = q0 = qx = qy = 0.0
     lift = lift_x = lift_y = twist = 0.0
     for r in range(plant.rotors):
-        w = _speed_at_mid_step(body, plant, command, r)
+        w = _speed_at_mid_step(body, plant, command.rotor_reference[r], r)
         px, py = plant.rotor_x[r], plant.rotor_y[r]
         along = vz + ox * py - oy * px
-        thrust = body.rotor_lift[r] * w * w * max(1.0 - abs(along) * _INVERSE_INFLOW, 0.0)
+        thrust = constant * w * w * max(1.0 - abs(along) * _INVERSE_INFLOW, 0.0)
         q = plant.spin[r] * w
         w0 += w
         wx += w * px

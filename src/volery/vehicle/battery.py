@@ -8,7 +8,8 @@
 
 This is the Thevenin model with one RC pair (M. Chen, G. Rincon-Mora, "Accurate electrical battery
 model", IEEE Trans. Energy Conversion 21, 2006, with one of its two pairs). It is brought up to date
-at guidance ticks, the current held in between; the RC pair is solved exactly for that.
+at every fifth guidance tick, 25 times a second, the current held in between; the RC pair is solved
+exactly for that.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from pydantic import Field, model_validator
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.tables import NotNegative, Positive, Share, Table
 
+GUIDANCE_TICKS = 5
+"""Guidance ticks from one update to the next."""
 OCV_POINTS = 21
 """Points of the open-circuit voltage that kernels interpolate between."""
 
@@ -33,12 +36,12 @@ BATTERY = np.dtype(
         ("open_circuit", "f8", OCV_POINTS),  # V of the pack, charge 0 to 1
         ("resistance", "f8"),
         ("pair_resistance", "f8"),
-        ("pair_keep", "f8"),  # what is left of the pair's voltage after a tick
+        ("pair_keep", "f8"),  # what is left of the pair's voltage after an update
         ("avionics", "f8"),  # W
         ("speed_a_volt", "f8"),  # rad/s V
         ("low", "f8"),
         ("critical", "f8"),
-        ("tick", "f8"),  # s
+        ("period", "f8"),  # s
     ],
     align=True,
 )
@@ -100,8 +103,10 @@ def open_circuit_voltage(battery: Battery, charge: float) -> float:
     return battery.cells * float(np.interp(charge, np.linspace(0.0, 1.0, len(table)), table))
 
 
-def battery_row(battery: Battery | None, max_speed_rad_s: float, tick_s: float) -> NDArray[np.void]:
-    """The (1,) `BATTERY` row of a battery brought up to date each `tick_s`; None: ideal supply."""
+def battery_row(
+    battery: Battery | None, max_speed_rad_s: float, period_s: float
+) -> NDArray[np.void]:
+    """The (1,) `BATTERY` row of a battery updated each `period_s`; None: ideal supply."""
     row = np.zeros(1, BATTERY)
     if battery is None:
         return row
@@ -110,21 +115,21 @@ def battery_row(battery: Battery | None, max_speed_rad_s: float, tick_s: float) 
     row["open_circuit"] = [open_circuit_voltage(battery, charge) for charge in charges]
     row["resistance"] = battery.resistance_ohm
     row["pair_resistance"] = battery.pair_resistance_ohm
-    row["pair_keep"] = math.exp(-tick_s / battery.pair_time_s)
+    row["pair_keep"] = math.exp(-period_s / battery.pair_time_s)
     row["avionics"] = battery.avionics_w
     row["speed_a_volt"] = max_speed_rad_s / battery.rated_v
     row["low"] = battery.low
     row["critical"] = battery.critical
-    row["tick"] = tick_s
+    row["period"] = period_s
     return row
 
 
 @inner_kernel
 def drain(body: Any, plant: Any, command: Any) -> bool:
-    """Take a tick's charge out of a `BODY`'s battery and limit its rotors; whether a level fell.
+    """Take the charge of one update out of a `BODY`'s battery; whether it fell to a lower level.
 
     plant: a `PLANT` with a battery. command: a record with `full_thrust`, N, the most that a rotor
-    gives now; the mixer shares out no more.
+    can give now; control asks for no more.
     """
     battery = plant.battery
     power = battery.avionics
@@ -137,7 +142,7 @@ def drain(body: Any, plant: Any, command: Any) -> bool:
     body.battery_pair_voltage = (
         keep * body.battery_pair_voltage + (1.0 - keep) * battery.pair_resistance * current
     )
-    charge = max(body.battery_charge - current * battery.tick / battery.capacity, 0.0)
+    charge = max(body.battery_charge - current * battery.period / battery.capacity, 0.0)
     body.battery_charge = charge
     body.battery_current = current
     body.battery_voltage = voltage
@@ -152,8 +157,6 @@ def drain(body: Any, plant: Any, command: Any) -> bool:
     fell = level > body.battery_level
     body.battery_level = level
     limit = 0.0 if level == _EMPTY else min(plant.max_speed, voltage * battery.speed_a_volt)
-    for r in range(plant.rotors):
-        body.rotor_limit[r] = limit if body.rotor_health[r] > 0.0 else 0.0
     command.full_thrust = plant.thrust_constant * limit * limit
     return bool(fell)
 

@@ -46,10 +46,14 @@ _INVERSE_SLANT = 1.0 / math.sqrt(1.0 + (EDGE * SPREAD) ** 2)
 _LOOK_BEYOND = 2.0
 """m beyond the widest jet that a look reaches, and twice what may be flown until the next."""
 
+_REFILL_BELOW = 0.25
+"""m: who has less left looks around when somebody must, so that looks come together."""
+
 
 class Jets(NamedTuple):
-    """What a look around needs for N UAVs, kept from call to call; no state: only `order` is read
-    before it is written, and any order gives the same result.
+    """What a look around needs for N UAVs, kept from call to call.
+
+    No state: only `order` is read before it is written, and any order gives the same result.
     """
 
     order: NDArray[np.int64]
@@ -79,7 +83,7 @@ def find_downwash(uavs: NDArray[np.void], models: NDArray[np.void], jets: Jets) 
         return
     reach = _LOOK_BEYOND + _line_up(uavs, models, jets)
     for k in range(count):
-        if uavs[jets.order[k]].body.downwash_budget <= 0.0:
+        if uavs[jets.order[k]].body.downwash_budget < _REFILL_BELOW:
             _refill_budgets(uavs, jets, k, reach)
     for k in range(count):
         i = jets.order[k]

@@ -23,9 +23,10 @@ BODY = np.dtype(
         ("battery_current", "f8"),
         ("battery_level", "i8"),
         ("rotor_health", "f8", MAX_ROTORS),
-        # what every step reads or writes, close together for the cache
-        ("rotor_limit", "f8", MAX_ROTORS),  # rad/s that wear and battery allow
         ("rotor_lift", "f8", MAX_ROTORS),  # N s^2: thrust over speed squared, wear and ground in it
+        ("free_acceleration", "f8", 3),  # on the ground, acceleration_map without its push ...
+        ("free_angular_acceleration", "f8", 3),  # ... and likewise
+        # what every step reads or writes, close together for the cache
         ("rotor_speed", "f8", MAX_ROTORS),
         ("position_map", "f8", 3),
         ("velocity_map", "f8", 3),
@@ -34,8 +35,6 @@ BODY = np.dtype(
         ("air_velocity_map", "f8", 3),
         ("acceleration_map", "f8", 3),
         ("angular_acceleration_body", "f8", 3),
-        ("free_acceleration", "f8", 3),
-        ("free_angular_acceleration", "f8", 3),
         ("contact_budget", "f8"),
         ("separation_budget", "f8"),
         ("ground_budget", "f8"),
@@ -43,7 +42,8 @@ BODY = np.dtype(
         ("crashed", "?"),
         ("on_ground", "?"),
         ("asleep", "?"),
-        ("spare", "u1", 5),  # no hidden padding: equal states are equal bytes
+        ("altered", "?"),  # some rotor_lift is not that of a new rotor far from the ground
+        ("spare", "u1", 4),  # no hidden padding: equal states are equal bytes
     ],
     align=True,
 )
@@ -115,7 +115,7 @@ def fit_rotors(body: np.void, plant: np.void, health: ArrayLike) -> None:
     count = int(plant["rotors"])
     body["rotor_health"][:count] = health
     body["rotor_lift"][:count] = plant["thrust_constant"] * np.asarray(health)
-    body["rotor_limit"][:count] = np.where(np.asarray(health) > 0.0, plant["max_speed"], 0.0)
+    body["altered"] = (np.asarray(health) != 1.0).any()
 
 
 def charge_battery(body: np.void, plant: np.void, charge: float) -> None:

@@ -60,6 +60,7 @@ def feel_ground(body: Any, plant: Any, grid: TerrainGrid, steepest: float, dt: f
     ay = body.velocity_map[1] - body.air_velocity_map[1]
     across = ax * ax + ay * ay
     area = math.pi * plant.rotor_radius * plant.rotor_radius
+    altered = False
     for r in range(plant.rotors):
         px, py, pz = plant.rotor_x[r], plant.rotor_y[r], plant.rotor_z[r]
         hub_x = x + r00 * px + r01 * py + r02 * pz
@@ -69,7 +70,10 @@ def feel_ground(body: Any, plant: Any, grid: TerrainGrid, steepest: float, dt: f
         w = body.rotor_speed[r]
         induced = lift * w * w / (2.0 * AIR_DENSITY * area)  # v_i^2
         share = induced / (induced + across + 1e-12)  # 1 / (1 + (V / v_i)^2), 0 for a rotor at rest
-        body.rotor_lift[r] = lift / (1.0 - share * ground_share(plant, height))
+        lift /= 1.0 - share * ground_share(plant, height)
+        body.rotor_lift[r] = lift
+        altered = altered or lift != plant.thrust_constant
+    body.altered = altered
 
 
 @inner_kernel
@@ -90,7 +94,8 @@ def ground_share(plant: Any, height: float) -> float:
     up = (z / radius - _FADE_FROM) * (1.0 / (_FADE_TO - _FADE_FROM))
     if up > 0.0:
         share *= 1.0 - up * up * (3.0 - 2.0 * up)
-    return share
+    faded: float = share
+    return faded
 
 
 @inner_kernel

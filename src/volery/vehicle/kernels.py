@@ -43,13 +43,18 @@ def accelerate(body: Any, plant: Any, command: Any, dt: float) -> None:
     half = 0.5 * dt
     vx, vy, vz = three(body.velocity_map)
     ox, oy, oz = three(body.omega_body)
+    ax, ay, az = three(body.acceleration_map)
+    bx, by, bz = three(body.angular_acceleration_body)
+    if body.on_ground:  # without the push of the contact
+        ax, ay, az = three(body.free_acceleration)
+        bx, by, bz = three(body.free_angular_acceleration)
     # mid-step, extrapolated
-    mx = ox + half * body.free_angular_acceleration[0]
-    my = oy + half * body.free_angular_acceleration[1]
-    mz = oz + half * body.free_angular_acceleration[2]
-    ax = vx + half * body.free_acceleration[0] - body.air_velocity_map[0]
-    ay = vy + half * body.free_acceleration[1] - body.air_velocity_map[1]
-    az = vz + half * body.free_acceleration[2] - body.air_velocity_map[2]
+    mx = ox + half * bx
+    my = oy + half * by
+    mz = oz + half * bz
+    ax = vx + half * ax - body.air_velocity_map[0]
+    ay = vy + half * ay - body.air_velocity_map[1]
+    az = vz + half * az - body.air_velocity_map[2]
     quarter = 0.5 * half
     x, y, z, w = nudged(
         body.attitude[0],
@@ -79,8 +84,6 @@ def accelerate(body: Any, plant: Any, command: Any, dt: float) -> None:
     bx = tx * plant.inverse_inertia[0] - plant.gyroscopic[0] * my * mz
     by = ty * plant.inverse_inertia[1] - plant.gyroscopic[1] * mz * mx
     bz = tz * plant.inverse_inertia[2] - plant.gyroscopic[2] * mx * my
-    _store(body.free_acceleration, ax, ay, az)
-    _store(body.free_angular_acceleration, bx, by, bz)
     _store(body.acceleration_map, ax, ay, az)
     _store(body.angular_acceleration_body, bx, by, bz)
     _store(body.velocity_map, vx + dt * ax, vy + dt * ay, vz + dt * az)
@@ -127,6 +130,8 @@ def meet_ground(
     for k in range(3):
         body.velocity_map[k] *= keep
         body.omega_body[k] *= keep
+        body.free_acceleration[k] = body.acceleration_map[k]
+        body.free_angular_acceleration[k] = body.angular_acceleration_body[k]
     body.acceleration_map[0] += (body.velocity_map[0] - vx) / dt
     body.acceleration_map[1] += (body.velocity_map[1] - vy) / dt
     body.acceleration_map[2] += (body.velocity_map[2] - vz) / dt
@@ -153,13 +158,13 @@ def carry(body: Any, dt: float) -> None:
         body.attitude[1],
         body.attitude[2],
         body.attitude[3],
-        half * (body.omega_body[0] - back * body.free_angular_acceleration[0]),
-        half * (body.omega_body[1] - back * body.free_angular_acceleration[1]),
-        half * (body.omega_body[2] - back * body.free_angular_acceleration[2]),
+        half * (body.omega_body[0] - back * body.angular_acceleration_body[0]),
+        half * (body.omega_body[1] - back * body.angular_acceleration_body[1]),
+        half * (body.omega_body[2] - back * body.angular_acceleration_body[2]),
     )
-    vx -= back * body.free_acceleration[0]
-    vy -= back * body.free_acceleration[1]
-    vz -= back * body.free_acceleration[2]
+    vx -= back * body.acceleration_map[0]
+    vy -= back * body.acceleration_map[1]
+    vz -= back * body.acceleration_map[2]
     body.position_map[0] += dt * vx
     body.position_map[1] += dt * vy
     body.position_map[2] += dt * vz

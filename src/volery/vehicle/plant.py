@@ -64,11 +64,12 @@ PLANT = np.dtype(
 
 
 def plant_of(
-    airframe: Airframe, dt: float, tick: float, wear: Sequence[RotorWear] = ()
+    airframe: Airframe, dt: float, battery_period: float, wear: Sequence[RotorWear] = ()
 ) -> NDArray[np.void]:
-    """The (1,) `PLANT` row of an airframe stepped by `dt` s, its battery each `tick` s.
+    """The (1,) `PLANT` row of an airframe stepped by `dt` s, its battery each `battery_period` s.
 
-    wear: one a rotor, or none at all. The thrust that wear leaves is a state (`BODY`'s rotor_health), not part of this row.
+    wear: one a rotor, or none at all. The thrust that wear leaves is a state (`BODY`'s
+    rotor_health), not part of this row.
     """
     row = np.zeros(1, PLANT)
     body, ground = airframe.body, airframe.ground
@@ -79,7 +80,9 @@ def plant_of(
     row["drag"] = 0.5 * AIR_DENSITY * np.array(body.drag_area_m2)
     _fill_rotors(row[0], airframe, dt, wear)
     _fill_neighbours(row[0], airframe)
-    row["battery"] = battery_row(airframe.battery, airframe.rotors.max_speed_rad_s, tick)[0]
+    row["battery"] = battery_row(airframe.battery, airframe.rotors.max_speed_rad_s, battery_period)[
+        0
+    ]
     points = contact_points(airframe)
     row["contacts"] = len(points)
     row["contact_point"][0, : len(points)] = points

@@ -1,0 +1,51 @@
+"""Battery monitors: voltage, current and charge as they are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from volery.control.fleet import Fleet
+from volery.core.clock import Schedule
+from volery.core.errors import DataFileError
+from volery.sensors.bank import Memoryless, uav_rows
+from volery.sensors.samples import BatteryReadings, SensorId, owned
+
+
+class BatteryBank(Memoryless):
+    """The battery monitors of all UAVs of one rate and phase.
+
+    Raises `DataFileError` where an airframe has no battery.
+    """
+
+    name = "battery"
+    lag_ns = 0
+
+    def __init__(self, schedule: Schedule, sensors: tuple[SensorId, ...], fleet: Fleet) -> None:
+        self.schedule = schedule
+        self.sensors = sensors
+        self._rows = uav_rows(sensors)
+        packs = []
+        for row in self._rows:
+            airframe = fleet.airframes[row]
+            if airframe.battery is None:
+                raise DataFileError(
+                    f"airframe {airframe.name} has no battery to monitor; its file needs a "
+                    "[battery] table"
+                )
+            packs.append(airframe.battery)
+        self._capacity_ah = owned(np.array([pack.capacity_ah for pack in packs]))
+        self._cells = owned(np.array([pack.cells for pack in packs]))
+
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> BatteryReadings:  # noqa: ARG002
+        """Reading number k (counted from 0) of all monitors of the bank."""
+        state, rows = fleet.state, self._rows
+        return BatteryReadings(
+            self.sensors,
+            time_ns,
+            owned(state.battery_voltage[rows]),
+            owned(state.battery_current[rows]),
+            owned(state.battery_charge[rows]),
+            self._capacity_ah,
+            self._cells,
+            owned(state.battery_level[rows]),
+        )
