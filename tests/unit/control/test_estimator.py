@@ -134,7 +134,10 @@ def test_late_and_absent_measurements():
     estimator.fuse_gnss(rows, 90 * STEP, fix, fix, FIX_VARIANCE, valid=[True, False])
     estimator.fuse_gnss(rows, 91 * STEP, fix + np.array([[0], [np.nan]]), fix, FIX_VARIANCE)
     estimator.fuse_range(rows, 92 * STEP, [np.inf, 1.0], 0.01, -1.0)
+    estimator.fuse_pressure_height(rows, 92 * STEP, [0.0, 0.0], np.array([np.inf, np.nan]))
     hover(estimator, rows, 101, 140, gnss=False)
+    assert estimator.gate(Aid.PRESSURE_HEIGHT).accepted.tolist() == [0, 0]
+    assert np.isfinite(estimator.covariance(rows)).all()
     assert estimator.gate(Aid.GNSS_POSITION).accepted.tolist() == [2, 0]
     assert estimator.gate(Aid.RANGE_TO_GROUND).accepted.tolist() == [0, 1]
     assert np.isfinite(estimator.state.position_map).all()

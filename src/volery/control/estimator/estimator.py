@@ -37,9 +37,9 @@ from volery.core import rotations
 from volery.core.errors import EstimatorError
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 _AT_CENTRE = Mounting()
 _IN_THE_AIR = StartSigmas()
-Rows = NDArray[np.int64]
 
 
 class Estimator:

@@ -49,6 +49,8 @@ def linearise(  # noqa: PLR0911
     for i in range(3):
         for j in range(STATES):
             H[i, j] = 0.0
+    if not _has(measured, part):
+        return 0
     age = (state.reading.stamp_ns - measured.stamp_ns) * 1e-9
     kind = measured.kind
     if kind == MAGNETIC:
@@ -57,8 +59,6 @@ def linearise(  # noqa: PLR0911
         return _pressure(state, tuning, measured, age, H, residual, variance) if part == 0 else 0
     if kind == RANGE:
         return _range(state, tuning, measured, age, H, residual, variance) if part == 0 else 0
-    if not _has(measured, part):
-        return 0
     if kind == POSE and part == 1:
         return _attitude(state, measured, age, H, residual, variance)
     if kind == STATED_VELOCITY or part == 1:
