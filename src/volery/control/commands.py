@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.control import mass_commands
+from volery.control.belief import Motion
 from volery.control.flight_modes import FlightMode
 from volery.control.segment_store import SegmentStore
 from volery.control.setpoints import (
@@ -189,9 +190,9 @@ class FleetCommands:
         elsewhere approaches at about 1 m/s beside the motion asked for.
         """
         self._refuse_wreck(i)
-        body = self._bodies[i]
+        motion = self._believed(i)
         trajectory = trajectory.led_in_from(
-            body["position_map"], body["velocity_map"], float(rotations.yaw_of(body["attitude"]))
+            motion.position, motion.velocity, float(rotations.yaw_of(motion.attitude))
         )
         pilot = self._enter_guided(i, FlightMode.TRAJECTORY)
         pilot["start_step"] = self.step
@@ -229,7 +230,7 @@ class FleetCommands:
         self._refuse_wreck(i)
         if self.mode(i) is not FlightMode.LANDED:
             raise CommandError(f"{self.names[i]} cannot take off: it flies ({self.mode(i).name})")
-        place = self._bodies["position_map"][i].copy()
+        place = self._believed(i).position
         self._pilots["home"][i] = place
         pilot = self._enter_guided(i, FlightMode.TAKE_OFF, from_ground=True)
         pilot["position_target"] = place + np.array([0.0, 0.0, altitude_m])
@@ -251,7 +252,7 @@ class FleetCommands:
         pilot["braking"] = True
         pilot["phase"] = 0
         pilot["return_height"] = max(
-            float(pilot["home"][2]) + height_m, float(self._bodies["position_map"][i, 2])
+            float(pilot["home"][2]) + height_m, float(self._believed(i).position[2])
         )
 
     def set_home(self, i: int, position: ArrayLike) -> None:
@@ -285,6 +286,15 @@ class FleetCommands:
         self._bodies["ground_budget"][i] = 0.0
         self._bodies["downwash_budget"][i] = 0.0
 
+    def _believed(self, i: int) -> Motion:
+        """What the controllers of UAV `i` take for its motion now."""
+        body, belief = self._bodies[i], self._uavs["belief"][i]
+        return Motion(
+            body["position_map"] + belief["position_error"],
+            body["velocity_map"] + belief["velocity_error"],
+            rotations.multiply(belief["rotation_error"], body["attitude"]),
+        )
+
     def _enter_low_level(self, i: int, level: ControlLevel) -> Any:
         self._wake(i)
         pilot: Any = self._pilots[i]
@@ -299,11 +309,11 @@ class FleetCommands:
         self._wake(i)
         pilot: Any = self._pilots[i]
         if pilot["level"] != ControlLevel.GUIDED:
-            body = self._bodies[i]
-            yaw = float(rotations.yaw_of(body["attitude"]))
+            motion = self._believed(i)
+            yaw = float(rotations.yaw_of(motion.attitude))
             pilot["level"] = ControlLevel.GUIDED
-            pilot["position"] = body["position_map"]
-            pilot["velocity"] = body["velocity_map"]
+            pilot["position"] = motion.position
+            pilot["velocity"] = motion.velocity
             pilot["acceleration"] = 0.0
             pilot["velocity_integral"] = 0.0
             pilot["heading"] = pilot["heading_target"] = math.cos(yaw), math.sin(yaw)

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.control import impulses
+from volery.control.belief import new_beliefs
 from volery.control.commands import FleetCommands
+from volery.control.estimator.errors import EstimationError
 from volery.control.fleet_events import FleetEvent, event_of
 from volery.control.flight_modes import FlightMode
 from volery.control.gains import ATTITUDE_PERIOD_S, GUIDANCE_PERIOD_S, steps_of
@@ -111,6 +113,7 @@ class Fleet(FleetCommands):
         uavs["pilot"] = new_pilots(attitude)
         uavs["model"] = rows
         uavs["copy"] = copies
+        uavs["belief"] = new_beliefs(count)
         uavs["turbulence"] = new_turbulence(seed, names)
         super().__init__(tuple(airframes), plants, names, uavs, dt_ns / NS_PER_S)
         self._models = models
@@ -246,6 +249,15 @@ class Fleet(FleetCommands):
         health[rotor] = checked_within("rotor health", factor, (), 1.0)
         fit_rotors(self._bodies[i], self._models["plant"][self._uavs["model"][i]], health)
         self._bodies["ground_budget"][i] = 0.0
+
+    def set_estimation_error(self, rows: NDArray[np.int64], error: EstimationError) -> None:
+        """Let the controllers of the UAVs `rows` fly on estimates that are off by `error`."""
+        belief = self._uavs["belief"]
+        belief["position_error"][rows] = error.position_map
+        belief["velocity_error"][rows] = error.velocity_map
+        belief["rotation_error"][rows] = error.rotation_map
+        belief["rate_error"][rows] = error.omega_body
+        belief["errs"][rows] = True
 
     def displace(self, i: int, offset: ArrayLike) -> None:
         """Put UAV `i` elsewhere at once, by `offset` (3,) m, map; its motion goes on there."""

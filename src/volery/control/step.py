@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.air import refresh_air
+from volery.control.belief import BELIEF, believe_attitude, believe_place, believe_rates
 from volery.control.flight_modes import CRASHED, guide, stop
 from volery.control.gains import GAINS
 from volery.control.kinematic_flight import fly_kinematic
@@ -34,14 +35,15 @@ UAV = np.dtype(
     [
         ("body", BODY),
         ("pilot", PILOT),
+        ("belief", BELIEF),
         ("turbulence", TURBULENCE),
         ("model", "i8"),
         ("copy", "i8"),
     ],
     align=True,
 )
-"""One UAV: its plant, its control, the turbulence around it, the row of its model, and the copy of
-the scenario that it flies in; UAVs of different copies never meet."""
+"""One UAV: its plant, its control, what that knows of its motion, the turbulence around it, the row
+of its model, and the copy of the scenario that it flies in; UAVs of different copies never meet."""
 MODEL = np.dtype(
     [
         ("plant", PLANT),
@@ -159,13 +161,18 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                         dt,
                     )
                 else:
-                    estimate = body  # what control knows of the motion: for now, the truth
+                    belief = uavs[i].belief
                     if guiding:
-                        guide(pilot, estimate, model.gains, paths, step, dt)
+                        believe_place(belief, body)
+                    if guiding or turning:
+                        believe_attitude(belief, body)
+                    if guiding:
+                        guide(pilot, belief, model.gains, paths, step, dt)
                     if model.kind == RIGID_BODY:
                         if turning:
-                            hold_attitude(pilot, estimate, model.gains)
-                        hold_rates(pilot, estimate, model.gains, dt)
+                            hold_attitude(pilot, belief, model.gains)
+                        believe_rates(belief, body)
+                        hold_rates(pilot, belief, model.gains, dt)
                         if feels_ground(body, plant):
                             feel_ground(body, plant, grid, steepest, dt)
                         accelerate(body, plant, pilot, dt)

@@ -1,0 +1,180 @@
+"""From what sensors send to what UAVs believe: estimators that listen as measurements come."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.estimator.errors import estimation_error
+from volery.control.estimator.estimator import Estimator
+from volery.control.fleet import Fleet
+from volery.core import atmosphere
+from volery.sensors.samples import (
+    GnssReadings,
+    ImuReadings,
+    MagneticReadings,
+    PressureReadings,
+    RangeReadings,
+    Samples,
+    SensorId,
+)
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class EstimationSetup:
+    """How estimators are fed: row e of each array belongs to estimator e."""
+
+    uavs: Rows
+    """(E,) rows of the fleet."""
+    flies: NDArray[np.bool_]
+    """(E,) whether the UAV's controllers fly on the estimate."""
+    listens: Mapping[tuple[int, str], int]
+    """Estimator that listens to a sensor, by row of the UAV and name of the sensor."""
+    gnss_drift_variance: Array
+    """(E, 3) m^2 of what a receiver states as noise and the filter estimates as an offset."""
+    origin_altitude_m: float
+    """Of the map's z = 0 above sea level."""
+    ground_height_m: float | None
+    """Height of level ground; None where it is not level, and ranges tell nothing by themselves."""
+
+
+class Estimation:
+    """The estimators of all UAVs that have one."""
+
+    def __init__(self, estimator: Estimator, setup: EstimationSetup, fleet: Fleet) -> None:
+        self.estimator = estimator
+        self.setup = setup
+        self._fleet = fleet
+        self._known: dict[int, tuple[tuple[SensorId, ...], Rows, Rows]] = {}
+        self._tell_fleet()
+
+    def register(self, sensors: tuple[SensorId, ...]) -> None:
+        """Look up once who listens to a bank whose samples name `sensors`."""
+        self._known[id(sensors)] = (sensors, *self._look_up(sensors))
+
+    def take(self, samples: Samples) -> None:
+        """Feed what a bank's sensors have sent to who listens to them."""
+        heard, rows = self._listeners(samples.sensors)
+        if isinstance(samples, ImuReadings):
+            if len(rows):
+                self.estimator.predict(
+                    rows,
+                    samples.stamp_ns,
+                    samples.angular_velocity[heard],
+                    samples.specific_force[heard],
+                )
+            self._tell_fleet()
+        elif not len(rows):
+            return
+        elif isinstance(samples, GnssReadings):
+            self._take_fixes(samples, heard, rows)
+        elif isinstance(samples, PressureReadings):
+            self._take_pressures(samples, heard, rows)
+        elif isinstance(samples, MagneticReadings):
+            self.estimator.fuse_magnetic(
+                rows, samples.stamp_ns, samples.field[heard], samples.field_variance
+            )
+        elif isinstance(samples, RangeReadings) and self.setup.ground_height_m is not None:
+            self.estimator.fuse_range(
+                rows,
+                samples.stamp_ns,
+                samples.ranges[heard],
+                samples.variance,
+                self.setup.ground_height_m,
+            )
+
+    def restart(self, uavs: Rows, position: Array, velocity: Array, attitude: Array) -> None:
+        """Begin anew for UAVs that have begun anew, believing the states given for each."""
+        rows = np.flatnonzero(np.isin(self.setup.uavs, uavs))
+        if len(rows):
+            self.estimator.reset(
+                rows,
+                position=position,
+                velocity=velocity,
+                attitude=attitude,
+                stamp_ns=self._fleet.time_ns - 1,
+            )
+            self._tell_fleet()
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return self.estimator.get_state()
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state; the fleet keeps the errors that belong to it."""
+        self.estimator.set_state(state)
+
+    def _take_fixes(self, samples: GnssReadings, heard: Rows, rows: Rows) -> None:
+        drift = self.setup.gnss_drift_variance[rows]
+        noise = np.maximum(samples.position_variance[heard] - drift, _LEAST_VARIANCE)
+        self.estimator.fuse_gnss(
+            rows,
+            samples.stamp_ns,
+            samples.position_map[heard],
+            samples.velocity_map[heard],
+            np.hstack([noise, np.maximum(samples.velocity_variance[heard], _LEAST_VARIANCE)]),
+            samples.has_fix[heard],
+        )
+
+    def _take_pressures(self, samples: PressureReadings, heard: Rows, rows: Rows) -> None:
+        pressure = samples.pressure[heard]
+        height = atmosphere.altitude(pressure) - self.setup.origin_altitude_m
+        slope = atmosphere.altitude(pressure + 1.0) - atmosphere.altitude(pressure)
+        variance = np.maximum(slope**2 * samples.pressure_variance, _LEAST_VARIANCE)
+        self.estimator.fuse_pressure_height(rows, samples.stamp_ns, height, variance)
+
+    def _tell_fleet(self) -> None:
+        """Tell the controllers how far what they fly on is from the truth."""
+        flying = np.flatnonzero(self.setup.flies)
+        if not len(flying):
+            return
+        uavs = self.setup.uavs[flying]
+        error = estimation_error(
+            _rows_of(self.estimator.state, flying), _rows_of(self._fleet.state, uavs)
+        )
+        self._fleet.set_estimation_error(uavs, error)
+
+    def _listeners(self, sensors: tuple[SensorId, ...]) -> tuple[Rows, Rows]:
+        found = self._known.get(id(sensors))
+        if found is not None and found[0] is sensors:
+            return found[1], found[2]
+        return self._look_up(sensors)
+
+    def _look_up(self, sensors: Sequence[SensorId]) -> tuple[Rows, Rows]:
+        """Places in a bank's arrays that are listened to, and the estimators that do."""
+        listens = self.setup.listens
+        pairs = [
+            (k, listens[s.uav, s.name])
+            for k, s in enumerate(sensors)
+            if (s.uav, s.name) in listens
+        ]
+        table = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        return table[:, 0], table[:, 1]
+
+
+_LEAST_VARIANCE = 1e-4
+"""m^2 and (m/s)^2: no measurement is taken for better than a centimetre."""
+
+
+@dataclass(frozen=True)
+class _Motions:
+    position_map: Array
+    velocity_map: Array
+    attitude: Array
+    omega_body: Array
+
+
+def _rows_of(states: Any, rows: Rows) -> _Motions:
+    return _Motions(
+        states.position_map[rows],
+        states.velocity_map[rows],
+        states.attitude[rows],
+        states.omega_body[rows],
+    )
