@@ -99,11 +99,16 @@ def turbulent_velocity(
     )
     way = max(math.sqrt(speed), _LEAST_SPEED) * period / _FOOT  # ft past the UAV in a tick
     begun = state.axis[0] != 0.0 or state.axis[1] != 0.0
-    share = 1.0
-    if begun:
-        share = _advance(state, way * root * root * root / h, way / h, _DRAWS * tick)
-    else:
-        _begin(state, _DRAWS * tick)
+    draw = _DRAWS * tick
+    across = way * root * root * root / h  # in lengths Lu = Lv
+    keep, whole, coupled, rest = _step_of(across, begun)
+    state.longitudinal = keep * state.longitudinal + whole * normal(state.key, draw)
+    _step(state.lateral, across, keep, whole, coupled, rest, state.key, draw + 1)
+    share = 1.0 - keep  # of these states that is new
+    upward = way / h  # in lengths Lw
+    keep, whole, coupled, rest = _step_of(upward, begun)
+    _step(state.vertical, upward, keep, whole, coupled, rest, state.key, draw + 3)
+
     if wind_x * wind_x + wind_y * wind_y >= _CALM * _CALM:
         _turn(state.axis, wind_x, wind_y, share)
     elif air_x * air_x + air_y * air_y >= _CALM * _CALM:
@@ -121,35 +126,15 @@ def turbulent_velocity(
 
 
 @inner_kernel
-def _begin(state: Any, counter: int) -> None:
-    """Draw the states from their steady state."""
-    state.longitudinal = normal(state.key, counter)
-    _step(state.lateral, 0.0, 0.0, 1.0, 0.5, 0.5, state.key, counter + 1)
-    _step(state.vertical, 0.0, 0.0, 1.0, 0.5, 0.5, state.key, counter + 3)
-
-
-@inner_kernel
-def _advance(state: Any, across: float, upward: float, counter: int) -> float:
-    """Step the filters on, the horizontal ones by `across` lengths Lu, the vertical by `upward` Lw.
-
-    Returns the share of the horizontal states that is new.
-    """
-    keep, whole, coupled, rest = _step_of(across)
-    state.longitudinal = keep * state.longitudinal + whole * normal(state.key, counter)
-    _step(state.lateral, across, keep, whole, coupled, rest, state.key, counter + 1)
-    share = 1.0 - keep
-    keep, whole, coupled, rest = _step_of(upward)
-    _step(state.vertical, upward, keep, whole, coupled, rest, state.key, counter + 3)
-    return share
-
-
-@inner_kernel
-def _step_of(q: float) -> tuple[float, float, float, float]:
+def _step_of(q: float, begun: bool) -> tuple[float, float, float, float]:
     """Over q = p t lengths: exp(-q), and the Cholesky factor of the covariance that x, y gain.
 
     With P(n, r) = exp(-r) sum over i >= n of r^i / i!, r = 2 q, that covariance is P(1, r) of x,
     P(2, r) / 2 of both and P(3, r) / 2 of y; P(3, r) comes from its series, without cancellation.
+    What has not begun takes all of its steady state.
     """
+    if not begun:
+        return 0.0, 1.0, 0.5, 0.5
     keep = math.exp(-q)
     fade = keep * keep
     r = 2.0 * q
