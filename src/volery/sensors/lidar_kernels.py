@@ -62,9 +62,9 @@ def _note(
     """Enter the hits of a piece, `count` rays from packet `first` on, under their beams."""
     rays, instance, material = block.rays, block.instance, block.material
     distance, cosine = surfaces.distance[scan], surfaces.cosine[scan]
-    kind = surfaces.material[scan]
+    kind, beam = surfaces.material[scan], table.beam[first * LANES :]
     for p in range((count + LANES - 1) // LANES):
-        for k in range(min(LANES, count - p * LANES)):
+        for k in range(LANES):  # all lanes, without a condition: the compiler makes it vectors
             x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
             along = (
                 x * rays[p, DIRECTION, k]
@@ -72,10 +72,13 @@ def _note(
                 + z * rays[p, DIRECTION + 2, k]
             )
             squared = max(x * x + y * y + z * z, np.float32(1e-30))
-            i = table.beam[(first + p) * LANES + k]
+            rays[p, NORMAL, k] = abs(along) / np.sqrt(squared)
             hit = instance[p, k] >= 0
-            cosine[i] = abs(along) / np.sqrt(squared)
-            distance[i] = rays[p, FAR, k] if hit else np.float32(np.inf)
+            rays[p, FAR, k] = rays[p, FAR, k] if hit else np.float32(np.inf)
+        for k in range(min(LANES, count - p * LANES)):
+            i = beam[p * LANES + k]
+            distance[i] = rays[p, FAR, k]
+            cosine[i] = rays[p, NORMAL, k]
             kind[i] = material[p, k]
 
 
@@ -122,8 +125,9 @@ def scan_batch(
         count = min(own * LANES, total - first * LANES)
         near_count = _near_scan(scene, lidar, batch, scan, history, block.near)
         aim_packets(table, batch, scan, history, first, own, block.rays)
+        seen_ns = table.seen_ns[first:]
         for p in range(own):
-            time = batch.sweep_start_ns[scan] + table.seen_ns[first + p]
+            time = batch.sweep_start_ns[scan] + seen_ns[p]
             fraction = (time - bodies_start_ns) / interval
             block.fraction[p] = min(max(fraction, 0.0), 1.0)
         cast_block(scene, block, count, lidar.range_max, near_count)
