@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.graph.lidar_publishing import cloud_points
 from volery.report.flight_data import (
     FlightData,
     FlightEvent,
@@ -27,6 +26,7 @@ from volery.report.flight_data import (
     Trees,
     UavTrack,
 )
+from volery.report.scan_placing import end_ns, scan_points, stamp_ns
 from volery.report.voxels import VoxelSet
 
 if TYPE_CHECKING:
@@ -37,11 +37,11 @@ Array = NDArray[np.float64]
 TRACK_PERIOD_NS = NS_PER_S // 20
 SCANS_PER_S = 24.0
 """Scans of the whole fleet that are mapped in a simulated second."""
+CLOUDS_PER_S = 4.0
+"""Clouds of the whole fleet that are mapped in a simulated second; each holds many scans' worth."""
 NODDING_WEIGHT = 4.0
 """A nodding scanner sees the third dimension: it gets more of the scans than a level one."""
 VOXEL_M = 0.25
-MAX_RANGE_M = 28.0
-"""Beams longer than that are not mapped: heading errors and dropouts spoil them."""
 CLEARANCE_REACH_M = 10.0
 _POSES_KEPT = 64
 _CLEARANCE_BATCH = 4096
@@ -77,18 +77,20 @@ class FlightCollector:
         mounts: Mapping[str, Any] = simulation.mounts
         clouds: Mapping[str, Any] = simulation.cloud_mounts
         weights = {t: NODDING_WEIGHT if m.nods else 1.0 for t, m in mounts.items()}
-        weights |= dict.fromkeys(clouds, 1.0)
-        for topic, mount in {**mounts, **clouds}.items():
+        for topic, mount in mounts.items():
             uav = self._uavs[topic.split("/")[1]]
             rate_hz = SCANS_PER_S * weights[topic] / sum(weights.values())
             receive = self._scan(uav, mount, round(NS_PER_S / rate_hz))
-            kind = "PointCloud2" if topic in clouds else "LaserScan"
-            graph.subscribe(topic, receive, f"sensor_msgs/msg/{kind}")
+            graph.subscribe(topic, receive, "sensor_msgs/msg/LaserScan")
+        for topic, mount in clouds.items():
+            uav = self._uavs[topic.split("/")[1]]
+            receive = self._scan(uav, mount, round(NS_PER_S * len(clouds) / CLOUDS_PER_S))
+            graph.subscribe(topic, receive, "sensor_msgs/msg/PointCloud2")
 
     def _track(self, uav: _Uav) -> Callable[[Published], None]:
         def receive(published: Published) -> None:
             message = published.message
-            stamp = _stamp_ns(message)
+            stamp = stamp_ns(message)
             uav.poses.append((stamp, message.pose.pose))
             if stamp >= uav.next_row_ns:
                 uav.next_row_ns = stamp + TRACK_PERIOD_NS
@@ -115,7 +117,7 @@ class FlightCollector:
         return receive
 
     def _map_waiting(self, uav: _Uav, newest_ns: int) -> None:
-        ready = [pair for pair in uav.waiting if _end_ns(pair[0]) <= newest_ns]
+        ready = [pair for pair in uav.waiting if end_ns(pair[0]) <= newest_ns]
         for pair in ready:
             uav.waiting.remove(pair)
             points = scan_points(*pair, uav.poses)
@@ -195,95 +197,6 @@ class FlightCollector:
             return None
         height = points[:, 2] - self._ground(points)
         return LidarMap(points, height.astype(np.float32), self._voxels.voxel_m, self._scans)
-
-
-def scan_points(scan: Any, mount: Any, poses: deque[tuple[int, Any]]) -> NDArray[np.float64] | None:
-    """Map points (n, 3) of a LaserScan or PointCloud2; None without poses.
-
-    Each beam is placed from the body's poses at the start and at the end of the sweep, which come
-    from `poses` (time in ns, geometry_msgs/Pose), and the two places are interpolated.
-    """
-    start_ns, end_ns = _stamp_ns(scan), _end_ns(scan)
-    if not poses or poses[0][0] > start_ns:
-        return None
-    along, fraction = _beams_of_cloud(scan) if _is_cloud(scan) else _beams_of_scan(scan)
-    ends = (_pose_at(poses, start_ns), _pose_at(poses, end_ns))
-    nod = _nodding_angles(mount, start_ns, end_ns, fraction)
-    if nod is not None:
-        # about the sensor's y axis, positive looks down
-        x, y, z = along.T
-        along = np.stack(
-            [x * np.cos(nod) + z * np.sin(nod), y, z * np.cos(nod) - x * np.sin(nod)], -1
-        )
-    in_body = along @ rotations.matrix(mount.attitude_body).T + np.asarray(mount.position_body)
-    # a sweep turns the body by a few hundredths of a radian: points may be interpolated
-    first, last = (p + in_body @ rotations.matrix(q).T for p, q in ends)
-    return np.asarray(first + fraction[:, None] * (last - first))
-
-
-def _beams_of_scan(scan: Any) -> tuple[Array, Array]:
-    """Returns of a LaserScan in the sensor frame (n, 3) and their share of the sweep's time (n,)."""
-    ranges = np.asarray(scan.ranges, dtype=np.float64)
-    beams = np.flatnonzero(
-        (ranges >= scan.range_min) & (ranges <= min(scan.range_max, MAX_RANGE_M))
-    )
-    azimuth = scan.angle_min + scan.angle_increment * beams
-    reach = ranges[beams]
-    along = np.stack([reach * np.cos(azimuth), reach * np.sin(azimuth), np.zeros(len(beams))], -1)
-    return along, beams / max(len(ranges) - 1, 1)
-
-
-def _beams_of_cloud(cloud: Any) -> tuple[Array, Array]:
-    """Points of a PointCloud2 in the sensor frame (n, 3) and their share of the sweep's time (n,)."""
-    points = cloud_points(cloud)
-    along = np.stack([points[name].astype(np.float64) for name in ("x", "y", "z")], -1)
-    near = np.linalg.norm(along, axis=1) <= MAX_RANGE_M
-    time = points["time"].astype(np.float64)
-    return along[near], time[near] / max(time.max(initial=0.0), 1e-9)
-
-
-def _nodding_angles(mount: Any, start_ns: int, end_ns: int, fraction: Array) -> Array | None:
-    if not mount.nods:
-        return None
-    from volery.sensors.mount import nodding_angle_at
-
-    knots = np.linspace(0.0, 1.0, 5)
-    angles = [nodding_angle_at(mount, start_ns + round(k * (end_ns - start_ns))) for k in knots]
-    return np.interp(fraction, knots, angles)
-
-
-def _pose_at(poses: deque[tuple[int, Any]], time_ns: int) -> tuple[Array, Array]:
-    """Position (3,) and attitude (4,) at a time between the first pose and the last."""
-    later = next((k for k, (t, _) in enumerate(poses) if t >= time_ns), len(poses) - 1)
-    before = max(later - 1, 0)
-    (t0, a), (t1, b) = poses[before], poses[later]
-    p0, q0 = _arrays(a)
-    p1, q1 = _arrays(b)
-    share = min(max((time_ns - t0) / (t1 - t0), 0.0), 1.0) if t1 > t0 else 1.0
-    q1 = q1 if q0 @ q1 >= 0.0 else -q1
-    return p0 + share * (p1 - p0), rotations.normalize(q0 + share * (q1 - q0))
-
-
-def _arrays(pose: Any) -> tuple[Array, Array]:
-    p, q = pose.position, pose.orientation
-    return np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
-
-
-def _stamp_ns(message: Any) -> int:
-    stamp = message.header.stamp
-    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
-
-
-def _end_ns(scan: Any) -> int:
-    if _is_cloud(scan):
-        sweep_s = float(cloud_points(scan)["time"].max(initial=0.0))
-    else:
-        sweep_s = float((len(scan.ranges) - 1) * scan.time_increment)
-    return _stamp_ns(scan) + round(sweep_s * NS_PER_S)
-
-
-def _is_cloud(message: Any) -> bool:
-    return hasattr(message, "point_step")
 
 
 def _event(event: Any) -> FlightEvent:

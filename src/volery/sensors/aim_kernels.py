@@ -101,25 +101,6 @@ def sensor_frame(batch: LidarBatch, scan: int, history: PoseHistory, time_ns: in
 
 
 @inner_kernel
-def _aim_ray(
-    table: BeamTable, ray: int, a: Frame, b: Frame, f: float, rays: NDArray[np.float32], k: int
-) -> None:
-    """Fill lane k of a packet (PACKET_ROWS, LANES) with a ray between two frames."""
-    g = 1.0 - f
-    c, s, u = table.direction[0, ray], table.direction[1, ray], table.direction[2, ray]
-    dx = c * (g * a[3] + f * b[3]) + s * (g * a[6] + f * b[6]) + u * (g * a[9] + f * b[9])
-    dy = c * (g * a[4] + f * b[4]) + s * (g * a[7] + f * b[7]) + u * (g * a[10] + f * b[10])
-    dz = c * (g * a[5] + f * b[5]) + s * (g * a[8] + f * b[8]) + u * (g * a[11] + f * b[11])
-    unit = 1.5 - 0.5 * (dx * dx + dy * dy + dz * dz)
-    rays[ORIGIN, k] = g * a[0] + f * b[0]
-    rays[ORIGIN + 1, k] = g * a[1] + f * b[1]
-    rays[ORIGIN + 2, k] = g * a[2] + f * b[2]
-    rays[DIRECTION, k] = dx * unit
-    rays[DIRECTION + 1, k] = dy * unit
-    rays[DIRECTION + 2, k] = dz * unit
-
-
-@inner_kernel
 def aim_packets(
     table: BeamTable,
     batch: LidarBatch,
@@ -134,28 +115,61 @@ def aim_packets(
     Neighbouring packets often share knots; what is known already is not looked up again.
     """
     start = batch.sweep_start_ns[scan]
-    total = table.fraction.shape[0]
-    knots = table.knot_ns
-    a_ns = b_ns = knots[first, 0]
+    # Views from the first packet on: a sum as index could be negative, and costs a test a ray.
+    skipped = first * LANES
+    forward, left = table.direction[0, skipped:], table.direction[1, skipped:]
+    up, fraction = table.direction[2, skipped:], table.fraction[skipped:]
+    knots = table.knot_ns[first:]
+    total = fraction.shape[0]
+    a_ns = b_ns = knots[0, 0]
     a = b = sensor_frame(batch, scan, history, start + a_ns)
     for p in range(count):
-        q = first + p
-        if knots[q, 0] != a_ns:
-            a_ns = knots[q, 0]
+        if knots[p, 0] != a_ns:
+            a_ns = knots[p, 0]
             a = b if a_ns == b_ns else sensor_frame(batch, scan, history, start + a_ns)
-        if knots[q, 1] != b_ns:
-            b_ns = knots[q, 1]
+        if knots[p, 1] != b_ns:
+            b_ns = knots[p, 1]
             b = sensor_frame(batch, scan, history, start + b_ns)
-        r = q * LANES
-        lanes = min(LANES, total - r)
-        if b_ns - a_ns <= _LONGEST_CHORD_NS:
-            for k in range(lanes):
-                _aim_ray(table, r + k, a, b, table.fraction[r + k], rays[p], k)
-        else:
-            for k in range(lanes):
-                time = a_ns + round(table.fraction[r + k] * (b_ns - a_ns))
-                own = sensor_frame(batch, scan, history, start + time)
-                _aim_ray(table, r + k, own, own, 0.0, rays[p], k)
+        if b_ns - a_ns > _LONGEST_CHORD_NS:
+            _aim_one_by_one(table, batch, scan, history, first + p, rays[p])
+            continue
+        r = p * LANES
+        for k in range(min(LANES, total - r)):
+            f = fraction[r + k]
+            g = 1.0 - f
+            c, s, u = forward[r + k], left[r + k], up[r + k]
+            dx = c * (g * a[3] + f * b[3]) + s * (g * a[6] + f * b[6]) + u * (g * a[9] + f * b[9])
+            dy = c * (g * a[4] + f * b[4]) + s * (g * a[7] + f * b[7]) + u * (g * a[10] + f * b[10])
+            dz = c * (g * a[5] + f * b[5]) + s * (g * a[8] + f * b[8]) + u * (g * a[11] + f * b[11])
+            unit = 1.5 - 0.5 * (dx * dx + dy * dy + dz * dz)
+            rays[p, ORIGIN, k] = g * a[0] + f * b[0]
+            rays[p, ORIGIN + 1, k] = g * a[1] + f * b[1]
+            rays[p, ORIGIN + 2, k] = g * a[2] + f * b[2]
+            rays[p, DIRECTION, k] = dx * unit
+            rays[p, DIRECTION + 1, k] = dy * unit
+            rays[p, DIRECTION + 2, k] = dz * unit
+
+
+@inner_kernel
+def _aim_one_by_one(
+    table: BeamTable,
+    batch: LidarBatch,
+    scan: int,
+    history: PoseHistory,
+    packet: int,
+    rays: NDArray[np.float32],
+) -> None:
+    """Fill one packet (PACKET_ROWS, LANES), looking the pose up for every ray."""
+    first = packet * LANES
+    start, end = table.knot_ns[packet, 0], table.knot_ns[packet, 1]
+    for k in range(min(LANES, table.fraction.shape[0] - first)):
+        r = first + k
+        after = start + round(table.fraction[r] * (end - start))
+        frame = sensor_frame(batch, scan, history, batch.sweep_start_ns[scan] + after)
+        c, s, u = table.direction[0, r], table.direction[1, r], table.direction[2, r]
+        for j in range(3):
+            rays[ORIGIN + j, k] = frame[j]
+            rays[DIRECTION + j, k] = c * frame[3 + j] + s * frame[6 + j] + u * frame[9 + j]
 
 
 @kernel

@@ -30,8 +30,8 @@ class BeamTable(NamedTuple):
     """(P, 2) after the start of the sweep."""
     seen_ns: NDArray[np.int64]
     """(P,) when a packet sees the other UAVs, after the start of the sweep."""
-    beam: NDArray[np.int64]
-    """(R,) number of a ray's beam."""
+    beam: NDArray[np.uint32]
+    """(R,) number of a ray's beam; unsigned, so that kernels need not test for negative indices."""
 
 
 def packets_of(rays: int) -> int:
@@ -55,7 +55,7 @@ def row_table(direction: Array, time_ns: NDArray[np.int64]) -> BeamTable:
         fraction=place * np.repeat(step, LANES)[:beams],
         knot_ns=np.column_stack([time_ns[first], time_ns[last]]),
         seen_ns=time_ns[np.minimum(first + LANES // 2, beams - 1)],
-        beam=np.arange(beams),
+        beam=np.arange(beams, dtype=np.uint32),
     )
 
 
@@ -88,5 +88,5 @@ def block_table(
         fraction=(time_ns[order] - knots[packet, 0]) / length[packet],
         knot_ns=knots,
         seen_ns=knots.sum(axis=1) // 2,
-        beam=order,
+        beam=order.astype(np.uint32),
     )

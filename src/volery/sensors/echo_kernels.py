@@ -54,7 +54,7 @@ class LidarConstants(NamedTuple):
 
 
 class Surfaces(NamedTuple):
-    """What the beams of S scans met."""
+    """What the beams of scans met; S rows."""
 
     distance: NDArray[np.float32]
     """(S, beams) m; inf where nothing was met."""
@@ -307,13 +307,17 @@ def measure(
     scan_number: int,
     time_ns: int,
     scan: int,
+    row: int,
     surfaces: Surfaces,
     echoes: Echoes,
 ) -> None:
-    """Turn what one scan met into what it measures; `time_ns` is when the sweep began."""
+    """Turn what a scan met (`row` of surfaces) into what it measures (row `scan` of echoes).
+
+    `time_ns` is when the sweep began.
+    """
     bias = _bias(lidar, time_ns)
-    distance, cosine = surfaces.distance[scan], surfaces.cosine[scan]
-    material = surfaces.material[scan]
+    distance, cosine = surfaces.distance[row], surfaces.cosine[row]
+    material = surfaces.material[row]
     ranges, intensities = echoes.ranges[scan], echoes.intensities[scan]
     if ranges.shape[0] == 1:
         _measure_single(
@@ -332,8 +336,9 @@ def measure_scan(
     scan_number: int,
     time_ns: int,
     scan: int,
+    row: int,
     surfaces: Surfaces,
     echoes: Echoes,
 ) -> None:
     """`measure` for callers in Python."""
-    measure(lidar, key, scan_number, time_ns, scan, surfaces, echoes)
+    measure(lidar, key, scan_number, time_ns, scan, row, surfaces, echoes)

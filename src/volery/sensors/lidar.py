@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from typing import Any
 
@@ -110,33 +111,35 @@ def sample_echoes(
     start, end = _interval(model, batch, history)
     bodies = _move_bodies(scene, history, start, end)
     table = model.scan.table(_sweep_number(model, batch))
-    surfaces = _new_surfaces(scans, beams)
     if not scene.compiled:
+        surfaces = _surfaces(1, beams)
         for scan in range(scans):
-            _scan_plainly(scene, model, table, batch, scan, history, (start, end), surfaces)
+            _cast_plainly(scene, model, table, batch, scan, history, (start, end), surfaces)
             measure_scan(
                 model.constants,
                 batch.key[scan],
                 batch.scan_number[scan],
                 batch.sweep_start_ns[scan],
                 scan,
+                0,
                 surfaces,
                 echoes,
             )
         return echoes
     handle, constants, counter = scene.handle, model.constants, new_counter()
     rays = min(beams, PIECE * LANES)
+    common = _surfaces(scans, beams) if packets_of(beams) > PIECE else None
 
     def cast() -> None:
-        block = thread_block(rays, bodies)
+        block, met = thread_block(rays, bodies), common or _surfaces(1, beams)
         scan_batch(
-            handle, constants, table, batch, history, start, end, counter, block, surfaces, echoes
+            handle, constants, table, batch, history, start, end, counter, block, met, echoes
         )
 
     team, alone = workers or scene.workers, scans * beams <= _FEW_BEAMS
     team.run(cast, alone=alone)
-    if packets_of(beams) > PIECE:
-        team.run(measure_batch, constants, batch, new_counter(), surfaces, echoes, alone=alone)
+    if common is not None:
+        team.run(measure_batch, constants, batch, new_counter(), common, echoes, alone=alone)
     return echoes
 
 
@@ -188,14 +191,21 @@ def _sweep_number(model: LidarModel, batch: LidarBatch) -> int:
     return number
 
 
-def _new_surfaces(scans: int, beams: int) -> Surfaces:
-    shape = (scans, beams)
-    return Surfaces(
-        np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, np.uint8)
-    )
+_own = threading.local()
 
 
-def _scan_plainly(
+def _surfaces(scans: int, beams: int) -> Surfaces:
+    """The calling thread's memory for that many scans, kept: fresh pages cost as much as rays."""
+    needed = scans * beams
+    flat: Surfaces | None = _own.__dict__.get("surfaces")
+    if flat is None or len(flat.distance) < needed:
+        flat = _own.surfaces = Surfaces(
+            np.empty(needed, np.float32), np.empty(needed, np.float32), np.empty(needed, np.uint8)
+        )
+    return Surfaces(*(array[:needed].reshape(scans, beams) for array in flat))
+
+
+def _cast_plainly(
     scene: Scene,
     model: LidarModel,
     table: BeamTable,
@@ -205,7 +215,7 @@ def _scan_plainly(
     interval: tuple[int, int],
     surfaces: Surfaces,
 ) -> None:
-    """One scan through the fallback backend: the same beams, which then meet the same noise."""
+    """What one scan meets (first row of `surfaces`), through the fallback backend."""
     backend = scene.backend
     assert isinstance(backend, EmbreexBackend)
     origins, directions, times = _rays(table, batch, scan, history)
@@ -220,6 +230,6 @@ def _scan_plainly(
         model.range.max_m,
         np.array([batch.uav[scan]], dtype=np.int32),
         fraction,
-        (surfaces.distance[scan], normal, instance, surfaces.material[scan]),
+        (surfaces.distance[0], normal, instance, surfaces.material[0]),
     )
-    surfaces.cosine[scan] = np.abs(np.einsum("ij,ij->i", normal, directions))
+    surfaces.cosine[0] = np.abs(np.einsum("ij,ij->i", normal, directions))

@@ -53,14 +53,14 @@ def _near_scan(
 
 @inner_kernel
 def _note(
-    block: RayBlock, table: BeamTable, first: int, count: int, scan: int, surfaces: Surfaces
+    block: RayBlock, table: BeamTable, first: int, count: int, row: int, surfaces: Surfaces
 ) -> None:
     """Enter the hits of a piece, `count` rays from packet `first` on, under their beams."""
     rays, instance, material = block.rays, block.instance, block.material
-    distance, cosine = surfaces.distance[scan], surfaces.cosine[scan]
-    kind = surfaces.material[scan]
+    distance, cosine = surfaces.distance[row], surfaces.cosine[row]
+    kind, beam = surfaces.material[row], table.beam[first * LANES :]
     for p in range((count + LANES - 1) // LANES):
-        for k in range(min(LANES, count - p * LANES)):
+        for k in range(LANES):  # all lanes, without a condition: the compiler makes it vectors
             x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
             along = (
                 x * rays[p, DIRECTION, k]
@@ -68,16 +68,24 @@ def _note(
                 + z * rays[p, DIRECTION + 2, k]
             )
             squared = max(x * x + y * y + z * z, np.float32(1e-30))
-            i = table.beam[(first + p) * LANES + k]
+            rays[p, NORMAL, k] = abs(along) / np.sqrt(squared)
             hit = instance[p, k] >= 0
-            cosine[i] = abs(along) / np.sqrt(squared)
-            distance[i] = rays[p, FAR, k] if hit else np.float32(np.inf)
+            rays[p, FAR, k] = rays[p, FAR, k] if hit else np.float32(np.inf)
+        for k in range(min(LANES, count - p * LANES)):
+            i = beam[p * LANES + k]
+            distance[i] = rays[p, FAR, k]
+            cosine[i] = rays[p, NORMAL, k]
             kind[i] = material[p, k]
 
 
 @inner_kernel
 def _measure(
-    lidar: LidarConstants, batch: LidarBatch, scan: int, surfaces: Surfaces, echoes: Echoes
+    lidar: LidarConstants,
+    batch: LidarBatch,
+    scan: int,
+    row: int,
+    surfaces: Surfaces,
+    echoes: Echoes,
 ) -> None:
     measure(
         lidar,
@@ -85,6 +93,7 @@ def _measure(
         batch.scan_number[scan],
         batch.sweep_start_ns[scan],
         scan,
+        row,
         surfaces,
         echoes,
     )
@@ -104,7 +113,11 @@ def scan_batch(
     surfaces: Surfaces,
     echoes: Echoes,
 ) -> None:
-    """Cast pieces of scans, taken one by one from `counter`; measure scans of one piece."""
+    """Cast pieces of scans, taken one by one from `counter`; measure scans of one piece.
+
+    Scans of several pieces need a row each in `surfaces`, which `measure_batch` reads; those of one
+    piece share the first row of a thread's own memory.
+    """
     total, packets = table.fraction.shape[0], table.seen_ns.shape[0]
     pieces = (packets + PIECE - 1) // PIECE
     interval = max(bodies_end_ns - bodies_start_ns, 1)
@@ -118,14 +131,15 @@ def scan_batch(
         count = min(own * LANES, total - first * LANES)
         near_count = _near_scan(scene, lidar, batch, scan, history, block.near)
         aim_packets(table, batch, scan, history, first, own, block.rays)
+        seen_ns = table.seen_ns[first:]
         for p in range(own):
-            time = batch.sweep_start_ns[scan] + table.seen_ns[first + p]
+            time = batch.sweep_start_ns[scan] + seen_ns[p]
             fraction = (time - bodies_start_ns) / interval
             block.fraction[p] = min(max(fraction, 0.0), 1.0)
         cast_block(scene, block, count, lidar.range_max, near_count)
-        _note(block, table, first, count, scan, surfaces)
+        _note(block, table, first, count, scan if pieces > 1 else 0, surfaces)
         if pieces == 1:
-            _measure(lidar, batch, scan, surfaces, echoes)
+            _measure(lidar, batch, scan, 0, surfaces, echoes)
 
 
 @kernel
@@ -141,4 +155,4 @@ def measure_batch(
         scan = fetch_add(counter.ctypes.data)
         if scan >= batch.uav.shape[0]:
             return
-        _measure(lidar, batch, scan, surfaces, echoes)
+        _measure(lidar, batch, scan, scan, surfaces, echoes)

@@ -12,7 +12,8 @@ import pytest
 from volery.core import rotations
 from volery.engine.events import Event, EventKind
 from volery.graph import messages as m
-from volery.report.collect import FlightCollector, scan_points
+from volery.report.collect import FlightCollector
+from volery.report.scan_placing import scan_points
 from volery.sensors.mount import make_mount
 from volery.world.terrain import Terrain
 
@@ -38,6 +39,7 @@ class FakeSimulation:
     graph: FakeGraph = field(default_factory=FakeGraph)
     uav_names: tuple[str, ...] = ("uav1",)
     mounts: dict[str, Any] = field(default_factory=dict)
+    cloud_mounts: dict[str, Any] = field(default_factory=dict)
     terrain: Terrain = field(default_factory=lambda: Terrain.flat(200.0, 1.0, (-100.0, -100.0)))
     forest: Any = None
     events: list[Event] = field(default_factory=list)
