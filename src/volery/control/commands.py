@@ -143,7 +143,6 @@ class FleetCommands:
         angle = None if yaw is None else float(checked("yaw", yaw, (), 1e4))
         pilot = self._enter_guided(i, FlightMode.GO_TO)
         pilot["position_target"] = position
-        pilot["braking"] = False
         if angle is not None:
             self._face(i, angle)
 
@@ -234,7 +233,6 @@ class FleetCommands:
         self._pilots["home"][i] = place
         pilot = self._enter_guided(i, FlightMode.TAKE_OFF, from_ground=True)
         pilot["position_target"] = place + np.array([0.0, 0.0, altitude_m])
-        pilot["braking"] = False
 
     def hold(self, i: int) -> None:
         """Let UAV `i` stop and stay where it comes to rest."""
@@ -321,6 +319,7 @@ class FleetCommands:
             pilot["heading_target"] = pilot["heading"]
             pilot["turning"] = False
         pilot["mode"] = mode
+        pilot["braking"] = False
         pilot["calm_ticks"] = 0
         return pilot
 

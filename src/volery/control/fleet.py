@@ -378,7 +378,6 @@ class Fleet(FleetCommands):
         pilot = self._enter_guided(i, FlightMode.HOLD, from_ground=True)
         pilot["thrust"] = airframe.weight
         pilot["position_target"] = self._bodies["position_map"][i]
-        pilot["braking"] = False
 
     def _collide(self, i: int, j: int | None, normal_map: ArrayLike, *how: Any) -> float:
         size = impulses.collide(self.airframes, self.state, i, j, normal_map, *how)

@@ -100,9 +100,12 @@ def _level_error(pilot: Any, estimate: Any, gains: Any) -> tuple[float, float, b
     """Way (m) to the reference's place, no longer than the leash; whether it is at its end."""
     ex = pilot.position[0] - estimate.position_map[0]
     ey = pilot.position[1] - estimate.position_map[1]
-    size = math.sqrt(ex * ex + ey * ey)
-    share = gains.level_leash / size if size > gains.level_leash else 1.0
-    return share * ex, share * ey, size > _FAR * gains.level_leash
+    square = ex * ex + ey * ey
+    near = _FAR * gains.level_leash
+    if square <= near * near:
+        return ex, ey, False
+    share = min(gains.level_leash / math.sqrt(square), 1.0)
+    return share * ex, share * ey, True
 
 
 @inner_kernel

@@ -47,9 +47,9 @@ def lead_level(pilot: Any, estimate: Any, gains: Any, speed: float) -> None:
     """Choose the horizontal acceleration that leads to `position_target` at up to `speed` m/s."""
     dx = pilot.position[0] - estimate.position_map[0]
     dy = pilot.position[1] - estimate.position_map[1]
-    size = math.sqrt(dx * dx + dy * dy)
-    if size > gains.level_leash:
-        share = gains.level_leash / size
+    square = dx * dx + dy * dy
+    if square > gains.level_leash * gains.level_leash:
+        share = gains.level_leash / math.sqrt(square)
         pilot.position[0] = estimate.position_map[0] + share * dx
         pilot.position[1] = estimate.position_map[1] + share * dy
     vx, vy = pilot.velocity[0], pilot.velocity[1]
@@ -59,10 +59,11 @@ def lead_level(pilot: Any, estimate: Any, gains: Any, speed: float) -> None:
     ax, ay = -gains.ease * vx, -gains.ease * vy
     if distance > 1e-9:
         wanted = approach_speed(distance, gains.position, gains.brake, speed)
-        nx, ny = dx / distance, dy / distance
+        inverse = 1.0 / distance
+        nx, ny = inverse * dx, inverse * dy
         along = nx * vx + ny * vy
         # how the wanted velocity changes on the way, and what is missing to it
-        turn = wanted / distance
+        turn = inverse * wanted
         ahead = (turn - _slope(wanted, gains.position, gains.brake, speed)) * along
         ax += (gains.ease * wanted + ahead) * nx - turn * vx
         ay += (gains.ease * wanted + ahead) * ny - turn * vy
@@ -124,13 +125,14 @@ def brake_height(pilot: Any, estimate: Any, gains: Any) -> None:
 
 @inner_kernel
 def _choose_level(pilot: Any, gains: Any, ax: float, ay: float, most_change: float) -> None:
-    size = math.sqrt(ax * ax + ay * ay)
-    if size > gains.acceleration:
-        ax *= gains.acceleration / size
-        ay *= gains.acceleration / size
+    square = ax * ax + ay * ay
+    if square > gains.acceleration * gains.acceleration:
+        share = gains.acceleration / math.sqrt(square)
+        ax *= share
+        ay *= share
     dx, dy = ax - pilot.acceleration[0], ay - pilot.acceleration[1]
-    size = math.sqrt(dx * dx + dy * dy)
-    share = most_change / size if size > most_change else 1.0
+    square = dx * dx + dy * dy
+    share = most_change / math.sqrt(square) if square > most_change * most_change else 1.0
     pilot.acceleration[0] += share * dx
     pilot.acceleration[1] += share * dy
 

@@ -50,7 +50,7 @@ _REBOUND_SPEED = 0.5
 """m/s of approach below which nothing rebounds."""
 _COS_UPRIGHT = 0.5
 """Touching the ground with more than 60 degrees between the vehicle's axis and up is an impact."""
-_FRESH_S = 0.2
+FRESH_S = 0.2
 """s without contact after which a touch is a new one."""
 
 NO_TOUCH, TOUCH_DOWN, IMPACT = 0, 1, 2
@@ -265,7 +265,7 @@ def classify_touch(
     speed: of the centre of mass before the contact, m/s. An impact is a touch faster than the
     landing limit, or with the vehicle tilted beyond 60 degrees; a crashed vehicle reports no more.
     """
-    fresh = (step - body.last_contact_step) * dt > _FRESH_S
+    fresh = (step - body.last_contact_step) * dt > FRESH_S
     body.last_contact_step = step
     if body.crashed:
         return NO_TOUCH

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from volery.vehicle.airframe import Airframe, hover_thrusts
 from volery.vehicle.compiled import inner_kernel
-from volery.vehicle.contact import NO_TOUCH, classify_touch
+from volery.vehicle.contact import FRESH_S, IMPACT, NO_TOUCH, TOUCH_DOWN
 from volery.vehicle.rigid import four, three
 from volery.world.terrain import TerrainGrid, terrain_height
 
@@ -141,7 +141,9 @@ def face(body: Any, c: float, s: float, rate: float, dt: float) -> None:
 def stop_at_ground(
     body: Any, plant: Any, model: Any, grid: TerrainGrid, steepest: float, step: int, dt: float
 ) -> int:
-    """Keep its feet above the ground; `NO_TOUCH`, `TOUCH_DOWN` or `IMPACT`, which ends nothing.
+    """Keep its feet above the ground; `NO_TOUCH`, `TOUCH_DOWN` or `IMPACT`.
+
+    It may press on: that is the same touch.
 
     steepest: cosine of the terrain's steepest slope. step: number of the step that ends here.
     """
@@ -157,8 +159,12 @@ def stop_at_ground(
     body.velocity_map[2] = max(vz, 0.0)
     body.acceleration_map[2] += (body.velocity_map[2] - vz) / dt
     body.on_ground = True
-    speed = math.sqrt(vx * vx + vy * vy + vz * vz)
-    return classify_touch(body, plant, max(-vz, 0.0), speed, step, dt, True)
+    fresh = (step - body.last_contact_step) * dt > FRESH_S
+    body.last_contact_step = step
+    if body.crashed or not fresh:
+        return NO_TOUCH
+    body.touch_speed = math.sqrt(vx * vx + vy * vy + vz * vz)
+    return IMPACT if -vz > plant.landing_limit else TOUCH_DOWN
 
 
 @inner_kernel

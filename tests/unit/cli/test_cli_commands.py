@@ -38,7 +38,7 @@ def test_help_is_quick_and_imports_nothing_heavy() -> None:
 
 
 def test_every_command_is_explained() -> None:
-    for name in ("run", "list", "info", "recover", "bench", "doctor"):
+    for name in ("run", "list", "info", "recover", "bench", "doctor", "identify"):
         result = runner.invoke(app, [name, "--help"])
         assert result.exit_code == 0
         assert name in result.stdout
@@ -183,3 +183,18 @@ def test_page_names_every_machine() -> None:
     assert "Another CPU" in text
     assert "## new (machine 2)" in text
     assert "| `rays_per_s_1_thread` | 7e+06 | >= 6e+06 |" in text
+
+
+def test_identify_writes_a_model_that_loads(tmp_path: Path) -> None:
+    from volery.vehicle.identified import load_identified
+
+    out = tmp_path / "mine.toml"
+    result = runner.invoke(app, ["identify", "f450", "--out", str(out), "--order", "1"])
+    assert result.exit_code == 0, result.output
+    assert "attitude_deg" in result.stdout
+    model = load_identified(str(out))
+    assert model.roll.kind == "first_order"
+    assert model.fit_error is not None
+    missing = runner.invoke(app, ["identify", "f450", "--out", str(tmp_path / "no" / "a.toml")])
+    assert missing.exit_code == 2
+    assert "no folder" in missing.output

@@ -189,6 +189,17 @@ def test_one_that_begins_later_is_led_in():
     np.testing.assert_allclose(fleet.state.position_map[0], [4, 2, 50], atol=0.1)
 
 
+def test_a_setpoint_ends_braking():
+    fleet = in_air()
+    fleet.state.velocity_map[0] = (6, 0, 0)
+    fleet.hold(0)
+    fleet.advance(100, FLAT.grid)
+    fleet.set_command_timeout(60.0)
+    fleet.command_setpoint(0, (1, 0, 50))
+    fleet.advance(15_000, FLAT.grid)
+    np.testing.assert_allclose(fleet.state.position_map[0], (1, 0, 50), atol=0.02)
+
+
 def test_setpoints_time_out_into_hold():
     fleet = in_air()
     fleet.command_setpoint(0, (0, 0, 50), (2, 0, 0), yaw=0.0, yaw_rate=0.4)

@@ -7,7 +7,19 @@ import pytest
 
 import volery
 from volery.core.errors import CommandError, ScenarioError, VoleryError
-from volery.graph.messages import Twist, Vector3, typestore
+from volery.graph.messages import (
+    MultiDOFJointTrajectory,
+    MultiDOFJointTrajectoryPoint,
+    Quaternion,
+    Transform,
+    Twist,
+    Vector3,
+    header,
+    message_type,
+    typestore,
+)
+
+Duration = message_type("builtin_interfaces/msg/Duration")
 
 
 def collect(simulation, seconds):
@@ -195,3 +207,92 @@ def test_a_failing_node_is_named(simulate, flat_data, tmp_path, monkeypatch, whe
     flat_data["types"]["f450"]["nodes"] = [{"node": f"bad_{where}:Bad"}]
     with pytest.raises(VoleryError, match=words):
         simulate(flat_data).run(0.2)
+
+
+# ------------------------------------------------------------------------- trajectories and plants
+
+
+def trajectory(points, frame="map"):
+    """A MultiDOFJointTrajectory of (time, place, velocity) for the vehicle."""
+    zero = Vector3(0.0, 0.0, 0.0)
+    made = [
+        MultiDOFJointTrajectoryPoint(
+            [Transform(Vector3(*map(float, place)), Quaternion(0.0, 0.0, 0.0, 1.0))],
+            [Twist(Vector3(*map(float, velocity)), zero)],
+            [],
+            Duration(int(t), round(1e9 * (t % 1))),
+        )
+        for t, place, velocity in points
+    ]
+    return MultiDOFJointTrajectory(header(0, frame), ["base_link"], made)
+
+
+def test_a_trajectory_message_is_flown(simulate, flat_data):
+    flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 20.0]
+    simulation = simulate(flat_data)
+    way = simulation.graph.advertise("/uav1/trajectory", MultiDOFJointTrajectory)
+    uav = simulation.uavs["uav1"]
+    way.publish(trajectory([(0, (9, 9, 9), (0, 0, 0))], frame="odom"))
+    simulation.run(0.1)
+    assert uav.mode.name == "HOLD"  # not in the map: ignored
+    way.publish(
+        trajectory(
+            [(0, (0, 0, 20), (0, 0, 0)), (2.5, (3, 0, 21), (1, 0, 0)), (5, (4, 0, 21), (0,) * 3)]
+        )
+    )
+    simulation.run(2.6)
+    assert uav.mode.name == "TRAJECTORY"
+    np.testing.assert_allclose(uav.position_map, (3, 0, 21), atol=0.25)
+    simulation.run(4.0)
+    assert uav.mode.name == "HOLD"
+    np.testing.assert_allclose(uav.position_map, (4, 0, 21), atol=0.05)
+
+
+def test_one_point_is_a_setpoint_and_a_late_one_a_goal(simulate, flat_data):
+    flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 20.0]
+    simulation = simulate(flat_data)
+    way = simulation.graph.advertise("/uav1/trajectory", MultiDOFJointTrajectory)
+    uav = simulation.uavs["uav1"]
+    way.publish(trajectory([(0, (0, 0, 20), (1, 0, 0))]))
+    simulation.run(0.4)
+    assert uav.mode.name == "TRAJECTORY"
+    simulation.run(0.4)
+    assert uav.mode.name == "HOLD"  # nothing came after it
+    way.publish(trajectory([(4, (2, 3, 22), (0, 0, 0))]))
+    simulation.run(7.0)
+    np.testing.assert_allclose(uav.position_map, (2, 3, 22), atol=0.05)
+
+
+def test_plants_of_a_scenario(simulate, flat_data):
+    flat_data["types"]["f450"]["plant"] = "identified"
+    flat_data["types"]["mover"] = {"plant": "kinematic"}
+    flat_data["uavs"] = [
+        {"type": "f450", "position_m": [0.0, 0.0]},
+        {"type": "mover", "position_m": [5.0, 0.0, 10.0]},
+    ]
+    simulation = simulate(flat_data)
+    real, mover = simulation.uavs.values()
+    real.take_off(3.0)
+    mover.command_pose((5, 5, 10), (0, 0, 0, 1))
+    simulation.run(0.5)
+    np.testing.assert_array_equal(mover.position_map, (5, 5, 10))
+    mover.command_velocity((2, 0, 0))
+    simulation.run(0.4)
+    np.testing.assert_allclose(mover.position_map, (5.8, 5, 10), atol=1e-9)
+    simulation.run(6.0)
+    assert real.position_map[2] == pytest.approx(3.12, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"plant": "identified", "identified_model": "f449"}, "types.f450.identified_model.*f450"),
+        ({"identified_model": "f450"}, 'needs plant = "identified"'),
+        ({"kinematic": {"limited": True}}, 'needs plant = "kinematic"'),
+        ({"plant": "rigid"}, "rigid_body"),
+    ],
+)
+def test_wrong_plants_are_refused(simulate, flat_data, changes, words):
+    flat_data["types"]["f450"] |= changes
+    with pytest.raises(VoleryError, match=words):
+        simulate(flat_data)
