@@ -21,6 +21,7 @@ class FlightProgress:
         self._bar: Any = None
         self._task: Any = None
         self._told_at = time.monotonic()
+        self._paused = False
 
     def __enter__(self) -> FlightProgress:
         """Begin, with the building of the world."""
@@ -52,12 +53,15 @@ class FlightProgress:
         """Take the bar away."""
         self._stop()
 
-    def update(self, time_s: float, real_time_factor: float) -> None:
+    def update(self, time_s: float, real_time_factor: float, *, paused: bool = False) -> None:
         """Show how far the flight is."""
         state = f"{time_s:.1f} of {self._duration_s:g} s  {real_time_factor:.1f} x real time"
+        if paused:
+            state = f"paused at {time_s:.3f} of {self._duration_s:g} s: space goes on, . steps"
+        changed, self._paused = paused != self._paused, paused
         if self._bar is not None:
             self._bar.update(self._task, completed=time_s, state=state)
-        elif time.monotonic() - self._told_at > _PLAIN_PERIOD_S:
+        elif changed or time.monotonic() - self._told_at > _PLAIN_PERIOD_S:
             self._told_at = time.monotonic()
             typer.echo(f"{self._name}: {state}")
 
