@@ -6,7 +6,6 @@ import os
 import select
 import sys
 import termios
-from types import TracebackType
 from typing import Any
 
 _ESCAPE = "\x1b"
@@ -33,12 +32,7 @@ class Keys:
             self._before = termios.tcgetattr(self._terminal)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_exception: object) -> None:
         """Set the terminal as it was."""
         if self._terminal >= 0 and self._in_foreground():
             termios.tcsetattr(self._terminal, termios.TCSADRAIN, self._before)
