@@ -79,7 +79,8 @@ class Log(ABC):
     """A log being written. After the first RecordingError every further `write` repeats it."""
 
     path: Path
-    messages: int = 0
+    messages: int
+    """Number of messages that can be read in the file: those of its whole chunks."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -87,13 +88,15 @@ class Log(ABC):
         self._chunk_since = time.monotonic()
         self._failure: RecordingError | None = None
         self._closed = False
+        self.messages = 0
+        self._taken = 0
 
     def write(self, published: Published) -> None:
         """Add a message, at its simulated time of publication."""
         if self._failure is not None:
             raise self._failure
         self._add(published)
-        self.messages += 1
+        self._taken += 1
         if self._file.pending:
             self._commit()
         elif time.monotonic() - self._chunk_since > CHUNK_WALL_S:
@@ -130,6 +133,7 @@ class Log(ABC):
         except RecordingError as error:
             self._failure = error
             raise
+        self.messages = self._taken  # a chunk is handed over as soon as it is whole
         self._chunk_since = time.monotonic()
 
     @abstractmethod

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import io
+import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
 from volery.bridges.bag import CHUNK_BYTES, LIBRARY
 from volery.bridges.disk_file import DiskFile
-from volery.bridges.log_records import LogTopic, LogWalk, log_format
+from volery.bridges.log_records import LogRecord, LogTopic, LogWalk, log_format
 from volery.core.errors import RecordingError
 
 
@@ -35,7 +37,8 @@ def recover(path: str | Path, out: str | Path | None = None) -> Recovery:
     Raises
     ------
     RecordingError
-        The file is no log, or the new one exists already or cannot be written.
+        The file is no log or holds no readable message, or the new one exists already or cannot
+        be written.
 
     """
     path = Path(path)
@@ -44,14 +47,20 @@ def recover(path: str | Path, out: str | Path | None = None) -> Recovery:
     if out.exists():
         raise RecordingError(f"{out}: exists already; choose another name")
     walk = LogWalk(path)
+    records = iter(walk)
+    first = next(records, None)
+    if first is None:
+        trouble = f" ({walk.trouble})" if walk.trouble else ""
+        raise RecordingError(f"{path}: holds no readable message{trouble}; nothing is written")
+    write = _to_mcap if kind == "mcap" else _to_bag
     try:
-        count, end_ns = (_to_mcap if kind == "mcap" else _to_bag)(walk, out)
+        count, end_ns = write(itertools.chain([first], records), out)
     except OSError as error:
         raise RecordingError(f"{out}: cannot write the log: {error.strerror}") from None
     return Recovery(out, count, end_ns, walk.trouble)
 
 
-def _to_mcap(walk: LogWalk, out: Path) -> tuple[int, int]:
+def _to_mcap(records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
     from mcap.writer import CompressionType, Writer
 
     file = DiskFile(out)
@@ -62,7 +71,7 @@ def _to_mcap(walk: LogWalk, out: Path) -> tuple[int, int]:
         schemas: dict[tuple[str, str], int] = {}
         channels: dict[LogTopic, int] = {}
         count = end_ns = 0
-        for topic, time_ns, data, sequence in walk:
+        for topic, time_ns, data, sequence in records:
             if topic not in channels:
                 key = (topic.msgtype, topic.definition)
                 if key not in schemas:
@@ -83,7 +92,7 @@ def _to_mcap(walk: LogWalk, out: Path) -> tuple[int, int]:
     return count, end_ns
 
 
-def _to_bag(walk: LogWalk, out: Path) -> tuple[int, int]:
+def _to_bag(records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
     from rosbags.rosbag1 import Writer
 
     writer = Writer(out)
@@ -92,7 +101,7 @@ def _to_bag(walk: LogWalk, out: Path) -> tuple[int, int]:
     connections: dict[LogTopic, Any] = {}
     count = end_ns = 0
     with writer:
-        for topic, time_ns, data, _ in walk:
+        for topic, time_ns, data, _ in records:
             if topic not in connections:
                 connections[topic] = writer.add_connection(
                     topic.topic, topic.msgtype, msgdef=topic.definition, md5sum=topic.digest

@@ -65,7 +65,12 @@ def run(
         bool, typer.Option("--overwrite", help="Replace an existing log.")
     ] = False,
 ) -> None:
-    """Fly a scenario."""
+    """Fly a scenario.
+
+    At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
+    + and - double and halve the speed, m frees it. Ctrl-C ends the flight and still writes log and
+    report.
+    """
     from volery.cli.run import RunOptions, fly, parse_speed
 
     options = RunOptions(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from types import TracebackType
 from typing import Any
 
 import typer
@@ -21,6 +20,7 @@ class FlightProgress:
         self._bar: Any = None
         self._task: Any = None
         self._told_at = time.monotonic()
+        self._paused = False
 
     def __enter__(self) -> FlightProgress:
         """Begin, with the building of the world."""
@@ -43,21 +43,19 @@ class FlightProgress:
             )
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_exception: object) -> None:
         """Take the bar away."""
         self._stop()
 
-    def update(self, time_s: float, real_time_factor: float) -> None:
+    def update(self, time_s: float, real_time_factor: float, *, paused: bool = False) -> None:
         """Show how far the flight is."""
         state = f"{time_s:.1f} of {self._duration_s:g} s  {real_time_factor:.1f} x real time"
+        if paused:
+            state = f"paused at {time_s:.3f} of {self._duration_s:g} s: space goes on, . steps"
+        changed, self._paused = paused != self._paused, paused
         if self._bar is not None:
             self._bar.update(self._task, completed=time_s, state=state)
-        elif time.monotonic() - self._told_at > _PLAIN_PERIOD_S:
+        elif changed or time.monotonic() - self._told_at > _PLAIN_PERIOD_S:
             self._told_at = time.monotonic()
             typer.echo(f"{self._name}: {state}")
 

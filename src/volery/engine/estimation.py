@@ -151,9 +151,7 @@ class Estimation:
         """Places in a bank's arrays that are listened to, and the estimators that do."""
         listens = self.setup.listens
         pairs = [
-            (k, listens[s.uav, s.name])
-            for k, s in enumerate(sensors)
-            if (s.uav, s.name) in listens
+            (k, listens[s.uav, s.name]) for k, s in enumerate(sensors) if (s.uav, s.name) in listens
         ]
         table = np.array(pairs, dtype=np.int64).reshape(-1, 2)
         return table[:, 0], table[:, 1]

@@ -3,6 +3,9 @@
 Delivery is deterministic: a publication joins a queue, and `deliver` hands queued messages to
 subscribers first come, first served, in the order of subscription. What a callback publishes joins
 the end of the queue.
+
+A latched publisher's last message is kept and handed to everyone who subscribes later, as ROS 1
+latches and ROS 2 does with durability TRANSIENT_LOCAL and depth 1.
 """
 
 from __future__ import annotations
@@ -10,8 +13,8 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 from volery.core.errors import GraphError
 from volery.graph.messages import Published, message_type, type_name
@@ -28,6 +31,8 @@ class TopicInfo:
     publishers: int
     subscribers: int
     messages: int
+    latched: bool
+    """Whether a publisher's last message awaits those who subscribe later."""
 
 
 class _Topic:
@@ -37,14 +42,17 @@ class _Topic:
         self.callbacks: list[Callback] = []
         self.publishers = 0
         self.messages = 0
+        self.latched = False
+        self.kept: dict[Publisher, Published] = {}  # the last delivered one of each latched one
 
 
 class Publisher:
     """A right to publish one type on one topic."""
 
-    def __init__(self, graph: Graph, topic: _Topic) -> None:
+    def __init__(self, graph: Graph, topic: _Topic, *, latched: bool = False) -> None:
         self._graph = graph
         self._topic = topic
+        self.latched = latched
 
     @property
     def topic(self) -> str:
@@ -54,11 +62,11 @@ class Publisher:
     @property
     def wanted(self) -> bool:
         """Whether anybody would receive a message; what is not wanted need not be built."""
-        return bool(self._topic.callbacks or self._graph.listens_to_all)
+        return bool(self.latched or self._topic.callbacks or self._graph.listens_to_all)
 
     def publish(self, message: Any) -> None:
         """Queue a message for delivery."""
-        self._graph.enqueue(self._topic, message)
+        self._graph.enqueue(self, self._topic, message)
 
 
 class Subscription:
@@ -72,6 +80,15 @@ class Subscription:
         """Stop receiving."""
         if self._callback in self._callbacks:
             self._callbacks.remove(self._callback)
+
+
+class _Letter(NamedTuple):
+    """A message under way; `only` is the late subscriber that a kept one is meant for."""
+
+    topic: _Topic
+    published: Published
+    sender: Publisher
+    only: Callback | None = None
 
 
 @dataclass(frozen=True)
@@ -88,7 +105,7 @@ class Graph:
         self._topics: dict[str, _Topic] = {}
         self._services: dict[str, _Service] = {}
         self._to_all: list[Callback] = []
-        self._queue: deque[tuple[_Topic, Published]] = deque()
+        self._queue: deque[_Letter] = deque()
 
     # ---------------------------------------------------------------------------------- topics
 
@@ -97,65 +114,97 @@ class Graph:
         """Whether a recorder or digest wants every message."""
         return bool(self._to_all)
 
-    def advertise(self, topic: str, msgtype: str | type[Any]) -> Publisher:
-        """Announce a publisher. `GraphError` if the topic exists with another type."""
+    def advertise(
+        self, topic: str, msgtype: str | type[Any], *, latched: bool = False
+    ) -> Publisher:
+        """Announce a publisher. `GraphError` if the topic exists with another type.
+
+        The last message of a `latched` one also goes to those who subscribe after it.
+        """
         found = self._topic(topic, msgtype)
         found.publishers += 1
-        return Publisher(self, found)
+        found.latched = found.latched or latched
+        return Publisher(self, found, latched=latched)
 
     def subscribe(
         self, topic: str, callback: Callback, msgtype: str | type[Any] | None = None
     ) -> Subscription:
-        """Call `callback` with each message of `topic`, which must exist or be given a type."""
+        """Call `callback` with each message of `topic`, which must exist or be given a type.
+
+        What latched publishers sent before comes first, with the next delivery; its `time_ns` is
+        that of this subscription.
+        """
         if msgtype is None and topic not in self._topics:
             raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
         found = self._topics[topic] if msgtype is None else self._topic(topic, msgtype)
         found.callbacks.append(callback)
+        self._send_kept([found], callback)
         return Subscription(found.callbacks, callback)
 
     def subscribe_all(self, callback: Callback) -> Subscription:
-        """Call `callback` with every message of every topic, before the topic's subscribers."""
+        """Call `callback` with every message of every topic, before the topic's subscribers.
+
+        What latched publishers sent before comes first, as for `subscribe`.
+        """
         self._to_all.append(callback)
+        self._send_kept(list(self._topics.values()), callback)
         return Subscription(self._to_all, callback)
 
     def topics(self) -> list[TopicInfo]:
         """All topics, by name."""
         return [
-            TopicInfo(t.name, t.msgtype, t.publishers, len(t.callbacks), t.messages)
+            TopicInfo(t.name, t.msgtype, t.publishers, len(t.callbacks), t.messages, t.latched)
             for _, t in sorted(self._topics.items())
         ]
 
-    def enqueue(self, topic: _Topic, message: Any) -> None:
+    def enqueue(self, sender: Publisher, topic: _Topic, message: Any) -> None:
         """Queue a message; used by `Publisher`."""
         name = getattr(message, "__msgtype__", None)
         if name != topic.msgtype:
             raise GraphError(f"topic '{topic.name}' carries {topic.msgtype}, not {name}")
         topic.messages += 1
-        if topic.callbacks or self._to_all:
+        if sender.wanted:
             published = Published(topic.name, topic.msgtype, self._now_ns(), message)
-            self._queue.append((topic, published))
+            self._queue.append(_Letter(topic, published, sender))
 
     def deliver(self) -> None:
         """Hand out all queued messages, those published meanwhile included."""
         while self._queue:
-            topic, published = self._queue.popleft()
+            topic, published, sender, only = self._queue.popleft()
+            if only is not None:
+                if only in topic.callbacks or only in self._to_all:
+                    only(published)
+                continue
+            if sender.latched:
+                topic.kept[sender] = published
             for callback in tuple(self._to_all):
                 callback(published)
             for callback in tuple(topic.callbacks):
                 callback(published)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps: undelivered messages, and how many each topic has seen."""
+        """What a snapshot keeps: undelivered and latched messages, how many each topic has seen."""
         return {
             "queue": list(self._queue),
-            "messages": {name: topic.messages for name, topic in self._topics.items()},
+            "topics": {name: (t.messages, dict(t.kept)) for name, t in self._topics.items()},
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state; topics, subscribers and services stay as they are."""
         self._queue = deque(state["queue"])
         for name, topic in self._topics.items():
-            topic.messages = state["messages"].get(name, 0)
+            messages, kept = state["topics"].get(name, (0, {}))
+            topic.messages, topic.kept = messages, dict(kept)
+
+    def _send_kept(self, topics: list[_Topic], callback: Callback) -> None:
+        """Put what was kept before everything under way, which is newer."""
+        now_ns = self._now_ns()
+        letters = [
+            _Letter(topic, replace(published, time_ns=now_ns), sender, callback)
+            for topic in topics
+            for sender, published in topic.kept.items()
+        ]
+        self._queue.extendleft(reversed(letters))
 
     def _topic(self, name: str, msgtype: str | type[Any]) -> _Topic:
         wanted = msgtype if isinstance(msgtype, str) else type_name(msgtype)

@@ -102,10 +102,16 @@ class Node:
         """The clock that stamps are compared with."""
         return Clock(self._now_ns)
 
-    def create_publisher(self, msg_type: type[Any], topic: str, qos: int = 10) -> Publisher:
-        """Publish `msg_type` on `topic`; `qos` is the queue depth of outside subscribers."""
+    def create_publisher(
+        self, msg_type: type[Any], topic: str, qos: int = 10, *, latched: bool = False
+    ) -> Publisher:
+        """Publish `msg_type` on `topic`; `qos` is the queue depth of outside subscribers.
+
+        `latched` hands the last message to those who subscribe later, as rclpy's durability
+        TRANSIENT_LOCAL does.
+        """
         _check_depth(qos)
-        publisher = self._context.graph.advertise(self.resolve(topic), msg_type)
+        publisher = self._context.graph.advertise(self.resolve(topic), msg_type, latched=latched)
         return publisher if self._thinker is None else DelayedPublisher(publisher, self._thinker)
 
     def create_subscription(

@@ -74,7 +74,7 @@ class GraphPublisher:
         self._mounts: dict[SensorId, Mount] = {}
         self._clock = graph.advertise("/clock", Clock)
         self._tf = graph.advertise("/tf", TFMessage)
-        self._tf_static = graph.advertise("/tf_static", TFMessage)
+        self._tf_static = graph.advertise("/tf_static", TFMessage, latched=True)
         self._events = graph.advertise("/events", String)
         self._static_sent = False
         self._static: list[TransformStamped] = []
@@ -143,7 +143,7 @@ class GraphPublisher:
 
     def _publish_static(self) -> None:
         self._static_sent = True
-        if self._static and self._tf_static.wanted:
+        if self._static:
             self._tf_static.publish(TFMessage(list(self._static)))
 
     # ---------------------------------------------------------------------------------- by kind

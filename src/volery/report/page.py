@@ -21,13 +21,15 @@ class ReportError(VoleryError):
 
 
 def check_folder(folder: Path) -> None:
-    """Make the folder and try to write there, before a long flight rather than after it.
+    """Try to write there, or where it would be made, before a long flight rather than after it.
 
-    Raises ReportError that says what the system objects to.
+    Leaves nothing behind. Raises ReportError that says what the system objects to.
     """
-    probe = folder / ".volery-probe"
+    place = folder
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        while not place.exists():
+            place = place.parent
+        probe = place / ".volery-probe"
         probe.write_bytes(b"")
         probe.unlink()
     except OSError as error:
@@ -37,9 +39,9 @@ def check_folder(folder: Path) -> None:
 def write_report(flight: FlightData, folder: str | Path) -> Path:
     """Write `index.html` into `folder` (made if missing) and return its path."""
     path = Path(folder) / "index.html"
-    check_folder(path.parent)
     text = page(flight)
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ReportError(f"{path}: cannot write the report: {error.strerror}") from None

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
+from volery.control.setpoints import MAX_COORDINATE, checked
 from volery.control.trajectory import Trajectory
 from volery.scenario.schema import Flight
 
@@ -65,7 +66,7 @@ class Uav:
     def take_off(self, altitude_m: float | None = None) -> None:
         """Climb to `altitude_m` above the present place (default: the scenario's) and hold."""
         altitude = self._flight.take_off_altitude_m if altitude_m is None else altitude_m
-        self._fleet.take_off(self._row, altitude)
+        self._fleet.take_off(self._row, float(checked("altitude", altitude, (), MAX_COORDINATE)))
 
     def hold(self) -> None:
         """Stop and stay."""

@@ -75,6 +75,10 @@ def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
         return f"key '{key}' is missing"
     if not key:
         return message
+    if fault["type"] == "tuple_type" and isinstance(fault.get("input"), dict):
+        header = _header(fault["loc"], data)
+        if header and _holds_tables(model, fault["loc"]):
+            return f"key '{key}': there may be several of them; write [[{header}]], not [{header}]"
     found = fault.get("input")
     shown = f" (found {found!r})" if isinstance(found, str | int | float | bool) else ""
     return f"key '{key}': {message}{shown}"
@@ -92,6 +96,25 @@ def _key(location: tuple[int | str, ...], data: Any, *, keep_last: bool) -> str:
             data = data[part] if part < len(data) else None
         key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else str(part)
     return key
+
+
+def _header(location: tuple[int | str, ...], data: Any) -> str:
+    """The key as a TOML table's header names it; empty where none can."""
+    return (
+        ""
+        if any(isinstance(part, int) for part in location)
+        else _key(location, data, keep_last=False)
+    )
+
+
+def _holds_tables(model: type[BaseModel], location: tuple[int | str, ...]) -> bool:
+    """Whether the key holds an array of tables."""
+    schema = model.model_json_schema()
+    node: Any = schema
+    for part in location:
+        node = _descend(schema, node, part)
+    items = _resolve(schema, node.get("items", {}))
+    return "oneOf" in items or "properties" in items
 
 
 def _sibling_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:

@@ -227,7 +227,7 @@ def test_full_disk(
         log.flush()
     log.close()
     assert path.stat().st_size == size
-    assert summarize(path).messages == 200
+    assert summarize(path).messages == log.messages == 200
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -251,8 +251,21 @@ def test_file_size_limit_stops_the_run_with_one_error(
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         signal.signal(signal.SIGXFSZ, handler)
     summary = summarize(path)
-    assert summary.messages > 100
+    assert summary.messages == log.messages > 100
     assert "cut off" in summary.trouble
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_messages_are_those_that_can_be_read(tmp_path: Path, flight: Flight, suffix: str) -> None:
+    log = open_log(tmp_path / f"flight{suffix}")
+    counts = []
+    for message in flight(10.0):
+        log.write(message)
+        counts.append(log.messages)
+    log.close()
+    assert counts[0] == 0
+    assert 0 < counts[-1] < len(counts)  # a chunk of a megabyte is written, the rest is not yet
+    assert log.messages == summarize(log.path).messages == len(counts)
 
 
 KILLED = """

@@ -85,6 +85,16 @@ def test_damaged_chunk_is_left_out(tmp_path: Path, flight: Flight, suffix: str) 
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
+def test_a_stub_is_refused_and_nothing_written(tmp_path: Path, flight: Flight, suffix: str) -> None:
+    path = tmp_path / f"flight{suffix}"
+    cut(path, flight(0.2), 1.0)
+    path.write_bytes(path.read_bytes()[:40])
+    with pytest.raises(RecordingError, match=r"holds no readable message.*nothing is written"):
+        recover(path)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
 def test_existing_target_is_kept(tmp_path: Path, flight: Flight, suffix: str) -> None:
     path = tmp_path / f"flight{suffix}"
     cut(path, flight(0.2), 0.9)

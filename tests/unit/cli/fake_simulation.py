@@ -35,6 +35,7 @@ class FakeSimulation:
         self.events: list[Event] = []
         self.stage_seconds = {"lidars": 0.2, "dynamics": 0.1}
         self.closed = False
+        self.paused, self.paused_s = False, 0.0
         self.speed: float | None = None
         self._digest = False
         self._odom = self.graph.advertise("/uav1/ground_truth/odom", m.Odometry)

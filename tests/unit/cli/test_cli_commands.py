@@ -85,6 +85,17 @@ def test_info_and_recover(tmp_path: Path, suffix: str) -> None:
     assert "is whole: nothing to recover" in result.stdout
 
 
+@pytest.mark.parametrize("content", [b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"])
+def test_recover_of_a_stub(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "stub.mcap"
+    path.write_bytes(content)
+    result = runner.invoke(app, ["recover", str(path)])
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"error: {path}: holds no readable message")
+    assert len(result.stderr.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == [path]
+
+
 @pytest.mark.parametrize("content", [b"", b"no log", b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"])
 def test_info_of_a_broken_file(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "broken.mcap"

@@ -86,7 +86,11 @@ def test_ros1_log(invoke: Invoke, tmp_path: Path) -> None:
         (("run", "hover", "--speed", "0"), "--speed"),
         (("run", "hover", "--speed", "nan"), "--speed"),
         (("run", "hover", "--record", "log.txt"), r"log.txt.*\.mcap.*\.bag"),
-        (("run", "hover", "--record", "exists.mcap"), "exists already"),
+        (("run", "hover", "--record", "exists.mcap"), "exists already.*--overwrite"),
+        (("run", "hover", "--record", "a/b/x.mcap"), "a/b/x.mcap: cannot.*no folder .*a/b.*mkdir"),
+        (("run", "hover", "--record", "/nosuchroot/x.mcap"), "no folder /nosuchroot; `mkdir -p"),
+        (("run", "hover", "--report", "a/b/report"), "a/b/report: cannot.*no folder .*a/b.*mkdir"),
+        (("run", "hover", "--report", "/nosuchroot/x"), "no folder /nosuchroot"),
         (("run", "hover", "--report", "exists.mcap"), "exists.mcap: cannot write the report"),
         (("run", "hover", "--record", "exists.mcap/x.bag"), "exists.mcap/x.bag: cannot create"),
     ],
@@ -105,6 +109,8 @@ def test_mistakes_are_one_line(
     assert re.match(f"error: .*{message}", result.stderr), result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
     assert Path("exists.mcap").read_text() == "precious"
+    assert os.listdir() == ["exists.mcap"]
+    assert not Path("/nosuchroot").exists()
 
 
 @pytest.mark.parametrize(
@@ -145,6 +151,7 @@ def test_full_disk(
     assert re.match(rf"error: .*flight\{suffix}: .*No space left on device", errors[0])
     left = summarize(log)
     assert 100 < left.messages < 4800
+    assert f", {left.messages:,} messages)" in result.stdout
     assert "cut off" in left.trouble
     assert "The log could not be written" in (report / "index.html").read_text()
 
@@ -159,6 +166,64 @@ volery.Simulation = FakeSimulation
 from volery.cli.app import main
 main()
 """
+
+
+def test_one_missing_folder_is_made(invoke: Invoke, tmp_path: Path) -> None:
+    log, report = tmp_path / "logs" / "flight.mcap", tmp_path / "reports" / "first"
+    result = invoke("run", "hover", "--seconds", 1, "--record", log, "--report", report)
+    assert result.exit_code == 0, result.output
+    assert log.exists()
+    assert (report / "index.html").exists()
+
+
+def test_ctrl_c_while_kernels_compile(tmp_path: Path) -> None:
+    """One line, no traceback, nothing left behind: the real simulation with an empty cache."""
+    log, report = tmp_path / "new" / "flight.mcap", tmp_path / "report"
+    cache = tmp_path / "cache"
+    command = [sys.executable, "-m", "volery.cli", "run", "hover"]
+    command += ["--record", str(log), "--report", str(report)]
+    with subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "VOLERY_CACHE_DIR": str(cache)},
+    ) as process:
+        for _ in range(600):
+            if any(cache.glob("volery/kernels/*/*/*.nbi")):
+                break
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert (out, err) == ("", "Stopped with Ctrl-C before the flight began\n")
+    assert list(tmp_path.iterdir()) == [cache]
+
+
+LOST = """
+import sys, os, signal
+sys.path.insert(0, sys.argv.pop(1))
+import volery
+from fake_simulation import FakeSimulation
+class Swallows(FakeSimulation):
+    def __init__(self, *arguments, **options):
+        class Noisy:
+            def __del__(self):
+                os.kill(os.getpid(), signal.SIGINT)
+                [None for _ in range(1000)]
+        Noisy()  # an exception in here cannot be passed on
+        super().__init__(*arguments, **options)
+volery.Simulation = Swallows
+from volery.cli.app import main
+main()
+"""
+
+
+def test_ctrl_c_that_python_could_not_pass_on(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", LOST, str(Path(__file__).parent), "run", "hover"]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 130
+    assert done.stderr == "Stopped with Ctrl-C before the flight began\n"
 
 
 @pytest.mark.parametrize("suffix", [".mcap", ".bag"])

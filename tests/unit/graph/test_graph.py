@@ -1,5 +1,7 @@
 """Topics and services: typed, ordered, nothing built for nobody."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,82 @@ def test_publication_carries_time_type_and_bytes(graph):
     assert (message.topic, message.msgtype, message.time_ns) == ("/a", "std_msgs/msg/String", 42)
     assert typestore().deserialize_cdr(message.cdr, message.msgtype).data == "hi"
     assert message.cdr is message.cdr  # made once
+
+
+@pytest.fixture
+def clock():
+    return SimpleNamespace(now_ns=0)
+
+
+@pytest.fixture
+def timed(clock):
+    return Graph(lambda: clock.now_ns)
+
+
+def texts(got):
+    return [message.message.data for message in got]
+
+
+def test_a_late_subscriber_gets_the_last_latched_message_once(timed, clock):
+    latched = timed.advertise("/map", String, latched=True)
+    plain = timed.advertise("/map", String)
+    assert latched.wanted  # though nobody listens yet
+    for word in ("old", "new"):
+        latched.publish(String(word))
+    plain.publish(String("gone"))
+    timed.deliver()
+    clock.now_ns = 7
+    late, later = [], []
+    timed.subscribe("/map", late.append)
+    assert late == []  # with the next delivery, like everything
+    timed.deliver()
+    timed.deliver()
+    assert [(m.message.data, m.time_ns) for m in late] == [("new", 7)]
+    timed.subscribe("/map", later.append)
+    timed.deliver()
+    assert (texts(late), texts(later)) == (["new"], ["new"])
+    (info,) = timed.topics()
+    assert (info.latched, info.messages, info.subscribers) == (True, 3, 2)
+
+
+def test_what_is_under_way_comes_after_what_was_kept(timed):
+    latched = timed.advertise("/map", String, latched=True)
+    latched.publish(String("1"))
+    timed.deliver()
+    latched.publish(String("2"))
+    got = []
+    timed.subscribe("/map", got.append)
+    timed.deliver()
+    assert texts(got) == ["1", "2"]
+
+
+def test_every_latched_publisher_and_recorders(timed):
+    a, b = (timed.advertise("/tf_static", String, latched=True) for _ in range(2))
+    other = timed.advertise("/other", String, latched=True)
+    for publisher, word in ((b, "b1"), (a, "a1"), (other, "o1"), (b, "b2")):
+        publisher.publish(String(word))
+    timed.deliver()
+    got, everything = [], []
+    timed.subscribe("/tf_static", got.append)
+    timed.subscribe_all(everything.append)
+    timed.deliver()
+    assert texts(got) == ["b2", "a1"]  # by their first messages
+    assert texts(everything) == ["b2", "a1", "o1"]
+    gone = []
+    timed.subscribe("/tf_static", gone.append).cancel()
+    timed.deliver()
+    assert gone == []
+
+
+def test_a_callback_may_subscribe(timed):
+    timed.advertise("/map", String, latched=True).publish(String("m"))
+    timed.deliver()
+    got = []
+    go = timed.advertise("/go", String)
+    timed.subscribe("/go", lambda _m: timed.subscribe("/map", got.append))
+    go.publish(String("now"))
+    timed.deliver()
+    assert texts(got) == ["m"]
 
 
 @pytest.mark.parametrize("name", ["a", "/", "/a b", "//a", "/a/", "/1a", ""])

@@ -39,6 +39,18 @@ def test_publish_and_subscribe(context):
     assert node.get_clock().now_ns() == 7
 
 
+def test_latched_publishers_serve_late_subscribers(context):
+    node = Node("late", context=context, namespace="/uav1")
+    node.create_publisher(String, "map", latched=True).publish(String("m"))
+    node.create_publisher(String, "plain").publish(String("p"))
+    context.graph.deliver()
+    got = []
+    for topic in ("map", "plain"):
+        node.create_subscription(String, topic, lambda message: got.append(message.data))
+    context.graph.deliver()
+    assert got == ["m"]
+
+
 def test_parameters(context):
     node = Node("a", context=context, parameter_overrides={"speed": 3, "sped": 1})
     assert node.declare_parameter("speed", 1.0).value == 3

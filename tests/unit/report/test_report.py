@@ -161,7 +161,7 @@ def test_numbers() -> None:
 
 def test_folder_that_is_a_file(tmp_path: Path) -> None:
     (tmp_path / "report").write_text("")
-    with pytest.raises(ReportError, match="report: cannot write the report there: File exists"):
+    with pytest.raises(ReportError, match="report: cannot write the report there: Not a directory"):
         check_folder(tmp_path / "report")
     with pytest.raises(ReportError, match="Not a directory"):
         write_report(sample_flight(seconds=2.0), tmp_path / "report" / "inner")

@@ -68,6 +68,19 @@ def test_transforms_form_one_tree(simulate, wood_data):
         assert root(frame) == "map"
 
 
+def test_fixed_transforms_reach_late_subscribers(simulate, flat_data):
+    flat_data["types"]["f450"]["nodes"] = []
+    simulation = simulate(flat_data)
+    simulation.run(0.5)
+    late = []
+    simulation.graph.subscribe("/tf_static", late.append)
+    simulation.run(0.5)
+    (message,) = late
+    assert message.time_ns == 500_000_000
+    children = {t.child_frame_id for t in message.message.transforms}
+    assert children == {"uav1/imu", "uav1/range", "uav1/odom"}
+
+
 def test_real_time_and_faster(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.run(0.1)
@@ -103,6 +116,27 @@ def test_bad_requests(simulate, flat_data):
         simulate(flat_data, threads=0)
     with pytest.raises(CommandError):
         simulation.uavs["uav1"].go_to([np.nan, 0, 0])
+
+
+@pytest.mark.parametrize("wrong", ["x", None, [1.0, "y", 2.0], object(), {}, np.zeros((2, 2)), 1j])
+def test_commands_of_the_wrong_type(simulate, flat_data, wrong):
+    uav = simulate(flat_data).uavs["uav1"]
+    commands = [
+        lambda: uav.go_to(wrong),
+        lambda: uav.command_velocity(wrong),
+        lambda: uav.command_velocity([1.0, 0.0, 0.0], wrong),
+        lambda: uav.command_velocity_map(wrong),
+        lambda: uav.command_attitude(wrong, 10.0),
+        lambda: uav.command_attitude([0.0, 0.0, 0.0, 1.0], wrong),
+        lambda: uav.command_rates(wrong, 10.0),
+        lambda: uav.command_rotor_speeds(wrong),
+    ]
+    if wrong is not None:  # which stands for the scenario's altitude, and for the present heading
+        commands += [lambda: uav.take_off(wrong), lambda: uav.go_to([1.0, 0.0, 2.0], wrong)]
+    for command in commands:
+        with pytest.raises(CommandError):
+            command()
+    assert uav.mode.name == "LANDED"
 
 
 def test_a_run_ends_at_its_duration(simulate, flat_data):

@@ -60,6 +60,19 @@ def broken(path, value):
         ),
         ({"name": "a"}, ["types", "uavs", "missing"]),
         (
+            broken(["uavs"], {"type": "t", "position_m": [0, 0]}),
+            ["my.toml: key 'uavs'", "write [[uavs]], not [uavs]"],
+        ),
+        (
+            broken(["types", "t", "sensors"], {"kind": "imu"}),
+            ["key 'types.t.sensors'", "write [[types.t.sensors]], not [types.t.sensors]"],
+        ),
+        (
+            broken(["types", "t", "nodes"], {"node": "a:B"}),
+            ["key 'types.t.nodes'", "write [[types.t.nodes]], not [types.t.nodes]"],
+        ),
+        (broken(["uavs", 0, "position_m"], {"x": 1}), ["key 'uavs[0].position_m'", "tuple"]),
+        (
             broken(["types", "t", "sensors"], [{"kind": "imu", "name": "cmd_vel"}]),
             ["types.t", "'cmd_vel' is no name", "joint_states"],
         ),

@@ -1,0 +1,172 @@
+"""One flight of the command line: run it, then write what was asked for, also after Ctrl-C."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from volery.cli.guard import INTERRUPTED, USER_ERROR, complain
+from volery.cli.interrupt import Interrupts
+from volery.cli.keys import Keys
+from volery.cli.progress import FlightProgress
+from volery.cli.steering import steer
+from volery.core.errors import RecordingError, VoleryError
+
+if TYPE_CHECKING:
+    from volery.bridges.bag import Log
+    from volery.report.collect import FlightCollector
+
+_CONTACTS_SHOWN = 10
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What the command line asked for."""
+
+    scenario: str
+    uavs: int | None = None
+    seconds: float | None = None
+    seed: int | None = None
+    speed: float | None = None
+    threads: int | None = None
+    record: Path | None = None
+    report: Path | None = None
+    digest: bool = False
+    overwrite: bool = False
+
+
+class _StoppedError(Exception):
+    """Ctrl-C was pressed; raised between two steps."""
+
+
+class Flight:
+    """One flight with its log, report and digest."""
+
+    def __init__(
+        self,
+        simulation: Any,
+        options: RunOptions,
+        progress: FlightProgress,
+        interrupts: Interrupts,
+    ) -> None:
+        self._simulation = simulation
+        self._options = options
+        self._progress = progress
+        self._interrupts = interrupts
+        self._keys = Keys()
+        self._wall_s = 0.0
+        self._log: Log | None = None
+        self._collector: FlightCollector | None = None
+        if options.digest:
+            simulation.enable_digest()
+        if options.report is not None:
+            from volery.report.collect import FlightCollector
+
+            self._collector = FlightCollector(simulation)
+        if options.record is not None:
+            from volery.bridges.bag import open_log
+
+            self._log = open_log(options.record, overwrite=options.overwrite)
+            simulation.graph.subscribe_all(self._log.write)
+
+    def fly(self) -> int:
+        """Run to the end, to Ctrl-C or to an error; then write what is left to write."""
+        code = 0
+        trouble = ""
+        start = time.perf_counter()
+        try:
+            with self._keys:
+                self._simulation.run(speed=self._options.speed, on_progress=self._on_progress)
+        except _StoppedError:
+            code, trouble = INTERRUPTED, "Stopped with Ctrl-C"
+        except RecordingError as error:
+            code, trouble = USER_ERROR, "The log could not be written"
+            complain(str(error))
+        except VoleryError as error:
+            code, trouble = USER_ERROR, "The flight ended with an error"
+            complain(str(error))
+        finally:
+            self._wall_s = time.perf_counter() - start - self._simulation.paused_s
+            closed = self._close_log()
+        self._progress.finish(self._simulation.time_s)
+        self._tell_flight(trouble)
+        if not closed and not code:
+            code, trouble = USER_ERROR, "The log could not be written"
+        report_written = self._write_report(trouble)
+        return code if report_written else code or USER_ERROR
+
+    def _on_progress(self, progress: Any) -> None:
+        if self._interrupts.pressed:
+            raise _StoppedError
+        for key in self._keys.pressed():
+            steer(self._simulation, key, progress.real_time_factor)
+        self._progress.update(
+            progress.time_s, progress.real_time_factor, paused=self._simulation.paused
+        )
+
+    def _close_log(self) -> bool:
+        if self._log is None:
+            return True
+        try:
+            self._log.close()
+        except RecordingError as error:
+            complain(str(error))
+            return False
+        return True
+
+    def _write_report(self, interrupted: str) -> bool:
+        if self._collector is None or self._options.report is None:
+            self._tell_files(None)
+            return True
+        from volery.bench.machine import describe_machine, describe_versions
+        from volery.report.page import write_report
+
+        self._progress.note("drawing the report")
+        path: Path | None = None
+        try:
+            flight = self._collector.finish(
+                self._wall_s,
+                digest=self._simulation.digest() if self._options.digest else "",
+                interrupted=interrupted,
+                log_path=self._options.record,
+                log_messages=self._log.messages if self._log else 0,
+                machine=describe_machine(),
+                versions=describe_versions(),
+            )
+            path = write_report(flight, self._options.report)
+        except VoleryError as error:
+            complain(str(error))
+        self._progress.note("")
+        self._tell_files(path)
+        return path is not None
+
+    def _tell_flight(self, trouble: str) -> None:
+        simulated = self._simulation.time_s
+        factor = simulated / self._wall_s if self._wall_s > 0.0 else 0.0
+        count = len(self._simulation.uav_names)
+        head = f"{trouble}: flew" if trouble else "Flew"
+        typer.echo(
+            f"{head} {simulated:.1f} s with {count} UAV{'s' if count != 1 else ''} "
+            f"in {self._wall_s:.1f} s ({factor:.1f} x real time)"
+        )
+        events = [e for e in self._simulation.events if str(e.kind) in {"impact", "collision"}]
+        for event in events[:_CONTACTS_SHOWN]:
+            typer.echo(f"  {event.describe()}")
+        if len(events) > _CONTACTS_SHOWN:
+            counts = Counter(event.uav for event in events)
+            typer.echo(f"  and more: {len(events)} contacts of {len(counts)} UAVs in all")
+
+    def _tell_files(self, report: Path | None) -> None:
+        if self._log is not None:
+            size = self._log.path.stat().st_size / 1e6
+            messages = f"{self._log.messages:,} messages"
+            typer.echo(f"log     {self._log.path} ({size:.1f} MB, {messages})")
+        if report is not None:
+            typer.echo(f"report  {report}")
+        if self._options.digest:
+            typer.echo(f"digest  {self._simulation.digest()}")

@@ -1,0 +1,68 @@
+"""Keys pressed at a terminal, read without waiting for Enter."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+import termios
+from typing import Any
+
+_ESCAPE = "\x1b"
+_LOCAL_FLAGS, _CONTROL = 3, 6
+"""Places in the list that termios calls the attributes of a terminal."""
+
+
+class Keys:
+    """Context in which single keys can be read; none come where stdin is no terminal.
+
+    Ctrl-C and Ctrl-Z keep their meaning. In the background the terminal is left alone: who changes
+    it from there is stopped.
+    """
+
+    def __init__(self) -> None:
+        self._terminal = -1
+        self._before: list[Any] = []
+
+    def __enter__(self) -> Keys:
+        """Remember how the terminal is set."""
+        stdin = sys.stdin
+        if stdin is not None and not stdin.closed and stdin.isatty():
+            self._terminal = stdin.fileno()
+            self._before = termios.tcgetattr(self._terminal)
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        """Set the terminal as it was."""
+        if self._terminal >= 0 and self._in_foreground():
+            termios.tcsetattr(self._terminal, termios.TCSADRAIN, self._before)
+
+    def pressed(self) -> str:
+        """The keys since the last call, one character each; cursor keys and the like left out."""
+        if self._terminal < 0 or not self._in_foreground():
+            return ""
+        try:
+            self._read_single_keys()
+            if not select.select([self._terminal], [], [], 0.0)[0]:
+                return ""
+            data = os.read(self._terminal, 64)
+        except (OSError, termios.error):
+            data = b""
+        if not data:
+            self._terminal = -1  # it was hung up
+        return data.decode(errors="ignore").partition(_ESCAPE)[0]
+
+    def _read_single_keys(self) -> None:
+        """Take lines and echo off; again where a shell that had the terminal put them back."""
+        mode: list[Any] = termios.tcgetattr(self._terminal)
+        taken_off = termios.ICANON | termios.ECHO
+        if mode[_LOCAL_FLAGS] & taken_off:
+            mode[_LOCAL_FLAGS] &= ~taken_off
+            mode[_CONTROL][termios.VMIN], mode[_CONTROL][termios.VTIME] = 1, 0
+            termios.tcsetattr(self._terminal, termios.TCSADRAIN, mode)
+
+    def _in_foreground(self) -> bool:
+        try:
+            return os.tcgetpgrp(self._terminal) == os.getpgrp()
+        except OSError:
+            return True  # not our controlling terminal: it has no background
