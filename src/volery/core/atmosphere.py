@@ -29,3 +29,10 @@ def pressure(altitude_m: ArrayLike) -> Array:
     """Pressure, Pa, at altitudes above sea level."""
     ratio = temperature(altitude_m) / SEA_LEVEL_TEMPERATURE_K
     return np.asarray(SEA_LEVEL_PRESSURE_PA * ratio**PRESSURE_EXPONENT)
+
+
+def altitude(pressure_pa: ArrayLike) -> Array:
+    """Altitude above sea level, m, at which the pressure is `pressure_pa`."""
+    ratio = np.asarray(pressure_pa, float) / SEA_LEVEL_PRESSURE_PA
+    drop = 1.0 - ratio ** (1.0 / PRESSURE_EXPONENT)
+    return np.asarray(SEA_LEVEL_TEMPERATURE_K / LAPSE_RATE_K_M * drop)

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,9 @@ from volery.sensors.samples import Samples
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 from volery.world.weather import Gust, Weather
+
+if TYPE_CHECKING:
+    from volery.engine.estimation import Estimation
 
 _MOST_STEPS_A_TICK = 50
 """The history of poses holds 64 steps; whoever reads along must not miss one."""
@@ -75,6 +78,7 @@ class Engine:
         *,
         crash_on_contact: bool,
         copies: int = 1,
+        estimation: Estimation | None = None,
     ) -> None:
         self.fleet = fleet
         self.scene = scene
@@ -91,6 +95,8 @@ class Engine:
             fleet, scene, names, response, self._new_events.append, copies=copies
         )
         self.banks = tuple(banks)
+        self.estimation = estimation
+        """Estimators that listen to the sensors, where there are any."""
         self.sensor_agenda: Agenda[SensorBank] = Agenda(self.dt_ns)
         for bank in banks:
             self.sensor_agenda.add(bank, bank.schedule, lag_ns=bank.lag_ns)
@@ -153,7 +159,14 @@ class Engine:
     def restart_sensors(
         self, uavs: NDArray[np.int64], keys: Keys
     ) -> list[tuple[Samples, NDArray[np.int64]]]:
-        """Put the sensors of `uavs` back to their start; see `engine.restart`."""
+        """Put the sensors of `uavs`, and what is made of them, back to their start.
+
+        See `engine.restart`; the random stream of an estimate is found under its sensor's name.
+        """
+        if self.estimation is not None:
+            self.estimation.restart(
+                {uav: key for (uav, name), key in keys.items() if name == "odom"}
+            )
         return restart_sensors(self.sensor_agenda, self.banks, self.fleet, uavs, keys)
 
     # ------------------------------------------------------------------------------ snapshot
@@ -165,6 +178,7 @@ class Engine:
             "collisions": self.collisions.get_state(),
             "banks": [bank.get_state() for bank in self.banks],
             "due": [part.get_state() for part in self._due],
+            "estimation": None if self.estimation is None else self.estimation.get_state(),
             "new_events": list(self._new_events),
         }
 
@@ -176,6 +190,8 @@ class Engine:
             bank.set_state(kept)
         for part, kept in zip(self._due, state["due"], strict=True):
             part.set_state(kept)
+        if self.estimation is not None:
+            self.estimation.set_state(state["estimation"])
         self._new_events[:] = state["new_events"]
 
     # -------------------------------------------------------------------------------- inside

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from volery.control.estimator.errors import estimation_error
 from volery.control.estimator.estimator import Estimator
+from volery.control.estimator.settings import StartSigmas
+from volery.control.estimator.start import drawn_start
 from volery.control.fleet import Fleet
 from volery.core import atmosphere
 from volery.sensors.samples import (
@@ -37,12 +39,16 @@ class EstimationSetup:
     """(E,) whether the UAV's controllers fly on the estimate."""
     listens: Mapping[tuple[int, str], int]
     """Estimator that listens to a sensor, by row of the UAV and name of the sensor."""
+    gyro_variance: Array
+    """(E,) rad^2/s^2 of one gyroscope reading."""
     gnss_drift_variance: Array
     """(E, 3) m^2 of what a receiver states as noise and the filter estimates as an offset."""
     origin_altitude_m: float
     """Of the map's z = 0 above sea level."""
     ground_height_m: float | None
     """Height of level ground; None where it is not level, and ranges tell nothing by themselves."""
+    start: StartSigmas
+    """How near the truth estimates begin."""
 
 
 class Estimation:
@@ -53,7 +59,15 @@ class Estimation:
         self.setup = setup
         self._fleet = fleet
         self._known: dict[int, tuple[tuple[SensorId, ...], Rows, Rows]] = {}
-        self._tell_fleet()
+
+    @property
+    def gyro_variance(self) -> Array:
+        """(E,) rad^2/s^2 of one gyroscope reading."""
+        return self.setup.gyro_variance
+
+    def rows_of(self, uavs: Rows) -> Rows:
+        """Estimators of UAVs, rows of the fleet; each must have one."""
+        return np.array([int(np.flatnonzero(self.setup.uavs == uav)[0]) for uav in uavs])
 
     def register(self, sensors: tuple[SensorId, ...]) -> None:
         """Look up once who listens to a bank whose samples name `sensors`."""
@@ -90,18 +104,29 @@ class Estimation:
                 self.setup.ground_height_m,
             )
 
-    def restart(self, uavs: Rows, position: Array, velocity: Array, attitude: Array) -> None:
-        """Begin anew for UAVs that have begun anew, believing the states given for each."""
-        rows = np.flatnonzero(np.isin(self.setup.uavs, uavs))
-        if len(rows):
-            self.estimator.reset(
-                rows,
-                position=position,
-                velocity=velocity,
-                attitude=attitude,
-                stamp_ns=self._fleet.time_ns - 1,
-            )
-            self._tell_fleet()
+    def restart(self, keys: Mapping[int, np.uint64]) -> None:
+        """Begin anew for UAVs that have begun anew, with a random stream for each of their rows."""
+        rows = np.array([e for e, uav in enumerate(self.setup.uavs) if int(uav) in keys], np.int64)
+        if not len(rows):
+            return
+        uavs = self.setup.uavs[rows]
+        truth = self._fleet.state
+        position, velocity, attitude = drawn_start(
+            np.array([keys[int(uav)] for uav in uavs], np.uint64),
+            truth.position_map[uavs],
+            truth.velocity_map[uavs],
+            truth.attitude[uavs],
+            self.setup.start,
+        )
+        before_the_first_reading = self._fleet.time_ns - 1
+        self.estimator.reset(
+            rows,
+            position=position,
+            velocity=velocity,
+            attitude=attitude,
+            stamp_ns=before_the_first_reading,
+        )
+        self._tell_fleet()
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""

@@ -52,7 +52,10 @@ def sample_sensors(engine: Engine, _tick: Tick) -> None:
     """All sensors that are due, as batches."""
     for due in engine.sensor_agenda.pop_due(engine.fleet.step):
         time_ns = due.instant_ns if due.what.lag_ns else engine.time_ns
-        engine.sink.sampled(due.what.sample(due.k, time_ns, engine.fleet))
+        samples = due.what.sample(due.k, time_ns, engine.fleet)
+        if engine.estimation is not None:
+            engine.estimation.take(samples)
+        engine.sink.sampled(samples)
 
 
 def raise_events(engine: Engine, _tick: Tick) -> None:

@@ -17,6 +17,7 @@ from volery.core.errors import CommandError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.runtime.building import add_bodies, build_fleet
+from volery.runtime.estimation_building import build_estimation
 from volery.runtime.placement import Start
 from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors, refit
 from volery.runtime.uav import Uav
@@ -61,14 +62,16 @@ class CopyBlock:
         add_bodies(self._scene, everyone, copies=copies)
         self._fitted = fit_sensors(scenario, self._starts)
         fitted = [f for k in range(copies) for f in self._fit(k)]
+        estimation = build_estimation(scenario, fitted, self.fleet)
         self._engine = Engine(
             self.fleet,
             self._scene,
             terrain,
-            build_banks(scenario, fitted, self.fleet, self._scene),
+            build_banks(scenario, fitted, self.fleet, self._scene, estimation),
             names,
             self,
             crash_on_contact=scenario.physics.on_contact == "crash",
+            estimation=estimation,
             copies=copies,
         )
         banks = self._engine.banks

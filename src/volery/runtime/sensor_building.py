@@ -6,7 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,11 +50,15 @@ from volery.sensors.scan_patterns import PlanarScan
 from volery.sensors.sonar import SonarBank, load_sonar_model
 from volery.world.scene import Scene
 
+if TYPE_CHECKING:
+    from volery.engine.estimation import Estimation
+
 RESULT_OF: dict[str, type[Samples]] = {
     "lidar": LidarScans,
     "imu": ImuReadings,
     "sonar": RangeReadings,
     "odometry": OdometryReadings,
+    "estimate": OdometryReadings,
     "ground_truth": OdometryReadings,
     "gnss": GnssReadings,
     "barometer": PressureReadings,
@@ -162,13 +166,17 @@ def _check_topics(scenario: schema.Scenario, fitted: Sequence[Fitted]) -> None:
 
 
 def build_banks(
-    scenario: schema.Scenario, fitted: Sequence[Fitted], fleet: Fleet, scene: Scene
+    scenario: schema.Scenario,
+    fitted: Sequence[Fitted],
+    fleet: Fleet,
+    scene: Scene,
+    estimation: Estimation | None = None,
 ) -> list[SensorBank]:
-    """Banks of all sensors, in a fixed order."""
+    """Banks of all sensors, in a fixed order: estimates last, after what they are made of."""
     groups: dict[tuple[Any, ...], list[Fitted]] = defaultdict(list)
-    for sensor in fitted:
+    for sensor in sorted(fitted, key=lambda sensor: sensor.spec.kind == "estimate"):
         groups[sensor.bank_key].append(sensor)
-    builder = _Builder(scenario, fleet, scene)
+    builder = _Builder(scenario, fleet, scene, estimation)
     banks: list[SensorBank] = [
         FaultableBank(builder.build(group), RESULT_OF[group[0].spec.kind].MEASURED)
         for group in groups.values()
@@ -181,7 +189,14 @@ def build_banks(
 
 
 class _Builder:
-    def __init__(self, scenario: schema.Scenario, fleet: Fleet, scene: Scene) -> None:
+    def __init__(
+        self,
+        scenario: schema.Scenario,
+        fleet: Fleet,
+        scene: Scene,
+        estimation: Estimation | None,
+    ) -> None:
+        self._estimation = estimation
         self._scenario = scenario.name
         self._world = scenario.world
         self._folder = scenario.folder
@@ -194,6 +209,7 @@ class _Builder:
             "imu": self._imu,
             "sonar": self._sonar,
             "odometry": self._odometry,
+            "estimate": self._estimate,
             "ground_truth": self._ground_truth,
             "gnss": self._gnss,
             "barometer": self._barometer,
@@ -233,6 +249,15 @@ class _Builder:
     def _odometry(self, group: list[Fitted]) -> Bank:
         model = load_odometry_model(group[0].spec.model, self._folder)
         return OdometryBank(model, _schedule(group), _ids(group), _keys(group), self._fleet)
+
+    def _estimate(self, group: list[Fitted]) -> Bank:
+        from volery.sensors.estimate import EstimateBank
+
+        assert self._estimation is not None
+        rows = self._estimation.rows_of(np.array([sensor.id.uav for sensor in group]))
+        variance = self._estimation.gyro_variance[rows]
+        estimator = self._estimation.estimator
+        return EstimateBank(_schedule(group), _ids(group), estimator, rows, variance)
 
     def _ground_truth(self, group: list[Fitted]) -> Bank:
         return GroundTruthBank(_schedule(group), _ids(group))

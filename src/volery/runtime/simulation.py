@@ -24,6 +24,7 @@ from volery.graph.publishing import GraphPublisher
 from volery.runtime.building import add_bodies, build_fleet, place
 from volery.runtime.command_door import open_commands
 from volery.runtime.digest import Digest
+from volery.runtime.estimation_building import build_estimation
 from volery.runtime.node_loading import start_node
 from volery.runtime.placement import Start
 from volery.runtime.progress import Progress, ProgressTeller
@@ -80,7 +81,8 @@ class Simulation:
         self._publisher = _make_publisher(self.graph, fitted)
         self.mounts = _lidar_mounts(fitted, planar=True)
         self.cloud_mounts = _lidar_mounts(fitted, planar=False)
-        self._banks = build_banks(scenario, fitted, self._fleet, self.scene)
+        estimation = build_estimation(scenario, fitted, self._fleet)
+        self._banks = build_banks(scenario, fitted, self._fleet, self.scene, estimation)
         self._engine = Engine(
             self._fleet,
             self.scene,
@@ -89,6 +91,7 @@ class Simulation:
             names,
             self,
             crash_on_contact=scenario.physics.on_contact == "crash",
+            estimation=estimation,
         )
         self.uavs: Mapping[str, Uav] = MappingProxyType(
             {

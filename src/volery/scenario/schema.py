@@ -146,6 +146,16 @@ class OdometrySensor(SensorData):
     rate_hz: Rate = 50.0
 
 
+class EstimateSensor(SensorData):
+    """What the UAV's estimator makes of its other sensors, as odometry; it needs an IMU."""
+
+    kind: Literal["estimate"]
+    name: Literal["odom"] = "odom"
+    rate_hz: Rate = 50.0
+    flies: bool = True
+    """Whether the UAV's controllers fly on the estimate; false: on the truth."""
+
+
 class GroundTruthSensor(SensorData):
     """The true state, for reports and checks; autonomy must not read it."""
 
@@ -167,6 +177,7 @@ Sensor = Annotated[
     | ImuSensor
     | SonarSensor
     | OdometrySensor
+    | EstimateSensor
     | GroundTruthSensor
     | NavigationSensor
     | BatterySensor,
@@ -254,6 +265,13 @@ class UavType(Data):
             raise ValueError(f"identified_model needs plant = \"identified\", not '{self.plant}'")
         if self.kinematic != KinematicMotion() and self.plant != "kinematic":
             raise ValueError(f"[kinematic] needs plant = \"kinematic\", not '{self.plant}'")
+        return self
+
+    @model_validator(mode="after")
+    def _estimates_have_an_imu(self) -> Self:
+        kinds = [sensor.kind for sensor in self.sensors]
+        if "estimate" in kinds and "imu" not in kinds:
+            raise ValueError('a sensor of kind "estimate" needs one of kind "imu"')
         return self
 
     @model_validator(mode="after")

@@ -136,7 +136,8 @@ class FaultTable:
             first += count
             if len(rows):
                 array = arrays[name].copy()
-                array[rows] += bias[rows, 0] if array.ndim == 1 else bias[rows]
+                each = bias[rows] if count > 1 else bias[rows].reshape(-1, *[1] * (array.ndim - 1))
+                array[rows] += each.astype(array.dtype)
                 changed[name] = owned(array)
         return changed
 

@@ -32,7 +32,7 @@ class SensorId:
 class LidarScans:
     """One sweep of each LIDAR of a bank."""
 
-    MEASURED: ClassVar[dict[str, int]] = {"ranges": 1}
+    MEASURED: ClassVar[dict[str, int]] = {"echoes": 1}
 
     sensors: tuple[SensorId, ...]
     stamp_ns: int
@@ -80,6 +80,8 @@ class RangeReadings:
     field_of_view_rad: float
     range_min_m: float
     range_max_m: float
+    variance: float
+    """m^2 of the noise."""
 
 
 @dataclass(frozen=True)

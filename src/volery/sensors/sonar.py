@@ -68,6 +68,8 @@ class SonarBank:
         self._position_body = position_body
         self._body_from_sensor = attitude_body
         self._noise = NoiseStreams(keys, len(sensors), per_measurement=1)
+        rounding = model.resolution_m**2 / 12.0
+        self._variance = model.noise_m**2 + rounding if self._noise.enabled else 0.0
         self._cone = _cone_directions(math.radians(model.field_of_view_deg) / 2.0)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> RangeReadings:
@@ -98,6 +100,7 @@ class SonarBank:
             math.radians(self._model.field_of_view_deg),
             self._model.range_min_m,
             self._model.range_max_m,
+            self._variance,
         )
 
     def get_state(self) -> dict[str, Any]:

@@ -14,7 +14,7 @@ def ranges(k):
     """Reading k of three sonars: 10 k + row."""
     values = 10.0 * k + np.arange(3.0)
     values.flags.writeable = False
-    return RangeReadings(SENSORS, k, values, 0.4, 0.2, 7.0)
+    return RangeReadings(SENSORS, k, values, 0.4, 0.2, 7.0, 1e-4)
 
 
 def imus():

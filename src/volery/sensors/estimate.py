@@ -1,0 +1,59 @@
+"""What estimators believe, as odometry: the source of `/uavN/odom`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.estimator.errors import pose_covariance, twist_covariance
+from volery.control.estimator.estimator import Estimator
+from volery.control.fleet import Fleet
+from volery.core import rotations
+from volery.core.clock import Schedule
+from volery.sensors.bank import Memoryless
+from volery.sensors.samples import OdometryReadings, SensorId, owned
+
+Array = NDArray[np.float64]
+
+
+class EstimateBank(Memoryless):
+    """The estimates of all UAVs of one rate and phase.
+
+    `rows` (S,) are those of the estimator, `gyro_variance` (S,) rad^2/s^2 that of one gyroscope
+    reading, which the estimated rates hold.
+    """
+
+    name = "estimate"
+    lag_ns = 0
+
+    def __init__(
+        self,
+        schedule: Schedule,
+        sensors: tuple[SensorId, ...],
+        estimator: Estimator,
+        rows: NDArray[np.int64],
+        gyro_variance: Array,
+    ) -> None:
+        self.schedule = schedule
+        self.sensors = sensors
+        self._estimator = estimator
+        self._rows = rows
+        self._gyro_variance = gyro_variance
+
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometryReadings:  # noqa: ARG002
+        """What is believed now."""
+        state, rows = self._estimator.state, self._rows
+        velocity, attitude = state.velocity_map[rows], state.attitude[rows]
+        covariance = self._estimator.covariance(rows)
+        twist = twist_covariance(covariance, velocity, attitude, self._gyro_variance)
+        return OdometryReadings(
+            self.sensors,
+            time_ns,
+            owned(state.position_map[rows]),
+            owned(attitude),
+            owned(rotations.rotate(rotations.conjugate(attitude), velocity)),
+            owned(state.omega_body[rows]),
+            owned(np.diagonal(pose_covariance(covariance), axis1=1, axis2=2).copy()),
+            owned(np.diagonal(twist, axis1=1, axis2=2).copy()),
+            is_ground_truth=False,
+        )
