@@ -199,7 +199,9 @@ _TAKEN_NAMES = (
     "take_off",
     "trajectory",
 )
-"""Frames, topics and services of a UAV that no sensor may take."""
+"""Frames, topics and services of a UAV that no sensor may take ..."""
+_OWN_NAMES = ("lidar", "odometry", "estimate", "ground_truth", "battery")
+"""... but for kinds whose name is given, and LIDARs, whose topics have a word before it."""
 
 
 class Flight(Data):
@@ -283,7 +285,7 @@ class UavType(Data):
             raise ValueError(f"sensor names must differ; used twice: {', '.join(twice)}")
         for sensor in self.sensors:
             taken = sensor.name in _TAKEN_NAMES or sensor.name.startswith("laser")
-            if sensor.kind not in ("lidar", "odometry", "ground_truth") and taken:
+            if sensor.kind not in _OWN_NAMES and taken:
                 raise ValueError(
                     f"'{sensor.name}' is no name for a sensor of kind {sensor.kind}: names that "
                     f"begin with laser are taken, and {', '.join(_TAKEN_NAMES)}"
