@@ -259,8 +259,8 @@ def test_a_peer_that_sees_another_world_gets_no_figures(
     naive = np.array([closest(corners, origin, direction) for origin, direction in beams])
     naive[naive > request["reach_m"]] = np.inf
     np.save(request["distances"], naive)
-    assert task.check({})["agreement"] > 0.998
-    assert 0.05 < np.isfinite(naive).mean() < 0.95
+    assert task.check({})["agreement"] > 0.9995  # of 2162
+    assert 50 < np.isfinite(naive).sum() < 2000
     np.save(request["distances"], naive + 0.02)
     with pytest.raises(PeerError, match=r"only \d.*within 1 cm of ours; 99% are needed"):
         task.check({})
@@ -273,13 +273,14 @@ def closest(corners: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> f
     a, b, c = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     p = np.cross(direction, c)
     det = (b * p).sum(1)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):  # parallel to a triangle: no hit
         t = origin - a
         u = (t * p).sum(1) / det
         q = np.cross(t, b)
         v = (q @ direction) / det
         d = (c * q).sum(1) / det
-    return float(np.min(d[(u >= 0) & (v >= 0) & (u + v <= 1) & (d > 0)], initial=np.inf))
+        hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (d > 0)
+    return float(np.min(d[hit], initial=np.inf))
 
 
 # ---------------------------------------------------------------------------- catalogue, page
