@@ -1,4 +1,5 @@
 import json
+import os
 import re
 import subprocess
 import sys
@@ -35,6 +36,11 @@ def prepare(request):
 """
 FALLEN = "def prepare(request): return lambda: None, lambda: {'position_error_m': 9.5}"
 NOT_A_NUMBER = "def prepare(request): return lambda: None, lambda: {'position_error_m': 'far'}"
+ONE_CORE = """
+import os
+def prepare(request):
+    return lambda: None, lambda: {"position_error_m": len(os.sched_getaffinity(0)) - 1}
+"""
 BROKEN = "def prepare(request): raise ImportError('no such engine')"
 BROKEN_LATER = """
 def prepare(request):
@@ -161,6 +167,12 @@ def test_ours_and_the_peer_are_measured_beside_each_other(tmp_path: Path) -> Non
     assert figures["fake_4_drones_ratio"] == pytest.approx(ours / theirs)
     assert figures["fake_4_drones_real_time_factor"] == pytest.approx(theirs / 2000)
     assert figures["fake_4_drones_ours_real_time_factor"] == pytest.approx(ours / 2000)
+
+
+def test_both_keep_to_one_core_meanwhile(tmp_path: Path) -> None:
+    cores = os.sched_getaffinity(0)
+    assert measured_with(ONE_CORE, tmp_path).failures == {}
+    assert os.sched_getaffinity(0) == cores
 
 
 @pytest.mark.parametrize(
@@ -307,7 +319,7 @@ def test_page_shows_a_table_of_peers_and_what_failed() -> None:
     assert Result.from_json(result.to_json()) == result
     text = render([result])
     assert (
-        "| rays a second in a forest; 99.99% of distances agree | open3d "
+        "| rays a second in a forest; 99.990% of distances agree | open3d "
         "| 1e+06 | 4e+06 | 4 | - | - |" in text
     )
     assert "100 drones in one world | pyflyt | - | 5e+06 | - | - | - |" in text

@@ -94,15 +94,15 @@ class _Match:
                 failures[name] = str(failure)
         (ours,) = _medians([self._ours], self._seconds)
         self._task.check(None)
-        return Measured(self._our_figures(ours), failures)
+        return Measured(self._figures("ours_", self._task.amount / ours), failures)
 
     def _beside(self, conversation: Conversation) -> Measured:
         versions = conversation.versions()
         ours, theirs = _medians([self._ours, conversation.round], self._seconds)
         further = self._task.check(conversation.facts())
-        figures = {**self._our_figures(ours), **self._figures("", self._task.peer_amount / theirs)}
-        own_time = ours / self._task.amount
-        figures[self._name("ratio")] = theirs / self._task.peer_amount / own_time
+        our_speed, speed = self._task.amount / ours, self._task.peer_amount / theirs
+        figures = {**self._figures("ours_", our_speed), **self._figures("", speed)}
+        figures[self._name("ratio")] = our_speed / speed
         figures.update((self._name(what), value) for what, value in further.items())
         told = ", ".join(f"{name} {version}" for name, version in versions.items())
         return Measured(figures, {}, {self._peer.name: told})
@@ -111,9 +111,6 @@ class _Match:
         start = time.perf_counter()
         self._task.ours()
         return time.perf_counter() - start
-
-    def _our_figures(self, seconds: float) -> dict[str, float]:
-        return self._figures("ours_", self._task.amount / seconds)
 
     def _figures(self, whose: str, per_s: float) -> dict[str, float]:
         figures = {self._name(f"{whose}{self._contest.unit}_per_s"): per_s}

@@ -34,7 +34,7 @@ def _row(figures: Mapping[str, float], peer: Peer, contest: Contest) -> str:
         )
     ]
     agreement = figures.get(peer.figure(contest, "agreement"))
-    agreeing = "" if agreement is None else f"; {agreement:.2%} of distances agree"
+    agreeing = "" if agreement is None else f"; {agreement:.3%} of distances agree"
     return f"| {contest}{agreeing} | {peer.name} | {' | '.join(cells)} |\n"
 
 
