@@ -1,6 +1,6 @@
 """The benches by name, their bounds, and the form of a result.
 
-A bench is a module of this package with `measure() -> dict[str, float]`.
+A bench is a module of this package with `measure() -> Measured`, or only its figures as a dict.
 """
 
 from __future__ import annotations
@@ -31,17 +31,39 @@ class Bound:
 
 
 @dataclass(frozen=True)
+class Measured:
+    """What a bench found.
+
+    failures: what could not be measured, and why. versions: of others' software that took part.
+    """
+
+    figures: Mapping[str, float]
+    failures: Mapping[str, str] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Result:
-    """Figures of one bench and the machine they were measured on."""
+    """Figures of one bench and the machine they were measured on.
+
+    failures, versions: as in `Measured`.
+    """
 
     bench: str
     machine: Mapping[str, str]
     figures: Mapping[str, float]
+    failures: Mapping[str, str] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        machine, figures = dict(self.machine), dict(self.figures)
-        return {"bench": self.bench, "machine": machine, "figures": figures}
+        return {
+            "bench": self.bench,
+            "machine": dict(self.machine),
+            "figures": dict(self.figures),
+            "failures": dict(self.failures),
+            "versions": dict(self.versions),
+        }
 
     def to_json(self) -> str:
         """One JSON object on one line."""
@@ -60,25 +82,36 @@ class Result:
         """A result as plain data. VoleryError if it is none."""
         try:
             figures = {str(k): float(v) for k, v in data["figures"].items()}
-            machine = {str(k): str(v) for k, v in data["machine"].items()}
-            return cls(str(data["bench"]), machine, figures)
+            machine = _texts(data["machine"])
+            failures, versions = _texts(data.get("failures", {})), _texts(data.get("versions", {}))
+            return cls(str(data["bench"]), machine, figures, failures, versions)
         except (KeyError, TypeError, ValueError, AttributeError):
             raise VoleryError("not the result of a bench: bench, machine, figures") from None
 
 
 @dataclass(frozen=True)
 class Bench:
-    """A module to measure with and the bounds of its figures."""
+    """A module to measure with and the bounds of its figures.
+
+    in_all: whether `volery bench all` runs it.
+    """
 
     name: str
     title: str
     bounds: Mapping[str, Bound] = field(default_factory=dict)
+    in_all: bool = True
 
     def run(self) -> Result:
         """Measure now."""
         module = importlib.import_module(f"volery.bench.{self.name}")
-        figures: dict[str, float] = module.measure()
-        return Result(self.name, {**describe_machine(), **describe_versions()}, figures)
+        found: Measured | dict[str, float] = module.measure()
+        measured = found if isinstance(found, Measured) else Measured(found)
+        machine = {**describe_machine(), **describe_versions()}
+        return Result(self.name, machine, measured.figures, measured.failures, measured.versions)
+
+
+def _texts(data: Any) -> dict[str, str]:
+    return {str(k): str(v) for k, v in data.items()}
 
 
 BENCHES: dict[str, Bench] = {
@@ -118,6 +151,12 @@ BENCHES: dict[str, Bench] = {
                 "first_frame_s_warm": Bound(3.0, at_most=True),
                 "peak_mb_main_job": Bound(700.0, at_most=True),
             },
+        ),
+        Bench(
+            "peers",
+            "Peers: other simulators beside Volery, in turns on one core; what each includes is "
+            "told in [peers.md](peers.md)",
+            in_all=False,  # it installs a few GB
         ),
     )
 }

@@ -126,7 +126,9 @@ def recover(
 @app.command()
 @guarded
 def bench(
-    name: Annotated[str, typer.Argument(help="lidar, fleet, dynamics, start, or all.")],
+    name: Annotated[
+        str, typer.Argument(help="lidar, fleet, dynamics, start, all of them, or peers.")
+    ],
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object a bench.")] = False,
     out: Annotated[Path | None, typer.Option(help="Write the JSON to this file too.")] = None,
     markdown: Annotated[

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import logging
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import typer
@@ -20,7 +23,11 @@ def measure_and_show(name: str, *, as_json: bool, out: Path | None, markdown: Pa
     for path in (out, markdown):
         if path is not None and not path.parent.is_dir():
             raise VoleryError(f"{path}: there is no folder {path.parent}")
-    results = [_in_own_process(each) for each in BENCHES] if name == "all" else [find(name).run()]
+    with _progress_told():
+        if name == "all":
+            results = [_in_own_process(each) for each, bench in BENCHES.items() if bench.in_all]
+        else:
+            results = [find(name).run()]
     for result in results:
         if as_json:
             typer.echo(result.to_json())
@@ -32,6 +39,18 @@ def measure_and_show(name: str, *, as_json: bool, out: Path | None, markdown: Pa
         out.write_text(text + "\n", encoding="utf-8")
     if markdown is not None:
         markdown.write_text(render(results), encoding="utf-8")
+
+
+@contextmanager
+def _progress_told() -> Iterator[None]:
+    """Let long benches say on standard error what they do."""
+    log, handler = logging.getLogger("volery.bench"), logging.StreamHandler()
+    log.setLevel(logging.INFO)
+    log.addHandler(handler)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
 
 
 def _in_own_process(name: str) -> Result:
@@ -51,3 +70,5 @@ def _show(result: Result) -> None:
         verdict = "" if bound is None else "ok" if bound.holds(value) else "missed"
         rows.append((figure, f"{value:,.4g}", str(bound or ""), verdict))
     print_table((result.bench, "figure", "bound", ""), rows, right=(1, 2))
+    for what, reason in result.failures.items():
+        typer.echo(f"not measured: {what}: {reason}")

@@ -54,10 +54,11 @@ def _cache_key() -> str:
     return digest.hexdigest()[:20]
 
 
-def _cache_root() -> Path:
+def cache_root() -> Path:
+    """Folder for what can be made again: VOLERY_CACHE_DIR, XDG_CACHE_HOME or ~/.cache."""
     base = os.environ.get("VOLERY_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     root = Path(base) if base else Path.home() / ".cache"
-    return root / "volery" / "kernels"
+    return root / "volery"
 
 
 def _sweep(root: Path, keep: Path) -> None:
@@ -75,7 +76,7 @@ def _sweep(root: Path, keep: Path) -> None:
 @cache
 def cache_dir() -> Path:
     """Folder of the compiled kernels; a temporary one where the user's cache is not writable."""
-    root = _cache_root()
+    root = cache_root() / "kernels"
     folder = root / _cache_key()
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -158,7 +158,8 @@ def test_bench(tmp_path: Path) -> None:
     result = runner.invoke(app, words)
     assert result.exit_code == 0, result.stderr
     printed = json.loads(result.stdout)
-    assert list(printed) == ["bench", "machine", "figures"]
+    assert list(printed) == ["bench", "machine", "figures", "failures", "versions"]
+    assert printed["failures"] == printed["versions"] == {}
     assert printed["figures"] == FIGURES
     assert {"processor", "cores", "memory", "python", "numba", "embreex"} <= set(printed["machine"])
     assert json.loads(out.read_text()) == printed
@@ -174,7 +175,9 @@ def test_bench(tmp_path: Path) -> None:
 def test_bench_mistakes(tmp_path: Path) -> None:
     result = runner.invoke(app, ["bench", "speed"])
     assert result.exit_code == 2
-    assert "no bench 'speed'; there are lidar, fleet, dynamics, start, or all" in result.stderr
+    assert (
+        "no bench 'speed'; there are lidar, fleet, dynamics, start, peers, or all" in result.stderr
+    )
     result = runner.invoke(app, ["bench", "lidar", "--out", str(tmp_path / "no" / "x.json")])
     assert result.exit_code == 2
     assert "there is no folder" in result.stderr

@@ -1,0 +1,82 @@
+"""A virtual environment for each peer, made once and kept below the user's cache folder."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from volery.bench.peers.catalogue import Peer
+from volery.bench.peers.failure import PeerError, last_line
+from volery.core.compiled import cache_root
+
+INSTALL_TIMEOUT_S = 900.0
+"""For a peer that has no wheel for this machine and must be compiled."""
+_DONE = "requirements.txt"
+
+
+def environment(peer: Peer, root: Path | None = None, timeout_s: float = INSTALL_TIMEOUT_S) -> Path:
+    """Interpreter with the pinned requirements of `peer`. PeerError if they cannot be had.
+
+    root: folder of all such environments; by default in the user's cache. One with the same
+    requirements is used again.
+    """
+    root = cache_root() / "peers" if root is None else root
+    wanted = "\n".join((f"# Python {sys.version}", *peer.requirements))
+    folder = root / f"{peer.name}-{hashlib.sha256(wanted.encode()).hexdigest()[:12]}"
+    python = folder / "bin" / "python"
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        with (root / f"{folder.name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)  # another bench may be installing the same
+            if not (folder / _DONE).is_file():
+                _make(folder, python, peer.requirements, timeout_s)
+                (folder / _DONE).write_text(wanted + "\n", encoding="utf-8")
+    except OSError as error:
+        raise PeerError(f"cannot be installed: {error}") from None
+    return python
+
+
+def _make(folder: Path, python: Path, requirements: Sequence[str], timeout_s: float) -> None:
+    """A new environment, or none if it fails."""
+    shutil.rmtree(folder, ignore_errors=True)
+    pip = [str(python), "-I", "-m", "pip", "--disable-pip-version-check", "--no-input"]
+    try:
+        _run([sys.executable, "-m", "venv", str(folder)], timeout_s)
+        _run([*pip, "install", "--prefer-binary", *requirements], timeout_s)
+    except PeerError:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+def _run(command: Sequence[str], timeout_s: float) -> None:
+    """Run to the end with everything it starts. PeerError with its last line otherwise."""
+    with tempfile.TemporaryFile() as log:
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        try:
+            status = process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            status = None
+        finally:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+        log.seek(0)
+        said = last_line(log.read().decode(errors="replace"))
+    if status is None:
+        raise PeerError(f"installing took longer than {timeout_s:g} s; last: {said}")
+    if status:
+        raise PeerError(f"cannot be installed: {said or f'exit status {status}'}")

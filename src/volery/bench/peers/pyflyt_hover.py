@@ -1,0 +1,40 @@
+"""PyFlyt's `Aviary` with position control; runs with its own interpreter (see `host`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from PyFlyt.core import Aviary
+
+_POSITION = 7
+"""Its flight mode for x, y, yaw, z."""
+
+
+def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], dict[str, Any]]]:
+    """A round is `steps` of physics and control; facts are how far drones are from their places."""
+    if request["worlds"] != 1:
+        raise ValueError("an Aviary is one world")
+    places = np.array(request["places"])
+    aviary = Aviary(
+        start_pos=places,
+        start_orn=np.zeros_like(places),
+        drone_type="quadx",
+        drone_options={"control_hz": request["rate_hz"]},
+        physics_hz=request["rate_hz"],
+        seed=1,
+    )
+    aviary.set_mode(_POSITION)
+    yaw = np.zeros(len(places))
+    aviary.set_all_setpoints(np.column_stack([places[:, :2], yaw, places[:, 2]]))
+
+    def advance() -> None:
+        for _ in range(request["steps"]):
+            aviary.step()
+
+    def facts() -> dict[str, Any]:
+        now = np.array([state[3] for state in aviary.all_states])
+        return {"position_error_m": float(np.linalg.norm(now - places, axis=1).max())}
+
+    return advance, facts
