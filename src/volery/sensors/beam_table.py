@@ -31,7 +31,12 @@ class BeamTable(NamedTuple):
     seen_ns: NDArray[np.int64]
     """(P,) when a packet sees the other UAVs, after the start of the sweep."""
     beam: NDArray[np.uint32]
-    """(R,) number of a ray's beam; unsigned, so that kernels need not test for negative indices."""
+    """(P LANES,) number of a ray's beam; lanes past the last ray have numbers past the last beam.
+
+    Unsigned, so that kernels need not test for negative indices.
+    """
+    in_order: bool
+    """Whether rays are cast in the order of their beams."""
 
 
 def packets_of(rays: int) -> int:
@@ -55,7 +60,8 @@ def row_table(direction: Array, time_ns: NDArray[np.int64]) -> BeamTable:
         fraction=place * np.repeat(step, LANES)[:beams],
         knot_ns=np.column_stack([time_ns[first], time_ns[last]]),
         seen_ns=time_ns[np.minimum(first + LANES // 2, beams - 1)],
-        beam=np.arange(beams, dtype=np.uint32),
+        beam=_padded(np.arange(beams)),
+        in_order=True,
     )
 
 
@@ -88,5 +94,12 @@ def block_table(
         fraction=(time_ns[order] - knots[packet, 0]) / length[packet],
         knot_ns=knots,
         seen_ns=knots.sum(axis=1) // 2,
-        beam=order.astype(np.uint32),
+        beam=_padded(order),
+        in_order=bool((order == np.arange(len(order))).all()),
     )
+
+
+def _padded(order: NDArray[np.int64]) -> NDArray[np.uint32]:
+    """The order, continued to whole packets."""
+    rest = np.arange(len(order), packets_of(len(order)) * LANES)
+    return np.concatenate([order, rest]).astype(np.uint32)

@@ -57,11 +57,11 @@ class Surfaces(NamedTuple):
     """What the beams of scans met; S rows."""
 
     distance: NDArray[np.float32]
-    """(S, beams) m; inf where nothing was met."""
+    """(S, B) m; inf where nothing was met. B is the number of beams or more."""
     cosine: NDArray[np.float32]
-    """(S, beams) of the angle of incidence, 0..1."""
+    """(S, B) of the angle of incidence, 0..1."""
     material: NDArray[np.uint8]
-    """(S, beams)."""
+    """(S, B)."""
 
 
 class Echoes(NamedTuple):
@@ -170,6 +170,11 @@ def _measure_single(
 ) -> None:
     """One echo a beam: distances (beams,) to ranges (beams,) and intensities (0 or 1, beams)."""
     beams, stride = distance.shape[0], lidar.stride
+    if not lidar.noise and intensities.shape[0] == 0:
+        for i in range(beams):
+            near = distance[i] < lidar.range_min
+            ranges[i] = np.float32(-np.inf) if near else distance[i]
+        return
     for i in range(beams):
         true = float(distance[i])
         r = true
@@ -316,9 +321,10 @@ def measure(
     `time_ns` is when the sweep began.
     """
     bias = _bias(lidar, time_ns)
-    distance, cosine = surfaces.distance[row], surfaces.cosine[row]
-    material = surfaces.material[row]
     ranges, intensities = echoes.ranges[scan], echoes.intensities[scan]
+    beams = ranges.shape[1]
+    distance, cosine = surfaces.distance[row, :beams], surfaces.cosine[row, :beams]
+    material = surfaces.material[row, :beams]
     if ranges.shape[0] == 1:
         _measure_single(
             lidar, key, scan_number, bias, distance, cosine, material, ranges[0], intensities

@@ -157,7 +157,7 @@ def scan_rays(
 def _rays(
     table: BeamTable, batch: LidarBatch, scan: int, history: PoseHistory
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    count = len(table.beam)
+    count = len(table.fraction)
     rays = np.empty((6, count), dtype=np.float32)
     times = np.empty(count, dtype=np.int64)
     sweep_rays(table, batch, scan, history, new_block(count, 0).rays, rays, times)
@@ -196,13 +196,14 @@ _own = threading.local()
 
 def _surfaces(scans: int, beams: int) -> Surfaces:
     """The calling thread's memory for that many scans, kept: fresh pages cost as much as rays."""
-    needed = scans * beams
+    room = packets_of(beams) * LANES
+    needed = scans * room
     flat: Surfaces | None = _own.__dict__.get("surfaces")
     if flat is None or len(flat.distance) < needed:
         flat = _own.surfaces = Surfaces(
             np.empty(needed, np.float32), np.empty(needed, np.float32), np.empty(needed, np.uint8)
         )
-    return Surfaces(*(array[:needed].reshape(scans, beams) for array in flat))
+    return Surfaces(*(array[:needed].reshape(scans, room) for array in flat))
 
 
 def _cast_plainly(
@@ -230,6 +231,6 @@ def _cast_plainly(
         model.range.max_m,
         np.array([batch.uav[scan]], dtype=np.int32),
         fraction,
-        (surfaces.distance[0], normal, instance, surfaces.material[0]),
+        (surfaces.distance[0, : model.beams], normal, instance, surfaces.material[0, : model.beams]),
     )
-    surfaces.cosine[0] = np.abs(np.einsum("ij,ij->i", normal, directions))
+    surfaces.cosine[0, : model.beams] = np.abs(np.einsum("ij,ij->i", normal, directions))

@@ -53,14 +53,22 @@ def _near_scan(
 
 @inner_kernel
 def _note(
-    block: RayBlock, table: BeamTable, first: int, count: int, row: int, surfaces: Surfaces
+    block: RayBlock, table: BeamTable, first: int, packets: int, row: int, surfaces: Surfaces
 ) -> None:
-    """Enter the hits of a piece, `count` rays from packet `first` on, under their beams."""
+    """Enter the hits of a piece, so many packets from `first` on, under their beams.
+
+    All lanes are entered, those past the last ray too, for which rows have room: without
+    conditions the compiler makes vectors of the loops.
+    """
     rays, instance, material = block.rays, block.instance, block.material
+    start = first * LANES
+    ordered = table.in_order
     distance, cosine = surfaces.distance[row], surfaces.cosine[row]
-    kind, beam = surfaces.material[row], table.beam[first * LANES :]
-    for p in range((count + LANES - 1) // LANES):
-        for k in range(LANES):  # all lanes, without a condition: the compiler makes it vectors
+    kind, beam = surfaces.material[row], table.beam[start:]
+    if ordered:
+        distance, cosine, kind = distance[start:], cosine[start:], kind[start:]
+    for p in range(packets):
+        for k in range(LANES):
             x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
             along = (
                 x * rays[p, DIRECTION, k]
@@ -69,13 +77,18 @@ def _note(
             )
             squared = max(x * x + y * y + z * z, np.float32(1e-30))
             rays[p, NORMAL, k] = abs(along) / np.sqrt(squared)
-            hit = instance[p, k] >= 0
-            rays[p, FAR, k] = rays[p, FAR, k] if hit else np.float32(np.inf)
-        for k in range(min(LANES, count - p * LANES)):
-            i = beam[p * LANES + k]
-            distance[i] = rays[p, FAR, k]
-            cosine[i] = rays[p, NORMAL, k]
-            kind[i] = material[p, k]
+            rays[p, FAR, k] = rays[p, FAR, k] if instance[p, k] >= 0 else np.float32(np.inf)
+        if ordered:
+            for k in range(LANES):
+                distance[p * LANES + k] = rays[p, FAR, k]
+                cosine[p * LANES + k] = rays[p, NORMAL, k]
+                kind[p * LANES + k] = material[p, k]
+        else:
+            for k in range(LANES):
+                i = beam[p * LANES + k]
+                distance[i] = rays[p, FAR, k]
+                cosine[i] = rays[p, NORMAL, k]
+                kind[i] = material[p, k]
 
 
 @inner_kernel
@@ -137,7 +150,7 @@ def scan_batch(
             fraction = (time - bodies_start_ns) / interval
             block.fraction[p] = min(max(fraction, 0.0), 1.0)
         cast_block(scene, block, count, lidar.range_max, near_count)
-        _note(block, table, first, count, scan if pieces > 1 else 0, surfaces)
+        _note(block, table, first, own, scan if pieces > 1 else 0, surfaces)
         if pieces == 1:
             _measure(lidar, batch, scan, 0, surfaces, echoes)
 
