@@ -103,21 +103,21 @@ def test_takes_off_flies_to_a_place_comes_back_and_lands(airframe):
     fleet.take_off(0, height)
     fleet.advance(9000, FLAT.grid)
     assert fleet.mode(0) is FlightMode.HOLD
-    near = 0.1 * airframe.body.collision_radius_m + 0.01
-    np.testing.assert_allclose(fleet.state.position_map[0], start + [0, 0, height], atol=near)
+    above = start + np.array([0, 0, height])
+    np.testing.assert_allclose(fleet.state.position_map[0], above, atol=0.05)
 
-    goal = start + [way, 0.5 * way, height]
+    goal = above + np.array([way, 0.5 * way, 0])
     fleet.command_position(0, goal, yaw=-1.0)
     fleet.advance(14_000, FLAT.grid)
     assert fleet.mode(0) is FlightMode.HOLD
-    np.testing.assert_allclose(fleet.state.position_map[0], goal, atol=near)
+    np.testing.assert_allclose(fleet.state.position_map[0], goal, atol=0.05)
     assert float(rotations.yaw_of(fleet.state.attitude[0])) == pytest.approx(-1.0, abs=0.02)
 
     fleet.land(0)
     fleet.advance(round(1000 * (6.0 + height / airframe.limits.landing_m_s)), FLAT.grid)
     assert fleet.mode(0) is FlightMode.LANDED
     assert not fleet.state.rotor_speed[0].any()
-    np.testing.assert_allclose(fleet.state.position_map[0, :2], goal[:2], atol=2 * near)
+    np.testing.assert_allclose(fleet.state.position_map[0, :2], goal[:2], atol=0.1)
     up = 1 - 2 * (fleet.state.attitude[0, :2] ** 2).sum()
     assert up > math.cos(math.radians(2.0))
     kinds = [event.kind for event in fleet.drain_events()]

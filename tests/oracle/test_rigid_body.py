@@ -24,7 +24,7 @@ def rotation(q):
 
 
 def ground_gain(radius, d, b, z, across, thrust):
-    """Sanchez-Cuevas et al. 2017 for four rotors, reduced in forward flight, faded from 6 to 10 R."""
+    """Sanchez-Cuevas et al. 2017, reduced in forward flight, faded from 6 to 10 R."""
     far = 4 * z**2
     share = (radius / (4 * z)) ** 2 + radius**2 * z / (d**2 + far) ** 1.5
     share += radius**2 / 2 * z / (2 * d**2 + far) ** 1.5

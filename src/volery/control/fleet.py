@@ -272,7 +272,7 @@ class Fleet:
         self._pilots["timeout_steps"][rows] = max(1, round(seconds / self._dt))
 
     def command_rotor_speeds(self, i: int, speeds: ArrayLike) -> None:
-        """Turn the rotors of UAV `i` at `speeds` (R,) rad/s, or as fast as its battery lets them."""
+        """Turn the rotors of UAV `i` at `speeds` (R,) rad/s, if its battery lets them."""
         self._refuse_wreck(i)
         rotors = self.airframes[i].rotors
         shape = (len(rotors.places),)

@@ -35,7 +35,7 @@ def with_places(places, base=F450, **body_changes) -> Airframe:
 
 
 def ring(count, radius=0.3, height=0.02, lean=0.0, **body_changes) -> Airframe:
-    """`count` rotors on a ring, each leaning `lean` rad to its neighbour, in turns left and right."""
+    """`count` rotors on a ring that lean `lean` rad along it, in turns to the left and right."""
     angle = (np.arange(count) + 0.5) * 2 * np.pi / count
     sign = np.where(np.arange(count) % 2, 1.0, -1.0)
     return with_places(
