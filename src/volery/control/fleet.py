@@ -150,15 +150,13 @@ class Fleet:
         )
         worn = [tuple(one) for one in wear or [()] * count]
         _check_wear(self.names, self.airframes, worn)
-        charge = checked_within(
-            "battery_charge", np.broadcast_to(battery_charge, count), (count,), 1.0
-        )
+        charge = checked_within("battery_charge", _each(battery_charge, count), (count,), 1.0)
         self._models, rows = _model_table(self.airframes, worn, self._dt)
         self._uavs = np.zeros(count, UAV)
         self._uavs["body"] = new_bodies(position, attitude)
         self._uavs["pilot"] = new_pilots(attitude)
         self._uavs["model"] = rows
-        self._uavs["copy"] = copies
+        self._uavs["copy"] = checked("copies", _each(copies, count), (count,), 2**31)
         self._jets = new_jets(count)
         self._bodies: NDArray[np.void] = self._uavs["body"]
         self._pilots: NDArray[np.void] = self._uavs["pilot"]
@@ -564,6 +562,11 @@ class Fleet:
             state.omega_body[row] += sign * (spin @ impulse)
             self._wake(row)
         return float(np.linalg.norm(impulse))
+
+
+def _each(value: ArrayLike, count: int) -> ArrayLike:
+    """One value a UAV, where one stands for all."""
+    return value if np.ndim(value) else np.full(count, value)
 
 
 def _check_wear(

@@ -120,9 +120,9 @@ def fly_on_without(airframe, rotor, seconds=12.0):
 
 
 def test_a_hexarotor_flies_on_without_a_rotor_and_a_quadrotor_does_not():
-    """Allocation stays nominal: it gives yaw up, spins, and holds its height."""
+    """Allocation stays nominal; the integrals of the rate loop find the new trim."""
     low, far = fly_on_without(ring(6), 1)
-    assert low > 95.0, (low, far)
-    assert far < 10.0, (low, far)
+    assert low > 99.0, (low, far)
+    assert far < 2.0, (low, far)
     low, _ = fly_on_without(F450, 1)
     assert low < 50.0
