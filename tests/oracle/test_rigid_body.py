@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from volery.control.fleet import Fleet
+from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe, load_airframe
 from volery.world.terrain import Terrain
 from volery.world.weather import Weather
@@ -23,8 +24,22 @@ def rotation(q):
     return np.eye(3) + 2 * w * skew + 2 * skew @ skew
 
 
-def right_hand_side(airframe, reference, wind):
+def ground_gain(radius, d, b, z, across, thrust):
+    """Sanchez-Cuevas et al. 2017, reduced in forward flight, faded from 6 to 10 R."""
+    far = 4 * z**2
+    share = (radius / (4 * z)) ** 2 + radius**2 * z / (d**2 + far) ** 1.5
+    share += radius**2 / 2 * z / (2 * d**2 + far) ** 1.5
+    share += 2 * radius**2 * z * 2 / (b**2 + far) ** 1.5
+    up = np.clip((z / radius - 6) / 4, 0, 1)
+    induced = thrust / (2 * RHO * np.pi * radius**2)
+    return 1 / (1 - share * (1 - up**2 * (3 - 2 * up)) / (1 + across / induced))
+
+
+def right_hand_side(airframe, reference, wind, wear=None, ground=None):
+    """wear: of each rotor. ground: height of level ground under a four-rotor frame, m."""
     rotors, inertia = airframe.rotors, np.array(airframe.body.inertia_kg_m2)
+    wear = wear or [RotorWear()] * len(rotors.places)
+    lag = np.array([w.lag for w in wear])
     area = np.array(airframe.body.drag_area_m2)
 
     def rhs(_t, y):
@@ -33,16 +48,23 @@ def right_hand_side(airframe, reference, wind):
         air = turn.T @ (v - wind)
         force = -0.5 * RHO * area * np.linalg.norm(air) * air
         torque = np.zeros(3)
-        for place, w in zip(rotors.places, speeds, strict=True):
+        for place, w, old in zip(rotors.places, speeds, wear, strict=True):
             axis, arm = np.array(place.axis), np.array(place.position_m)
             sense = {"ccw": 1.0, "cw": -1.0}[place.direction]
             hub = air + np.cross(omega, arm)
             along = hub @ axis
             across = hub - along * axis
-            thrust = rotors.thrust_n_s2 * w**2 * np.clip(1 - abs(along) / 25, 0, 1)
+            thrust = old.thrust * rotors.thrust_n_s2 * w**2
+            if ground is not None:
+                z = y[2] + (turn @ arm)[2] - ground
+                spacing = 2 * abs(arm[0]), 2 * abs(arm[0]) * np.sqrt(2)
+                across_ground = (v - wind)[0] ** 2 + (v - wind)[1] ** 2
+                thrust *= ground_gain(rotors.radius_m, *spacing, z, across_ground, thrust)
+            thrust *= np.clip(1 - abs(along) / 25, 0, 1)
             pull = thrust * axis - w * rotors.drag_n_s2_m * across
             force = force + pull
-            torque = torque + np.cross(arm, pull) - sense * thrust * rotors.torque_m * axis
+            torque = torque + np.cross(arm, pull)
+            torque = torque - sense * thrust * rotors.torque_m * old.torque * axis
             torque = torque - w * sense * rotors.rolling_n_s2 * across
         alpha = (torque - np.cross(omega, inertia * omega)) / inertia
         x, yy, z, w = q
@@ -54,31 +76,32 @@ def right_hand_side(airframe, reference, wind):
                 [-x, -yy, -z],
             ]
         )
-        tau = np.where(reference > speeds, rotors.rise_time_s, rotors.fall_time_s)
+        tau = lag * np.where(reference > speeds, rotors.rise_time_s, rotors.fall_time_s)
         acceleration = turn @ force / airframe.body.mass_kg - np.array([0, 0, G])
         return np.concatenate([v, acceleration, spin @ omega, alpha, (reference - speeds) / tau])
 
     return rhs
 
 
-def solve(airframe, start, reference, wind, seconds):
-    rhs = right_hand_side(airframe, reference, wind)
+def solve(airframe, start, reference, wind, seconds, **terms):
+    rhs = right_hand_side(airframe, reference, wind, **terms)
     result = solve_ivp(rhs, (0, seconds), start, method="DOP853", rtol=1e-11, atol=1e-11)
     y = result.y[:, -1]
     y[6:10] /= np.linalg.norm(y[6:10])
     return y
 
 
-def fly(airframe, start, reference, wind, seconds, dt_ns=1_000_000):
+def fly(airframe, start, reference, wind, seconds, dt_ns=1_000_000, wear=(), ground=None):
     start_pose = start[None, :3], start[None, 6:10]
-    fleet = Fleet([airframe], *start_pose, dt_ns=dt_ns, weather=Weather(wind))
+    fleet = Fleet([airframe], *start_pose, dt_ns=dt_ns, wear=[wear], weather=Weather(wind))
+    grid = FAR_BELOW if ground is None else Terrain.flat(1e5, ground, (-5e4, -5e4)).grid
     fleet.command_rotor_speeds(0, reference)
     state, count = fleet.state, len(reference)
     state.velocity_map[0] = start[3:6]
     state.omega_body[0] = start[10:13]
     state.rotor_speed[0, :count] = start[13:]
     steps = round(seconds * 1e9 / dt_ns)
-    assert fleet.advance(steps, FAR_BELOW) == steps
+    assert fleet.advance(steps, grid) == steps
     return np.concatenate(
         [
             state.position_map[0],
@@ -217,3 +240,29 @@ def test_hover_trim():
     np.testing.assert_allclose(fleet.state.rotor_speed[0, :4], wanted, rtol=1e-9)
     np.testing.assert_allclose(fleet.state.position_map[0], 0.0, atol=1e-9)
     assert not fleet.state.rotor_speed[0, 4:].any()
+
+
+WORN = [
+    RotorWear(thrust=0.9, torque=1.3),
+    RotorWear(lag=2.0),
+    RotorWear(thrust=0.97, lag=1.5, torque=0.8),
+    RotorWear(),
+]
+
+
+@pytest.mark.parametrize("terms", [{"wear": WORN}, {"ground": 2.45}, {"wear": WORN, "ground": 2.5}])
+def test_wear_and_ground_agree_with_the_equations(terms):
+    """Over the ground it climbs from 0.6 m through the whole fade of the effect."""
+    start = state_of(
+        F450, velocity=(1.5, -1, 0.8), omega=(0.1, 0.2, 0.3), speeds=760, q=(0, 0, 0.2, 1)
+    )
+    reference = np.array([775.0, 772, 774, 771])
+    wanted = solve(F450, start, reference, np.array([0.5, 0, 0]), 0.6, **terms)
+    got = fly(F450, start, reference, (0.5, 0, 0), 0.6, **terms)
+    plain = fly(F450, start, reference, (0.5, 0, 0), 0.6)
+    assert np.linalg.norm(plain[:6] - got[:6]) > 0.02  # the terms matter
+    assert np.linalg.norm(got[:3] - wanted[:3]) < 5e-4
+    assert np.linalg.norm(got[3:6] - wanted[3:6]) < 1e-3
+    assert attitude_error(got[6:10], wanted[6:10]) < 5e-4
+    assert np.linalg.norm(got[10:13] - wanted[10:13]) < 4e-3
+    np.testing.assert_allclose(got[13:], wanted[13:], atol=1e-6)

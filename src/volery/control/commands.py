@@ -76,13 +76,13 @@ class FleetCommands:
         self._pilots["timeout_steps"][rows] = max(1, round(seconds / self._dt))
 
     def command_rotor_speeds(self, i: int, speeds: ArrayLike) -> None:
-        """Turn the rotors of UAV `i` at `speeds` (R,) rad/s."""
+        """Turn the rotors of UAV `i` at `speeds` (R,) rad/s, if its battery lets them."""
         self._refuse_plants(i, "rotor speeds", IdentifiedModel, Kinematic)
         rotors = self.airframes[i].rotors
         shape = (len(rotors.places),)
         speeds = checked_within("rotor speeds", speeds, shape, rotors.max_speed_rad_s)
         pilot = self._enter_low_level(i, ControlLevel.ROTORS)
-        pilot["rotor_reference"][: len(speeds)] = speeds
+        pilot["rotor_target"][: len(speeds)] = speeds
 
     def command_rates(self, i: int, omega_body: ArrayLike, thrust: float) -> None:
         """Turn UAV `i` at `omega_body` (3,) rad/s, FLU, with `thrust` N along its z axis."""

@@ -104,15 +104,13 @@ class Fleet(FleetCommands):
 
         names = tuple(names or (f"UAV {i}" for i in range(count)))
         worn = checked_wear(names, airframes, wear)
-        charge = checked_within(
-            "battery_charge", np.broadcast_to(battery_charge, count), (count,), 1.0
-        )
+        charge = checked_within("battery_charge", _each(battery_charge, count), (count,), 1.0)
         models, rows = model_table(airframes, plants, worn, dt_ns / NS_PER_S)
         uavs = np.zeros(count, UAV)
         uavs["body"] = new_bodies(position, attitude)
         uavs["pilot"] = new_pilots(attitude)
         uavs["model"] = rows
-        uavs["copy"] = copies
+        uavs["copy"] = checked("copies", _each(copies, count), (count,), 2**31)
         uavs["belief"] = new_beliefs(count)
         uavs["turbulence"] = new_turbulence(seed, names)
         super().__init__(tuple(airframes), plants, names, uavs, dt_ns / NS_PER_S)
@@ -385,3 +383,8 @@ class Fleet(FleetCommands):
             for row in (i,) if j is None else (i, j):
                 self._wake(row)
         return size
+
+
+def _each(value: ArrayLike, count: int) -> ArrayLike:
+    """One value a UAV, where one stands for all."""
+    return value if np.ndim(value) else np.full(count, value)

@@ -31,7 +31,7 @@ def hold_rates(pilot: Any, estimate: Any, gains: Any, dt: float) -> None:
     if pilot.level <= _ROTORS:
         most = 0.0 if pilot.level == _STOPPED else _full_speed(pilot, gains)
         for r in range(gains.rotors):
-            pilot.rotor_reference[r] = min(pilot.rotor_reference[r], most)
+            pilot.rotor_reference[r] = min(pilot.rotor_target[r], most)
         return
     ox, oy, oz = three(estimate.omega_body)
     ix, iy, iz = three(gains.inertia)

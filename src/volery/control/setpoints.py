@@ -78,6 +78,7 @@ PILOT = np.dtype(
         ("velocity_integral", "f8", 3),  # m/s^2, map: answers what pushes steadily
         ("attitude", "f8", 4),  # map from body
         ("yaw_rate", "f8"),  # rad/s, fed forward to the rates
+        ("rotor_target", "f8", MAX_ROTORS),  # rad/s, where speeds are commanded
     ],
     align=True,
 )

@@ -52,6 +52,16 @@ class Uav:
         return np.array(self._fleet.state.rotor_speed[self._row, :rotors])
 
     @property
+    def battery_charge(self) -> float:
+        """Share of the battery's capacity that is left; 1 without a battery."""
+        return float(self._fleet.state.battery_charge[self._row])
+
+    @property
+    def battery_voltage(self) -> float:
+        """V under the present load; 0 without a battery."""
+        return float(self._fleet.state.battery_voltage[self._row])
+
+    @property
     def mode(self) -> FlightMode:
         """Present flight mode."""
         return self._fleet.mode(self._row)
@@ -60,6 +70,12 @@ class Uav:
     def crashed(self) -> bool:
         """Whether its rotors have stopped for good."""
         return bool(self._fleet.state.crashed[self._row])
+
+    # ------------------------------------------------------------------------------------- faults
+
+    def set_rotor_health(self, rotor: int, factor: float) -> None:
+        """Let rotor number `rotor` give `factor` (0 to 1) of a new one's thrust; 0: it stops."""
+        self._fleet.set_rotor_health(self._row, rotor, factor)
 
     # ------------------------------------------------------------------------------ flight modes
 

@@ -231,6 +231,11 @@ def _cast_plainly(
         model.range.max_m,
         np.array([batch.uav[scan]], dtype=np.int32),
         fraction,
-        (surfaces.distance[0, : model.beams], normal, instance, surfaces.material[0, : model.beams]),
+        (
+            surfaces.distance[0, : model.beams],
+            normal,
+            instance,
+            surfaces.material[0, : model.beams],
+        ),
     )
     surfaces.cosine[0, : model.beams] = np.abs(np.einsum("ij,ij->i", normal, directions))

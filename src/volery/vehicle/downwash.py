@@ -46,7 +46,7 @@ _INVERSE_SLANT = 1.0 / math.sqrt(1.0 + (EDGE * SPREAD) ** 2)
 _LOOK_BEYOND = 2.0
 """m beyond the widest jet that a look reaches, and twice what may be flown until the next."""
 
-_REFILL_BELOW = 0.25
+_REFILL_BELOW = 0.5
 """m: who has less left looks around when somebody must, so that looks come together."""
 
 
