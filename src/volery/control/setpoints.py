@@ -41,8 +41,21 @@ class ControlLevel(IntEnum):
 
 PILOT = np.dtype(
     [
+        # read in every physics step
         ("mode", "i8"),  # flight_modes.FlightMode
         ("level", "i8"),  # ControlLevel
+        ("velocity_in_heading", "?"),  # velocity_target turns with the vehicle's heading
+        ("braking", "?"),  # HOLD and LAND: stop first, then lock the place
+        ("turning", "?"),  # heading follows yaw_rate_target instead of heading_target
+        ("saturated", "?"),  # the rotors could not give the torque wanted last
+        ("path_faces", "?"),  # the trajectory has headings
+        ("spare", "u1", 3),  # no hidden padding: equal states are equal bytes
+        ("thrust", "f8"),  # N along the body's z
+        ("yaw_rate", "f8"),  # rad/s, fed forward to the rates
+        ("rates", "f8", 3),  # rad/s, FLU
+        ("rate_integral", "f8", 3),  # rad/s^2
+        ("rotor_reference", "f8", MAX_ROTORS),  # rad/s
+        # read at attitude and guidance ticks
         ("phase", "i8"),  # of a flight mode that has several
         ("calm_ticks", "i8"),  # guidance ticks for which a condition of the mode has held
         ("deadline_step", "i8"),  # a velocity or trajectory setpoint holds until this step
@@ -51,12 +64,6 @@ PILOT = np.dtype(
         ("path_first", "i8"),  # rows of the trajectory's segments; of none: 0, -1
         ("path_last", "i8"),
         ("path_row", "i8"),  # the segment flown now
-        ("velocity_in_heading", "?"),  # velocity_target turns with the vehicle's heading
-        ("braking", "?"),  # HOLD and LAND: stop first, then lock the place
-        ("turning", "?"),  # heading follows yaw_rate_target instead of heading_target
-        ("saturated", "?"),  # the rotors could not give the torque wanted last
-        ("path_faces", "?"),  # the trajectory has headings
-        ("spare", "u1", 3),  # no hidden padding: equal states are equal bytes
         ("home", "f8", 3),  # m, map: where the last take-off began
         ("return_height", "f8"),  # m, map
         ("position_target", "f8", 3),  # m, map
@@ -70,15 +77,10 @@ PILOT = np.dtype(
         ("acceleration", "f8", 3),  # m/s^2, map: likewise
         ("velocity_integral", "f8", 3),  # m/s^2, map: answers what pushes steadily
         ("attitude", "f8", 4),  # map from body
-        ("thrust", "f8"),  # N along the body's z
-        ("yaw_rate", "f8"),  # rad/s, fed forward to the rates
-        ("rates", "f8", 3),  # rad/s, FLU
-        ("rate_integral", "f8", 3),  # rad/s^2
-        ("rotor_reference", "f8", MAX_ROTORS),  # rad/s
     ],
     align=True,
 )
-"""Commands, setpoints and controller states of one UAV."""
+"""Commands, setpoints and controller states of one UAV; what every step needs lies together."""
 
 
 def new_pilots(attitude: Array) -> NDArray[np.void]:

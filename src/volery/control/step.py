@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from volery.control.flight_modes import CRASHED, guide, stop
 from volery.control.gains import GAINS
-from volery.control.kinematic_flight import fly_kinematic
+from volery.control.other_plants import fly_otherwise
 from volery.control.rates_attitude import hold_attitude, hold_rates
-from volery.control.setpoints import PILOT, ControlLevel
+from volery.control.setpoints import PILOT
 from volery.vehicle.aerodynamics import PLANT
-from volery.vehicle.compiled import apart_kernel, fused_kernel, inner_kernel
+from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
 from volery.vehicle.fleet import BODY
-from volery.vehicle.identified import IDENTIFIED, accelerate_identified
+from volery.vehicle.identified import IDENTIFIED
 from volery.vehicle.kernels import accelerate, carry, meet_ground, near_ground
 from volery.vehicle.kinematic import KINEMATIC
 from volery.vehicle.plants import KINEMATIC_MOTION, RIGID_BODY
@@ -51,7 +51,6 @@ EVENT = np.dtype(
 )
 """One happening; `kind` is `TOUCH_DOWN`, `IMPACT` or `MODE_CHANGE`."""
 MODE_CHANGE = 3
-_STOPPED = int(ControlLevel.STOPPED)
 EVENTS_A_STEP = 3
 """At most, of one UAV."""
 
@@ -114,47 +113,36 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                 gains = model.gains
                 estimate = body  # what control knows of the motion: for now, the truth
                 mode = pilot.mode
-                if model.kind == KINEMATIC_MOTION:
-                    touch = fly_kinematic(
-                        body,
-                        pilot,
-                        plant,
-                        model.kinematic,
-                        gains,
-                        paths,
-                        grid,
-                        steepest,
-                        step,
-                        guiding,
-                        dt,
-                    )
-                else:
+                if model.kind == RIGID_BODY:
                     if guiding:
                         guide(pilot, estimate, gains, paths, step, dt)
-                    if model.kind == RIGID_BODY:
-                        if turning:
-                            hold_attitude(pilot, estimate, gains)
-                        hold_rates(pilot, estimate, gains, dt)
-                        accelerate(body, plant, pilot, wind_x, wind_y, wind_z, dt)
-                    else:
-                        _follow_loops(
-                            body,
-                            plant,
-                            model.identified,
-                            pilot,
-                            references[i],
-                            step,
-                            wind_x,
-                            wind_y,
-                            wind_z,
-                            dt,
-                        )
+                    if turning:
+                        hold_attitude(pilot, estimate, gains)
+                    hold_rates(pilot, estimate, gains, dt)
+                    accelerate(body, plant, pilot, wind_x, wind_y, wind_z, dt)
                     touch = NO_TOUCH
                     if near_ground(body, dt):
                         touch = meet_ground(
                             body, plant, pilot, grid, steepest, bounce, scratch, step + 1, dt
                         )
                     carry(body, dt)
+                else:
+                    touch = fly_otherwise(
+                        body,
+                        pilot,
+                        estimate,
+                        model,
+                        references[i],
+                        paths,
+                        (wind_x, wind_y, wind_z),
+                        grid,
+                        steepest,
+                        bounce,
+                        scratch,
+                        step,
+                        guiding,
+                        dt,
+                    )
                 if touch != NO_TOUCH:
                     _note(events[written], step + 1, i, touch, mode, body.touch_speed, body)
                     written += 1
@@ -173,26 +161,6 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
         step += 1
         done += 1
     return done, written, spent
-
-
-@apart_kernel
-def _follow_loops(
-    body: Any,
-    plant: Any,
-    model: Any,
-    pilot: Any,
-    references: Any,
-    step: int,
-    wind_x: float,
-    wind_y: float,
-    wind_z: float,
-    dt: float,
-) -> None:
-    """Attitude and acceleration of an identified plant, out of the way of the others."""
-    live = pilot.level != _STOPPED
-    accelerate_identified(
-        body, plant, model, pilot, live, references, step, wind_x, wind_y, wind_z, dt
-    )
 
 
 @inner_kernel

@@ -169,15 +169,14 @@ def accelerate_identified(
     live: bool,
     references: Any,
     step: int,
-    wind_x: float,
-    wind_y: float,
-    wind_z: float,
+    wind: tuple[float, float, float],
     dt: float,
 ) -> None:
     """Like `kernels.accelerate`: take velocity and rates of a `BODY` to the end of the step.
 
     command: a record with `attitude`, `thrust` and `yaw_rate`, and `rotor_reference` to be filled.
     live: whether its controllers run. references: (L, 6), the commands of the last steps.
+    wind: m/s, map.
     """
     rows = references.shape[0]
     now = references[step % rows]
@@ -209,9 +208,9 @@ def accelerate_identified(
     )
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = matrix_of(x, y, z, w)
     vx, vy, vz = three(body.velocity_map)
-    ax = vx + half * body.free_acceleration[0] - wind_x
-    ay = vy + half * body.free_acceleration[1] - wind_y
-    az = vz + half * body.free_acceleration[2] - wind_z
+    ax = vx + half * body.free_acceleration[0] - wind[0]
+    ay = vy + half * body.free_acceleration[1] - wind[1]
+    az = vz + half * body.free_acceleration[2] - wind[2]
     fx = -model.drag[0] * (r00 * ax + r10 * ay + r20 * az)
     fy = -model.drag[1] * (r01 * ax + r11 * ay + r21 * az)
     fz = thrust * plant.inverse_mass - model.drag[2] * (r02 * ax + r12 * ay + r22 * az)
