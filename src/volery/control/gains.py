@@ -69,6 +69,9 @@ GAINS = np.dtype(
         ("ease", "f8"),
         ("lead", "f8"),
         ("brake", "f8"),
+        ("level_linear", "f8"),
+        ("height_brake", "f8"),
+        ("height_linear", "f8"),
         ("acceleration", "f8"),
         ("climb_acceleration", "f8"),
         ("tilt_tangent", "f8"),
@@ -150,6 +153,9 @@ def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:  # noqa: PLR091
     row["climb_acceleration"] = min(
         limits.acceleration_m_s2, 0.6 * (_THRUST_RESERVE * most / airframe.body.mass_kg - GRAVITY)
     )
+    row["level_linear"] = row["brake"] / position**2
+    row["height_brake"] = 0.6 * row["climb_acceleration"]
+    row["height_linear"] = row["height_brake"] / position**2
     row["level_leash"] = row["acceleration"] / level.position
     row["height_leash"] = row["climb_acceleration"] / height.position
     row["tilt_tangent"] = math.tan(math.radians(limits.tilt_deg))

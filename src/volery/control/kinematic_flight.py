@@ -17,7 +17,7 @@ from volery.control.flight_modes import (
 from volery.control.follow import END, path_time, polynomial, segment_at
 from volery.control.heading import heading_of
 from volery.control.setpoints import ControlLevel
-from volery.vehicle.compiled import apart_kernel, inner_kernel
+from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.kinematic import drive, face, glide, put, stop_at_ground, turn_by
 from volery.vehicle.rigid import three
 from volery.world.terrain import TerrainGrid
@@ -26,7 +26,7 @@ _STOPPED = int(ControlLevel.STOPPED)
 _POSE = int(ControlLevel.POSE)
 
 
-@apart_kernel
+@inner_kernel
 def fly_kinematic(
     body: Any,
     pilot: Any,

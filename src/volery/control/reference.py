@@ -26,20 +26,20 @@ def move_on(pilot: Any, gains: Any) -> None:
 
 
 @inner_kernel
-def approach_speed(distance: float, gain: float, brake: float, limit: float) -> float:
-    """Speed (m/s) towards a goal `distance` m away from which `brake` (m/s^2) still stops."""
-    linear = brake / (gain * gain)
+def approach(
+    distance: float, gain: float, brake: float, linear: float, limit: float
+) -> tuple[float, float]:
+    """Speed (m/s) towards a goal `distance` m away, and how it changes with the distance (1/s).
+
+    From it `brake` (m/s^2) still stops; within `linear` = brake / gain^2 of the goal it is
+    proportional.
+    """
     if distance <= linear:
-        return min(gain * distance, limit)
-    return min(math.sqrt(2.0 * brake * (distance - 0.5 * linear)), limit)
-
-
-@inner_kernel
-def _slope(speed: float, gain: float, brake: float, limit: float) -> float:
-    """Change of `approach_speed` with the distance, 1/s, where it is `speed`."""
-    if speed >= limit:
-        return 0.0
-    return min(gain, brake / max(speed, 1e-9))
+        speed, slope = gain * distance, gain
+    else:
+        speed = math.sqrt(2.0 * brake * (distance - 0.5 * linear))
+        slope = brake / speed
+    return (speed, slope) if speed < limit else (limit, 0.0)
 
 
 @inner_kernel
@@ -58,13 +58,13 @@ def lead_level(pilot: Any, estimate: Any, gains: Any, speed: float) -> None:
     distance = math.sqrt(dx * dx + dy * dy)
     ax, ay = -gains.ease * vx, -gains.ease * vy
     if distance > 1e-9:
-        wanted = approach_speed(distance, gains.position, gains.brake, speed)
+        wanted, slope = approach(distance, gains.position, gains.brake, gains.level_linear, speed)
         inverse = 1.0 / distance
         nx, ny = inverse * dx, inverse * dy
         along = nx * vx + ny * vy
         # how the wanted velocity changes on the way, and what is missing to it
         turn = inverse * wanted
-        ahead = (turn - _slope(wanted, gains.position, gains.brake, speed)) * along
+        ahead = (turn - slope) * along
         ax += (gains.ease * wanted + ahead) * nx - turn * vx
         ay += (gains.ease * wanted + ahead) * ny - turn * vy
     _choose_level(pilot, gains, ax, ay, gains.acceleration * gains.ease * gains.tick)
@@ -78,9 +78,9 @@ def lead_height(pilot: Any, estimate: Any, gains: Any, climb: float, descent: fl
     pilot.position[2] = estimate.position_map[2] + ahead
     dz = pilot.position_target[2] - pilot.position[2]
     limit = climb if dz > 0.0 else descent
-    brake = 0.6 * gains.climb_acceleration
-    wanted = approach_speed(abs(dz), gains.position, brake, limit)
-    slope = _slope(wanted, gains.position, brake, limit)
+    wanted, slope = approach(
+        abs(dz), gains.position, gains.height_brake, gains.height_linear, limit
+    )
     vz = pilot.velocity[2]
     az = gains.ease * (math.copysign(wanted, dz) - vz) - slope * vz
     _choose_height(pilot, gains, az, gains.climb_acceleration * gains.ease * gains.tick)

@@ -51,6 +51,7 @@ PILOT = np.dtype(
         ("path_faces", "?"),  # the trajectory has headings
         ("spare", "u1", 3),  # no hidden padding: equal states are equal bytes
         ("thrust", "f8"),  # N along the body's z
+        ("yaw_rate", "f8"),  # rad/s, fed forward to the rates
         ("full_thrust", "f8"),  # N: the most that one rotor gives at the battery's present voltage
         ("rates", "f8", 3),  # rad/s, FLU
         ("rate_integral", "f8", 3),  # rad/s^2
@@ -77,12 +78,11 @@ PILOT = np.dtype(
         ("acceleration", "f8", 3),  # m/s^2, map: likewise
         ("velocity_integral", "f8", 3),  # m/s^2, map: answers what pushes steadily
         ("attitude", "f8", 4),  # map from body
-        ("yaw_rate", "f8"),  # rad/s, fed forward to the rates
         ("rotor_target", "f8", MAX_ROTORS),  # rad/s, where speeds are commanded
     ],
     align=True,
 )
-"""Commands, setpoints and controller states of one UAV."""
+"""Commands, setpoints and controller states of one UAV; what every step needs lies together."""
 
 
 def new_pilots(attitude: Array) -> NDArray[np.void]:

@@ -11,17 +11,17 @@ from volery.control.air import refresh_air
 from volery.control.belief import BELIEF, believe_attitude, believe_place, believe_rates
 from volery.control.flight_modes import CRASHED, guide, stop
 from volery.control.gains import GAINS
-from volery.control.kinematic_flight import fly_kinematic
+from volery.control.other_plants import fly_otherwise
 from volery.control.rates_attitude import hold_attitude, hold_rates
-from volery.control.setpoints import PILOT, ControlLevel
+from volery.control.setpoints import PILOT
 from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.battery import drain
-from volery.vehicle.compiled import apart_kernel, fused_kernel, inner_kernel
+from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
 from volery.vehicle.downwash import Jets, find_downwash
 from volery.vehicle.fleet import BODY
 from volery.vehicle.ground_effect import feel_ground, feels_ground
-from volery.vehicle.identified import IDENTIFIED, accelerate_identified
+from volery.vehicle.identified import IDENTIFIED
 from volery.vehicle.kernels import accelerate, carry, meet_ground, near_ground
 from volery.vehicle.kinematic import KINEMATIC
 from volery.vehicle.plant import PLANT
@@ -73,7 +73,6 @@ MODE_CHANGE = 3
 BATTERY_FELL = 4
 EVENTS_A_STEP = 4
 """At most, of one UAV."""
-_STOPPED = int(ControlLevel.STOPPED)
 
 
 @fused_kernel
@@ -146,44 +145,43 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                 mode = pilot.mode
                 if guiding:
                     body.air_velocity_map[2] -= jets.downwash[i]
-                if model.kind == KINEMATIC_MOTION:
-                    touch = fly_kinematic(
-                        body,
-                        pilot,
-                        plant,
-                        model.kinematic,
-                        model.gains,
-                        paths,
-                        grid,
-                        steepest,
-                        step,
-                        guiding,
-                        dt,
-                    )
-                else:
-                    belief = uavs[i].belief
+                belief = uavs[i].belief
+                if model.kind == RIGID_BODY:
                     if guiding:
                         believe_place(belief, body)
                     if guiding or turning:
                         believe_attitude(belief, body)
                     if guiding:
                         guide(pilot, belief, model.gains, paths, step, dt)
-                    if model.kind == RIGID_BODY:
-                        if turning:
-                            hold_attitude(pilot, belief, model.gains)
-                        believe_rates(belief, body)
-                        hold_rates(pilot, belief, model.gains, dt)
-                        if feels_ground(body, plant):
-                            feel_ground(body, plant, grid, steepest, dt)
-                        accelerate(body, plant, pilot, dt)
-                    else:
-                        _follow_loops(body, plant, model.identified, pilot, references[i], step, dt)
+                    if turning:
+                        hold_attitude(pilot, belief, model.gains)
+                    believe_rates(belief, body)
+                    hold_rates(pilot, belief, model.gains, dt)
+                    if feels_ground(body, plant):
+                        feel_ground(body, plant, grid, steepest, dt)
+                    accelerate(body, plant, pilot, dt)
                     touch = NO_TOUCH
                     if near_ground(body, dt):
                         touch = meet_ground(
                             body, plant, pilot, grid, steepest, bounce, scratch, step + 1, dt
                         )
                     carry(body, dt)
+                else:
+                    touch = fly_otherwise(
+                        body,
+                        pilot,
+                        belief,
+                        model,
+                        references[i],
+                        paths,
+                        grid,
+                        steepest,
+                        bounce,
+                        scratch,
+                        step,
+                        guiding,
+                        dt,
+                    )
                 if touch != NO_TOUCH:
                     _note(events[written], step + 1, i, touch, mode, body.touch_speed, body)
                     written += 1
@@ -203,21 +201,6 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
         step += 1
         done += 1
     return done, written, spent
-
-
-@apart_kernel
-def _follow_loops(
-    body: Any,
-    plant: Any,
-    model: Any,
-    pilot: Any,
-    references: Any,
-    step: int,
-    dt: float,
-) -> None:
-    """Attitude and acceleration of an identified plant, out of the way of the others."""
-    live = pilot.level != _STOPPED
-    accelerate_identified(body, plant, model, pilot, live, references, step, dt)
 
 
 @inner_kernel

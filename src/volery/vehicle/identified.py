@@ -175,6 +175,7 @@ def accelerate_identified(
 
     command: a record with `attitude`, `thrust` and `yaw_rate`, and `rotor_reference` to be filled.
     live: whether its controllers run. references: (L, 6), the commands of the last steps.
+    wind: m/s, map.
     """
     rows = references.shape[0]
     now = references[step % rows]
