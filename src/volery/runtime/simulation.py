@@ -163,12 +163,12 @@ class Simulation:
                 self._engine.advance_to(min(end_step, self._fleet.step + steps), until=until)
             over = self._fleet.step >= end_step or (until is not None and until())
             while pacer.wait(self.time_ns) and not (over and pacer.paused):
-                # What nodes answer is delivered with the next tick, as it would be without a wait.
+                # What this publishes is delivered by the next tick, as it would be without a wait.
                 self._engine.inbox.work_off()
                 teller.tell(self.time_s - start_s)
             teller.tell(self.time_s - start_s, last=over)
 
-    # The seven below may be called by any thread, while the simulation runs or not.
+    # From here to `post`, everything may be called by any thread, while the simulation runs or not.
 
     @property
     def paused(self) -> bool:

@@ -75,10 +75,9 @@ def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
         return f"key '{key}' is missing"
     if not key:
         return message
-    if fault["type"] == "tuple_type" and isinstance(fault.get("input"), dict):
-        header = _header(fault["loc"], data)
-        if header and _holds_tables(model, fault["loc"]):
-            return f"key '{key}': there may be several of them; write [[{header}]], not [{header}]"
+    one_table = fault["type"] == "tuple_type" and isinstance(fault.get("input"), dict)
+    if one_table and _names_tables(model, fault["loc"]):
+        return f"key '{key}': there may be several of them; write [[{key}]], not [{key}]"
     found = fault.get("input")
     shown = f" (found {found!r})" if isinstance(found, str | int | float | bool) else ""
     return f"key '{key}': {message}{shown}"
@@ -98,23 +97,15 @@ def _key(location: tuple[int | str, ...], data: Any, *, keep_last: bool) -> str:
     return key
 
 
-def _header(location: tuple[int | str, ...], data: Any) -> str:
-    """The key as a TOML table's header names it; empty where none can."""
-    return (
-        ""
-        if any(isinstance(part, int) for part in location)
-        else _key(location, data, keep_last=False)
-    )
-
-
-def _holds_tables(model: type[BaseModel], location: tuple[int | str, ...]) -> bool:
-    """Whether the key holds an array of tables."""
+def _names_tables(model: type[BaseModel], location: tuple[int | str, ...]) -> bool:
+    """Whether the key is the header of an array of tables."""
     schema = model.model_json_schema()
     node: Any = schema
     for part in location:
         node = _descend(schema, node, part)
     items = _resolve(schema, node.get("items", {}))
-    return "oneOf" in items or "properties" in items
+    nested = any(isinstance(part, int) for part in location)
+    return not nested and ("oneOf" in items or "properties" in items)
 
 
 def _sibling_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
