@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.compiled import inner_kernel, kernel
-from volery.sensors.beam_table import BeamTable
+from volery.sensors.beam_table import TABLE_ROWS, BeamTable
 from volery.sensors.mount import Mount, sensor_attitude
 from volery.vehicle.pose_history import PoseHistory, pose_at
-from volery.world.embree import DIRECTION, LANES, ORIGIN
+from volery.world.embree import DIRECTION, LANES, ORIGIN, PACKET_ROWS
 
 _LONGEST_CHORD_NS = 2_000_000
 """Packets that last longer have the pose looked up for every ray.
@@ -115,12 +115,10 @@ def aim_packets(
     Neighbouring packets often share knots; what is known already is not looked up again.
     """
     start = batch.sweep_start_ns[scan]
-    # Views from the first packet on: a sum as index could be negative, and costs a test a ray.
-    skipped = first * LANES
-    forward, left = table.direction[0, skipped:], table.direction[1, skipped:]
-    up, fraction = table.direction[2, skipped:], table.fraction[skipped:]
+    # Flat slices with constant offsets: only so the compiler sees that nothing overlaps, and makes
+    # vectors of the loop over the lanes.
+    aims, out = table.lanes.reshape(table.lanes.size), rays.reshape(rays.size)
     knots = table.knot_ns[first:]
-    total = fraction.shape[0]
     a_ns = b_ns = knots[0, 0]
     a = b = sensor_frame(batch, scan, history, start + a_ns)
     for p in range(count):
@@ -133,21 +131,22 @@ def aim_packets(
         if b_ns - a_ns > _LONGEST_CHORD_NS:
             _aim_one_by_one(table, batch, scan, history, first + p, rays[p])
             continue
-        r = p * LANES
-        for k in range(min(LANES, total - r)):
-            f = fraction[r + k]
+        q = first + p
+        aim = aims[q * TABLE_ROWS * LANES : (q + 1) * TABLE_ROWS * LANES]
+        ray = out[p * PACKET_ROWS * LANES : (p + 1) * PACKET_ROWS * LANES]
+        for k in range(LANES):
+            c, s, u, f = aim[k], aim[LANES + k], aim[2 * LANES + k], aim[3 * LANES + k]
             g = 1.0 - f
-            c, s, u = forward[r + k], left[r + k], up[r + k]
             dx = c * (g * a[3] + f * b[3]) + s * (g * a[6] + f * b[6]) + u * (g * a[9] + f * b[9])
             dy = c * (g * a[4] + f * b[4]) + s * (g * a[7] + f * b[7]) + u * (g * a[10] + f * b[10])
             dz = c * (g * a[5] + f * b[5]) + s * (g * a[8] + f * b[8]) + u * (g * a[11] + f * b[11])
             unit = 1.5 - 0.5 * (dx * dx + dy * dy + dz * dz)
-            rays[p, ORIGIN, k] = g * a[0] + f * b[0]
-            rays[p, ORIGIN + 1, k] = g * a[1] + f * b[1]
-            rays[p, ORIGIN + 2, k] = g * a[2] + f * b[2]
-            rays[p, DIRECTION, k] = dx * unit
-            rays[p, DIRECTION + 1, k] = dy * unit
-            rays[p, DIRECTION + 2, k] = dz * unit
+            ray[ORIGIN * LANES + k] = g * a[0] + f * b[0]
+            ray[(ORIGIN + 1) * LANES + k] = g * a[1] + f * b[1]
+            ray[(ORIGIN + 2) * LANES + k] = g * a[2] + f * b[2]
+            ray[DIRECTION * LANES + k] = dx * unit
+            ray[(DIRECTION + 1) * LANES + k] = dy * unit
+            ray[(DIRECTION + 2) * LANES + k] = dz * unit
 
 
 @inner_kernel
@@ -160,13 +159,12 @@ def _aim_one_by_one(
     rays: NDArray[np.float32],
 ) -> None:
     """Fill one packet (PACKET_ROWS, LANES), looking the pose up for every ray."""
-    first = packet * LANES
     start, end = table.knot_ns[packet, 0], table.knot_ns[packet, 1]
-    for k in range(min(LANES, table.fraction.shape[0] - first)):
-        r = first + k
-        after = start + round(table.fraction[r] * (end - start))
+    for k in range(LANES):
+        aim = table.lanes[packet]
+        c, s, u, f = aim[0, k], aim[1, k], aim[2, k], aim[3, k]
+        after = start + round(f * (end - start))
         frame = sensor_frame(batch, scan, history, batch.sweep_start_ns[scan] + after)
-        c, s, u = table.direction[0, r], table.direction[1, r], table.direction[2, r]
         for j in range(3):
             rays[ORIGIN + j, k] = frame[j]
             rays[DIRECTION + j, k] = c * frame[3 + j] + s * frame[6 + j] + u * frame[9 + j]
@@ -184,7 +182,7 @@ def sweep_rays(
 ) -> None:
     """Beams of one scan (6, beams) and when they see the others, for a caster in Python."""
     aim_packets(table, batch, scan, history, 0, packets.shape[0], packets)
-    for r in range(table.fraction.shape[0]):
+    for r in range(table.rays):
         i = table.beam[r]
         for j in range(3):
             rays[j, i] = packets[r // LANES, ORIGIN + j, r % LANES]

@@ -16,22 +16,27 @@ from volery.world.embree import LANES
 Array = NDArray[np.float64]
 
 
-class BeamTable(NamedTuple):
-    """R rays of a sweep in the order in which they are cast, P = ceil(R / LANES) packets.
+TABLE_ROWS = 4
 
-    The sensor's pose is looked up at the two knots of a packet and interpolated between.
+
+class BeamTable(NamedTuple):
+    """The rays of a sweep in the order in which they are cast, L = P LANES lanes in P packets.
+
+    The sensor's pose is looked up at the two knots of a packet and interpolated between. Lanes past
+    the last ray repeat it, so that kernels treat all packets alike.
     """
 
-    direction: Array
-    """(3, R) unit vectors in the sensor frame, FLU."""
-    fraction: Array
-    """(R,) time of a ray between its packet's knots, 0..1."""
+    rays: int
+    """Number of rays, one a beam."""
+    lanes: Array
+    """(P, TABLE_ROWS, LANES): unit vector x, y, z in the sensor frame, FLU, and the time of the ray
+    between its packet's knots, 0..1."""
     knot_ns: NDArray[np.int64]
     """(P, 2) after the start of the sweep."""
     seen_ns: NDArray[np.int64]
     """(P,) when a packet sees the other UAVs, after the start of the sweep."""
     beam: NDArray[np.uint32]
-    """(P LANES,) number of a ray's beam; lanes past the last ray have numbers past the last beam.
+    """(L,) number of a ray's beam; lanes past the last ray have numbers past the last beam.
 
     Unsigned, so that kernels need not test for negative indices.
     """
@@ -56,8 +61,8 @@ def row_table(direction: Array, time_ns: NDArray[np.int64]) -> BeamTable:
     place = np.arange(beams) % LANES
     step = 1.0 / np.maximum(last - first, 1)
     return BeamTable(
-        direction=np.ascontiguousarray(direction),
-        fraction=place * np.repeat(step, LANES)[:beams],
+        rays=beams,
+        lanes=in_packets(direction, place * np.repeat(step, LANES)[:beams]),
         knot_ns=np.column_stack([time_ns[first], time_ns[last]]),
         seen_ns=time_ns[np.minimum(first + LANES // 2, beams - 1)],
         beam=_padded(np.arange(beams)),
@@ -90,8 +95,10 @@ def block_table(
     packet = np.arange(len(order)) // LANES
     length = np.maximum(knots[:, 1] - knots[:, 0], 1)
     return BeamTable(
-        direction=np.ascontiguousarray(direction[:, order]),
-        fraction=(time_ns[order] - knots[packet, 0]) / length[packet],
+        rays=len(order),
+        lanes=in_packets(
+            direction[:, order], (time_ns[order] - knots[packet, 0]) / length[packet]
+        ),
         knot_ns=knots,
         seen_ns=knots.sum(axis=1) // 2,
         beam=_padded(order),
@@ -99,7 +106,15 @@ def block_table(
     )
 
 
+def in_packets(direction: Array, fraction: Array) -> Array:
+    """Lanes (P, TABLE_ROWS, LANES) of rays (3, R), (R,) in casting order."""
+    count = len(fraction)
+    ray = np.minimum(np.arange(packets_of(count) * LANES), count - 1)
+    rows = np.vstack([direction, fraction])[:, ray]
+    return np.ascontiguousarray(rows.reshape(TABLE_ROWS, -1, LANES).swapaxes(0, 1))
+
+
 def _padded(order: NDArray[np.int64]) -> NDArray[np.uint32]:
-    """The order, continued to whole packets."""
+    """The order, continued by numbers of its own up to whole packets."""
     rest = np.arange(len(order), packets_of(len(order)) * LANES)
     return np.concatenate([order, rest]).astype(np.uint32)

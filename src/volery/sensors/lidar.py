@@ -157,7 +157,7 @@ def scan_rays(
 def _rays(
     table: BeamTable, batch: LidarBatch, scan: int, history: PoseHistory
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    count = len(table.fraction)
+    count = table.rays
     rays = np.empty((6, count), dtype=np.float32)
     times = np.empty(count, dtype=np.int64)
     sweep_rays(table, batch, scan, history, new_block(count, 0).rays, rays, times)

@@ -15,7 +15,7 @@ from volery.sensors.aim_kernels import LidarBatch, aim_packets, sensor_frame
 from volery.sensors.beam_table import BeamTable
 from volery.sensors.echo_kernels import Echoes, LidarConstants, Surfaces, measure
 from volery.vehicle.pose_history import PoseHistory
-from volery.world.embree import DIRECTION, FAR, LANES, NORMAL
+from volery.world.embree import DIRECTION, FAR, LANES, NORMAL, PACKET_ROWS
 from volery.world.scene_kernels import RayBlock, SceneHandle, cast_block, near_bodies
 
 PIECE = 2048 // LANES
@@ -67,17 +67,21 @@ def _note(
     kind, beam = surfaces.material[row], table.beam[start:]
     if ordered:
         distance, cosine, kind = distance[start:], cosine[start:], kind[start:]
+    flat = rays.reshape(rays.size)
     for p in range(packets):
+        ray, met = flat[p * PACKET_ROWS * LANES : (p + 1) * PACKET_ROWS * LANES], instance[p]
         for k in range(LANES):
-            x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
+            x, y = ray[NORMAL * LANES + k], ray[(NORMAL + 1) * LANES + k]
+            z = ray[(NORMAL + 2) * LANES + k]
             along = (
-                x * rays[p, DIRECTION, k]
-                + y * rays[p, DIRECTION + 1, k]
-                + z * rays[p, DIRECTION + 2, k]
+                x * ray[DIRECTION * LANES + k]
+                + y * ray[(DIRECTION + 1) * LANES + k]
+                + z * ray[(DIRECTION + 2) * LANES + k]
             )
             squared = max(x * x + y * y + z * z, np.float32(1e-30))
-            rays[p, NORMAL, k] = abs(along) / np.sqrt(squared)
-            rays[p, FAR, k] = rays[p, FAR, k] if instance[p, k] >= 0 else np.float32(np.inf)
+            ray[NORMAL * LANES + k] = abs(along) / np.sqrt(squared)
+            far = ray[FAR * LANES + k]
+            ray[FAR * LANES + k] = far if met[k] >= 0 else np.float32(np.inf)
         if ordered:
             for k in range(LANES):
                 distance[p * LANES + k] = rays[p, FAR, k]
@@ -131,7 +135,7 @@ def scan_batch(
     Scans of several pieces need a row each in `surfaces`, which `measure_batch` reads; those of one
     piece share the first row of a thread's own memory.
     """
-    total, packets = table.fraction.shape[0], table.seen_ns.shape[0]
+    total, packets = table.rays, table.seen_ns.shape[0]
     pieces = (packets + PIECE - 1) // PIECE
     interval = max(bodies_end_ns - bodies_start_ns, 1)
     while True:

@@ -18,7 +18,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PrivateAttr, model_
 
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.sensors.beam_file import BeamList, read_beams
-from volery.sensors.beam_table import BeamTable, block_table, row_table
+from volery.sensors.beam_table import BeamTable, block_table, in_packets, row_table
 from volery.sensors.model import SensorModel
 from volery.world.embree import LANES
 
@@ -77,7 +77,8 @@ class Pattern(SensorModel):
         """The beams of a sweep, counted from 0, for kernels."""
         if self.is_fixed:
             return self._first_table
-        return self._first_table._replace(direction=self.directions(sweep))
+        fraction = self._first_table.lanes[:, -1].reshape(-1)[: self.beam_count]
+        return self._first_table._replace(lanes=in_packets(self.directions(sweep), fraction))
 
     @cached_property
     def _first_table(self) -> BeamTable:

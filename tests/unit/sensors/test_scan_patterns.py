@@ -24,11 +24,13 @@ def test_every_table_casts_every_beam_once_at_its_own_time(name):
     np.testing.assert_array_equal(np.sort(table.beam[: model.beams]), np.arange(model.beams))
     direction = pattern.directions(0)
     np.testing.assert_allclose(np.linalg.norm(direction, axis=0), 1.0, atol=1e-12)
-    np.testing.assert_array_equal(table.direction, direction[:, table.beam[: model.beams]])
-    assert table.fraction.min() >= 0.0
-    assert table.fraction.max() <= 1.0
+    rays = table.lanes.swapaxes(0, 1).reshape(4, -1)[:, : model.beams]
+    fraction = rays[3]
+    np.testing.assert_array_equal(rays[:3], direction[:, table.beam[: model.beams]])
+    assert fraction.min() >= 0.0
+    assert fraction.max() <= 1.0
     knots = table.knot_ns[np.arange(model.beams) // LANES]
-    time = knots[:, 0] + table.fraction * (knots[:, 1] - knots[:, 0])
+    time = knots[:, 0] + fraction * (knots[:, 1] - knots[:, 0])
     np.testing.assert_allclose(time, pattern.time_ns[table.beam[: model.beams]], atol=1.01)
     assert model.sweep_duration_ns <= 1e9 / pattern.rate_hz
     # A pose is looked up at least every 2 ms, so that the straight line between two is exact.
@@ -38,8 +40,7 @@ def test_every_table_casts_every_beam_once_at_its_own_time(name):
 @pytest.mark.parametrize(("name", "rings"), RINGS.items())
 def test_packets_of_ring_scanners_run_close_together(name, rings):
     table = load_lidar(name).scan.table(0)
-    whole = table.direction.shape[1] // LANES * LANES
-    packets = table.direction[:, :whole].reshape(3, -1, LANES)
+    packets = table.lanes[:, :3].swapaxes(0, 1)
     cosine = np.einsum("ipk,ip->pk", packets, packets[:, :, 0]).min(axis=1)
     # Some staggered or ragged tiles are wide; the most must pass Embree's coherent traversal.
     assert (cosine > 0.9).mean() > 0.98
