@@ -15,6 +15,7 @@ from volery.vehicle.airframe import Airframe, airframe_names, hover_thrusts, loa
 from volery.vehicle.contact import standing_pose
 from volery.vehicle.plant import contact_points
 from volery.world.terrain import Terrain
+from volery.world.weather import Weather
 
 FLAT = Terrain.flat(1000.0, 0.0, (-500.0, -500.0))
 
@@ -131,8 +132,8 @@ def test_hovers_still_also_in_wind(airframe):
     fleet = Fleet([airframe], [[0, 0, 20.0]], [[0, 0, 0, 1.0]])
     fleet.advance(3000, FLAT.grid)
     np.testing.assert_allclose(fleet.state.position_map[0], [0, 0, 20], atol=1e-3)
-    wind = (0.25 * airframe.limits.speed_m_s, 0.0, 0.0)
-    fleet.advance(15_000, FLAT.grid, wind)
+    fleet.set_weather(Weather((0.25 * airframe.limits.speed_m_s, 0.0, 0.0)))
+    fleet.advance(15_000, FLAT.grid)
     np.testing.assert_allclose(fleet.state.position_map[0], [0, 0, 20], atol=0.05)
     assert np.linalg.norm(fleet.state.velocity_map[0]) < 0.02
 
@@ -156,10 +157,11 @@ def test_numbers_are_sane(airframe):
 
 def flown(airframe, slices):
     fleet = on_ground(airframe, 2)
+    fleet.set_weather(Weather((0.5, 0.2, 0.0)))
     for i in (0, 1):
         fleet.take_off(i, 1.0)
     for steps in slices:
-        fleet.advance(steps, FLAT.grid, (0.5, 0.2, 0.0))
+        fleet.advance(steps, FLAT.grid)
         if fleet.step == 3000:
             fleet.command_position(0, [3.0, 1.0, 1.5])
             fleet.land(1)

@@ -16,6 +16,7 @@ from volery.vehicle.identified import FirstOrder, SecondOrder, load_identified, 
 from volery.vehicle.kinematic import Kinematic
 from volery.vehicle.plants import RigidBody
 from volery.world.terrain import Terrain
+from volery.world.weather import Weather
 
 IDENTIFIED, KINEMATIC = load_identified("f450"), Kinematic()
 PLANTS = {"identified": IDENTIFIED, "kinematic": KINEMATIC}
@@ -78,11 +79,13 @@ def mixed_fleet():
 
 def test_slicing_changes_nothing():
     whole, sliced = mixed_fleet(), mixed_fleet()
-    whole.advance(4000, FLAT.grid, (2, 1, 0))
+    for fleet in (whole, sliced):
+        fleet.set_weather(Weather((2, 1, 0)))
+    whole.advance(4000, FLAT.grid)
     rng = np.random.default_rng(0)
     while sliced.step < 4000:
         slice_ = min(int(rng.choice([1, 2, 3, 5, 7, 25, 100])), 4000 - sliced.step)
-        sliced.advance(slice_, FLAT.grid, (2, 1, 0))
+        sliced.advance(slice_, FLAT.grid)
     for key in ("uavs", "references"):
         assert whole.get_state()[key].tobytes() == sliced.get_state()[key].tobytes()
     np.testing.assert_array_equal(whole.history.position, sliced.history.position)
@@ -190,9 +193,10 @@ def test_free_motion_is_linear_drag_and_gravity():
 
 def test_wind_pushes_and_the_outer_loop_answers():
     fleet = flying(IDENTIFIED)
-    fleet.advance(500, FLAT.grid, (4, 0, 0))
+    fleet.set_weather(Weather((4, 0, 0)))
+    fleet.advance(500, FLAT.grid)
     assert fleet.state.position_map[0, 0] > 0.1
-    fleet.advance(20_000, FLAT.grid, (4, 0, 0))
+    fleet.advance(20_000, FLAT.grid)
     np.testing.assert_allclose(fleet.state.position_map[0], [0, 0, 50], atol=0.01)
 
 
