@@ -1,4 +1,4 @@
-"""One step of a UAV whose plant is not the rigid body, apart from the fused step's main path."""
+"""One step of a UAV whose plant is not the rigid body."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 from volery.control.flight_modes import guide
 from volery.control.kinematic_flight import fly_kinematic
 from volery.control.setpoints import ControlLevel
-from volery.vehicle.compiled import apart_kernel
+from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.contact import NO_TOUCH
 from volery.vehicle.identified import accelerate_identified
 from volery.vehicle.kernels import carry, meet_ground, near_ground
@@ -16,13 +16,15 @@ from volery.vehicle.plants import KINEMATIC_MOTION
 _STOPPED = int(ControlLevel.STOPPED)
 
 
-@apart_kernel
+@inner_kernel
 def fly_otherwise(
     body: Any,
     pilot: Any,
     estimate: Any,
     model: Any,
     references: Any,
+    i: int,
+    now: int,
     paths: Any,
     wind: tuple[float, float, float],
     grid: Any,
@@ -35,7 +37,7 @@ def fly_otherwise(
 ) -> int:
     """Control and motion of an identified or kinematic plant; how it touched the ground.
 
-    model: a `step.MODEL` row. references: (L, 6), see `vehicle.identified`. wind: m/s, map.
+    model: a `step.MODEL` row. references, i, now: see `vehicle.identified`. wind: m/s, map.
     """
     plant, gains = model.plant, model.gains
     if model.kind == KINEMATIC_MOTION:
@@ -46,7 +48,7 @@ def fly_otherwise(
     if guiding:
         guide(pilot, estimate, gains, paths, step, dt)
     live = pilot.level != _STOPPED
-    accelerate_identified(body, plant, model.identified, pilot, live, references, step, wind, dt)
+    accelerate_identified(body, plant, model.identified, pilot, live, references, i, now, wind, dt)
     touch = NO_TOUCH
     if near_ground(body, dt):
         touch = meet_ground(body, plant, pilot, grid, steepest, bounce, scratch, step + 1, dt)

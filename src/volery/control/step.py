@@ -101,6 +101,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
         guiding = step % guidance_steps == 0
         turning = step % attitude_steps == 0
         row = (step + 1) % rows
+        slot = step % references.shape[1]
         for i in range(count):
             body = uavs[i].body
             pilot = uavs[i].pilot
@@ -132,7 +133,9 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                         pilot,
                         estimate,
                         model,
-                        references[i],
+                        references,
+                        i,
+                        slot,
                         paths,
                         (wind_x, wind_y, wind_z),
                         grid,

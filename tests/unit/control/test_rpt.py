@@ -96,7 +96,7 @@ def test_integrals_do_not_wind_up_in_saturation():
     """Thrown off at growing speed: a longer saturation leaves no larger swing to the other side."""
     swings = []
     for speed in (5.0, 10.0, 20.0, 30.0):
-        errors, integrals = double_integrator(30.0, (0, 0, 0), (speed, 0, 0), tick=4e-3)
+        errors, integrals = double_integrator(45.0, (0, 0, 0), (speed, 0, 0), tick=4e-3)
         swings.append(-errors[:, 0].min())
         assert errors[:, 0].max() > speed**2 / 40  # far beyond what one second could bring back
         bound = gains_of(F450, 1e-3)["integral_limit"][0]
