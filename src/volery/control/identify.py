@@ -100,9 +100,10 @@ def validate(model: IdentifiedModel, airframe: Airframe) -> FitError:
 
 def to_toml(model: IdentifiedModel) -> str:
     """The model as the text of a data file."""
+    order = " --order 1" if model.roll.kind == "first_order" else ""
     lines = [
         f"# Closed loops of the airframe '{model.name}' from wanted to true attitude and thrust.",
-        f"# Made by: volery identify {model.name}",
+        f"# Made by: volery identify {model.name}{order} --out {model.name}.toml",
         "# Not measured on a real vehicle: identified from this project's rigid body.",
         "",
     ]

@@ -1,4 +1,4 @@
-"""One step of a UAV whose plant is not the rigid body, apart from the fused step's main path."""
+"""One step of a UAV whose plant is not the rigid body."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from volery.control.belief import believe_attitude, believe_place
 from volery.control.flight_modes import guide
 from volery.control.kinematic_flight import fly_kinematic
 from volery.control.setpoints import ControlLevel
-from volery.vehicle.compiled import apart_kernel
+from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.contact import NO_TOUCH
 from volery.vehicle.identified import accelerate_identified
 from volery.vehicle.kernels import carry, meet_ground, near_ground
@@ -17,13 +17,15 @@ from volery.vehicle.plants import KINEMATIC_MOTION
 _STOPPED = int(ControlLevel.STOPPED)
 
 
-@apart_kernel
+@inner_kernel
 def fly_otherwise(
     body: Any,
     pilot: Any,
     belief: Any,
     model: Any,
     references: Any,
+    i: int,
+    now: int,
     paths: Any,
     grid: Any,
     steepest: float,
@@ -35,7 +37,7 @@ def fly_otherwise(
 ) -> int:
     """Control and motion of an identified or kinematic plant; how it touched the ground.
 
-    model: a `step.MODEL` row. references: (L, 6), see `vehicle.identified`.
+    model: a `step.MODEL` row. references, i, now: see `vehicle.identified`.
     """
     plant, gains = model.plant, model.gains
     if model.kind == KINEMATIC_MOTION:
@@ -48,7 +50,7 @@ def fly_otherwise(
         believe_attitude(belief, body)
         guide(pilot, belief, gains, paths, step, dt)
     live = pilot.level != _STOPPED
-    accelerate_identified(body, plant, model.identified, pilot, live, references, step, dt)
+    accelerate_identified(body, plant, model.identified, pilot, live, references, i, now, dt)
     touch = NO_TOUCH
     if near_ground(body, dt):
         touch = meet_ground(body, plant, pilot, grid, steepest, bounce, scratch, step + 1, dt)

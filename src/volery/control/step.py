@@ -130,6 +130,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
             if look:
                 find_downwash(uavs, models, jets)
                 look = False
+        slot = step % references.shape[1]
         for i in range(count):
             body = uavs[i].body
             pilot = uavs[i].pilot
@@ -172,7 +173,9 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                         pilot,
                         belief,
                         model,
-                        references[i],
+                        references,
+                        i,
+                        slot,
                         paths,
                         grid,
                         steepest,

@@ -25,8 +25,3 @@ def fused_kernel(function: F) -> F:
 def inner_kernel(function: F) -> F:
     """Compile a part of a fused kernel, like `core.compiled.inner_kernel`."""
     return compiled.inner_kernel(function, forceinline=True, fastmath=_FASTMATH)
-
-
-def apart_kernel(function: F) -> F:
-    """Compile a large part that few vehicles need, without inlining it into the fused kernel."""
-    return compiled.inner_kernel(function, fastmath=_FASTMATH)

@@ -167,27 +167,27 @@ def accelerate_identified(
     model: Any,
     command: Any,
     live: bool,
-    references: Any,
-    step: int,
+    references: Array,
+    i: int,
+    now: int,
     dt: float,
 ) -> None:
     """Like `kernels.accelerate`: take velocity and rates of a `BODY` to the end of the step.
 
     command: a record with `attitude`, `thrust` and `yaw_rate`, and `rotor_reference` to be filled.
-    live: whether its controllers run. references: (L, 6), the commands of the last steps.
-    wind: m/s, map.
+    live: whether its controllers run. references: (N, L, 6), commands of the last L steps in a
+    ring; i: whose; now: the ring's row of this step. wind: m/s, map.
     """
-    rows = references.shape[0]
-    now = references[step % rows]
     for k in range(4):
-        now[k] = command.attitude[k]
-    now[4] = command.thrust if live else 0.0
-    now[5] = command.yaw_rate
+        references[i, now, k] = command.attitude[k]
+    references[i, now, 4] = command.thrust if live else 0.0
+    references[i, now, 5] = command.yaw_rate
 
     half = 0.5 * dt
-    thrust = _thrust(body, plant, model, command, references[(step - model.heave_delay) % rows][4])
+    row = _row_before(references, now, model.heave_delay)
+    thrust = _thrust(body, plant, model, command, references[i, row, 4])
     if live:
-        _turn(body, model, references[(step - model.attitude_delay) % rows], dt)
+        _turn(body, model, references, i, _row_before(references, now, model.attitude_delay), dt)
     else:
         for k in range(3):
             body.free_angular_acceleration[k] = body.angular_acceleration_body[k] = 0.0
@@ -226,6 +226,12 @@ def accelerate_identified(
 
 
 @inner_kernel
+def _row_before(references: Array, now: int, delay: int) -> int:
+    row = now - delay
+    return row + references.shape[1] if row < 0 else row
+
+
+@inner_kernel
 def _thrust(body: Any, plant: Any, model: Any, command: Any, wanted: float) -> float:
     """Thrust at mid-step, N; it is kept as the speed at which all rotors alike would give it."""
     whole = plant.thrust_constant * plant.rotors
@@ -243,12 +249,20 @@ def _thrust(body: Any, plant: Any, model: Any, command: Any, wanted: float) -> f
 
 
 @inner_kernel
-def _turn(body: Any, model: Any, wanted: Any, dt: float) -> None:
+def _turn(body: Any, model: Any, references: Array, i: int, row: int, dt: float) -> None:
     """Rates at the step's end, and the acceleration with which `carry` turns by the right angle."""
-    px, py, turn = _angles_to(body, model, wanted)
+    px, py, turn = _angles_to(
+        body,
+        model,
+        references[i, row, 0],
+        references[i, row, 1],
+        references[i, row, 2],
+        references[i, row, 3],
+    )
     x, y, z, w = four(body.attitude)
-    ux, uy = wanted[5] * 2.0 * (x * z - y * w), wanted[5] * 2.0 * (y * z + x * w)
-    uz = wanted[5] * (1.0 - 2.0 * (x * x + y * y))
+    rate = references[i, row, 5]
+    ux, uy = rate * 2.0 * (x * z - y * w), rate * 2.0 * (y * z + x * w)
+    uz = rate * (1.0 - 2.0 * (x * x + y * y))
     limit = model.rate_limit
     _advance(body, 0, model.roll, px, ux, limit, dt)
     _advance(body, 1, model.pitch, py, uy, limit, dt)
@@ -267,21 +281,24 @@ def _advance(
     way = min(max(way, -limit * dt), limit * dt)
     rate = min(max(rate, -limit), limit)
     body.omega_body[axis] = rate
-    body.angular_acceleration_body[axis] = (rate - before) / dt
-    body.free_angular_acceleration[axis] = 2.0 * (rate - way / dt) / dt
+    back = 1.0 / dt
+    body.angular_acceleration_body[axis] = back * (rate - before)
+    body.free_angular_acceleration[axis] = 2.0 * back * (rate - back * way)
 
 
 @inner_kernel
-def _angles_to(body: Any, model: Any, wanted: Any) -> tuple[float, float, float]:
+def _angles_to(
+    body: Any, model: Any, qx: float, qy: float, qz: float, qw: float
+) -> tuple[float, float, float]:
     """Angles (rad) about the body's axes to the wanted attitude, its tilt times the loops' gains.
 
     Tilt and turn apart, as the attitude controller does it (`control.rates_attitude`).
     """
     # wanted = turn about z * tilt without z; the tilt times the gains
-    qx, qy, qz, qw = wanted[0], wanted[1], wanted[2], wanted[3]
     n = math.sqrt(qz * qz + qw * qw)
     if n > 1e-6:
-        c, s = qw / n, qz / n
+        k = 1.0 / n
+        c, s = k * qw, k * qz
         tx = model.roll_gain * (c * qx + s * qy)
         ty = model.pitch_gain * (c * qy - s * qx)
         tw = math.sqrt(max(1.0 - tx * tx - ty * ty, 0.0))

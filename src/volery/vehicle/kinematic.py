@@ -63,7 +63,7 @@ def drive(body: Any, ux: float, uy: float, uz: float, rate: float, dt: float) ->
     """Move with (ux, uy, uz) m/s, forward, left and up, turning at `rate` rad/s: along an arc."""
     c, s = _heading(body)
     h = 0.5 * rate * dt
-    ch, sh = math.cos(h), math.sin(h)
+    ch, sh = _cosine_and_sine(h)
     chord = dt * (sh / h if abs(h) > 1e-5 else 1.0 - h * h / 6.0)
     cm, sm = c * ch - s * sh, s * ch + c * sh  # the mean heading of the step
     px = body.position_map[0] + chord * (cm * ux - sm * uy)
@@ -100,9 +100,10 @@ def put(
     body.ground_budget -= way
     body.contact_budget -= way
     body.separation_budget -= way
-    body.acceleration_map[0] = (vx - body.velocity_map[0]) / dt
-    body.acceleration_map[1] = (vy - body.velocity_map[1]) / dt
-    body.acceleration_map[2] = (vz - body.velocity_map[2]) / dt
+    back = 1.0 / dt
+    body.acceleration_map[0] = back * (vx - body.velocity_map[0])
+    body.acceleration_map[1] = back * (vy - body.velocity_map[1])
+    body.acceleration_map[2] = back * (vz - body.velocity_map[2])
     body.position_map[0], body.position_map[1], body.position_map[2] = px, py, pz
     body.velocity_map[0], body.velocity_map[1], body.velocity_map[2] = vx, vy, vz
     body.on_ground = False
@@ -111,9 +112,16 @@ def put(
 @inner_kernel
 def turn_by(body: Any, rate: float, dt: float) -> None:
     """Stand level and turn at `rate` rad/s for a step."""
+    x, y, z, w = four(body.attitude)
+    if x == 0.0 and y == 0.0:
+        ch, sh = _cosine_and_sine(0.5 * rate * dt)
+        z, w = z * ch + w * sh, w * ch - z * sh
+        n = 1.5 - 0.5 * (z * z + w * w)  # a Newton step to unit length
+        body.attitude[2], body.attitude[3] = n * z, n * w
+        _spin(body, rate, dt)
+        return
     c, s = _heading(body)
-    angle = rate * dt
-    ct, st = math.cos(angle), math.sin(angle)
+    ct, st = _cosine_and_sine(rate * dt)
     face(body, c * ct - s * st, s * ct + c * st, rate, dt)
 
 
@@ -131,10 +139,28 @@ def face(body: Any, c: float, s: float, rate: float, dt: float) -> None:
         w = 0.5 * s / z
     body.attitude[0] = body.attitude[1] = 0.0
     body.attitude[2], body.attitude[3] = z, w
-    for k in range(3):
-        last = rate if k == 2 else 0.0
-        body.angular_acceleration_body[k] = (last - body.omega_body[k]) / dt
-        body.omega_body[k] = last
+    _spin(body, rate, dt)
+
+
+@inner_kernel
+def _spin(body: Any, rate: float, dt: float) -> None:
+    """Body rates of a level vehicle."""
+    back = 1.0 / dt
+    body.angular_acceleration_body[0] = -back * body.omega_body[0]
+    body.angular_acceleration_body[1] = -back * body.omega_body[1]
+    body.angular_acceleration_body[2] = back * (rate - body.omega_body[2])
+    body.omega_body[0] = body.omega_body[1] = 0.0
+    body.omega_body[2] = rate
+
+
+@inner_kernel
+def _cosine_and_sine(angle: float) -> tuple[float, float]:
+    """Of an angle that is small most of the time: the series errs by 1e-17 where it is used."""
+    if abs(angle) > 0.02:
+        return math.cos(angle), math.sin(angle)
+    q = angle * angle
+    cosine = 1.0 - q * (0.5 - q * (1.0 / 24.0 - q * (1.0 / 720.0)))
+    return cosine, angle * (1.0 - q * (1.0 / 6.0 - q * (1.0 / 120.0 - q * (1.0 / 5040.0))))
 
 
 @inner_kernel
