@@ -15,7 +15,7 @@ from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.battery import drain
 from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
-from volery.vehicle.downwash import Jets, find_downwash
+from volery.vehicle.downwash import find_downwash
 from volery.vehicle.fleet import BODY
 from volery.vehicle.ground_effect import feel_ground, feels_ground
 from volery.vehicle.kernels import accelerate, carry, meet_ground, near_ground
@@ -53,7 +53,7 @@ EVENTS_A_STEP = 4
 def advance_fleet(  # noqa: PLR0912, PLR0915
     uavs: NDArray[np.void],
     models: NDArray[np.void],
-    jets: Jets,
+    jets: NDArray[np.void],
     heights: Array,
     origin_x: float,
     origin_y: float,
@@ -75,7 +75,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
 ) -> tuple[int, int, bool]:
     """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
 
-    jets: room for the search of neighbours (`new_jets`). Ends early after a step in which a budget
+    jets: room of `new_jets` for the search of neighbours. Ends early after a step in which a budget
     ran out, the events' buffer grew full or, with `event_ends`, anything was noted. Returns the
     steps done, the events written, and whether a budget ran out.
     """
@@ -102,7 +102,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
             plant = models[uavs[i].model].plant
             if guiding:
                 air = body.air_velocity_map
-                air[0], air[1], air[2] = wind_x, wind_y, wind_z - jets.downwash[i]
+                air[0], air[1], air[2] = wind_x, wind_y, wind_z - jets[i].downwash
             if draining and plant.battery.capacity > 0.0 and drain(body, plant, pilot):
                 _note(events[written], step + 1, i, BATTERY_FELL, pilot.mode, 0.0, body)
                 written += 1
