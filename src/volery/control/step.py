@@ -18,7 +18,7 @@ from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.battery import drain
 from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
-from volery.vehicle.downwash import Jets, find_downwash
+from volery.vehicle.downwash import find_downwash
 from volery.vehicle.fleet import BODY
 from volery.vehicle.ground_effect import feel_ground, feels_ground
 from volery.vehicle.identified import IDENTIFIED
@@ -79,7 +79,7 @@ EVENTS_A_STEP = 4
 def advance_fleet(  # noqa: PLR0912, PLR0915
     uavs: NDArray[np.void],
     models: NDArray[np.void],
-    jets: Jets,
+    jets: NDArray[np.void],
     heights: Array,
     origin_x: float,
     origin_y: float,
@@ -145,7 +145,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
             else:
                 mode = pilot.mode
                 if guiding:
-                    body.air_velocity_map[2] -= jets.downwash[i]
+                    body.air_velocity_map[2] -= jets[i].downwash
                 belief = uavs[i].belief
                 if model.kind == RIGID_BODY:
                     if guiding:

@@ -24,15 +24,13 @@ taken in the order of places, depends on places alone.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.plant import AIR_DENSITY
-
-Array = NDArray[np.float64]
 
 SPREAD = 0.1
 """Growth of the jet's radius with depth."""
@@ -50,115 +48,119 @@ _REFILL_BELOW = 0.5
 """m: who has less left looks around when somebody must, so that looks come together."""
 
 
-class Jets(NamedTuple):
-    """What a look around needs for N UAVs, kept from call to call.
+JET = np.dtype(
+    [
+        ("row", "i8"),  # of the UAV at this place in the order
+        ("copy", "i8"),  # of the scenario, that UAV's
+        ("x", "f8"),
+        ("y", "f8"),
+        ("z", "f8"),
+        ("radius", "f8"),
+        ("downwash", "f8"),  # m/s downwards at the UAV whose row has this number
+    ],
+    align=True,
+)
+"""What a look around notes. No state: of an earlier look only `row` is read, and any order of the
+rows gives the same result."""
 
-    No state: only `order` is read before it is written, and any order gives the same result.
-    """
 
-    order: NDArray[np.int64]
-    """(N,) rows, sorted by place."""
-    copy: NDArray[np.int64]
-    """(N,) copy of the scenario of UAV `order[k]`."""
-    place: Array
-    """(N, 4) its x, y, z and the radius of its jet, m."""
-    downwash: Array
-    """(N,) m/s: speed of the air downwards at each row's UAV."""
-
-
-def new_jets(count: int) -> Jets:
-    """Room for `count` UAVs."""
-    return Jets(np.arange(count), np.zeros(count, np.int64), np.zeros((count, 4)), np.zeros(count))
+def new_jets(count: int) -> NDArray[np.void]:
+    """Room (N,) of `JET` for a fleet of `count` UAVs."""
+    jets = np.zeros(count, JET)
+    jets["row"] = np.arange(count)
+    return jets
 
 
 @inner_kernel
-def find_downwash(uavs: NDArray[np.void], models: NDArray[np.void], jets: Jets) -> None:
-    """Fill `jets.downwash` with the speed of the jets over each UAV, at the present places."""
+def find_downwash(uavs: NDArray[np.void], models: NDArray[np.void], jets: Any) -> None:
+    """Fill the `downwash` of `jets`, from the present places and thrusts."""
     count = uavs.shape[0]
     waiting = False
     for i in range(count):
-        jets.downwash[i] = 0.0
+        jets[i].downwash = 0.0
         waiting = waiting or uavs[i].body.downwash_budget <= 0.0
     if not waiting:
         return
     reach = _LOOK_BEYOND + _line_up(uavs, models, jets)
     for k in range(count):
-        if uavs[jets.order[k]].body.downwash_budget < _REFILL_BELOW:
+        if uavs[jets[k].row].body.downwash_budget < _REFILL_BELOW:
             _refill_budgets(uavs, jets, k, reach)
     for k in range(count):
-        i = jets.order[k]
+        i = jets[k].row
         if uavs[i].body.downwash_budget <= 0.0:
-            jets.downwash[i] = _jets_over(uavs, models, jets, k, reach)
+            jets[i].downwash = _jets_over(uavs, models, jets, k, reach)
 
 
 @inner_kernel
-def _line_up(uavs: Any, models: Any, jets: Jets) -> float:
+def _line_up(uavs: Any, models: Any, jets: Any) -> float:
     """Sort the UAVs by copy, x, y, z; the half width of the widest jet between them, m."""
     count = uavs.shape[0]
     low, high, widest = math.inf, -math.inf, 0.0
     for k in range(count):  # by insertion: from one look to the next little changes
-        i = jets.order[k]
+        i = jets[k].row
         body = uavs[i].body
         x, y, z = body.position_map[0], body.position_map[1], body.position_map[2]
         radius = models[uavs[i].model].plant.jet_radius
         low, high, widest = min(low, z), max(high, z), max(widest, radius)
         n = k
-        while n > 0 and _is_before(uavs[i].copy, x, y, z, jets, n - 1):
-            jets.order[n] = jets.order[n - 1]
-            jets.copy[n] = jets.copy[n - 1]
-            for c in range(4):
-                jets.place[n, c] = jets.place[n - 1, c]
+        while n > 0 and _is_before(uavs[i].copy, x, y, z, jets[n - 1]):
+            _note(jets[n], jets[n - 1].row, jets[n - 1].copy, jets[n - 1].radius)
+            jets[n].x, jets[n].y, jets[n].z = jets[n - 1].x, jets[n - 1].y, jets[n - 1].z
             n -= 1
-        jets.order[n] = i
-        jets.copy[n] = uavs[i].copy
-        place = jets.place[n]
-        place[0], place[1], place[2], place[3] = x, y, z, radius
+        _note(jets[n], i, uavs[i].copy, radius)
+        jets[n].x, jets[n].y, jets[n].z = x, y, z
     return EDGE * (widest + SPREAD * min(high - low, DEPTH * widest))
 
 
 @inner_kernel
-def _is_before(copy: int, x: float, y: float, z: float, jets: Jets, n: int) -> bool:
-    place = jets.place[n]
-    if copy != jets.copy[n]:
-        return bool(copy < jets.copy[n])
-    if x != place[0]:
-        return bool(x < place[0])
-    if y != place[1]:
-        return bool(y < place[1])
-    return bool(z < place[2])
+def _note(jet: Any, row: int, copy: int, radius: float) -> None:
+    jet.row = row
+    jet.copy = copy
+    jet.radius = radius
 
 
 @inner_kernel
-def _refill_budgets(uavs: Any, jets: Jets, k: int, reach: float) -> None:
+def _is_before(copy: int, x: float, y: float, z: float, other: Any) -> bool:
+    if copy != other.copy:
+        return bool(copy < other.copy)
+    if x != other.x:
+        return bool(x < other.x)
+    if y != other.y:
+        return bool(y < other.y)
+    return bool(z < other.z)
+
+
+@inner_kernel
+def _refill_budgets(uavs: Any, jets: Any, k: int, reach: float) -> None:
     """Share the gap to each neighbour of UAV number `k` in order between the two of them."""
     budget = 0.5 * _LOOK_BEYOND * _INVERSE_SLANT
-    radius = jets.place[k, 3]
+    radius = jets[k].radius
     first, last = _window(jets, k, reach)
     for n in range(first, last):
-        if n != k and abs(jets.place[n, 1] - jets.place[k, 1]) < reach:
+        if n != k and abs(jets[n].y - jets[k].y) < reach:
             r, s = _offset(jets, k, n)
-            half = 0.5 * min(_gap(r, s, jets.place[n, 3]), _gap(r, -s, radius))
+            half = 0.5 * min(_gap(r, s, jets[n].radius), _gap(r, -s, radius))
             budget = min(budget, half)
             if half < _LOOK_BEYOND:
-                other = uavs[jets.order[n]].body
+                other = uavs[jets[n].row].body
                 other.downwash_budget = min(other.downwash_budget, half)
-    uavs[jets.order[k]].body.downwash_budget = budget
+    uavs[jets[k].row].body.downwash_budget = budget
 
 
 @inner_kernel
-def _jets_over(uavs: Any, models: Any, jets: Jets, k: int, reach: float) -> float:
+def _jets_over(uavs: Any, models: Any, jets: Any, k: int, reach: float) -> float:
     """Speed of the air downwards at UAV number `k` in order, m/s, summed in that order."""
     speed = 0.0
     first, last = _window(jets, k, reach)
     for n in range(first, last):
         r, s = _offset(jets, k, n)
-        if n != k and _gap(r, s, jets.place[n, 3]) < 0.0:
-            body = uavs[jets.order[n]].body
+        if n != k and _gap(r, s, jets[n].radius) < 0.0:
+            body = uavs[jets[n].row].body
             thrust = 0.0
-            for rotor in range(models[uavs[jets.order[n]].model].plant.rotors):
+            for rotor in range(models[uavs[jets[n].row].model].plant.rotors):
                 w = body.rotor_speed[rotor]
                 thrust += body.rotor_lift[rotor] * w * w
-            speed += jet_speed(thrust, jets.place[n, 3], r, s)
+            speed += jet_speed(thrust, jets[n].radius, r, s)
     return speed
 
 
@@ -191,21 +193,21 @@ def _gap(r: float, s: float, radius: float) -> float:
 
 
 @inner_kernel
-def _offset(jets: Jets, k: int, n: int) -> tuple[float, float]:
+def _offset(jets: Any, k: int, n: int) -> tuple[float, float]:
     """How far number `k` in order is off the vertical through number `n`, and below it; m."""
-    dx = jets.place[k, 0] - jets.place[n, 0]
-    dy = jets.place[k, 1] - jets.place[n, 1]
-    return math.sqrt(dx * dx + dy * dy), jets.place[n, 2] - jets.place[k, 2]
+    dx = jets[k].x - jets[n].x
+    dy = jets[k].y - jets[n].y
+    return math.sqrt(dx * dx + dy * dy), jets[n].z - jets[k].z
 
 
 @inner_kernel
-def _window(jets: Jets, k: int, reach: float) -> tuple[int, int]:
+def _window(jets: Any, k: int, reach: float) -> tuple[int, int]:
     """Range in order of the UAVs in the same copy within `reach` m in x of number `k`."""
-    copy, x = jets.copy[k], jets.place[k, 0]
+    copy, x = jets[k].copy, jets[k].x
     first = k
-    while first > 0 and jets.copy[first - 1] == copy and x - jets.place[first - 1, 0] <= reach:
+    while first > 0 and jets[first - 1].copy == copy and x - jets[first - 1].x <= reach:
         first -= 1
     last = k + 1
-    while last < len(jets.order) and jets.copy[last] == copy and jets.place[last, 0] - x <= reach:
+    while last < len(jets) and jets[last].copy == copy and jets[last].x - x <= reach:
         last += 1
     return first, last

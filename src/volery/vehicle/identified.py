@@ -176,7 +176,7 @@ def accelerate_identified(
 
     command: a record with `attitude`, `thrust` and `yaw_rate`, and `rotor_reference` to be filled.
     live: whether its controllers run. references: (N, L, 6), commands of the last L steps in a
-    ring; i: whose; now: the ring's row of this step. wind: m/s, map.
+    ring; i: whose; now: the ring's row of this step.
     """
     for k in range(4):
         references[i, now, k] = command.attitude[k]
