@@ -14,35 +14,33 @@ from volery.world.weather.air import air_velocity
 
 @inner_kernel
 def refresh_air(
-    uavs: NDArray[np.void],
+    uav: Any,
+    downwash: float,
     air: Any,
     nodes: NDArray[np.float64],
     grid: TerrainGrid,
     tick: int,
     period: float,
 ) -> None:
-    """Set `air_velocity_map` of every UAV that is awake; it keeps that until the next tick.
+    """Set `air_velocity_map` of a `UAV` record; it keeps that until the next tick.
 
-    air, nodes: the weather, see `world.weather.table`. tick: number of this guidance tick since the
-    start. period: s of a tick.
+    downwash: m/s of the air that other UAVs push down. air, nodes: the weather, see
+    `world.weather.table`. tick: number of this guidance tick since the start. period: s of a tick.
     """
-    for i in range(uavs.shape[0]):
-        body = uavs[i].body
-        if body.asleep:
-            continue
-        if air.steady:
-            x, y, z = air.velocity[0], air.velocity[1], air.velocity[2]
-        else:
-            x, y, z = air_velocity(
-                air,
-                nodes,
-                grid,
-                uavs[i].turbulence,
-                body.position_map,
-                body.velocity_map,
-                tick - uavs[i].turbulence.first_tick,
-                period,
-            )
-        body.air_velocity_map[0] = x
-        body.air_velocity_map[1] = y
-        body.air_velocity_map[2] = z
+    body = uav.body
+    if air.steady:
+        x, y, z = air.velocity[0], air.velocity[1], air.velocity[2]
+    else:
+        x, y, z = air_velocity(
+            air,
+            nodes,
+            grid,
+            uav.turbulence,
+            body.position_map,
+            body.velocity_map,
+            tick - uav.turbulence.first_tick,
+            period,
+        )
+    body.air_velocity_map[0] = x
+    body.air_velocity_map[1] = y
+    body.air_velocity_map[2] = z - downwash

@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.vehicle.compiled import inner_kernel
-from volery.vehicle.rigid import four
+from volery.vehicle.rigid import four, three
 
 Array = NDArray[np.float64]
 
 BELIEF = np.dtype(
     [
-        ("omega_body", "f8", 3),  # rad/s
         ("rate_error", "f8", 3),  # rad/s
         ("attitude", "f8", 4),  # map from body
         ("position_map", "f8", 3),  # m
@@ -27,12 +26,10 @@ BELIEF = np.dtype(
         ("position_error", "f8", 3),  # m, map
         ("velocity_error", "f8", 3),  # m/s, map
         ("rotation_error", "f8", 4),  # estimated attitude = this * true attitude
-        ("errs", "?"),
-        ("spare", "u1", 7),  # no hidden padding: equal states are equal bytes
     ],
     align=True,
 )
-"""The motion believed, and how far it is from the truth; without `errs` it is the truth."""
+"""The motion believed, and how far it is from the truth; `PILOT.errs` tells whether it is."""
 
 
 class Motion(NamedTuple):
@@ -51,17 +48,20 @@ def new_beliefs(count: int) -> NDArray[np.void]:
 
 
 @inner_kernel
-def believe_rates(belief: Any, body: Any) -> None:
-    """Bring the believed body rates up to date."""
-    for k in range(3):
-        belief.omega_body[k] = body.omega_body[k] + belief.rate_error[k]
+def believed_rates(belief: Any, body: Any, errs: bool) -> tuple[float, float, float]:
+    """Body rates believed, rad/s; `errs` spares a look at `belief` where it is the truth."""
+    x, y, z = three(body.omega_body)
+    if errs:
+        ex, ey, ez = three(belief.rate_error)
+        x, y, z = x + ex, y + ey, z + ez
+    return x, y, z
 
 
 @inner_kernel
-def believe_attitude(belief: Any, body: Any) -> None:
+def believe_attitude(belief: Any, body: Any, errs: bool) -> None:
     """Bring the believed attitude up to date."""
     x, y, z, w = four(body.attitude)
-    if belief.errs:
+    if errs:
         ex, ey, ez, ew = four(belief.rotation_error)
         x, y, z, w = (
             ew * x + ex * w + ey * z - ez * y,

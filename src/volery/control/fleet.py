@@ -255,7 +255,7 @@ class Fleet(FleetCommands):
         belief["velocity_error"][rows] = error.velocity_map
         belief["rotation_error"][rows] = error.rotation_map
         belief["rate_error"][rows] = error.omega_body
-        belief["errs"][rows] = True
+        self._pilots["errs"][rows] = True
 
     def displace(self, i: int, offset: ArrayLike) -> None:
         """Put UAV `i` elsewhere at once, by `offset` (3,) m, map; its motion goes on there."""

@@ -47,7 +47,7 @@ def fly_otherwise(
         )
     if guiding:
         believe_place(belief, body)
-        believe_attitude(belief, body)
+        believe_attitude(belief, body, pilot.errs)
         guide(pilot, belief, gains, paths, step, dt)
     live = pilot.level != _STOPPED
     accelerate_identified(body, plant, model.identified, pilot, live, references, i, now, dt)

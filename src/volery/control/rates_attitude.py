@@ -23,17 +23,13 @@ _ATTITUDE = int(ControlLevel.ATTITUDE)
 
 
 @inner_kernel
-def hold_rates(pilot: Any, estimate: Any, gains: Any, dt: float) -> None:
-    """Rotor speeds of a `PILOT` from its rates setpoint and thrust.
-
-    estimate: a record with `omega_body`.
-    """
+def hold_rates(pilot: Any, ox: float, oy: float, oz: float, gains: Any, dt: float) -> None:
+    """Rotor speeds of a `PILOT` from its rates setpoint and thrust; (ox, oy, oz): rates, rad/s."""
     if pilot.level <= _ROTORS:
         most = 0.0 if pilot.level == _STOPPED else _full_speed(pilot, gains)
         for r in range(gains.rotors):
             pilot.rotor_reference[r] = min(pilot.rotor_target[r], most)
         return
-    ox, oy, oz = three(estimate.omega_body)
     ix, iy, iz = three(gains.inertia)
     tx = ix * _angular_acceleration(pilot, gains, 0, ox, dt) + (iz - iy) * oy * oz
     ty = iy * _angular_acceleration(pilot, gains, 1, oy, dt) + (ix - iz) * oz * ox

@@ -49,7 +49,8 @@ PILOT = np.dtype(
         ("turning", "?"),  # heading follows yaw_rate_target instead of heading_target
         ("saturated", "?"),  # the rotors could not give the torque wanted last
         ("path_faces", "?"),  # the trajectory has headings
-        ("spare", "u1", 3),  # no hidden padding: equal states are equal bytes
+        ("errs", "?"),  # controllers fly on an estimate, see control.belief
+        ("spare", "u1", 2),  # no hidden padding: equal states are equal bytes
         ("thrust", "f8"),  # N along the body's z
         ("yaw_rate", "f8"),  # rad/s, fed forward to the rates
         ("full_thrust", "f8"),  # N: the most that one rotor gives at the battery's present voltage
