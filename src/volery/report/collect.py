@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.report.flight_data import (
     FlightData,

@@ -81,13 +81,13 @@ def _beams_of_cloud(cloud: Any) -> tuple[Array, Array]:
     return along[near], time[near] / max(time.max(initial=0.0), 1e-9)
 
 
-def _nodding_angles(mount: Any, start_ns: int, end_ns: int, fraction: Array) -> Array | None:
+def _nodding_angles(mount: Any, first_ns: int, last_ns: int, fraction: Array) -> Array | None:
     if not mount.nods:
         return None
     from volery.sensors.mount import nodding_angle_at
 
     knots = np.linspace(0.0, 1.0, 5)
-    angles = [nodding_angle_at(mount, start_ns + round(k * (end_ns - start_ns))) for k in knots]
+    angles = [nodding_angle_at(mount, first_ns + round(k * (last_ns - first_ns))) for k in knots]
     return np.interp(fraction, knots, angles)
 
 

@@ -96,9 +96,7 @@ def block_table(
     length = np.maximum(knots[:, 1] - knots[:, 0], 1)
     return BeamTable(
         rays=len(order),
-        lanes=in_packets(
-            direction[:, order], (time_ns[order] - knots[packet, 0]) / length[packet]
-        ),
+        lanes=in_packets(direction[:, order], (time_ns[order] - knots[packet, 0]) / length[packet]),
         knot_ns=knots,
         seen_ns=knots.sum(axis=1) // 2,
         beam=_padded(order),

@@ -170,7 +170,8 @@ def _measure_single(
 ) -> None:
     """One echo a beam: distances (beams,) to ranges (beams,) and intensities (0 or 1, beams)."""
     beams, stride = distance.shape[0], lidar.stride
-    if not lidar.noise and intensities.shape[0] == 0:
+    wanted = intensities.shape[0] > 0
+    if not (lidar.noise or wanted):
         for i in range(beams):
             near = distance[i] < lidar.range_min
             ranges[i] = np.float32(-np.inf) if near else distance[i]
@@ -190,7 +191,7 @@ def _measure_single(
                 r = _beyond_edge(lidar, r, distance[i - stride], gap)
             r = _disturbed(lidar, r, true, cosine[i], bias, key, counter)
         ranges[i] = r
-        if intensities.shape[0] > 0:
+        if wanted:
             seen = abs(r) < np.inf
             intensities[0, i] = (
                 _intensity(lidar, true, cosine[i], material[i], key, counter) if seen else 0.0

@@ -203,7 +203,12 @@ def _surfaces(scans: int, beams: int) -> Surfaces:
         flat = _own.surfaces = Surfaces(
             np.empty(needed, np.float32), np.empty(needed, np.float32), np.empty(needed, np.uint8)
         )
-    return Surfaces(*(array[:needed].reshape(scans, room) for array in flat))
+    shape = (scans, room)
+    return Surfaces(
+        flat.distance[:needed].reshape(shape),
+        flat.cosine[:needed].reshape(shape),
+        flat.material[:needed].reshape(shape),
+    )
 
 
 def _cast_plainly(
@@ -231,6 +236,11 @@ def _cast_plainly(
         model.range.max_m,
         np.array([batch.uav[scan]], dtype=np.int32),
         fraction,
-        (surfaces.distance[0, : model.beams], normal, instance, surfaces.material[0, : model.beams]),
+        (
+            surfaces.distance[0, : model.beams],
+            normal,
+            instance,
+            surfaces.material[0, : model.beams],
+        ),
     )
     surfaces.cosine[0, : model.beams] = np.abs(np.einsum("ij,ij->i", normal, directions))
