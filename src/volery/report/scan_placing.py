@@ -61,7 +61,7 @@ def _in_map(in_body: Array, fraction: Array, ends: list[tuple[Array, Array]]) ->
 
 
 def _beams_of_scan(scan: Any) -> tuple[Array, Array]:
-    """Returns of a LaserScan in the sensor frame (n, 3) and their share of the sweep's time (n,)."""
+    """Returns of a LaserScan in the sensor frame (n, 3), and at which share of the sweep (n,)."""
     ranges = np.asarray(scan.ranges, dtype=np.float64)
     beams = np.flatnonzero(
         (ranges >= scan.range_min) & (ranges <= min(scan.range_max, MAX_RANGE_M))
@@ -73,7 +73,7 @@ def _beams_of_scan(scan: Any) -> tuple[Array, Array]:
 
 
 def _beams_of_cloud(cloud: Any) -> tuple[Array, Array]:
-    """Points of a PointCloud2 in the sensor frame (n, 3) and their share of the sweep's time (n,)."""
+    """Points of a PointCloud2 in the sensor frame (n, 3), and at which share of the sweep (n,)."""
     points = cloud_points(cloud)
     along = np.stack([points[name].astype(np.float64) for name in ("x", "y", "z")], -1)
     near = np.linalg.norm(along, axis=1) <= MAX_RANGE_M

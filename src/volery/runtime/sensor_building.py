@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -110,6 +111,17 @@ def _check_topics(scenario: schema.Scenario, fitted: Sequence[Fitted]) -> None:
                 f"{scenario.name}: sensors '{other}' and '{sensor.id.name}' both publish on "
                 f"{sensor.topic}; give one of them another `topic`"
             )
+
+
+def lidar_mounts(fitted: Sequence[Fitted], *, planar: bool) -> Mapping[str, Mount]:
+    """Topics of LaserScans, or of PointCloud2s, and how their LIDARs are mounted."""
+    return MappingProxyType(
+        {
+            sensor.topic: sensor.mount
+            for sensor in fitted
+            if sensor.lidar is not None and isinstance(sensor.lidar.scan, PlanarScan) == planar
+        }
+    )
 
 
 def build_banks(

@@ -26,12 +26,11 @@ from volery.runtime.command_door import open_commands
 from volery.runtime.digest import Digest
 from volery.runtime.node_loading import start_node
 from volery.runtime.placement import Start, place_uavs
-from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors
+from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors, lidar_mounts
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
 from volery.runtime.worlds import build_forest, build_terrain
 from volery.scenario.schema import Scenario
-from volery.sensors.mount import Mount
 from volery.sensors.samples import (
     ImuReadings,
     JointAngles,
@@ -39,7 +38,6 @@ from volery.sensors.samples import (
     RangeReadings,
     Samples,
 )
-from volery.sensors.scan_patterns import PlanarScan
 from volery.vehicle.airframe import Airframe, load_airframe
 from volery.vehicle.body_shape import body_shape
 from volery.world.scene import Scene
@@ -96,8 +94,8 @@ class Simulation:
         fitted = fit_sensors(scenario, starts)
         self.graph = Graph(lambda: self.time_ns)
         self._publisher = _make_publisher(self.graph, fitted)
-        self.mounts = _lidar_mounts(fitted, planar=True)
-        self.cloud_mounts = _lidar_mounts(fitted, planar=False)
+        self.mounts = lidar_mounts(fitted, planar=True)
+        self.cloud_mounts = lidar_mounts(fitted, planar=False)
         self._banks = build_banks(scenario, fitted, self._fleet, self.scene)
         self._engine = Engine(
             self._fleet,
@@ -333,17 +331,6 @@ def _make_publisher(graph: Graph, fitted: list[Fitted]) -> GraphPublisher:
         if sensor.mount.nods:
             publisher.announce(sensor.id, JointAngles, sensor.mount)
     return publisher
-
-
-def _lidar_mounts(fitted: list[Fitted], *, planar: bool) -> Mapping[str, Mount]:
-    """Topics of LaserScans, or of PointCloud2s, and how their LIDARs are mounted."""
-    return MappingProxyType(
-        {
-            sensor.topic: sensor.mount
-            for sensor in fitted
-            if sensor.lidar is not None and isinstance(sensor.lidar.scan, PlanarScan) == planar
-        }
-    )
 
 
 def _slice_steps(slice_ns: int | None, dt_ns: int) -> int:

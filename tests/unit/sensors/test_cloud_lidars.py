@@ -46,7 +46,7 @@ def test_exact_ranges_of_an_upright_cylinder(name):
     radius, away = 0.8, 6.0
     scene = solids(cylinder(radius, 20.0, 4000, x=away, z=-10.0))
     ranges = echoes_of(scene, model).ranges[0, 0]
-    x, y, z = model.scan.directions(0)
+    x, y, _ = model.scan.directions(0)
     level = np.hypot(x, y)
     across = away * y / level  # distance of the axis from the beam, seen from above
     root = radius**2 - across**2
