@@ -60,7 +60,7 @@ class Pattern(SensorModel):
         return np.zeros(self.beam_count, dtype=np.uint16)
 
     def directions(self, sweep: int) -> Array:
-        """(3, beams) unit vectors of a sweep, counted from 0, in the sensor frame; not to change."""
+        """(3, beams) unit vectors of a sweep, counted from 0, in the sensor frame; read only."""
         return self._first_directions if self.is_fixed else self._aim(sweep)
 
     @cached_property
