@@ -100,7 +100,8 @@ def beyond_edge(lidar: LidarConstants, distance: float, neighbour: float, gap: f
 @inner_kernel
 def is_edge(lidar: LidarConstants, a: float, b: float) -> bool:
     """Whether two neighbouring beams meet surfaces that are no continuation of each other."""
-    return bool(np.isfinite(a) and np.isfinite(b) and abs(a - b) > lidar.least_jump)
+    gap = abs(a - b)  # inf or NaN where a beam meets nothing
+    return bool(lidar.least_jump < gap < np.inf)
 
 
 @inner_kernel
@@ -134,6 +135,17 @@ def disturbed(
 
 
 @inner_kernel
+def _power(base: float, exponent: float) -> float:
+    """Power; the usual exponents cost no logarithm."""
+    if exponent == 1.0:
+        return base
+    if exponent == 2.0:
+        return base * base
+    power: float = np.power(base, exponent)
+    return power
+
+
+@inner_kernel
 def echo_intensity(
     lidar: LidarConstants,
     distance: float,
@@ -145,10 +157,10 @@ def echo_intensity(
     """Strength of an echo; the formula stands at `lidar_model.Intensity`."""
     value = lidar.brightness[material]
     if lidar.incidence_exponent != 0.0:
-        value *= np.power(float(cosine), lidar.incidence_exponent)
+        value *= _power(float(cosine), lidar.incidence_exponent)
     if lidar.range_exponent != 0.0:
         far = max(distance, lidar.reference_range)
-        value *= np.power(lidar.reference_range / far, lidar.range_exponent)
+        value *= _power(lidar.reference_range / far, lidar.range_exponent)
     if lidar.noise and lidar.brightness_noise > 0.0:
         value *= 1.0 + lidar.brightness_noise * normal(key, counter + 3)
     bounded: float = min(max(value, 0.0), lidar.brightest)
