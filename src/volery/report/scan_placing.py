@@ -61,7 +61,7 @@ def _in_map(in_body: Array, fraction: Array, ends: list[tuple[Array, Array]]) ->
 
 
 def _beams_of_scan(scan: Any) -> tuple[Array, Array]:
-    """Returns of a LaserScan in the sensor frame (n, 3) and their share of the sweep's time (n,)."""
+    """Returns of a LaserScan in the sensor frame (n, 3), and at which share of the sweep (n,)."""
     ranges = np.asarray(scan.ranges, dtype=np.float64)
     beams = np.flatnonzero(
         (ranges >= scan.range_min) & (ranges <= min(scan.range_max, MAX_RANGE_M))
@@ -73,7 +73,7 @@ def _beams_of_scan(scan: Any) -> tuple[Array, Array]:
 
 
 def _beams_of_cloud(cloud: Any) -> tuple[Array, Array]:
-    """Points of a PointCloud2 in the sensor frame (n, 3) and their share of the sweep's time (n,)."""
+    """Points of a PointCloud2 in the sensor frame (n, 3), and at which share of the sweep (n,)."""
     points = cloud_points(cloud)
     along = np.stack([points[name].astype(np.float64) for name in ("x", "y", "z")], -1)
     near = np.linalg.norm(along, axis=1) <= MAX_RANGE_M
@@ -81,13 +81,13 @@ def _beams_of_cloud(cloud: Any) -> tuple[Array, Array]:
     return along[near], time[near] / max(time.max(initial=0.0), 1e-9)
 
 
-def _nodding_angles(mount: Any, start_ns: int, end_ns: int, fraction: Array) -> Array | None:
+def _nodding_angles(mount: Any, first_ns: int, last_ns: int, fraction: Array) -> Array | None:
     if not mount.nods:
         return None
     from volery.sensors.mount import nodding_angle_at
 
     knots = np.linspace(0.0, 1.0, 5)
-    angles = [nodding_angle_at(mount, start_ns + round(k * (end_ns - start_ns))) for k in knots]
+    angles = [nodding_angle_at(mount, first_ns + round(k * (last_ns - first_ns))) for k in knots]
     return np.interp(fraction, knots, angles)
 
 

@@ -19,7 +19,8 @@ from volery.engine.events import Event
 from volery.runtime.building import add_bodies, build_fleet
 from volery.runtime.estimation_building import build_estimation
 from volery.runtime.placement import Start
-from volery.runtime.sensor_building import Fitted, build_banks, fit_sensors, refit
+from volery.runtime.sensor_building import build_banks
+from volery.runtime.sensor_fitting import Fitted, fit_sensors, refit
 from volery.runtime.uav import Uav
 from volery.scenario.schema import Scenario
 from volery.sensors.bank import Bank

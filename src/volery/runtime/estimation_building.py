@@ -19,7 +19,7 @@ from volery.sensors.sonar import load_sonar_model
 if TYPE_CHECKING:
     from volery.control.estimator.settings import EstimatorSettings, Mounting
     from volery.engine.estimation import Estimation
-    from volery.runtime.sensor_building import Fitted
+    from volery.runtime.sensor_fitting import Fitted
 
 _AIDS = ("imu", "gnss", "barometer", "magnetometer", "sonar")
 _START_M, _START_M_S, _START_TILT_RAD, _START_HEADING_RAD = 0.5, 0.02, 0.01, 0.03

@@ -28,7 +28,8 @@ from volery.runtime.estimation_building import build_estimation
 from volery.runtime.node_loading import start_node
 from volery.runtime.placement import Start
 from volery.runtime.progress import Progress, ProgressTeller
-from volery.runtime.sensor_building import RESULT_OF, Fitted, build_banks, fit_sensors, refit
+from volery.runtime.sensor_building import build_banks
+from volery.runtime.sensor_fitting import RESULT_OF, Fitted, fit_sensors, lidar_mounts, refit
 from volery.runtime.snapshot import (
     Snapshot,
     check_nodes,
@@ -41,9 +42,7 @@ from volery.runtime.warm_up import compile_kernels
 from volery.runtime.worlds import build_forest, build_terrain
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario
-from volery.sensors.mount import Mount
 from volery.sensors.samples import JointAngles, Samples
-from volery.sensors.scan_patterns import PlanarScan
 from volery.world.scene import Scene
 from volery.world.weather import Weather
 
@@ -79,8 +78,8 @@ class Simulation:
         fitted = self._fitted = fit_sensors(scenario, starts)
         self.graph = Graph(lambda: self.time_ns)
         self._publisher = _make_publisher(self.graph, fitted)
-        self.mounts = _lidar_mounts(fitted, planar=True)
-        self.cloud_mounts = _lidar_mounts(fitted, planar=False)
+        self.mounts = lidar_mounts(fitted, planar=True)
+        self.cloud_mounts = lidar_mounts(fitted, planar=False)
         estimation = build_estimation(scenario, fitted, self._fleet)
         self._banks = build_banks(scenario, fitted, self._fleet, self.scene, estimation)
         self._engine = Engine(
@@ -451,14 +450,3 @@ def _make_publisher(graph: Graph, fitted: list[Fitted]) -> GraphPublisher:
         if sensor.mount.nods:
             publisher.announce(sensor.id, JointAngles, sensor.mount)
     return publisher
-
-
-def _lidar_mounts(fitted: list[Fitted], *, planar: bool) -> Mapping[str, Mount]:
-    """Topics of LaserScans, or of PointCloud2s, and how their LIDARs are mounted."""
-    return MappingProxyType(
-        {
-            sensor.topic: sensor.mount
-            for sensor in fitted
-            if sensor.lidar is not None and isinstance(sensor.lidar.scan, PlanarScan) == planar
-        }
-    )

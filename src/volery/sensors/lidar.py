@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from volery.core.workers import Workers, new_counter
 from volery.sensors.aim_kernels import LidarBatch, MountTable, poses_at, sweep_rays
 from volery.sensors.beam_table import BeamTable, packets_of
-from volery.sensors.echo_kernels import Echoes, Surfaces, measure_scan
+from volery.sensors.echo_kernels import Echoes, Surfaces
 from volery.sensors.lidar_kernels import PIECE, measure_batch, scan_batch
 from volery.sensors.lidar_model import LidarModel
+from volery.sensors.measure_kernels import measure_scan
 from volery.sensors.mount import Mount
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.embree import LANES
@@ -203,7 +204,12 @@ def _surfaces(scans: int, beams: int) -> Surfaces:
         flat = _own.surfaces = Surfaces(
             np.empty(needed, np.float32), np.empty(needed, np.float32), np.empty(needed, np.uint8)
         )
-    return Surfaces(*(array[:needed].reshape(scans, room) for array in flat))
+    shape = (scans, room)
+    return Surfaces(
+        flat.distance[:needed].reshape(shape),
+        flat.cosine[:needed].reshape(shape),
+        flat.material[:needed].reshape(shape),
+    )
 
 
 def _cast_plainly(

@@ -36,7 +36,7 @@ class PointMaker:
         self._scans = scans
         self._direction = pattern.directions(scans.number)
         self._ring = pattern.ring
-        self._time_s = (pattern.time_ns * 1e-9).astype(np.float32)
+        self._time_s = pattern.time_s
 
     def points(self, row: int) -> NDArray[Any]:
         """Points of one sensor, (N,) of POINT, read-only and its own.

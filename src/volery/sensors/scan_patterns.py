@@ -7,7 +7,6 @@ Beams are numbered in the order in which messages list them. Angles are those of
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -18,79 +17,21 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PrivateAttr, model_
 
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.sensors.beam_file import BeamList, read_beams
-from volery.sensors.beam_table import BeamTable, block_table, in_packets, row_table
-from volery.sensors.model import SensorModel
+from volery.sensors.beam_table import BeamTable, block_table, row_table
+from volery.sensors.pattern import MOST_BEAMS, Pattern, median_spacing
 from volery.world.embree import LANES
 
 Array = NDArray[np.float64]
 Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
 _TILE_COLUMNS = 4
 """Columns of a packet of a ring scanner; LANES / 4 neighbouring rings fill it."""
-_MOST_BEAMS = 1 << 20
-
-
-class Pattern(SensorModel):
-    """What all patterns have in common."""
-
-    rate_hz: PositiveFloat
-
-    @property
-    @abstractmethod
-    def time_ns(self) -> NDArray[np.int64]:
-        """(beams,) time of each beam after the start of the sweep."""
-
-    @property
-    @abstractmethod
-    def spacing_rad(self) -> float:
-        """Angle between a beam and the one `stride` numbers on."""
-
-    @property
-    def stride(self) -> int:
-        """A beam's neighbours along the sweep are so many numbers before and after it."""
-        return 1
-
-    @property
-    def is_fixed(self) -> bool:
-        """Whether every sweep has the same directions."""
-        return True
-
-    @property
-    def beam_count(self) -> int:
-        """Beams of a sweep."""
-        return len(self.time_ns)
-
-    @property
-    def sweep_ns(self) -> int:
-        """From the start of the sweep to its last beam."""
-        return int(self.time_ns.max())
-
-    @cached_property
-    def ring(self) -> NDArray[np.uint16]:
-        """(beams,) number of the ring that a beam belongs to."""
-        return np.zeros(self.beam_count, dtype=np.uint16)
-
-    @abstractmethod
-    def directions(self, sweep: int) -> Array:
-        """(3, beams) unit vectors of a sweep, counted from 0, in the sensor frame."""
-
-    def table(self, sweep: int) -> BeamTable:
-        """The beams of a sweep, counted from 0, for kernels."""
-        if self.is_fixed:
-            return self._first_table
-        fraction = self._first_table.lanes[:, -1].reshape(-1)[: self.beam_count]
-        return self._first_table._replace(lanes=in_packets(self.directions(sweep), fraction))
-
-    @cached_property
-    def _first_table(self) -> BeamTable:
-        order = np.arange(self.beam_count)
-        return block_table(self.directions(0), self.time_ns, order, order // LANES)
 
 
 class PlanarScan(Pattern):
     """Evenly spaced beams in the sensor's x-y plane."""
 
     kind: Literal["planar"]
-    beams: Annotated[int, Field(ge=2, le=_MOST_BEAMS)]
+    beams: Annotated[int, Field(ge=2, le=MOST_BEAMS)]
     angle_min_rad: float
     angle_max_rad: float
     sweep_duration_s: PositiveFloat
@@ -130,7 +71,7 @@ class PlanarScan(Pattern):
         duration = ns_from_s(self.sweep_duration_s)
         return (duration * np.arange(self.beams) / (self.beams - 1)).astype(np.int64)
 
-    def directions(self, sweep: int) -> Array:  # noqa: ARG002 - all sweeps are alike
+    def _aim(self, sweep: int) -> Array:  # noqa: ARG002 - all sweeps are alike
         """(3, beams)."""
         return np.stack([np.cos(self.angles), np.sin(self.angles), np.zeros(self.beams)])
 
@@ -148,7 +89,7 @@ class RingScan(Pattern):
     """
 
     kind: Literal["rings"]
-    columns: Annotated[int, Field(ge=2, le=_MOST_BEAMS)]
+    columns: Annotated[int, Field(ge=2, le=MOST_BEAMS)]
     column_period_s: PositiveFloat
     azimuth_start_deg: Degrees = 0.0
     """Of the head at the first column."""
@@ -170,8 +111,8 @@ class RingScan(Pattern):
         for name in ("azimuth_offset_deg", "firing_offset_s"):
             if len(getattr(self, name)) not in {0, rings}:
                 raise ValueError(f"{name} must have one entry a ring ({rings}), or none")
-        if rings * self.columns > _MOST_BEAMS:
-            raise ValueError(f"rings times columns may be {_MOST_BEAMS} at most")
+        if rings * self.columns > MOST_BEAMS:
+            raise ValueError(f"rings times columns may be {MOST_BEAMS} at most")
         if self.azimuth_step_deg == 0.0:
             raise ValueError("azimuth_step_deg must not be 0")
         if self.sweep_ns > NS_PER_S / self.rate_hz:
@@ -199,7 +140,7 @@ class RingScan(Pattern):
         seconds = np.arange(self.columns)[:, None] * self.column_period_s + self._firing_offset
         return np.round(seconds * NS_PER_S).astype(np.int64).reshape(-1)
 
-    def directions(self, sweep: int) -> Array:  # noqa: ARG002 - all sweeps are alike
+    def _aim(self, sweep: int) -> Array:  # noqa: ARG002 - all sweeps are alike
         """(3, beams)."""
         column = np.arange(self.columns)[:, None] + self._firing_offset / self.column_period_s
         offset = np.array(self.azimuth_offset_deg or [0.0] * self.stride)
@@ -231,7 +172,7 @@ class RosetteScan(Pattern):
     """
 
     kind: Literal["rosette"]
-    points: Annotated[int, Field(ge=2, le=_MOST_BEAMS)]
+    points: Annotated[int, Field(ge=2, le=MOST_BEAMS)]
     point_period_s: PositiveFloat
     prism_rpm: tuple[float, float]
     """Positive turns from y to z."""
@@ -253,14 +194,14 @@ class RosetteScan(Pattern):
     @cached_property
     def spacing_rad(self) -> float:
         """Median angle from a point to the next."""
-        return _median_spacing(self.directions(0))
+        return median_spacing(self.directions(0))
 
     @cached_property
     def time_ns(self) -> NDArray[np.int64]:
         """(points,)."""
         return np.round(np.arange(self.points) * self.point_period_s * NS_PER_S).astype(np.int64)
 
-    def directions(self, sweep: int) -> Array:
+    def _aim(self, sweep: int) -> Array:
         """(3, points)."""
         start_s = sweep / self.rate_hz
         bent = np.zeros(self.points, dtype=np.complex128)
@@ -291,12 +232,12 @@ class TableScan(Pattern):
 
     @cached_property
     def _list(self) -> BeamList:
-        return read_beams(self._folder / self.file, 1.0 / self.rate_hz, _MOST_BEAMS)
+        return read_beams(self._folder / self.file, 1.0 / self.rate_hz, MOST_BEAMS)
 
     @cached_property
     def spacing_rad(self) -> float:
         """Median angle from a beam to the next."""
-        return _median_spacing(self.directions(0))
+        return median_spacing(self.directions(0))
 
     @property
     def time_ns(self) -> NDArray[np.int64]:
@@ -308,7 +249,7 @@ class TableScan(Pattern):
         """(beams,)."""
         return self._list.ring
 
-    def directions(self, sweep: int) -> Array:  # noqa: ARG002 - all sweeps are alike
+    def _aim(self, sweep: int) -> Array:  # noqa: ARG002 - all sweeps are alike
         """(3, beams)."""
         return self._list.direction
 
@@ -316,9 +257,3 @@ class TableScan(Pattern):
 ScanPattern = Annotated[
     PlanarScan | RingScan | RosetteScan | TableScan, Field(discriminator="kind")
 ]
-
-
-def _median_spacing(direction: Array) -> float:
-    """Median angle between consecutive unit vectors (3, N), rad."""
-    chord = np.linalg.norm(np.diff(direction, axis=1), axis=0)
-    return max(float(np.median(2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)))), 1e-9)

@@ -138,6 +138,34 @@ def test_beams_return_to_the_wall(topic: str) -> None:
     assert scan_points(scan, MOUNTS[topic], deque()) is None
 
 
+def test_points_of_a_cloud_return_to_the_wall() -> None:
+    """A sweep of 100 ms while the body flies and turns."""
+    from collections import deque
+
+    from volery.sensors.point_cloud import POINT
+
+    start_ns, mount = 1_015 * MS, MOUNTS["/uav1/laser/horizontal/scan"]
+    t = start_ns / 1e9 + np.linspace(0.0, 0.1, 500)
+    azimuth = np.linspace(-0.9, 0.9, 500)
+    beam = np.stack([np.cos(azimuth), np.sin(azimuth), 0.1 * np.sin(9 * azimuth)], axis=-1)
+    p, q = pose_at(t)
+    origin, direction = p + rotations.rotate(q, mount.position_body), rotations.rotate(q, beam)
+    reach = (20.0 - origin[:, 0]) / direction[:, 0]
+    points = np.zeros(500, POINT)
+    for i, axis in enumerate("xyz"):
+        points[axis] = reach * beam[:, i]
+    points["time"] = t - t[0]
+    fields = [m.PointField("x", 0, m.PointField.FLOAT32, 1)]
+    cloud = m.PointCloud2(
+        m.header(start_ns, "laser"), 1, 500, fields, False, 22, 11000, points.view(np.uint8), True
+    )
+    poses = deque((k * MS, odometry(k * MS).pose.pose) for k in range(1000, 1140, 20))
+    found = scan_points(cloud, mount, poses)
+    assert found is not None
+    assert 200 < len(found) < 500  # what lies beyond 28 m is left out
+    assert np.abs(found[:, 0] - 20.0).max() < 0.02
+
+
 def test_collects_a_flight(tmp_path: Path) -> None:
     simulation = FakeSimulation(mounts=dict(MOUNTS))
     simulation.events.append(

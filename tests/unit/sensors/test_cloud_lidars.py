@@ -46,7 +46,7 @@ def test_exact_ranges_of_an_upright_cylinder(name):
     radius, away = 0.8, 6.0
     scene = solids(cylinder(radius, 20.0, 4000, x=away, z=-10.0))
     ranges = echoes_of(scene, model).ranges[0, 0]
-    x, y, z = model.scan.directions(0)
+    x, y, _ = model.scan.directions(0)
     level = np.hypot(x, y)
     across = away * y / level  # distance of the axis from the beam, seen from above
     root = radius**2 - across**2
@@ -65,7 +65,7 @@ def test_every_beam_starts_from_the_pose_it_had(name):
     scene = solids(wall(15.0, 800.0))
     ranges = echoes_of(scene, model, flying(velocity, yaw_rate), start_ns=start_ns).ranges[0, 0]
     t = (start_ns + model.scan.time_ns) * 1e-9
-    x, y, z = model.scan.directions(0)
+    x, y, _ = model.scan.directions(0)
     yaw = yaw_rate * t
     towards = x * np.cos(yaw) - y * np.sin(yaw)
     with np.errstate(divide="ignore"):

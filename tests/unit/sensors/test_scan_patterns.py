@@ -144,9 +144,7 @@ def coverage(scan, sweeps, cell_deg=0.28):
 def test_coverage_grows_with_integration_time_to_the_whole_field_of_view():
     scan = load_lidar("mid_40").scan
     shares = [coverage(scan, sweeps) for sweeps in (1, 2, 5, 10, 30)]
-    assert shares == sorted(shares)
-    assert shares[-1] > 0.99
-    assert shares[0] < 0.5
+    np.testing.assert_allclose(shares, [0.20, 0.37, 0.71, 0.93, 1.0], atol=0.01)
 
 
 # ------------------------------------------------------------------------------------ users' files

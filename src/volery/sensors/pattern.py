@@ -1,0 +1,95 @@
+"""What all beam patterns have in common."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PositiveFloat
+
+from volery.sensors.beam_table import BeamTable, block_table, in_packets
+from volery.sensors.model import SensorModel
+from volery.world.embree import LANES
+
+Array = NDArray[np.float64]
+
+MOST_BEAMS = 1 << 20
+"""Of a sweep."""
+
+
+class Pattern(SensorModel):
+    """Where the beams of a scanner go and when; the kinds stand in `scan_patterns`."""
+
+    rate_hz: PositiveFloat
+
+    @property
+    @abstractmethod
+    def time_ns(self) -> NDArray[np.int64]:
+        """(beams,) time of each beam after the start of the sweep."""
+
+    @property
+    @abstractmethod
+    def spacing_rad(self) -> float:
+        """Angle between a beam and the one `stride` numbers on."""
+
+    @property
+    def stride(self) -> int:
+        """A beam's neighbours along the sweep are so many numbers before and after it."""
+        return 1
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether every sweep has the same directions."""
+        return True
+
+    @property
+    def beam_count(self) -> int:
+        """Beams of a sweep."""
+        return len(self.time_ns)
+
+    @property
+    def sweep_ns(self) -> int:
+        """From the start of the sweep to its last beam."""
+        return int(self.time_ns.max())
+
+    @cached_property
+    def ring(self) -> NDArray[np.uint16]:
+        """(beams,) number of the ring that a beam belongs to."""
+        return np.zeros(self.beam_count, dtype=np.uint16)
+
+    def directions(self, sweep: int) -> Array:
+        """(3, beams) unit vectors of a sweep, counted from 0, in the sensor frame; read only."""
+        return self._first_directions if self.is_fixed else self._aim(sweep)
+
+    @cached_property
+    def time_s(self) -> NDArray[np.float32]:
+        """(beams,) time of each beam after the start of the sweep, as messages carry it."""
+        return (self.time_ns * 1e-9).astype(np.float32)
+
+    @abstractmethod
+    def _aim(self, sweep: int) -> Array:
+        """Compute `directions`."""
+
+    @cached_property
+    def _first_directions(self) -> Array:
+        return self._aim(0)
+
+    def table(self, sweep: int) -> BeamTable:
+        """The beams of a sweep, counted from 0, for kernels."""
+        if self.is_fixed:
+            return self._first_table
+        fraction = self._first_table.lanes[:, -1].reshape(-1)[: self.beam_count]
+        return self._first_table._replace(lanes=in_packets(self.directions(sweep), fraction))
+
+    @cached_property
+    def _first_table(self) -> BeamTable:
+        order = np.arange(self.beam_count)
+        return block_table(self.directions(0), self.time_ns, order, order // LANES)
+
+
+def median_spacing(direction: Array) -> float:
+    """Median angle between consecutive unit vectors (3, N), rad."""
+    chord = np.linalg.norm(np.diff(direction, axis=1), axis=0)
+    return max(float(np.median(2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)))), 1e-9)
