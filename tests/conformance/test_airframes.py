@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from volery.control.fleet import Fleet, FleetEventKind
+from volery.control.fleet import Fleet
+from volery.control.fleet_events import FleetEventKind
 from volery.control.flight_modes import FlightMode
 from volery.core import rotations
 from volery.vehicle.airframe import Airframe, airframe_names, hover_thrusts, load_airframe

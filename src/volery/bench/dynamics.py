@@ -1,4 +1,4 @@
-"""Plant and inner control alone: hovering F450s, one kernel call a slice, no sensors.
+"""Plant and control, no sensors: the fused step by itself, then whole swarms and many copies.
 
 The slices are those of the engine: five steps between two IMU samples for one UAV, with Python's
 share of the call included; longer ones for a thousand, where it does not count.
@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 
+from volery.bench import swarm
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.vehicle.airframe import load_airframe
@@ -21,7 +22,7 @@ _ROUNDS = 15
 
 
 def measure() -> dict[str, float]:
-    """Medians over `_ROUNDS`: ns a drone-step at N = 1000, us a step at N = 1."""
+    """Medians: ns a drone-step at N = 1000, us a step at N = 1; see also `bench.swarm`."""
     many, one = _fleet(1000), _fleet(1)
     terrain = Terrain.flat(4000.0, 0.0, (-2000.0, -2000.0)).grid
     for fleet in (many, one):
@@ -38,6 +39,8 @@ def measure() -> dict[str, float]:
     return {
         "ns_per_drone_step_n1000": 1e9 * statistics.median(large),
         "us_per_step_n1": 1e6 * statistics.median(small),
+        "realtime_factor_100_drones": swarm.real_time_factor_of_swarm(),
+        "steps_per_s_1024_copies": swarm.steps_a_second_of_copies(),
     }
 
 

@@ -19,7 +19,7 @@ from volery.control.commands import FleetCommands
 from volery.control.estimator.errors import EstimationError
 from volery.control.fleet_events import FleetEvent, event_of
 from volery.control.flight_modes import FlightMode
-from volery.control.gains import ATTITUDE_PERIOD_S, GUIDANCE_PERIOD_S, steps_of
+from volery.control.gains import STANDARD_RATES, ControlRates
 from volery.control.model_table import checked_wear, model_table, new_references
 from volery.control.setpoints import (
     MAX_COORDINATE,
@@ -60,11 +60,11 @@ class Fleet(FleetCommands):
     dt_ns: physics step. on_contact: what an impact does, "crash" (rotors stop, it falls and rests)
     or "bounce" (it rebounds and flies on). mode: `HOLD` starts in the air with rotors turning,
     `LANDED` on the ground with rotors stopped; one for all or one a UAV. names: for messages and,
-    with `seed`, the streams of what is random. plants: what turns commands into motion
-    (`vehicle.plants`), one for all or one a UAV. weather: the air; `set_weather` changes it.
-    wear: of the rotors, one a rotor, for each UAV; an empty one means new. battery_charge: shares
-    from 0 to 1, one for all or one a UAV. copies: (N,) whole numbers; UAVs of different copies of
-    a scenario do not feel each other's air.
+    with `seed`, the streams of what is random. control: how often its layers run. plants: what
+    turns commands into motion (`vehicle.plants`), one for all or one a UAV. weather: the air;
+    `set_weather` changes it. wear: of the rotors, one a rotor, for each UAV; an empty one means
+    new. battery_charge: shares from 0 to 1, one for all or one a UAV. copies: (N,) whole numbers;
+    UAVs of different copies of a scenario do not feel each other's air.
 
     Rows are numbered from 0. After `advance` the state belongs to time `step * dt_ns`.
     """
@@ -79,6 +79,7 @@ class Fleet(FleetCommands):
         on_contact: Literal["crash", "bounce"] = "crash",
         mode: FlightMode | Sequence[FlightMode] = FlightMode.HOLD,
         names: Sequence[str] | None = None,
+        control: ControlRates = STANDARD_RATES,
         plants: Plant | Sequence[Plant] = RigidBody(),  # noqa: B008  (frozen)
         weather: Weather = CALM,
         seed: int = 0,
@@ -105,7 +106,7 @@ class Fleet(FleetCommands):
         names = tuple(names or (f"UAV {i}" for i in range(count)))
         worn = checked_wear(names, airframes, wear)
         charge = checked_within("battery_charge", _each(battery_charge, count), (count,), 1.0)
-        models, rows = model_table(airframes, plants, worn, dt_ns / NS_PER_S)
+        models, rows = model_table(airframes, plants, worn, dt_ns / NS_PER_S, control)
         uavs = np.zeros(count, UAV)
         uavs["body"] = new_bodies(position, attitude)
         uavs["pilot"] = new_pilots(attitude)
@@ -123,8 +124,9 @@ class Fleet(FleetCommands):
         self._dt_ns = int(dt_ns)
         self._bounce = on_contact == "bounce"
         self._periods = (
-            steps_of(GUIDANCE_PERIOD_S, self._dt),
-            steps_of(ATTITUDE_PERIOD_S, self._dt),
+            control.guidance_steps(self._dt),
+            control.attitude_steps(self._dt),
+            control.air_steps(self._dt),
         )
         self._events = np.zeros(max(256, 2 * EVENTS_A_STEP * count), EVENT)
         self._drained: list[FleetEvent] = []
@@ -147,6 +149,11 @@ class Fleet(FleetCommands):
     def dt_ns(self) -> int:
         """Physics step."""
         return self._dt_ns
+
+    @property
+    def guidance_period_ns(self) -> int:
+        """From one look at the air, which is at a guidance tick, to the next."""
+        return self._periods[2] * self._dt_ns
 
     @property
     def time_ns(self) -> int:
@@ -346,7 +353,7 @@ class Fleet(FleetCommands):
         """
         fresh = start["uavs"][rows].copy()
         fresh["turbulence"]["key"] = self._uavs["turbulence"]["key"][rows]
-        fresh["turbulence"]["first_tick"] = self.step // self._periods[0]
+        fresh["turbulence"]["first_tick"] = self.step // self._periods[2]
         for part, name in (("pilot", "deadline_step"), ("pilot", "start_step")):
             fresh[part][name] += self.step
         touched = fresh["body"]["last_contact_step"] > NEVER

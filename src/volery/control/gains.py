@@ -8,6 +8,7 @@ bandwidth. Torques are angular accelerations times inertia, so gains need no uni
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +22,8 @@ from volery.vehicle.airframe import (
     hover_thrusts,
 )
 
-GUIDANCE_PERIOD_S = 0.008
-"""Flight modes, position and velocity run at 125 Hz ..."""
-ATTITUDE_PERIOD_S = 0.004
-"""... attitude at 250 Hz, rates at every step."""
+_AIR_PERIOD_S = 0.008
+"""Least time between two looks at the air; eddies and jets that matter to a vehicle last longer."""
 _THRUST_RESERVE = 0.9
 """Share of the full thrust that guidance may ask for; the rest steers."""
 _LEAST_THRUST = 0.15
@@ -92,12 +91,34 @@ GAINS = np.dtype(
 """One airframe's control as kernels read it: SI, FLU."""
 
 
-def steps_of(period: float, dt: float) -> int:
-    """Physics steps of `dt` s in a period of a control loop."""
-    return max(1, round(period / dt))
+@dataclass(frozen=True)
+class ControlRates:
+    """How often the layers run, Hz, in whole physics steps; rates are held at every step."""
+
+    guidance_hz: float = 125.0
+    """Flight modes, trajectories, the outer loop."""
+    attitude_hz: float = 250.0
+
+    def guidance_steps(self, dt: float) -> int:
+        """Physics steps of `dt` s from one guidance tick to the next."""
+        return max(1, round(1.0 / (self.guidance_hz * dt)))
+
+    def air_steps(self, dt: float) -> int:
+        """Physics steps from one look at the air around to the next: guidance ticks, some 8 ms."""
+        steps = self.guidance_steps(dt)
+        return steps * max(1, round(_AIR_PERIOD_S / (steps * dt)))
+
+    def attitude_steps(self, dt: float) -> int:
+        """Physics steps of `dt` s from one attitude tick to the next."""
+        return max(1, round(1.0 / (self.attitude_hz * dt)))
 
 
-def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:  # noqa: PLR0915
+STANDARD_RATES = ControlRates()
+
+
+def gains_of(  # noqa: PLR0915
+    airframe: Airframe, dt: float, control: ControlRates = STANDARD_RATES
+) -> NDArray[np.void]:
     """The (1,) `GAINS` row of an airframe stepped by `dt` s."""
     row = np.zeros(1, GAINS)
     rotors, limits, wish = airframe.rotors, airframe.limits, airframe.control
@@ -166,7 +187,7 @@ def gains_of(airframe: Airframe, dt: float) -> NDArray[np.void]:  # noqa: PLR091
     row["descent"] = limits.descent_m_s
     row["take_off"] = limits.take_off_m_s
     row["landing"] = limits.landing_m_s
-    row["tick"] = steps_of(GUIDANCE_PERIOD_S, dt) * dt
+    row["tick"] = control.guidance_steps(dt) * dt
     row["inverse_tick"] = 1.0 / row["tick"]
     row["lead"] = 1.0 / attitude + row["tick"]
     row["least_acceleration"] = row["least_thrust"] / airframe.body.mass_kg

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.control.gains import GUIDANCE_PERIOD_S, gains_of, steps_of
+from volery.control.gains import ControlRates, gains_of
 from volery.control.step import MODEL
 from volery.core.errors import CommandError
 from volery.scenario.schema import RotorWear
@@ -26,6 +26,7 @@ def model_table(
     plants: Sequence[Plant],
     worn: Sequence[tuple[RotorWear, ...]],
     dt: float,
+    control: ControlRates,
 ) -> tuple[NDArray[np.void], list[int]]:
     """Distinct airframes, plants and wears as `MODEL` rows, and each UAV's row.
 
@@ -41,10 +42,10 @@ def model_table(
             distinct.append((airframe, plant, wear))
         rows.append(numbers[key])
     models = np.zeros(len(distinct), MODEL)
-    period = BATTERY_TICKS * steps_of(GUIDANCE_PERIOD_S, dt) * dt
+    period = BATTERY_TICKS * control.guidance_steps(dt) * dt
     for row, (airframe, plant, wear) in enumerate(distinct):
         models["plant"][row] = plant_of(airframe, dt, period, wear)[0]
-        models["gains"][row] = gains_of(airframe, dt)[0]
+        models["gains"][row] = gains_of(airframe, dt, control)[0]
         models["kind"][row] = kind_of(plant)
         if isinstance(plant, IdentifiedModel):
             models["identified"][row] = identified_row(plant, airframe, dt)[0]

@@ -99,6 +99,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     steps: int,
     guidance_steps: int,
     attitude_steps: int,
+    air_steps: int,
     dt: float,
     bounce: bool,
     event_ends: bool,
@@ -110,7 +111,8 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     search of neighbours (`new_jets`).
 
     Ends early after a step in which a budget ran out, the events' buffer grew full or, with
-    `event_ends`, anything was noted. Returns the steps done, the events written, and whether a
+    `event_ends`, anything was noted. The air around the UAVs is looked up each `air_steps`, a
+    multiple of `guidance_steps`. Returns the steps done, the events written, and whether a
     budget ran out.
     """
     grid = TerrainGrid(heights, origin_x, origin_y, spacing)
@@ -130,7 +132,8 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
         # One step for all, or, where nobody needs the others, all steps to the tick for each in
         # turn, while his data are in the nearest cache.
         together = min(to_tick, steps - done) if calm and not guiding else 1
-        if guiding and look:
+        airing = step % air_steps == 0
+        if airing and look:
             find_downwash(uavs, models, jets)
             look = False
         first_row, first_phase = (step + 1) % rows, step % attitude_steps
@@ -148,8 +151,8 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
             if draining and plant.battery.capacity > 0.0 and drain(body, plant, pilot):
                 _note(events[written], step + 1, i, BATTERY_FELL, pilot.mode, 0.0, body)
                 written += 1
-            if guiding and not body.asleep:
-                tick, period = step // guidance_steps, guidance_steps * dt
+            if airing and not body.asleep:
+                tick, period = step // air_steps, air_steps * dt
                 refresh_air(uavs[i], jets[i].downwash, air[0], air_nodes, grid, tick, period)
             for now in range(step, step + together):
                 if body.asleep:
@@ -213,7 +216,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                 row = row + 1 if row + 1 < rows else 0
                 phase = phase + 1 if phase + 1 < attitude_steps else 0
             spent = spent or body.contact_budget <= 0.0 or body.separation_budget <= 0.0
-            look = look or body.downwash_budget <= 0.0
+            look = look or body.in_jet or body.downwash_budget <= 0.0
             calm = calm and (
                 body.asleep or (model.kind == RIGID_BODY and _is_far(body, guidance_steps * dt))
             )

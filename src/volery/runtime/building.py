@@ -8,6 +8,7 @@ import numpy as np
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
+from volery.control.gains import ControlRates
 from volery.core.errors import DataFileError, ScenarioError
 from volery.runtime.placement import Start, place_uavs
 from volery.runtime.plant_building import plant_of_type
@@ -44,12 +45,14 @@ def build_fleet(
 
     `copies`: how often `starts` holds the scenario's UAVs, copy after copy.
     """
+    physics = scenario.physics
     fleet = Fleet(
         [start.airframe for start in starts],
         np.array([start.position_map for start in starts]),
         np.array([start.attitude for start in starts]),
         dt_ns=1_000_000_000 // scenario.physics.rate_hz,
         on_contact=scenario.physics.on_contact,
+        control=ControlRates(physics.guidance_rate_hz, max(250.0, physics.guidance_rate_hz)),
         names=names,
         mode=[FlightMode.LANDED if start.on_ground else FlightMode.HOLD for start in starts],
         plants=[plant_of_type(scenario, start.type_name, start.airframe) for start in starts],

@@ -11,8 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.control.gains import GUIDANCE_PERIOD_S
-from volery.core.clock import NS_PER_S, ns_from_s
+from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
@@ -108,7 +107,7 @@ class CopyBlock:
     @property
     def common_period_s(self) -> float:
         """Period after which guidance and all sensors fire together again."""
-        periods = [Fraction(ns_from_s(GUIDANCE_PERIOD_S), NS_PER_S)]
+        periods = [Fraction(self.fleet.guidance_period_ns, NS_PER_S)]
         periods += [1 / bank.schedule.rate_hz for bank in self._engine.banks]
         down = math.lcm(*(p.denominator for p in periods))
         return math.lcm(*(int(p * down) for p in periods)) / down

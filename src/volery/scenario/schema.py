@@ -320,6 +320,8 @@ class Physics(Data):
     """The inner step and what a touch does."""
 
     rate_hz: Annotated[int, Field(ge=200, le=4000)] = 1000
+    guidance_rate_hz: Annotated[int, Field(ge=25, le=1000)] = 125
+    """Flight modes and outer loop, in whole physics steps; attitude runs at 250 Hz or as often."""
     on_contact: Literal["crash", "bounce"] = "crash"
 
 

@@ -76,19 +76,22 @@ def find_downwash(uavs: NDArray[np.void], models: NDArray[np.void], jets: Any) -
     """Fill the `downwash` of `jets`, from the present places and thrusts."""
     count = uavs.shape[0]
     waiting = False
+    under = False
     for i in range(count):
         jets[i].downwash = 0.0
         waiting = waiting or uavs[i].body.downwash_budget <= 0.0
-    if not waiting:
+        under = under or uavs[i].body.in_jet
+    if not (waiting or under):
         return
-    reach = _LOOK_BEYOND + _line_up(uavs, models, jets)
-    for k in range(count):
-        if uavs[jets[k].row].body.downwash_budget < _REFILL_BELOW:
-            _refill_budgets(uavs, jets, k, reach)
+    widest = _line_up(uavs, models, jets)
+    if waiting:
+        for k in range(count):
+            if uavs[jets[k].row].body.downwash_budget < _REFILL_BELOW:
+                _refill_budgets(uavs, jets, k, _LOOK_BEYOND + widest)
     for k in range(count):
         i = jets[k].row
-        if uavs[i].body.downwash_budget <= 0.0:
-            jets[i].downwash = _jets_over(uavs, models, jets, k, reach)
+        if uavs[i].body.in_jet:
+            jets[i].downwash = _jets_over(uavs, models, jets, k, widest)
 
 
 @inner_kernel
@@ -132,19 +135,30 @@ def _is_before(copy: int, x: float, y: float, z: float, other: Any) -> bool:
 
 @inner_kernel
 def _refill_budgets(uavs: Any, jets: Any, k: int, reach: float) -> None:
-    """Share the gap to each neighbour of UAV number `k` in order between the two of them."""
+    """Share the gap to each neighbour of UAV number `k` in order between the two of them.
+
+    A gap that is closed counts no more: who is `in_jet` sums the jets over him at every tick.
+    """
+    own = uavs[jets[k].row].body
+    own.in_jet = False
     budget = 0.5 * _LOOK_BEYOND * _INVERSE_SLANT
-    radius = jets[k].radius
     first, last = _window(jets, k, reach)
     for n in range(first, last):
         if n != k and abs(jets[n].y - jets[k].y) < reach:
             r, s = _offset(jets, k, n)
-            half = 0.5 * min(_gap(r, s, jets[n].radius), _gap(r, -s, radius))
+            other = uavs[jets[n].row].body
+            over, below = _gap(r, s, jets[n].radius), _gap(r, -s, jets[k].radius)
+            if over <= 0.0:
+                own.in_jet = True
+                over = _LOOK_BEYOND
+            if below <= 0.0:
+                other.in_jet = True
+                below = _LOOK_BEYOND
+            half = 0.5 * min(over, below)
             budget = min(budget, half)
             if half < _LOOK_BEYOND:
-                other = uavs[jets[n].row].body
                 other.downwash_budget = min(other.downwash_budget, half)
-    uavs[jets[k].row].body.downwash_budget = budget
+    own.downwash_budget = budget
 
 
 @inner_kernel

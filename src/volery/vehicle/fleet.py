@@ -43,7 +43,8 @@ BODY = np.dtype(
         ("on_ground", "?"),
         ("asleep", "?"),
         ("altered", "?"),  # some rotor_lift is not that of a new rotor far from the ground
-        ("spare", "u1", 4),  # no hidden padding: equal states are equal bytes
+        ("in_jet", "?"),  # another's air may reach it, vehicle.downwash
+        ("spare", "u1", 3),  # no hidden padding: equal states are equal bytes
     ],
     align=True,
 )

@@ -282,8 +282,10 @@ def _advance(
     rate = min(max(rate, -limit), limit)
     body.omega_body[axis] = rate
     back = 1.0 / dt
-    body.angular_acceleration_body[axis] = back * (rate - before)
-    body.free_angular_acceleration[axis] = 2.0 * back * (rate - back * way)
+    # that with which `carry`, which turns by the mean of both rates, turns by `way`
+    acceleration = 2.0 * back * (rate - back * way)
+    body.angular_acceleration_body[axis] = acceleration
+    body.free_angular_acceleration[axis] = acceleration
 
 
 @inner_kernel

@@ -5,7 +5,8 @@ import pytest
 from plants import F450, LEVEL, body, plant
 from scipy.integrate import solve_ivp
 
-from volery.control.fleet import Fleet, FleetEventKind
+from volery.control.fleet import Fleet
+from volery.control.fleet_events import FleetEventKind
 from volery.core.errors import CommandError
 from volery.vehicle.airframe import Airframe, airframe_names, hover_power, load_airframe
 from volery.vehicle.battery import BatteryLevel, drain

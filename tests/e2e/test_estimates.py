@@ -1,0 +1,117 @@
+"""UAVs that fly on what their own sensors tell them."""
+
+import numpy as np
+import pytest
+
+from volery.core.errors import ScenarioError
+from volery.scenario.load import parse_scenario
+
+AIDS = [
+    {"kind": "imu"},
+    {"kind": "gnss"},
+    {"kind": "barometer"},
+    {"kind": "magnetometer"},
+    {"kind": "sonar", "position_m": [0.0, 0.0, -0.05], "rpy_deg": [0.0, 90.0, 0.0]},
+]
+
+
+@pytest.fixture
+def estimating_data(flat_data):
+    flat_data["types"]["f450"]["sensors"] = [*AIDS, {"kind": "estimate"}]
+    flat_data["world"] = {"wind": {"velocity_m_s": [2.0, 0.0, 0.0], "turbulence": "light"}}
+    return flat_data
+
+
+def errors_of(simulation):
+    """Time, error (3,) m and standard deviation (3,) m of every odometry message."""
+    rows = []
+
+    def on_odometry(published):
+        message = published.message
+        place = message.pose.pose.position
+        error = np.array([place.x, place.y, place.z]) - simulation.uavs["uav1"].position_map
+        sigma = np.sqrt(np.diag(np.reshape(message.pose.covariance, (6, 6)))[:3])
+        rows.append((published.time_ns / 1e9, *error, *sigma))
+
+    simulation.graph.subscribe("/uav1/odom", on_odometry)
+    return rows
+
+
+def test_flies_on_estimates_through_an_outage_and_lands(simulate, estimating_data):
+    simulation = simulate(estimating_data)
+    rows = errors_of(simulation)
+    uav = simulation.uavs["uav1"]
+    uav.take_off(5.0)
+    simulation.run(8.0)
+    uav.go_to([15.0, 5.0, 6.0])
+    simulation.run(10.0)
+    np.testing.assert_allclose(uav.position_map, [15.0, 5.0, 6.0], atol=2.5)
+    simulation.inject({"kind": "gnss_loss", "uav": "uav1", "at_s": 18.0, "until_s": 38.0})
+    simulation.run(21.0)
+    simulation.run(6.0)
+    uav.land()
+    simulation.run(25.0)
+    assert uav.mode.name == "LANDED"
+    assert not uav.crashed
+
+    t, *columns = np.array(rows).T
+    error, sigma = np.abs(columns[:3]), np.array(columns[3:])
+    inside = (error < 3.0 * sigma).mean(axis=1)
+    assert (inside > 0.97).all()
+    before, end = (t > 10.0) & (t < 18.0), (t > 37.0) & (t < 38.0)
+    assert sigma[:2, before].max() < 1.0
+    assert sigma[:2, end].min() > 3.0  # it says that it drifts
+    assert error[:2, end].max() > 3.0 * error[:2, before].max()  # and it does
+    assert error[:2, (t > 41.0) & (t < 45.0)].max() < 2.5
+
+
+def test_estimates_may_be_told_and_not_flown_on(simulate, estimating_data):
+    estimating_data["types"]["f450"]["sensors"][-1]["flies"] = False
+    simulation = simulate(estimating_data)
+    rows = errors_of(simulation)
+    uav = simulation.uavs["uav1"]
+    uav.take_off(5.0)
+    simulation.run(10.0)
+    at_rest = uav.position_map[:2]
+    assert np.hypot(*at_rest) < 0.3  # the start's error of half a metre is not flown out
+    assert max(abs(row[1]) for row in rows) > 0.05
+
+
+def test_flights_on_estimates_are_repeated_restored_and_reset(simulate, estimating_data):
+    digests = []
+    for slices in ([4.0], [0.0073] * 400 + [1.08]):
+        simulation = simulate(estimating_data)
+        simulation.enable_digest()
+        simulation.uavs["uav1"].take_off(3.0)
+        for seconds in slices:
+            simulation.run(seconds)
+        digests.append(simulation.digest())
+    assert digests[0] == digests[1]
+    kept = simulation.snapshot()
+    simulation.run(2.0)
+    later = simulation.digest()
+    simulation.restore(kept)
+    simulation.run(2.0)
+    assert simulation.digest() == later
+    simulation.reset()
+    simulation.uavs["uav1"].take_off(3.0)
+    simulation.run(4.0)
+    assert simulation.digest() == digests[0]
+
+
+def test_other_seeds_begin_elsewhere_near_the_truth(simulate, estimating_data):
+    simulation = simulate(estimating_data)
+    firsts = []
+    for seed in (1, 2, 3):
+        simulation.reset(seed)
+        rows = errors_of(simulation)
+        simulation.run(0.05)
+        firsts.append(rows[0][1:4])
+    assert len({round(x, 6) for x, _, _ in firsts}) == 3
+    assert np.abs(firsts).max() < 3.0
+
+
+def test_an_estimate_needs_an_imu(estimating_data):
+    estimating_data["types"]["f450"]["sensors"] = [{"kind": "gnss"}, {"kind": "estimate"}]
+    with pytest.raises(ScenarioError, match='needs one of kind "imu"'):
+        parse_scenario(estimating_data)

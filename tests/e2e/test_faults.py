@@ -1,0 +1,142 @@
+"""Faults, as timed entries of a scenario and as calls."""
+
+import numpy as np
+import pytest
+
+from volery.core.errors import CommandError, ScenarioError
+
+
+@pytest.fixture
+def airborne(flat_data):
+    flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 20.0]
+    return flat_data
+
+
+def messages(simulation, topic):
+    got = []
+    simulation.graph.subscribe(topic, got.append)
+    return got
+
+
+def test_lost_motor_at_its_time_brings_a_quadrotor_down(simulate, airborne):
+    airborne["faults"] = [{"kind": "motor", "uav": "uav1", "rotor": 0, "at_s": 1.0}]
+    simulation = simulate(airborne)
+    simulation.run(1.0)
+    health = simulation._fleet.state.rotor_health[0]
+    assert simulation.uavs["uav1"].position_map[2] == pytest.approx(20.0, abs=0.02)
+    simulation.run(3.0)
+    assert health[0] == 0.0
+    assert simulation.uavs["uav1"].position_map[2] < 15.0
+
+
+def test_weak_motor_for_a_while(simulate, airborne):
+    simulation = simulate(airborne)
+    simulation.inject(
+        {"kind": "motor", "uav": "uav1", "rotor": 2, "thrust_factor": 0.7, "until_s": 1.0}
+    )
+    simulation.run(0.5)
+    assert simulation._fleet.state.rotor_health[0, 2] == 0.7
+    simulation.run(4.0)
+    assert simulation._fleet.state.rotor_health[0, 2] == 1.0
+    np.testing.assert_allclose(simulation.uavs["uav1"].position_map, [0, 0, 20], atol=0.2)
+
+
+def test_sensors_fall_silent_stick_and_err(simulate, airborne):
+    airborne["faults"] = [
+        {"kind": "sensor", "uav": "uav1", "sensor": "imu", "effect": "dropped",
+         "at_s": 0.1, "until_s": 0.2},
+        {"kind": "sensor", "uav": "uav1", "sensor": "imu", "effect": "biased",
+         "bias": [1.0, 0, 0, 0, 0, 0], "at_s": 0.3, "until_s": 0.4},
+        {"kind": "sensor", "uav": "uav1", "sensor": "imu", "effect": "stuck", "at_s": 0.5},
+    ]  # fmt: skip
+    simulation = simulate(airborne)
+    got = messages(simulation, "/uav1/imu")
+    simulation.run(0.6)
+    times = np.array([m.time_ns for m in got]) / 1e9
+    rates = np.array([m.message.angular_velocity.x for m in got])
+    assert not ((times > 0.1) & (times <= 0.2)).any()
+    assert rates[(times > 0.3) & (times <= 0.4)].min() > 0.9
+    assert np.abs(rates[times < 0.3]).max() < 0.1
+    assert len(set(rates[times > 0.5])) == 1
+
+
+def test_gust_pushes_and_displacement_moves(simulate, airborne):
+    airborne["faults"] = [
+        {"kind": "gust", "velocity_m_s": [8.0, 0.0, 0.0], "rise_s": 0.2, "hold_s": 0.5, "at_s": 1.0}
+    ]
+    simulation = simulate(airborne)
+    uav = simulation.uavs["uav1"]
+    simulation.run(1.8)
+    pushed = uav.position_map[0]
+    assert pushed > 0.1
+    simulation.run(6.0)
+    assert abs(uav.position_map[0]) < 0.1
+    simulation.inject({"kind": "displacement", "uav": "uav1", "offset_m": [0.0, 3.0, 1.0]})
+    simulation.step(1)
+    np.testing.assert_allclose(uav.position_map[1:], [3.0, 21.0], atol=0.05)
+    simulation.run(8.0)
+    np.testing.assert_allclose(uav.position_map, [0, 0, 20], atol=0.2)
+
+
+def test_lost_satellites(simulate, airborne):
+    airborne["types"]["f450"]["sensors"].append({"kind": "gnss"})
+    airborne["faults"] = [{"kind": "gnss_loss", "uav": "uav1", "at_s": 1.0, "until_s": 2.0}]
+    simulation = simulate(airborne)
+    got = messages(simulation, "/uav1/fix")
+    simulation.run(5.0)
+    lost = [m.message.status.status < 0 for m in got]
+    stamps = [m.message.header.stamp.sec + m.message.header.stamp.nanosec / 1e9 for m in got]
+    for stamp, is_lost in zip(stamps, lost, strict=True):
+        assert is_lost == (1.0 <= stamp < 3.0), stamp  # and one second to find them again
+
+
+def test_faults_are_part_of_what_is_kept(simulate, airborne):
+    airborne["faults"] = [
+        {"kind": "motor", "uav": "uav1", "rotor": 1, "thrust_factor": 0.8, "at_s": 0.5}
+    ]
+    simulation = simulate(airborne)
+    simulation.enable_digest()
+    simulation.run(0.3)
+    kept = simulation.snapshot()
+    simulation.run(1.0)
+    first = simulation.digest()
+    simulation.restore(kept)
+    simulation.run(1.0)
+    assert simulation.digest() == first
+    simulation.reset()
+    simulation.run(1.3)
+    assert simulation.digest() == first
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ({"kind": "motor", "uav": "uav9", "rotor": 0}, "no UAV 'uav9'; known: uav1"),
+        ({"kind": "motor", "uav": "uav1", "rotor": 4}, "no rotor 4; 0 to 3 exist"),
+        ({"kind": "sensor", "uav": "uav1", "sensor": "x", "effect": "stuck"}, "known: imu"),
+        ({"kind": "sensor", "uav": "uav1", "sensor": "imu", "effect": "biased", "bias": [1.0]},
+         "6 finite numbers"),
+        ({"kind": "gnss_loss", "uav": "uav1"}, "no GNSS receiver"),
+    ],
+)  # fmt: skip
+def test_faults_that_cannot_be_are_refused(simulate, airborne, fault, words):
+    simulation = simulate(airborne)
+    with pytest.raises(CommandError, match=words):
+        simulation.inject(fault)
+    airborne["faults"] = [fault]
+    with pytest.raises(ScenarioError, match=rf"faults\[0\]: .*{words}"):
+        simulate(airborne)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"kind": "motor", "uav": "uav1", "rotor": 0, "at_s": 2.0, "until_s": 1.0},
+        {"kind": "motor", "uav": "uav1", "rotor": 0, "thrust_factor": 1.5},
+        {"kind": "sensor", "uav": "uav1", "sensor": "imu", "effect": "stuck", "bias": [1.0]},
+        {"kind": "plague", "uav": "uav1"},
+    ],
+)
+def test_impossible_data_is_refused(simulate, airborne, fault):
+    with pytest.raises(CommandError, match="fault"):
+        simulate(airborne).inject(fault)
