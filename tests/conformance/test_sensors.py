@@ -51,7 +51,8 @@ KINDS = [
     Kind("gnss", ("fix", "fix_velocity"), 5.0, "GNSS", "gnss_m8", 120_000_000, True),
     Kind("barometer", ("pressure", "pressure/temperature"), 50.0, "Barometer", "barometer_px4"),
     Kind("magnetometer", ("mag",), 100.0, "Magnetometer", "magnetometer_px4"),
-    Kind("battery", ("battery",), 1.0, "Battery", noisy_at_rest=False),
+    Kind("battery", ("battery",), 20.0, "Battery", noisy_at_rest=False,
+         entry={"rate_hz": 20.0}),
     Kind("lidar", ("laser/horizontal/scan",), 40.0, "Hokuyo", "utm_30lx", 18_750_000, True,
          entry=LEANT),
 ]  # fmt: skip

@@ -137,8 +137,8 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "dynamics",
-            "Dynamics: plant and control, fused substeps; a swarm with contacts and downwash, 500 Hz "
-            "position control; 1,024 copies under velocity control on two threads",
+            "Dynamics: plant and control, fused substeps; a swarm with contacts and downwash, "
+            "500 Hz position control; 1,024 copies under velocity control on two threads",
             {
                 "ns_per_drone_step_n1000": Bound(150.0, at_most=True),
                 "us_per_step_n1": Bound(1.5, at_most=True),

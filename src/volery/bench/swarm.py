@@ -1,8 +1,8 @@
 """Whole swarms and many copies, the engine with contacts, downwash and events included.
 
-The scenario `swarm_100` flies 100 Crazyflies in two tiers to and fro by position commands, at 500 Hz
-physics and position control. The copies are 1,024 times one Crazyflie under velocity commands, ten
-a second, at 1 kHz physics, on two threads.
+The scenario `swarm_100` flies 100 Crazyflies in two tiers to and fro by position commands, with
+physics and position control at 500 Hz. The copies are 1,024 times one Crazyflie under velocity
+commands, ten a second, at 1 kHz physics, on two threads.
 """
 
 from __future__ import annotations
