@@ -1,0 +1,23 @@
+"""Drop 256 copies of a UAV into turbulence, each with its own, and see how far they are pushed."""
+
+import numpy as np
+
+from volery import Copies
+from volery.scenario.load import parse_scenario
+
+SCENARIO = {
+    "name": "gusty",
+    "world": {"seed": 1, "wind": {"velocity_m_s": [4.0, 0.0, 0.0], "turbulence": "moderate"}},
+    "types": {"iris": {"airframe": "iris", "sensors": [{"kind": "imu"}]}},
+    "uavs": [{"type": "iris", "position_m": [0.0, 0.0, 20.0]}],
+}
+
+with Copies(parse_scenario(SCENARIO), 256) as copies:
+    copies.run(10.0)
+    away = np.linalg.norm(copies.state().position_map[:, 0] - [0.0, 0.0, 20.0], axis=1)
+    print(
+        f"{copies.count} copies: {np.median(away):.2f} m off in the middle, {away.max():.2f} m most"
+    )
+
+    copies.reset(away > 0.3)
+    print(f"{(copies.age_s == 0.0).sum()} of them begin anew")
