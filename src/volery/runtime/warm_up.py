@@ -98,6 +98,19 @@ def compile_sensors() -> None:
     scene.close()
 
 
+def compile_estimators() -> None:
+    """Compile the filters, which flights without a sensor of kind "estimate" do not need."""
+    from volery.control.estimator.estimator import Estimator
+    from volery.control.estimator.settings import EstimatorSettings
+
+    still, level = np.zeros((2, 3)), np.tile(rotations.IDENTITY, (2, 1))
+    rows, up = np.arange(2), np.tile([0.0, 0.0, 9.8], (2, 1))
+    estimator = Estimator(2, EstimatorSettings(), position=still, velocity=still, attitude=level)
+    estimator.fuse_pressure_height(rows, 1, np.zeros(2), 1.0)
+    estimator.predict(rows, 5_000_000, still, up)
+    estimator.covariance(rows)
+
+
 def _fleet() -> Fleet:
     """Two UAVs: views of a single one would have another memory layout, and another kernel."""
     places = [[0.0, 0.0, 1.0], [3.0, 0.0, 1.0]]
@@ -106,3 +119,4 @@ def _fleet() -> Fleet:
 
 if __name__ == "__main__":
     compile_kernels()
+    compile_estimators()

@@ -176,7 +176,8 @@ def test_bench_mistakes(tmp_path: Path) -> None:
     result = runner.invoke(app, ["bench", "speed"])
     assert result.exit_code == 2
     assert (
-        "no bench 'speed'; there are lidar, fleet, dynamics, start, peers, or all" in result.stderr
+        "no bench 'speed'; there are lidar, fleet, dynamics, reset, start, peers, or all"
+        in result.stderr
     )
     result = runner.invoke(app, ["bench", "lidar", "--out", str(tmp_path / "no" / "x.json")])
     assert result.exit_code == 2
