@@ -18,6 +18,7 @@ PLANTS = {
     "kinematic": Kinematic(),
     "kinematic, lagging": Kinematic(time_constant_s=0.3, limited=True),
 }
+WAY = np.array([3.0, 1.0, 1.0])
 every_plant = pytest.mark.parametrize("plant", PLANTS.values(), ids=PLANTS)
 
 
@@ -32,7 +33,7 @@ def task(fleet, row=0):
     """Somewhere else by velocity, then to a place, then down."""
     at = fleet.state.position_map[row].copy()
     yield 400, lambda: fleet.command_velocity_body(row, [1.0, 0.5, 0.2], 0.4)
-    yield 5000, lambda: fleet.command_position(row, at + [3.0, 1.0, 1.0], 0.5)
+    yield 5000, lambda: fleet.command_position(row, at + WAY, 0.5)
     yield 400, lambda: fleet.hold(row)
 
 
@@ -59,7 +60,7 @@ def test_does_its_task(plant):
     start = fleet.state.position_map[0].copy()
     flown(fleet)
     fleet.advance(2000, FLAT)
-    np.testing.assert_allclose(fleet.state.position_map[0], start + [3, 1, 1], atol=0.15)
+    np.testing.assert_allclose(fleet.state.position_map[0], start + WAY, atol=0.15)
     assert np.linalg.norm(fleet.state.velocity_map[0]) < 0.05
     np.testing.assert_allclose(np.linalg.norm(fleet.state.attitude[0]), 1.0, atol=1e-9)
 
