@@ -1,8 +1,9 @@
 """Going back to a kept state, and to the start, is exact to the bit."""
 
+import numpy as np
 import pytest
 
-from volery.core.errors import SnapshotError
+from volery.core.errors import CommandError, SnapshotError
 from volery.graph.messages import Odometry, String
 from volery.graph.node import Node
 
@@ -142,3 +143,47 @@ def test_undelivered_messages_are_kept(simulate, flat_data):
     simulation.restore(kept)
     simulation.run(0.01)
     assert heard == ["waiting", "waiting"]
+
+
+def test_a_single_uav_begins_anew_and_the_other_flies_on(simulate, flat_data):
+    flat_data["uavs"] = [
+        {"type": "f450", "position_m": [0.0, 0.0]},
+        {"type": "f450", "position_m": [5.0, 0.0]},
+    ]
+
+    def told(simulation, since_ns):
+        got = []
+        simulation.graph.subscribe(
+            "/uav1/imu",
+            lambda p: got.append((p.time_ns - since_ns, p.message.linear_acceleration.z)),
+        )
+        return got
+
+    used, undisturbed, fresh = (simulate(flat_data) for _ in range(3))
+    for simulation in (used, undisturbed):
+        simulation.uavs["uav1"].take_off(4.0)
+        simulation.uavs["uav2"].take_off(3.0)
+        simulation.run(4.0)
+        simulation.uavs["uav1"].command_rotor_speeds([0.0] * 4)
+        simulation.run(2.0)
+    assert used.uavs["uav1"].crashed
+    used.reset_uav("uav1")
+    assert not used.uavs["uav1"].crashed
+    again, first = told(used, 6_000_000_000), told(fresh, 0)
+    for simulation in (used, fresh):
+        simulation.uavs["uav1"].take_off(2.0)
+        simulation.run(3.0)
+    undisturbed.run(3.0)
+    np.testing.assert_array_equal(used.uavs["uav1"].position_map, fresh.uavs["uav1"].position_map)
+    np.testing.assert_array_equal(
+        used.uavs["uav2"].position_map, undisturbed.uavs["uav2"].position_map
+    )
+    assert again == first[1:]  # the reading of the very start was made before anyone listened
+
+    used.uavs["uav2"].go_to([0.0, 0.0, 0.4])
+    used.uavs["uav1"].go_to([-6.0, 0.0, 3.0])
+    used.run(12.0)
+    with pytest.raises(CommandError, match="uav1 cannot go back to its start: uav2 is there"):
+        used.reset_uav("uav1")
+    with pytest.raises(CommandError, match="no UAV 'uav7'; known: uav1, uav2"):
+        used.reset_uav("uav7")

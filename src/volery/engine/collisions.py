@@ -88,9 +88,12 @@ class Collisions:
         return {"solid": self._touched_solid.copy(), "uav": self._touching_uav.copy()}
 
     def forget(self, rows: NDArray[np.int64]) -> None:
-        """Take the UAVs of whole copies as new: they touch nothing, and look around at once."""
+        """Take UAVs as new: they touch nothing, and look around at once."""
         self._touched_solid[rows] = -1
         self._touching_uav[rows] = False
+        for row in rows.tolist():
+            crew = self._crew_of(row)
+            self._touching_uav[crew, row - crew.start] = False
         self._fleet.state.contact_budget[rows] = 0.0
         self._fleet.state.separation_budget[rows] = 0.0
 

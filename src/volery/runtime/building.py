@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.control.gains import ControlRates
-from volery.core.errors import DataFileError, ScenarioError
+from volery.core.errors import CommandError, DataFileError, ScenarioError
 from volery.runtime.placement import Start, place_uavs
 from volery.runtime.plant_building import plant_of_type
 from volery.runtime.worlds import build_weather
@@ -66,6 +67,18 @@ def build_fleet(
         flight = scenario.types[start.type_name].flight
         fleet.set_command_timeout(flight.command_timeout_s, row)
     return fleet
+
+
+def check_free(fleet: Fleet, row: int, position_map: NDArray[np.float64]) -> None:
+    """`CommandError` where another UAV is too near to `position_map` (3,) m for UAV `row`."""
+    radius = np.array([airframe.body.collision_radius_m for airframe in fleet.airframes])
+    apart = np.linalg.norm(fleet.state.position_map - position_map, axis=1)
+    apart[row] = np.inf
+    nearest = int(np.argmin(apart - radius))
+    if apart[nearest] < radius[nearest] + radius[row]:
+        raise CommandError(
+            f"{fleet.names[row]} cannot go back to its start: {fleet.names[nearest]} is there"
+        )
 
 
 def add_bodies(scene: Scene, starts: Sequence[Start], *, copies: int = 1) -> None:

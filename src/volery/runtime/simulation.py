@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from types import MappingProxyType
 from typing import Any, Literal
@@ -21,7 +21,7 @@ from volery.engine.partners import Partner
 from volery.graph.graph import Graph
 from volery.graph.node import Context, Node
 from volery.graph.publishing import GraphPublisher
-from volery.runtime.building import add_bodies, build_fleet, place
+from volery.runtime.building import add_bodies, build_fleet, check_free, place
 from volery.runtime.command_door import open_commands
 from volery.runtime.digest import Digest
 from volery.runtime.estimation_building import build_estimation
@@ -305,6 +305,27 @@ class Simulation:
         self._put_back(self._start_state)
         self._seed_streams(self.scenario.seed if seed is None else seed)
 
+    def reset_uav(self, name: str) -> None:
+        """Put one UAV back to its start while the others fly on: as it was, mended, charged, new.
+
+        Its plant, controllers, sensors, estimate and nodes begin anew, with the noise of the start;
+        guidance and sensors keep their phase. `CommandError` where its place is taken.
+        """
+        if name not in self.uavs:
+            raise CommandError(f"there is no UAV '{name}'; known: {', '.join(self.uavs)}")
+        row = self.uav_names.index(name)
+        nodes = [k for k, node in enumerate(self.nodes) if node.get_namespace() == f"/{name}"]
+        self._check_standing("a reset", [self.nodes[k] for k in nodes])
+        start = self._start_state["engine"]["fleet"]
+        check_free(self._fleet, row, start["position"][0, row])
+        rows = np.array([row])
+        self._fleet.restart(start, rows)
+        self._engine.collisions.forget(rows)
+        keys = {(f.id.uav, f.id.name): f.key for f in self._fitted if f.id.uav == row}
+        self._engine.restart_sensors(rows, keys)
+        states = self._start_state["nodes"]
+        put_back_nodes([self.nodes[k] for k in nodes], [states[k] for k in nodes])
+
     def _seed_streams(self, seed: int) -> None:
         """Give sensors and turbulence the random streams of another run; at the start only."""
         rows = np.arange(len(self._fleet))
@@ -333,9 +354,9 @@ class Simulation:
         self._events[:] = state["events"]
         self._owed_ns = state["owed_ns"]
 
-    def _check_standing(self, what: str) -> None:
+    def _check_standing(self, what: str, nodes: Sequence[Node] | None = None) -> None:
         self._check_open()
-        check_nodes(self.nodes, what)
+        check_nodes(self.nodes if nodes is None else nodes, what)
         check_partners(self._partners, what)
         if not self._engine.stands:
             raise SnapshotError(f"{what} is not possible in the middle of a tick; use post()")
