@@ -18,7 +18,7 @@ from volery.engine.agenda import Agenda
 from volery.engine.collisions import BOUNCE, CRASH, Collisions
 from volery.engine.commands import Inbox
 from volery.engine.deadlines import Deadlines
-from volery.engine.events import Event
+from volery.engine.events import Event, EventKind
 from volery.engine.partners import Partner
 from volery.engine.restart import Keys, restart_sensors
 from volery.engine.stages import STAGES, Tick, take_commands
@@ -82,6 +82,7 @@ class Engine:
     ) -> None:
         self.fleet = fleet
         self.scene = scene
+        self.ground = terrain
         self.terrain = terrain.grid
         self.sink = sink
         self.inbox = Inbox()
@@ -148,6 +149,13 @@ class Engine:
         """How far a tick may go that shall not pass `step`."""
         now = self.fleet.step
         return min(max(min(step, self._due_step()), now), now + _MOST_STEPS_A_TICK)
+
+    def note(self, uav: int, kind: EventKind, detail: str) -> None:
+        """Let something that happens to a UAV now be an event."""
+        x, y, z = self.fleet.state.position_map[uav].tolist()
+        self._new_events.append(
+            Event(self.time_ns, self._names[uav], kind, (x, y, z), 0.0, detail=detail)
+        )
 
     def collect_events(self) -> list[Event]:
         """Events since the last call, oldest first."""

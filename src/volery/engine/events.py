@@ -20,6 +20,8 @@ class EventKind(StrEnum):
     """Changed its flight mode."""
     BATTERY = "battery"
     """Its battery ran low, critical or empty."""
+    FAULT = "fault"
+    """Something planned went wrong with it, or is well again."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Event:
         x, y, z = self.position_map
         where = f"at ({x:.1f}, {y:.1f}, {z:.1f}) m"
         time = f"{s_from_ns(self.time_ns):.3f} s"
-        if self.kind in (EventKind.MODE, EventKind.BATTERY):
+        if self.kind in (EventKind.MODE, EventKind.BATTERY, EventKind.FAULT):
             return f"{time}  {self.uav} {self.detail} {where}"
         what = {
             EventKind.TOUCH_DOWN: "touched down",

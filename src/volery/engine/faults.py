@@ -9,6 +9,7 @@ from volery.control.fleet import Fleet
 from volery.core.clock import ns_from_s, s_from_ns
 from volery.core.errors import CommandError
 from volery.engine.engine import Engine, SensorBank
+from volery.engine.events import EventKind
 from volery.scenario.faults import (
     DisplacementFault,
     Fault,
@@ -19,6 +20,7 @@ from volery.scenario.faults import (
 )
 from volery.sensors.faults import FaultableBank
 from volery.sensors.gnss import GnssBank
+from volery.vehicle.plants import RigidBody
 from volery.world.weather import Gust
 
 
@@ -28,6 +30,10 @@ class FaultPlan:
     def __init__(self, engine: Engine, names: tuple[str, ...]) -> None:
         self._engine = engine
         self._names = names
+        self._sound = engine.fleet.state.rotor_health.copy()
+        """(N, rotors) health without faults: what wear has left."""
+        self._weak: dict[tuple[int, int], list[float]] = {}
+        """Shares of thrust that the present faults leave, by UAV and rotor."""
 
     def add(self, fault: Fault) -> None:
         """Let a fault happen when its time comes, or at the next tick if that has passed.
@@ -46,25 +52,60 @@ class FaultPlan:
             begin, end = self._sensor(fault)
         else:
             begin = self._gnss(fault)
-        self._engine.at(ns_from_s(fault.at_s), begin)
+        uav = getattr(fault, "uav", None)
         until_s = getattr(fault, "until_s", None)
-        if end is not None and until_s is not None:
-            self._engine.at(ns_from_s(until_s), end)
+        self._at(fault.at_s, begin, uav, f"fault: {fault.kind}")
+        if until_s is not None:
+            self._at(until_s, end or _nothing, uav, f"fault over: {fault.kind}")
+
+    def mend(self, uav: int) -> None:
+        """Forget what weakens the rotors of a UAV that begins anew."""
+        self._weak = {key: shares for key, shares in self._weak.items() if key[0] != uav}
+
+    def get_state(self) -> dict[tuple[int, int], list[float]]:
+        """What a snapshot keeps beside what is planned and what fleet and sensors hold."""
+        return {key: list(shares) for key, shares in self._weak.items()}
+
+    def set_state(self, state: dict[tuple[int, int], list[float]]) -> None:
+        """Go back to a kept state."""
+        self._weak = {key: list(shares) for key, shares in state.items()}
 
     @property
     def _fleet(self) -> Fleet:
         return self._engine.fleet
+
+    def _at(self, time_s: float, action: Callable[[], Any], uav: str | None, what: str) -> None:
+        def act() -> None:
+            action()
+            if uav is not None:
+                self._engine.note(self._row(uav), EventKind.FAULT, what)
+
+        self._engine.at(ns_from_s(time_s), act)
 
     def _motor(self, fault: MotorFault) -> tuple[Callable[[], Any], Callable[[], Any]]:
         i = self._row(fault.uav)
         rotors = len(self._fleet.airframes[i].rotors.places)
         if fault.rotor >= rotors:
             raise CommandError(f"{fault.uav} has no rotor {fault.rotor}; 0 to {rotors - 1} exist")
-        fresh = float(self._fleet.state.rotor_health[i, fault.rotor])
-        return (
-            lambda: self._fleet.set_rotor_health(i, fault.rotor, fault.thrust_factor * fresh),
-            lambda: self._fleet.set_rotor_health(i, fault.rotor, fresh),
-        )
+        if not isinstance(self._fleet.plants[i], RigidBody):
+            raise CommandError(f"{fault.uav} has no motors to fail: its plant is no rigid body")
+        key = i, fault.rotor
+
+        def weaken() -> None:
+            self._weak.setdefault(key, []).append(fault.thrust_factor)
+            self._set_health(key)
+
+        def mend() -> None:
+            if fault.thrust_factor in self._weak.get(key, ()):
+                self._weak[key].remove(fault.thrust_factor)
+                self._set_health(key)
+
+        return weaken, mend
+
+    def _set_health(self, key: tuple[int, int]) -> None:
+        """The worst of the present faults decides."""
+        share = min(self._weak.get(key, ()), default=1.0)
+        self._fleet.set_rotor_health(*key, share * float(self._sound[key]))
 
     def _sensor(self, fault: SensorFault) -> tuple[Callable[[], Any], Callable[[], Any]]:
         bank, row = self._find(fault.uav, fault.sensor)
@@ -107,7 +148,17 @@ class FaultPlan:
 
     def _displacement(self, fault: DisplacementFault) -> Callable[[], Any]:
         i = self._row(fault.uav)
-        return lambda: self._fleet.displace(i, fault.offset_m)
+
+        def displace() -> None:
+            there = self._fleet.state.position_map[i] + fault.offset_m
+            x0, y0, x1, y1 = self._engine.ground.bounds
+            if not (x0 <= there[0] <= x1 and y0 <= there[1] <= y1):
+                raise CommandError(f"fault: {fault.uav} would be displaced beyond the terrain")
+            if there[2] < float(self._engine.ground.height(there[0], there[1])):
+                raise CommandError(f"fault: {fault.uav} would be displaced under the ground")
+            self._fleet.displace(i, fault.offset_m)
+
+        return displace
 
     def _row(self, uav: str) -> int:
         try:
@@ -126,3 +177,7 @@ class FaultPlan:
                     if own.name == sensor:
                         return bank, row
         raise CommandError(f"{uav} has no sensor '{sensor}'; known: {', '.join(known)}")
+
+
+def _nothing() -> None:
+    """A fault that ends by itself needs nothing to be done."""

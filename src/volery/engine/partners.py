@@ -14,12 +14,14 @@ an error, or, where that was agreed, is left behind.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
-from volery.core.errors import PartnerError
+from volery.core.clock import NS_PER_S
+from volery.core.errors import CommandError, PartnerError
 
 Action = Callable[[], Any]
 
@@ -103,6 +105,17 @@ class Partner:
             f"partner '{self.name}' did not answer within {self.timeout_s} s of wall time at "
             f"{meeting_ns / 1e9:.3f} s"
         )
+
+
+def check_terms(period_s: float, timeout_s: float, on_timeout: str, dt_ns: int) -> None:
+    """`CommandError` for terms that no partner can be met on, with physics steps of `dt_ns`."""
+    for value, what in ((period_s, "period_s"), (timeout_s, "timeout_s")):
+        if not (math.isfinite(value) and value > 0.0):
+            raise CommandError(f"{what} must be finite and positive, not {value}")
+    if period_s * NS_PER_S < dt_ns:
+        raise CommandError(f"period_s = {period_s} is less than a physics step of {dt_ns / 1e9} s")
+    if on_timeout not in ("stop", "leave"):
+        raise CommandError(f'on_timeout must be "stop" or "leave", not {on_timeout!r}')
 
 
 def meet(partners: Sequence[Partner], time_ns: int) -> None:

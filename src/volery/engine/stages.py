@@ -73,6 +73,7 @@ def publish(engine: Engine, _tick: Tick) -> None:
     for due in engine.timer_agenda.pop_due(engine.fleet.step):
         due.what()
         engine.sink.deliver()
+    raise_events(engine, _tick)  # what was noted since: faults
 
 
 def meet_partners(engine: Engine, _tick: Tick) -> None:

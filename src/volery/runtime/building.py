@@ -31,6 +31,10 @@ def place(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[Start, ..
             key = f"{scenario.name}: types.{name}.airframe"
             raise DataFileError(f"{key}: {error}") from None
         rotors = len(airframes[name].rotors.places)
+        if kind.wear and kind.plant != "rigid_body":
+            raise ScenarioError(
+                f'{scenario.name}: types.{name}.wear: rotors wear with plant = "rigid_body" alone'
+            )
         if len(kind.wear) not in (0, rotors):
             raise ScenarioError(
                 f"{scenario.name}: types.{name}.wear has {len(kind.wear)} entries; "

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import bisect
 import itertools
-import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -29,6 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 from volery.core.clock import ns_from_s, s_from_ns
 from volery.core.errors import CommandError, ScenarioError
 from volery.runtime.building import place
+from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.copy_block import CopyBlock, CopyEvent, Reading
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
@@ -75,6 +75,7 @@ class Copies:
         ]
         self._first: list[int] = ends[:-1]
         self._owed_ns = 0
+        self._closed = False
         self._pool = ThreadPoolExecutor(len(self._blocks), thread_name_prefix="volery-copies")
 
     # -------------------------------------------------------------------------------------- time
@@ -115,8 +116,8 @@ class Copies:
 
     def step(self, steps: int = 1) -> None:
         """Advance by physics steps."""
-        if steps < 0:
-            raise CommandError(f"steps must not be negative, not {steps}")
+        self._check_open()
+        check_steps(steps)
         target = self._blocks[0].step + steps
         others = [self._pool.submit(block.advance_to, target) for block in self._blocks[1:]]
         self._blocks[0].advance_to(target)
@@ -125,8 +126,8 @@ class Copies:
 
     def run(self, seconds: float) -> None:
         """Advance by `seconds`; parts of a step are owed to the next call."""
-        if not (math.isfinite(seconds) and seconds >= 0.0):
-            raise CommandError(f"seconds must be finite and not negative, not {seconds}")
+        self._check_open()
+        check_seconds(seconds)
         dt_ns = self._blocks[0].dt_ns
         steps, self._owed_ns = divmod(self._owed_ns + ns_from_s(seconds), dt_ns)
         self.step(steps)
@@ -134,6 +135,8 @@ class Copies:
     def reset(self, copies: ArrayLike | None = None, seeds: Sequence[int] | None = None) -> None:
         """Put `copies` (all by default) back to the start, with the seeds they have or new ones."""
         chosen = self._chosen(copies)
+        for seed in seeds or ():
+            check_seed(seed)
         if seeds is not None and len(seeds) != len(chosen):
             raise CommandError(f"{len(chosen)} copies need as many seeds, not {len(seeds)}")
         for block, first in zip(self._blocks, self._first, strict=True):
@@ -153,9 +156,11 @@ class Copies:
             block.set_state(kept)
 
     def close(self) -> None:
-        """Give threads and scene memory back."""
-        self._pool.shutdown()
-        self.scene.close()
+        """Give threads and scene memory back; nothing can be simulated afterwards."""
+        if not self._closed:
+            self._closed = True
+            self._pool.shutdown()
+            self.scene.close()
 
     def __enter__(self) -> Copies:
         return self
@@ -207,18 +212,39 @@ class Copies:
         not heed it.
         """
         shape = (self.count, len(self._starts))
-        velocity = np.broadcast_to(np.asarray(velocity, dtype=np.float64), (*shape, 3))
-        yaw_rate = np.broadcast_to(np.asarray(yaw_rate, dtype=np.float64), shape)
+        velocity = _spread("velocity", velocity, (*shape, 3))
+        yaw_rate = _spread("yaw_rate", yaw_rate, shape)
         for block, first in zip(self._blocks, self._first, strict=True):
             rows = slice(first, first + len(block.seeds))
             block.fleet.command_velocities(
                 velocity[rows].reshape(-1, 3), yaw_rate[rows].reshape(-1)
             )
 
+    def _check_open(self) -> None:
+        if self._closed:
+            raise CommandError("the copies are closed; make new ones")
+
     def _chosen(self, copies: ArrayLike | None) -> NDArray[np.int64]:
         chosen = np.arange(self.count) if copies is None else np.atleast_1d(np.asarray(copies))
         if chosen.dtype == bool:
+            if chosen.shape != (self.count,):
+                raise CommandError(
+                    f"a mask of copies has one entry for each of {self.count}, not {chosen.shape}"
+                )
             chosen = np.flatnonzero(chosen)
+        if len(chosen) and (chosen.ndim != 1 or not np.issubdtype(chosen.dtype, np.integer)):
+            raise CommandError(f"copies are named by whole numbers or a mask, not {copies!r}")
         if len(chosen) and not 0 <= chosen.min() <= chosen.max() < self.count:
             raise CommandError(f"copies are numbered 0 to {self.count - 1}")
         return chosen.astype(np.int64)
+
+
+def _spread(what: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Finite numbers for all UAVs from as many, or from fewer that stand for several."""
+    try:
+        spread = np.broadcast_to(np.asarray(values, dtype=np.float64), shape)
+    except (TypeError, ValueError):
+        raise CommandError(f"{what}: numbers that fit {shape} are needed") from None
+    if not np.isfinite(spread).all():
+        raise CommandError(f"{what} must be finite")
+    return spread

@@ -80,12 +80,9 @@ class CopyBlock:
         self._latest: list[Samples | None] = [None] * len(banks)
         self._events: list[CopyEvent] = []
         self._began_ns = np.zeros(copies, np.int64)
-        for row, start in enumerate(everyone):
-            if start.takes_off:
-                altitude = scenario.types[start.type_name].flight.take_off_altitude_m
-                self.fleet.take_off(row, altitude)
         self._stir_air(np.arange(copies))
         self._start_state = self.fleet.get_state()
+        self._take_off(np.arange(len(everyone)))
 
     # -------------------------------------------------------------------------------------- time
 
@@ -134,6 +131,7 @@ class CopyBlock:
         keys = self._keys_of(copies)
         for samples, fresh in self._engine.restart_sensors(rows, keys):
             self._renew(samples, fresh)
+        self._take_off(rows)
 
     def get_state(self) -> dict[str, Any]:
         """Everything that changes."""
@@ -213,6 +211,14 @@ class CopyBlock:
 
     def _fit(self, copy: int) -> list[Fitted]:
         return refit(self._fitted, self.seeds[copy], copy * len(self._starts))
+
+    def _take_off(self, rows: NDArray[np.int64]) -> None:
+        """Let those of the UAVs `rows` take off that do so by themselves."""
+        for row in rows.tolist():
+            start = self._starts[row % len(self._starts)]
+            if start.takes_off:
+                flight = self._scenario.types[start.type_name].flight
+                self.fleet.take_off(row, flight.take_off_altitude_m)
 
     def _stir_air(self, copies: NDArray[np.int64]) -> None:
         """Give each copy the turbulence of its own seed."""

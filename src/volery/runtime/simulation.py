@@ -17,11 +17,12 @@ from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.engine.faults import FaultPlan
 from volery.engine.pacing import Pacer
-from volery.engine.partners import Partner
+from volery.engine.partners import Partner, check_terms
 from volery.graph.graph import Graph
 from volery.graph.node import Context, Node
 from volery.graph.publishing import GraphPublisher
 from volery.runtime.building import add_bodies, build_fleet, check_free, place
+from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.command_door import open_commands
 from volery.runtime.digest import Digest
 from volery.runtime.estimation_building import build_estimation
@@ -103,7 +104,9 @@ class Simulation:
         self._open_graph(starts)
         self._faults = FaultPlan(self._engine, names)
         self._plan_faults()
+        self._starts = starts
         self._start_state = self._state()
+        self._take_off(names)
 
     # -------------------------------------------------------------------------------------- time
 
@@ -127,8 +130,7 @@ class Simulation:
     def step(self, steps: int = 1) -> None:
         """Advance by physics steps (1 ms each unless the scenario says otherwise)."""
         self._check_open()
-        if steps < 0:
-            raise CommandError(f"steps must not be negative, not {steps}")
+        check_steps(steps)
         self._engine.advance_to(self._fleet.step + steps)
 
     def run(
@@ -146,8 +148,8 @@ class Simulation:
         call, so that many short runs come as far as a long one.
         """
         self._check_open()
-        if seconds is not None and not (math.isfinite(seconds) and seconds >= 0.0):
-            raise CommandError(f"seconds must be finite and not negative, not {seconds}")
+        if seconds is not None:
+            check_seconds(seconds)
         left = self.scenario.duration_s - self.time_s if seconds is None else seconds
         start_s = self.time_s
         end_step = self._fleet.step + self._whole_steps(left, seconds is None)
@@ -219,6 +221,7 @@ class Simulation:
         self, amplitude_map: tuple[float, float, float], rise_s: float, lasts_s: float = math.inf
     ) -> None:
         """Let a 1-cosine gust of `amplitude_map` (3,) m/s begin now, over after `lasts_s`."""
+        self._check_open()
         self._engine.gust_now(amplitude_map, rise_s, lasts_s)
 
     def post(self, action: Callable[[], Any]) -> Future[Any]:
@@ -237,7 +240,8 @@ class Simulation:
         `simulation.inject({"kind": "motor", "uav": "uav1", "rotor": 0})`. Raises `CommandError` for
         one that cannot be.
         """
-        self._faults.add(parse_fault(dict(fault)) if isinstance(fault, Mapping) else fault)
+        self._check_open()
+        self._faults.add(parse_fault(fault))
 
     def add_partner(
         self,
@@ -253,9 +257,9 @@ class Simulation:
         is waited for no more.
         """
         self._check_open()
-        for value, what in ((period_s, "period_s"), (timeout_s, "timeout_s")):
-            if not (math.isfinite(value) and value > 0.0):
-                raise CommandError(f"{what} must be finite and positive, not {value}")
+        check_terms(period_s, timeout_s, on_timeout, self._fleet.dt_ns)
+        if any(partner.name == name and not partner.has_left for partner in self._partners):
+            raise CommandError(f"there is a lock-step partner '{name}' already")
         partner = Partner(name, timeout_s, on_timeout)
         self._partners.append(partner)
         self._engine.wait_for(partner, period_s)
@@ -291,6 +295,8 @@ class Simulation:
     def restore(self, snapshot: Snapshot) -> None:
         """Go back, or forward, to a state of this simulation: what follows is the same again."""
         self._check_standing("to restore a state")
+        if not isinstance(snapshot, Snapshot):
+            raise SnapshotError(f"not a snapshot: {snapshot!r}")
         if snapshot.owner != id(self):
             raise SnapshotError("the snapshot is of another simulation")
         self._put_back(snapshot.state)
@@ -302,8 +308,11 @@ class Simulation:
         as they are (a scenario's `world.seed` fixes them apart from all other randomness).
         """
         self._check_standing("a reset")
+        if seed is not None:
+            check_seed(seed)
         self._put_back(self._start_state)
         self._seed_streams(self.scenario.seed if seed is None else seed)
+        self._take_off(self.uav_names)
 
     def reset_uav(self, name: str) -> None:
         """Put one UAV back to its start while the others fly on: as it was, mended, charged, new.
@@ -325,6 +334,8 @@ class Simulation:
         self._engine.restart_sensors(rows, keys)
         states = self._start_state["nodes"]
         put_back_nodes([self.nodes[k] for k in nodes], [states[k] for k in nodes])
+        self._faults.mend(row)
+        self._take_off([name])
 
     def _seed_streams(self, seed: int) -> None:
         """Give sensors and turbulence the random streams of another run; at the start only."""
@@ -337,6 +348,7 @@ class Simulation:
         return {
             "engine": self._engine.get_state(),
             "graph": self.graph.get_state(),
+            "faults": self._faults.get_state(),
             "publisher": self._publisher.get_state(),
             "nodes": keep_nodes(self.nodes),
             "digest": None if self._digest is None else self._digest.get_state(),
@@ -348,6 +360,7 @@ class Simulation:
         put_back_nodes(self.nodes, state["nodes"])
         self._engine.set_state(state["engine"])
         self.graph.set_state(state["graph"])
+        self._faults.set_state(state["faults"])
         self._publisher.set_state(state["publisher"])
         if self._digest is not None:
             self._digest.set_state(state["digest"])
@@ -415,10 +428,8 @@ class Simulation:
     def _open_graph(self, starts: tuple[Start, ...]) -> None:
         self._engine.every(_CLOCK_PERIOD_S, lambda: self._publisher.publish_clock(self.time_ns))
         self._engine.every(_DIGEST_PERIOD_S, self._take_fingerprint)
-        for start, uav in zip(starts, self.uavs.values(), strict=True):
+        for uav in self.uavs.values():
             open_commands(self.graph, uav)
-            if start.takes_off:
-                uav.take_off()
         for start in starts:
             for k, entry in enumerate(self.scenario.types[start.type_name].nodes):
                 where = f"{self.scenario.name}: types.{start.type_name}.nodes[{k}]"
@@ -427,6 +438,12 @@ class Simulation:
                 self.nodes.append(
                     start_node(entry, context, f"/{start.name}", where, self.scenario.folder)
                 )
+
+    def _take_off(self, names: Sequence[str]) -> None:
+        """Let those of the UAVs take off that do so by themselves."""
+        for start in self._starts:
+            if start.takes_off and start.name in names:
+                self.uavs[start.name].take_off()
 
     def _plan_faults(self) -> None:
         for k, fault in enumerate(self.scenario.faults):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
@@ -94,13 +95,28 @@ Fault: TypeAlias = Annotated[
 ]
 
 _ADAPTER: TypeAdapter[Fault] = TypeAdapter(Fault)
+_KINDS: dict[Any, type[_Fault]] = {
+    "motor": MotorFault,
+    "sensor": SensorFault,
+    "gnss_loss": GnssFault,
+    "gust": GustFault,
+    "displacement": DisplacementFault,
+}
 
 
-def parse_fault(data: dict[str, Any]) -> Fault:
+def parse_fault(data: Fault | Mapping[str, Any]) -> Fault:
     """Fault from plain data, as in a scenario. `CommandError` says what is wrong with it."""
+    if isinstance(data, _Fault):
+        return data
+    if not isinstance(data, Mapping):
+        raise CommandError(f"a fault is a table such as {{'kind': 'motor', ...}}, not {data!r}")
+    from volery.scenario.load import describe_validation_error
+
+    kind = data.get("kind")
+    if kind not in _KINDS:
+        raise CommandError(f"fault: kind must be one of {', '.join(_KINDS)}, not {kind!r}")
     try:
-        return _ADAPTER.validate_python(data)
+        return _ADAPTER.validate_python(dict(data))
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise CommandError(f"fault: {place}: {first['msg']}") from None
+        plain = dict(data)
+        raise CommandError(describe_validation_error(error, "fault", _KINDS[kind], plain)) from None

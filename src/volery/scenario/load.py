@@ -69,7 +69,7 @@ def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
     if fault["type"] == "extra_forbidden":
         allowed = _sibling_keys(model, fault["loc"])
         near = difflib.get_close_matches(str(fault["loc"][-1]), allowed, n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else ""
+        hint = f"; did you mean '{near[0]}'?" if near else "."
         return f"unknown key '{key}'{hint} Allowed here: {', '.join(allowed)}"
     if fault["type"] == "missing":
         return f"key '{key}' is missing"
@@ -85,7 +85,11 @@ def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
 
 def _key(location: tuple[int | str, ...], data: Any, *, keep_last: bool) -> str:
     key = ""
+    tagged: Any = None
     for position, part in enumerate(location):
+        if isinstance(data, dict) and data.get("kind") == part and data is not tagged:
+            tagged = data  # the name of a union branch, even where a key is called like it
+            continue
         is_key = isinstance(part, int) or (isinstance(data, dict) and part in data)
         if not is_key and not (keep_last and position == len(location) - 1):
             continue  # the name of a union branch
@@ -156,8 +160,8 @@ def _find(name_or_path: str | Path) -> Path:
     if shipped is None:
         known = ", ".join(library.names())
         near = difflib.get_close_matches(str(name_or_path), library.names(), n=1)
-        hint = f" Did you mean '{near[0]}'?" if near else ""
+        hint = f"; did you mean '{near[0]}'?" if near else "."
         raise ScenarioError(
-            f"no scenario '{name_or_path}':{hint} it is neither a file nor one of: {known}"
+            f"no scenario '{name_or_path}'{hint} It is neither a file nor one of: {known}"
         )
     return shipped

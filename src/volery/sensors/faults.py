@@ -122,7 +122,7 @@ class FaultTable:
             wanted = " or ".join(str(n) for n in sorted(set(allowed)))
             what = ", ".join(f"{name} ({count})" for name, count in self._measured.items())
             raise CommandError(
-                f"fault biased: value must be {wanted} finite numbers for {what}, not {value!r}"
+                f"fault biased: the bias must be {wanted} finite numbers for {what}, not {value!r}"
             )
         return bias
 

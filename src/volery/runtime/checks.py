@@ -1,0 +1,33 @@
+"""What a user may say in numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from volery.core.errors import CommandError
+
+
+def check_steps(steps: Any) -> None:
+    """`CommandError` unless `steps` is a whole number, not negative."""
+    if not _is_whole(steps) or steps < 0:
+        raise CommandError(f"steps must be a whole number, not negative, not {steps!r}")
+
+
+def check_seconds(seconds: Any) -> None:
+    """`CommandError` unless `seconds` is finite and not negative."""
+    number = isinstance(seconds, int | float | np.number)
+    if not (number and math.isfinite(seconds) and seconds >= 0.0):
+        raise CommandError(f"seconds must be finite and not negative, not {seconds!r}")
+
+
+def check_seed(seed: Any) -> None:
+    """`CommandError` unless `seed` is one that a scenario may have."""
+    if not (_is_whole(seed) and 0 <= seed < 2**63):
+        raise CommandError(f"a seed must be a whole number from 0 to 2^63 - 1, not {seed!r}")
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
