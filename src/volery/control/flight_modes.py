@@ -29,7 +29,7 @@ from volery.control.reference import (
     steer_level,
 )
 from volery.control.setpoints import ControlLevel
-from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.compiled import apart_kernel, inner_kernel
 from volery.vehicle.rigid import three
 
 
@@ -87,7 +87,7 @@ _GROUND_S = 0.3
 CLIMBING, CROSSING, DESCENDING = 0, 1, 2
 
 
-@inner_kernel
+@apart_kernel
 def guide(pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float) -> None:
     """One guidance tick of a `PILOT`: mode changes, the reference, attitude and thrust setpoints.
 

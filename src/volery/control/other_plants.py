@@ -8,7 +8,7 @@ from volery.control.belief import believe_attitude, believe_place
 from volery.control.flight_modes import guide
 from volery.control.kinematic_flight import fly_kinematic
 from volery.control.setpoints import ControlLevel
-from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.compiled import apart_kernel
 from volery.vehicle.contact import NO_TOUCH
 from volery.vehicle.identified import accelerate_identified
 from volery.vehicle.kernels import carry, meet_ground, near_ground
@@ -17,7 +17,7 @@ from volery.vehicle.plants import KINEMATIC_MOTION
 _STOPPED = int(ControlLevel.STOPPED)
 
 
-@inner_kernel
+@apart_kernel
 def fly_otherwise(
     body: Any,
     pilot: Any,

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterable
 from typing import Any, Protocol, runtime_checkable
 
 
 def keep(owner: object, names: Iterable[str]) -> dict[str, Any]:
-    """Deep copies of the attributes `names` of `owner`."""
-    return copy.deepcopy({name: getattr(owner, name) for name in names})
+    """The attributes `names` of `owner`, as they are: who keeps them copies them."""
+    return {name: getattr(owner, name) for name in names}
 
 
 def put_back(owner: object, state: dict[str, Any]) -> None:
-    """Set the attributes of `owner` to copies of what `keep` kept."""
-    for name, value in copy.deepcopy(state).items():
+    """Set the attributes of `owner` to what `keep` kept."""
+    for name, value in state.items():
         setattr(owner, name, value)
 
 

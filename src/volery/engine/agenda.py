@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
@@ -19,6 +20,7 @@ class _Entry(Generic[What]):
     schedule: Schedule = field(compare=False)
     lag_ns: int = field(compare=False)
     what: What = field(compare=False)
+    wanted: Callable[[], bool] | None = field(compare=False)
 
 
 @dataclass(frozen=True)
@@ -41,12 +43,21 @@ class Agenda(Generic[What]):
         self._heap: list[_Entry[What]] = []
         self._added = 0
 
-    def add(self, what: What, schedule: Schedule, *, lag_ns: int = 0, after_step: int = -1) -> None:
+    def add(
+        self,
+        what: What,
+        schedule: Schedule,
+        *,
+        lag_ns: int = 0,
+        after_step: int = -1,
+        wanted: Callable[[], bool] | None = None,
+    ) -> None:
         """Fire `what` by `schedule`, `lag_ns` late (a sweep must end before it is known).
 
-        Firings at or before `after_step` are skipped.
+        Firings at or before `after_step` are skipped, and so are those at which `wanted()` is
+        false: for them no tick needs to end.
         """
-        entry = _Entry(0, self._added, 0, schedule, lag_ns, what)
+        entry = _Entry(0, self._added, 0, schedule, lag_ns, what, wanted)
         entry.due_step = self._step_of(entry)
         while entry.due_step <= after_step:
             entry.k += 1
@@ -56,14 +67,16 @@ class Agenda(Generic[What]):
 
     def next_step(self) -> int | None:
         """Step of the next firing, None when the agenda is empty."""
-        return self._heap[0].due_step if self._heap else None
+        steps = (e.due_step for e in self._heap if e.wanted is None or e.wanted())
+        return min(steps, default=None)
 
     def pop_due(self, step: int) -> list[Due[What]]:
         """All firings due at or before `step`, in order; their next ones are entered."""
         due = []
         while self._heap and self._heap[0].due_step <= step:
             entry = self._heap[0]
-            due.append(Due(entry.what, entry.k, entry.schedule.instant_ns(entry.k)))
+            if entry.wanted is None or entry.wanted():
+                due.append(Due(entry.what, entry.k, entry.schedule.instant_ns(entry.k)))
             entry.k += 1
             entry.due_step = self._step_of(entry)
             heapq.heapreplace(self._heap, entry)

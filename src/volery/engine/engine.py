@@ -122,9 +122,19 @@ class Engine:
         now_s = s_from_ns(self.time_ns)
         self.fleet.add_gust(Gust(amplitude_map, now_s, rise_s, now_s + lasts_s))
 
-    def every(self, period_s: float, callback: Callable[[], Any]) -> None:
-        """Call `callback` each period of simulated time, first after one period."""
-        self.timer_agenda.add(callback, self._from_now(period_s), after_step=self.fleet.step)
+    def every(
+        self,
+        period_s: float,
+        callback: Callable[[], Any],
+        *,
+        wanted: Callable[[], bool] | None = None,
+    ) -> None:
+        """Call `callback` each period of simulated time, first after one period.
+
+        Not where `wanted()` is false: then no tick ends for it.
+        """
+        schedule = self._from_now(period_s)
+        self.timer_agenda.add(callback, schedule, after_step=self.fleet.step, wanted=wanted)
 
     def at(self, time_ns: int, action: Callable[[], Any]) -> None:
         """Call `action` once, at `time_ns` of simulated time or at once if that has passed."""

@@ -136,6 +136,11 @@ class GraphPublisher:
         if self._events.wanted:
             self._events.publish(String(json.dumps(asdict(event))))
 
+    @property
+    def clock_wanted(self) -> bool:
+        """Whether anybody listens to `/clock`."""
+        return self._clock.wanted
+
     def publish_clock(self, time_ns: int) -> None:
         """Queue `/clock`."""
         if self._clock.wanted:

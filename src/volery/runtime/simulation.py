@@ -426,8 +426,13 @@ class Simulation:
     # ----------------------------------------------------------------------------------- building
 
     def _open_graph(self, starts: tuple[Start, ...]) -> None:
-        self._engine.every(_CLOCK_PERIOD_S, lambda: self._publisher.publish_clock(self.time_ns))
-        self._engine.every(_DIGEST_PERIOD_S, self._take_fingerprint)
+        publisher, every = self._publisher, self._engine.every
+        every(
+            _CLOCK_PERIOD_S,
+            lambda: publisher.publish_clock(self.time_ns),
+            wanted=lambda: publisher.clock_wanted,
+        )
+        every(_DIGEST_PERIOD_S, self._take_fingerprint, wanted=lambda: self._digest is not None)
         for uav in self.uavs.values():
             open_commands(self.graph, uav)
         for start in starts:

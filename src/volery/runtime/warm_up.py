@@ -67,39 +67,46 @@ def compile_kernels() -> None:
 
 
 def compile_dynamics() -> None:
-    """Compile the fused step and the look around that contacts need."""
-    terrain = Terrain.flat(extent_m=10.0)
-    _fleet().advance(0, terrain.grid)
-    scene = Scene(terrain, None)
-    scene.clearance(np.zeros((1, 3)), 1.0, include_terrain=False)
-    scene.close()
+    """Compile the fused step."""
+    _fleet().advance(0, Terrain.flat(extent_m=10.0).grid)
 
 
 def compile_sensors() -> None:
-    """Let two sensors of every kind measure once."""
+    """Look around as contacts do, and let two sensors of the kinds that most UAVs have measure."""
     fleet = _fleet()
     scene = Scene(Terrain.flat(extent_m=10.0), None)
+    scene.clearance(np.zeros((1, 3)), 1.0, include_terrain=False)
     scene.set_bodies([body_shape(fleet.airframes[0])], [0, 0])
     sensors = tuple(SensorId(row, f"uav{row + 1}", "sensor") for row in range(2))
     schedule, mounts = Schedule.from_hz(40.0), 2 * (make_mount(amplitude_rad=0.5, period_s=2.0),)
     place, turn = np.zeros((2, 3)), np.tile(rotations.IDENTITY, (2, 1))
     keys = np.zeros(2, dtype=np.uint64)
-    clouds = LidarBank(load_lidar("vlp_16"), schedule, sensors, mounts, keys, scene)
-    PointMaker(clouds.sample(0, 0, fleet)).points(0)
     for bank in (
         LidarBank(load_lidar(), schedule, sensors, mounts, keys, scene),
         SonarBank(load_sonar_model("downward_sonar"), schedule, sensors, place, turn, keys, scene),
         ImuBank(load_imu_model("adis16448"), schedule, sensors, place, turn, keys),
         GroundTruthBank(schedule, sensors),
-        GnssBank(load_gnss_model("gnss_m8"), schedule, sensors, place, keys, LocalFrame(0, 0, 0)),
         JointBank(sensors, mounts),
     ):
         bank.sample(0, 0, fleet)
     scene.close()
 
 
-def compile_estimators() -> None:
-    """Compile the filters, which flights without a sensor of kind "estimate" do not need."""
+def compile_the_rest() -> None:
+    """Compile what only some flights need, and what else compiles when it is first used."""
+    fleet, scene = _fleet(), Scene(Terrain.flat(extent_m=10.0), None)
+    sensors = tuple(SensorId(row, f"uav{row + 1}", "sensor") for row in range(2))
+    schedule, mounts = Schedule.from_hz(10.0), 2 * (make_mount(),)
+    keys, place = np.zeros(2, dtype=np.uint64), np.zeros((2, 3))
+    clouds = LidarBank(load_lidar("vlp_16"), schedule, sensors, mounts, keys, scene)
+    PointMaker(clouds.sample(0, 0, fleet)).points(0)
+    gnss = load_gnss_model("gnss_m8")
+    GnssBank(gnss, schedule, sensors, place, keys, LocalFrame(0, 0, 0)).sample(0, 0, fleet)
+    scene.close()
+    _compile_estimators()
+
+
+def _compile_estimators() -> None:
     from volery.control.estimator.estimator import Estimator
     from volery.control.estimator.settings import EstimatorSettings
 
@@ -119,4 +126,4 @@ def _fleet() -> Fleet:
 
 if __name__ == "__main__":
     compile_kernels()
-    compile_estimators()
+    compile_the_rest()

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.compiled import apart_kernel, inner_kernel
 from volery.vehicle.tables import NotNegative, Positive, Share, Table
 
 GUIDANCE_TICKS = 5
@@ -124,7 +124,7 @@ def battery_row(
     return row
 
 
-@inner_kernel
+@apart_kernel
 def drain(body: Any, plant: Any, command: Any) -> bool:
     """Take the charge of one update out of a `BODY`'s battery; whether it fell to a lower level.
 

@@ -25,3 +25,8 @@ def fused_kernel(function: F) -> F:
 def inner_kernel(function: F) -> F:
     """Compile a part of a fused kernel, like `core.compiled.inner_kernel`."""
     return compiled.inner_kernel(function, forceinline=True, fastmath=_FASTMATH)
+
+
+def apart_kernel(function: F) -> F:
+    """Compile a part that is called seldom: a function of its own spares the compiler's time."""
+    return compiled.inner_kernel(function, fastmath=_FASTMATH)

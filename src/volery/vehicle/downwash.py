@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.compiled import apart_kernel, inner_kernel
 from volery.vehicle.plant import AIR_DENSITY
 
 SPREAD = 0.1
@@ -71,7 +71,7 @@ def new_jets(count: int) -> NDArray[np.void]:
     return jets
 
 
-@inner_kernel
+@apart_kernel
 def find_downwash(uavs: NDArray[np.void], models: NDArray[np.void], jets: Any) -> None:
     """Fill the `downwash` of `jets`, from the present places and thrusts."""
     count = uavs.shape[0]

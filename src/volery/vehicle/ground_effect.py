@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.compiled import apart_kernel, inner_kernel
 from volery.vehicle.plant import AIR_DENSITY, GROUND_FADE
 from volery.vehicle.rigid import matrix_of
 from volery.world.terrain import TerrainGrid, terrain_height
@@ -41,7 +41,7 @@ def feels_ground(body: Any, plant: Any) -> bool:
     return bool(body.ground_budget < plant.ground_reach)
 
 
-@inner_kernel
+@apart_kernel
 def feel_ground(body: Any, plant: Any, grid: TerrainGrid, steepest: float, dt: float) -> None:
     """Look at the ground: fresh `ground_budget`, and each rotor's `rotor_lift` at mid-step.
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from volery.vehicle.aerodynamics import air_wrench
 from volery.vehicle.airframe import GRAVITY
-from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.compiled import apart_kernel, inner_kernel
 from volery.vehicle.contact import NO_TOUCH, classify_touch, resolve_contact
 from volery.vehicle.rigid import matrix_of, nudged, three, turned
 from volery.world.terrain import TerrainGrid, terrain_height
@@ -99,7 +99,7 @@ def near_ground(body: Any, dt: float) -> bool:
     return bool(body.ground_budget < _GROUND_MARGIN + travel)
 
 
-@inner_kernel
+@apart_kernel
 def meet_ground(
     body: Any,
     plant: Any,
