@@ -116,3 +116,16 @@ def test_an_estimate_needs_an_imu(estimating_data):
     estimating_data["types"]["f450"]["sensors"] = [{"kind": "gnss"}, {"kind": "estimate"}]
     with pytest.raises(ScenarioError, match='needs one of kind "imu"'):
         parse_scenario(estimating_data)
+
+
+def test_reset_with_another_seed_is_a_fresh_start(simulate, estimating_data):
+    """Also where UAVs take off by themselves, to a height above where they believe to be."""
+    estimating_data["world"]["seed"] = 1
+    estimating_data["uavs"][0]["on_start"] = "take_off"
+    used, fresh = simulate(estimating_data), simulate({**estimating_data, "seed": 7})
+    used.run(1.3)
+    used.reset(7)
+    for simulation in (used, fresh):
+        simulation.enable_digest()
+        simulation.run(3.0)
+    assert used.digest() == fresh.digest()

@@ -141,3 +141,28 @@ def test_faults_that_cannot_be_are_refused(simulate, airborne, fault, words):
 def test_impossible_data_is_refused(simulate, airborne, fault):
     with pytest.raises(CommandError, match="fault"):
         simulate(airborne).inject(fault)
+
+
+def test_the_worst_of_overlapping_faults_decides(simulate, airborne):
+    airborne["faults"] = [
+        {"kind": "motor", "uav": "uav1", "rotor": 0, "thrust_factor": f, "at_s": a, "until_s": b}
+        for f, a, b in ((0.9, 0.1, 0.3), (0.8, 0.2, 0.4))
+    ]
+    simulation = simulate(airborne)
+    health = simulation._fleet.state.rotor_health
+    found = []
+    for _ in range(5):
+        simulation.run(0.1)
+        simulation.step(1)
+        found.append(float(health[0, 0]))
+    assert found == [0.9, 0.8, 0.8, 1.0, 1.0]
+    told = [e.detail for e in simulation.events if e.kind == "fault"]
+    assert told == ["fault: motor"] * 2 + ["fault over: motor"] * 2
+
+
+@pytest.mark.parametrize("offset", [[0.0, 0.0, -50.0], [1e6, 0.0, 0.0]])
+def test_nobody_is_displaced_out_of_the_world(simulate, airborne, offset):
+    simulation = simulate(airborne)
+    simulation.inject({"kind": "displacement", "uav": "uav1", "offset_m": offset})
+    with pytest.raises(CommandError, match="would be displaced"):
+        simulation.run(0.1)

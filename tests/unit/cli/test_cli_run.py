@@ -76,7 +76,7 @@ def test_ros1_log(invoke: Invoke, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("run", "hovr"), "no scenario 'hovr'.*Did you mean 'hover'"),
+        (("run", "hovr"), "no scenario 'hovr'.*did you mean 'hover'"),
         (("run", "nowhere.toml"), "nowhere.toml: no such file"),
         (("run", "hover", "--seconds", "-1"), "duration_s"),
         (("run", "hover", "--seconds", "nan"), "duration_s"),

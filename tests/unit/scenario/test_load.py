@@ -113,7 +113,7 @@ def test_good_data_is_taken():
 
 
 def test_unknown_name_lists_the_library_and_guesses():
-    with pytest.raises(ScenarioError, match=r"Did you mean 'hover'.*forest_survey"):
+    with pytest.raises(ScenarioError, match=r"did you mean 'hover'.*forest_survey"):
         load_scenario("hoover")
 
 
