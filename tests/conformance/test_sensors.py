@@ -36,7 +36,6 @@ class Kind(NamedTuple):
     stamps_instant: bool = False
     """Whether the stamp is the nominal instant, not the physics step that comes next."""
     noisy_at_rest: bool = True
-    keeps_state: bool = True
     entry: Mapping[str, Any] = MappingProxyType({})
     """What a scenario's entry needs beyond the kind, such as a view of the ground."""
 
@@ -58,19 +57,6 @@ KINDS = [
 ]  # fmt: skip
 
 every_kind = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.kind)
-every_kind_that_keeps_state = pytest.mark.parametrize(
-    "kind",
-    [
-        pytest.param(
-            kind,
-            id=kind.kind,
-            marks=[]
-            if kind.keeps_state
-            else pytest.mark.xfail(raises=AttributeError, strict=True, reason="keeps no state yet"),
-        )
-        for kind in KINDS
-    ],
-)
 
 
 def scenario(kind, *, uavs=1, seed=1, **changes):
@@ -211,7 +197,7 @@ def is_plain(state):
     )
 
 
-@every_kind_that_keeps_state
+@every_kind
 def test_state_can_be_kept_and_given_to_another_instance(simulate, kind):
     measure, other = (Measuring(simulate, scenario(kind, uavs=2)) for _ in range(2))
     for k in range(3):
@@ -231,7 +217,7 @@ def reset(measure, kind, uavs, keys, k):
     measure.bank.reset(uavs, keys, measure.simulation.time_ns, k)
 
 
-@every_kind_that_keeps_state
+@every_kind
 def test_reset_rows_start_afresh_and_others_go_on(simulate, kind):
     """Row 1 measures from k = 5 as a fresh bank of another seed does from k = 0."""
     measure, undisturbed = (Measuring(simulate, scenario(kind, uavs=3)) for _ in range(2))
@@ -249,7 +235,7 @@ def test_reset_rows_start_afresh_and_others_go_on(simulate, kind):
         assert differs(samples, plain, [1])
 
 
-@every_kind_that_keeps_state
+@every_kind
 def test_reset_of_all_keeps_streams_without_new_keys(simulate, kind):
     measure, fresh = (Measuring(simulate, scenario(kind, uavs=2)) for _ in range(2))
     for k in range(4):
