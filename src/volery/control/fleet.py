@@ -38,7 +38,7 @@ from volery.vehicle.airframe import Airframe, hover_thrusts
 from volery.vehicle.contact import steepest_cosine
 from volery.vehicle.downwash import new_jets
 from volery.vehicle.fleet import NEVER, FleetState, charge_battery, fit_rotors, new_bodies, state_of
-from volery.vehicle.plants import Plant, RigidBody
+from volery.vehicle.plants import RIGID_BODY, Plant, RigidBody
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.terrain import TerrainGrid
 from volery.world.weather import CALM, Gust, Weather
@@ -95,13 +95,8 @@ class Fleet(FleetCommands):
         position = checked("position_map", position_map, (count, 3), MAX_COORDINATE)
         attitude = checked("attitude", attitude, (count, 4), 1.1)
         attitude = np.array([checked_attitude(q) for q in attitude])
-        modes = [mode] * count if isinstance(mode, FlightMode) else list(mode)
-        if len(modes) != count or not set(modes) <= {FlightMode.HOLD, FlightMode.LANDED}:
-            raise CommandError("a UAV starts in HOLD or LANDED, one mode for all or one for each")
-
-        plants = tuple(plants) if isinstance(plants, Sequence) else (plants,) * count
-        if len(plants) != count:
-            raise CommandError(f"there are {len(plants)} plants for {count} UAVs")
+        modes = _checked_modes(mode, count)
+        plants = _checked_plants(plants, count)
 
         names = tuple(names or (f"UAV {i}" for i in range(count)))
         worn = checked_wear(names, airframes, wear)
@@ -121,6 +116,7 @@ class Fleet(FleetCommands):
         weight = np.array([airframe.weight for airframe in airframes])
         flying = np.array([start is FlightMode.HOLD for start in modes])
         self._references = new_references(models, attitude, weight * flying)
+        self._all_rigid = bool((models["kind"] == RIGID_BODY).all())
         self._dt_ns = int(dt_ns)
         self._bounce = on_contact == "bounce"
         self._periods = (
@@ -187,7 +183,7 @@ class Fleet(FleetCommands):
                 self.history.position,
                 self.history.attitude,
                 self._paths.rows,
-                self._references,
+                None if self._all_rigid else self._references,
                 self._air,
                 self._air_nodes,
                 self._events,
@@ -395,3 +391,17 @@ class Fleet(FleetCommands):
 def _each(value: ArrayLike, count: int) -> ArrayLike:
     """One value a UAV, where one stands for all."""
     return value if np.ndim(value) else np.full(count, value)
+
+
+def _checked_modes(mode: FlightMode | Sequence[FlightMode], count: int) -> list[FlightMode]:
+    modes = [mode] * count if isinstance(mode, FlightMode) else list(mode)
+    if len(modes) != count or not set(modes) <= {FlightMode.HOLD, FlightMode.LANDED}:
+        raise CommandError("a UAV starts in HOLD or LANDED, one mode for all or one for each")
+    return modes
+
+
+def _checked_plants(plants: Plant | Sequence[Plant], count: int) -> tuple[Plant, ...]:
+    plants = tuple(plants) if isinstance(plants, Sequence) else (plants,) * count
+    if len(plants) != count:
+        raise CommandError(f"there are {len(plants)} plants for {count} UAVs")
+    return plants

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from volery.control.belief import believe_attitude, believe_place
 from volery.control.flight_modes import (
     LAND,
     LANDED,
@@ -30,6 +31,7 @@ _POSE = int(ControlLevel.POSE)
 def fly_kinematic(
     body: Any,
     pilot: Any,
+    belief: Any,
     plant: Any,
     model: Any,
     gains: Any,
@@ -57,7 +59,9 @@ def fly_kinematic(
             pilot.position[k] = body.position_map[k]
             pilot.velocity[k] = body.velocity_map[k]
         pilot.heading[0], pilot.heading[1] = heading_of(body)
-        plan(pilot, body, gains, paths, step, dt)
+        believe_place(belief, body)
+        believe_attitude(belief, body, pilot.errs)
+        plan(pilot, belief, gains, paths, step, dt)
     if pilot.mode == VELOCITY:
         _follow_velocity(body, pilot, model, gains, dt)
     elif pilot.mode == TRAJECTORY:

@@ -43,7 +43,7 @@ def fly_otherwise(
     if model.kind == KINEMATIC_MOTION:
         kinematic = model.kinematic
         return fly_kinematic(
-            body, pilot, plant, kinematic, gains, paths, grid, steepest, step, guiding, dt
+            body, pilot, belief, plant, kinematic, gains, paths, grid, steepest, step, guiding, dt
         )
     if guiding:
         believe_place(belief, body)

@@ -91,7 +91,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     history_position: Array,
     history_attitude: Array,
     paths: Array,
-    references: Array,
+    references: Array | None,
     air: NDArray[np.void],
     air_nodes: Array,
     events: NDArray[np.void],
@@ -106,9 +106,10 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
 ) -> tuple[int, int, bool]:
     """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
 
-    paths: segments of trajectories, see `control.follow`. references: (N, L, 6), commands of the
-    last L steps where identified plants have dead times, else of any size. jets: room for the
-    search of neighbours (`new_jets`).
+    paths: segments of trajectories, see `control.follow`. references: None where all plants are
+    rigid bodies: the other plants are then not compiled at all. Else (N, L, 6), commands of the
+    last L steps where identified plants have dead times, or of any size. jets: room for the search
+    of neighbours (`new_jets`).
 
     Ends early after a step in which a budget ran out, the events' buffer grew full or, with
     `event_ends`, anything was noted. The air around the UAVs is looked up each `air_steps`, a
@@ -160,7 +161,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                         body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
                 else:
                     mode = pilot.mode
-                    if model.kind == RIGID_BODY:
+                    if references is None or model.kind == RIGID_BODY:
                         turning = phase == 0
                         if guiding:
                             believe_place(belief, body)

@@ -45,8 +45,8 @@ def _measure_single(
             ranges[i] = np.float32(-np.inf) if near else distance[i]
         return
     for i in range(beams):
-        true = float(distance[i])
-        r = true
+        true: float = np.float64(distance[i])
+        r: float = true
         counter = (scan_number * beams + i) * DRAWS
         if true < lidar.range_min:
             r = -np.inf
@@ -140,7 +140,7 @@ def _measure_several(
     for i in range(beams):
         ranges[:, i] = np.inf
         intensities[:, i] = 0.0
-        true = float(distance[i])
+        true: float = np.float64(distance[i])
         if true < lidar.range_min:
             ranges[0, i] = -np.inf
             continue
