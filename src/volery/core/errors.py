@@ -25,6 +25,10 @@ class GraphError(VoleryError):
     """A topic, service or message does not fit: wrong type, unknown name, invalid rate."""
 
 
+class BridgeError(VoleryError):
+    """A door to the graph cannot be opened, or its peer breaks the protocol."""
+
+
 class NodeError(VoleryError):
     """A node failed while it ran; the message names node, cause and simulated time."""
 

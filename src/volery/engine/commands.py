@@ -24,9 +24,10 @@ class Inbox:
         self._waiting.append((action, future))
         return future
 
-    def work_off(self) -> None:
-        """Call everything that waits, in the order of arrival."""
-        for _ in range(len(self._waiting)):
+    def work_off(self) -> bool:
+        """Call everything that waits, in the order of arrival; whether there was anything."""
+        waiting = len(self._waiting)
+        for _ in range(waiting):
             action, future = self._waiting.popleft()
             if not future.set_running_or_notify_cancel():
                 continue
@@ -34,3 +35,4 @@ class Inbox:
                 future.set_result(action())
             except Exception as error:  # the sender's business, not the engine's
                 future.set_exception(error)
+        return waiting > 0

@@ -155,6 +155,16 @@ class Engine:
                 return
             self._run_tick(Tick(step))
 
+    def take_in(self) -> None:
+        """Do what was posted and hand out what that published; between ticks."""
+        if not self.inbox.work_off():
+            return
+        stood, self.stands = self.stands, False
+        try:
+            self.sink.deliver()
+        finally:
+            self.stands = stood
+
     def horizon(self, step: int) -> int:
         """How far a tick may go that shall not pass `step`."""
         now = self.fleet.step

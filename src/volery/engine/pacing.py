@@ -14,6 +14,7 @@ from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
 
 _SLICE_S = 0.005
+_PROMPT_SLICE_S = 0.001
 _FULL_SPEED_SLICE = 100
 """Steps between two looks at what other threads want, at full speed or one step after another."""
 _LONGEST_WAIT_S = 0.05
@@ -37,6 +38,7 @@ class Pacer:
         self._wall_start = 0.0  # `_sim_start_ns` was, or is, due at this wall time
         self._sim_start_ns = 0
         self._paused_s = 0.0
+        self._slice_s = _SLICE_S
 
     # ------------------------------------------------------------------------------- any thread
 
@@ -87,6 +89,10 @@ class Pacer:
             self._steps += steps
             self._changed.notify()
 
+    def be_prompt(self) -> None:
+        """Make slices of `_PROMPT_SLICE_S`: what is commanded acts that soon in wall time."""
+        self._slice_s = _PROMPT_SLICE_S
+
     def wake(self) -> None:
         """End the present `wait`: there is something to do for the thread that runs."""
         with self._changed:
@@ -111,7 +117,7 @@ class Pacer:
                 return steps
             if self._speed is None:
                 return _FULL_SPEED_SLICE
-            return max(1, round(_SLICE_S * self._speed * NS_PER_S) // dt_ns)
+            return max(1, round(self._slice_s * self._speed * NS_PER_S) // dt_ns)
 
     def wait(self, time_ns: int) -> bool:
         """Hold the run at simulated `time_ns`, at most a moment; whether it must be held further.

@@ -30,8 +30,9 @@ def take_commands(engine: Engine, _tick: Tick) -> None:
     """Do what other threads have posted since the last tick, in the order of arrival.
 
     Nothing is half done here, so that an action may take the simulation back to an earlier state.
+    What was published is handed out, so that it acts on the physics steps of this very tick.
     """
-    engine.inbox.work_off()
+    engine.take_in()
 
 
 def advance_vehicles(engine: Engine, tick: Tick) -> None:

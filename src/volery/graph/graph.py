@@ -6,11 +6,15 @@ the end of the queue.
 
 A latched publisher's last message is kept and handed to everyone who subscribes later, as ROS 1
 latches and ROS 2 does with durability TRANSIENT_LOCAL and depth 1.
+
+Messages are published, and requests handled, in the simulation's thread alone. Who takes part may
+be changed by any thread: `graph.session` does so for clients outside.
 """
 
 from __future__ import annotations
 
 import math
+import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,8 +22,11 @@ from typing import Any, NamedTuple
 
 from volery.core.errors import GraphError
 from volery.graph.messages import Published, message_type, type_name
+from volery.graph.reply import Reply
 
 Callback = Callable[[Published], None]
+AsyncHandler = Callable[[Any, Reply], None]
+"""Takes a request and answers through the reply, at once or later."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +60,12 @@ class Publisher:
         self._graph = graph
         self._topic = topic
         self.latched = latched
+        self._cancelled = False
+
+    @property
+    def msgtype(self) -> str:
+        """Type of its messages."""
+        return self._topic.msgtype
 
     @property
     def topic(self) -> str:
@@ -65,8 +78,15 @@ class Publisher:
         return bool(self.latched or self._topic.callbacks or self._graph.listens_to_all)
 
     def publish(self, message: Any) -> None:
-        """Queue a message for delivery."""
-        self._graph.enqueue(self, self._topic, message)
+        """Queue a message for delivery; nothing after `cancel`."""
+        if not self._cancelled:
+            self._graph.enqueue(self, self._topic, message)
+
+    def cancel(self) -> None:
+        """Publish no more; what it latched is forgotten."""
+        if not self._cancelled:
+            self._cancelled = True
+            self._graph.dismiss(self, self._topic)
 
 
 class Subscription:
@@ -93,8 +113,11 @@ class _Letter(NamedTuple):
 
 @dataclass(frozen=True)
 class _Service:
+    """A service: answered at once by `handler`, or some time by `ask`."""
+
     srvtype: str
-    handler: Callable[[Any], Any]
+    handler: Callable[[Any], Any] | None
+    ask: AsyncHandler
 
 
 class Graph:
@@ -106,6 +129,8 @@ class Graph:
         self._services: dict[str, _Service] = {}
         self._to_all: list[Callback] = []
         self._queue: deque[_Letter] = deque()
+        self._members = threading.RLock()
+        """Held by whoever changes topics, publishers, subscribers or services."""
 
     # ---------------------------------------------------------------------------------- topics
 
@@ -121,10 +146,17 @@ class Graph:
 
         The last message of a `latched` one also goes to those who subscribe after it.
         """
-        found = self._topic(topic, msgtype)
-        found.publishers += 1
-        found.latched = found.latched or latched
+        with self._members:
+            found = self._topic(topic, msgtype)
+            found.publishers += 1
+            found.latched = found.latched or latched
         return Publisher(self, found, latched=latched)
+
+    def dismiss(self, publisher: Publisher, topic: _Topic) -> None:
+        """Strike a publisher off; used by `Publisher`."""
+        with self._members:
+            topic.publishers -= 1
+            topic.kept.pop(publisher, None)
 
     def subscribe(
         self, topic: str, callback: Callback, msgtype: str | type[Any] | None = None
@@ -134,12 +166,25 @@ class Graph:
         What latched publishers sent before comes first, with the next delivery; its `time_ns` is
         that of this subscription.
         """
-        if msgtype is None and topic not in self._topics:
-            raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
-        found = self._topics[topic] if msgtype is None else self._topic(topic, msgtype)
-        found.callbacks.append(callback)
+        with self._members:
+            found = self._known_topic(topic, msgtype)
+            found.callbacks.append(callback)
         self._send_kept([found], callback)
         return Subscription(found.callbacks, callback)
+
+    def attach(
+        self, topic: str, put: Callback, msgtype: str | type[Any] | None = None
+    ) -> Subscription:
+        """Like `subscribe`, for a `put` that any thread may call: what was latched comes at once.
+
+        Its order among other subscribers changes nothing in the simulation.
+        """
+        with self._members:
+            found = self._known_topic(topic, msgtype)
+            for kept in tuple(found.kept.values()):
+                put(kept)
+            found.callbacks.append(put)
+        return Subscription(found.callbacks, put)
 
     def subscribe_all(self, callback: Callback) -> Subscription:
         """Call `callback` with every message of every topic, before the topic's subscribers.
@@ -152,10 +197,16 @@ class Graph:
 
     def topics(self) -> list[TopicInfo]:
         """All topics, by name."""
-        return [
-            TopicInfo(t.name, t.msgtype, t.publishers, len(t.callbacks), t.messages, t.latched)
-            for _, t in sorted(self._topics.items())
-        ]
+        with self._members:
+            return [
+                TopicInfo(t.name, t.msgtype, t.publishers, len(t.callbacks), t.messages, t.latched)
+                for _, t in sorted(self._topics.items())
+            ]
+
+    def topic_type(self, topic: str) -> str | None:
+        """Type of a topic; None where there is no such topic."""
+        found = self._topics.get(topic)
+        return None if found is None else found.msgtype
 
     def enqueue(self, sender: Publisher, topic: _Topic, message: Any) -> None:
         """Queue a message; used by `Publisher`."""
@@ -175,11 +226,11 @@ class Graph:
                 if only in topic.callbacks or only in self._to_all:
                     only(published)
                 continue
-            if sender.latched:
-                topic.kept[sender] = published
-            for callback in tuple(self._to_all):
-                callback(published)
-            for callback in tuple(topic.callbacks):
+            with self._members:  # who attaches meanwhile gets it once
+                if sender.latched:
+                    topic.kept[sender] = published
+                callbacks = (*self._to_all, *topic.callbacks)
+            for callback in callbacks:
                 callback(published)
 
     def get_state(self) -> dict[str, Any]:
@@ -206,6 +257,13 @@ class Graph:
         ]
         self._queue.extendleft(reversed(letters))
 
+    def _known_topic(self, name: str, msgtype: str | type[Any] | None) -> _Topic:
+        if msgtype is not None:
+            return self._topic(name, msgtype)
+        if name not in self._topics:
+            raise GraphError(f"no topic '{name}'; give a type to subscribe before it exists")
+        return self._topics[name]
+
     def _topic(self, name: str, msgtype: str | type[Any]) -> _Topic:
         wanted = msgtype if isinstance(msgtype, str) else type_name(msgtype)
         _check_name(name)
@@ -224,19 +282,32 @@ class Graph:
 
     def offer(self, service: str, srvtype: str, handler: Callable[[Any], Any]) -> None:
         """Offer a service: `handler(request)` returns the response message."""
-        _check_name(service)
-        if service in self._services:
-            raise GraphError(f"service '{service}' is offered already")
-        self._services[service] = _Service(srvtype, handler)
+
+        def ask(request: Any, reply: Reply) -> None:
+            reply.answer(handler(request))
+
+        self._add_service(service, _Service(srvtype, handler, ask))
+
+    def offer_async(self, service: str, srvtype: str, ask: AsyncHandler) -> None:
+        """Offer a service whose answers come later; only `call_async` can call it."""
+        self._add_service(service, _Service(srvtype, None, ask))
+
+    def withdraw(self, service: str) -> None:
+        """Offer a service no more."""
+        with self._members:
+            self._services.pop(service, None)
 
     def call(self, service: str, request: Any | None = None) -> Any:
         """Call a service and return its response. `GraphError` if nobody offers it."""
-        found = self._services.get(service)
-        if found is None:
-            raise GraphError(f"nobody offers service '{service}'")
-        if request is None:
-            request = message_type(f"{found.srvtype}_Request")()
-        return found.handler(request)
+        found = self._service(service)
+        if found.handler is None:
+            raise GraphError(f"service '{service}' is offered from outside: use call_async")
+        return found.handler(_request(found, request))
+
+    def call_async(self, service: str, request: Any | None, reply: Reply) -> None:
+        """Call a service that may take its time. `GraphError` if nobody offers it."""
+        found = self._service(service)
+        found.ask(_request(found, request), reply)
 
     def has_service(self, service: str) -> bool:
         """Whether the service is offered."""
@@ -244,7 +315,28 @@ class Graph:
 
     def services(self) -> dict[str, str]:
         """Service names and their types."""
-        return {name: s.srvtype for name, s in sorted(self._services.items())}
+        with self._members:
+            return {name: s.srvtype for name, s in sorted(self._services.items())}
+
+    def _add_service(self, name: str, service: _Service) -> None:
+        _check_name(name)
+        with self._members:
+            if name in self._services:
+                raise GraphError(f"service '{name}' is offered already")
+            self._services[name] = service
+
+    def _service(self, name: str) -> _Service:
+        found = self._services.get(name)
+        if found is None:
+            raise GraphError(f"nobody offers service '{name}'")
+        return found
+
+
+def _request(service: _Service, request: Any | None) -> Any:
+    """The request, or a blank one."""
+    if request is None:
+        return message_type(f"{service.srvtype}_Request")()
+    return request
 
 
 def _check_name(name: str) -> None:

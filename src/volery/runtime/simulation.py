@@ -21,6 +21,7 @@ from volery.engine.partners import Partner, check_terms
 from volery.graph.graph import Graph
 from volery.graph.node import Context, Node
 from volery.graph.publishing import GraphPublisher
+from volery.graph.session import Gateway
 from volery.runtime.building import add_bodies, build_fleet, check_free, place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.command_door import open_commands
@@ -78,6 +79,8 @@ class Simulation:
         add_bodies(self.scene, starts)
         fitted = self._fitted = fit_sensors(scenario, starts)
         self.graph = Graph(lambda: self.time_ns)
+        self.gateway = Gateway(self.graph, self.post)
+        """Where clients of other threads join the graph."""
         self._publisher = _make_publisher(self.graph, fitted)
         self.mounts = lidar_mounts(fitted, planar=True)
         self.cloud_mounts = lidar_mounts(fitted, planar=False)
@@ -164,8 +167,7 @@ class Simulation:
                 self._engine.advance_to(min(end_step, self._fleet.step + steps), until=until)
             over = self._fleet.step >= end_step or (until is not None and until())
             while pacer.wait(self.time_ns) and not (over and pacer.paused):
-                # What this publishes is delivered by the next tick, as it would be without a wait.
-                self._engine.inbox.work_off()
+                self._engine.take_in()
                 teller.tell(self.time_s - start_s)
             teller.tell(self.time_s - start_s, last=over)
 
@@ -207,6 +209,13 @@ class Simulation:
         Returns at once: the thread that runs makes the steps. Where none does, use `step`.
         """
         self._pacer.single_steps(steps)
+
+    def be_prompt(self) -> None:
+        """Keep real time to the physics step from now on, for clients who wait for answers.
+
+        Costs a few tenths of a core; at full speed and for results it changes nothing.
+        """
+        self._pacer.be_prompt()
 
     @property
     def weather(self) -> Weather:

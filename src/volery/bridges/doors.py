@@ -1,0 +1,123 @@
+"""Doors: servers and clients that carry the graph to other programs, on one asyncio thread.
+
+    with Doors(simulation.gateway) as doors:
+        doors.open(RosTcpEndpoint(port=10000))
+        simulation.run(speed=1.0)
+
+Everything a door does runs in the thread of `Doors`; what it needs of the simulation it asks of the
+`Gateway`. A door that fails ends alone.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import threading
+from collections.abc import Callable, Coroutine
+from typing import Any, Protocol, TypeVar
+
+from volery.core.errors import BridgeError
+from volery.graph.session import Gateway
+
+T = TypeVar("T")
+
+_SWITCH_INTERVAL_S = 0.0005
+"""Python's own 5 ms would be the latency of every answer while the engine computes."""
+_LONGEST_START_S = 30.0
+
+
+class Door(Protocol):
+    """One way into the graph."""
+
+    name: str
+    """What it is and where, for people: `ROS-TCP 127.0.0.1:10000`."""
+
+    async def start(self, gateway: Gateway) -> None:
+        """Begin to serve, or to connect. `BridgeError` where that is not possible."""
+
+    async def stop(self) -> None:
+        """Let everybody go and give everything back; also after a start that failed."""
+
+
+class Doors:
+    """The thread in which doors work. Use it as a context manager, or call `close`."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
+        self._doors: list[Door] = []
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, name="volery-doors", daemon=True)
+        self._closed = False
+        sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL_S))
+        self._thread.start()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the open doors."""
+        return tuple(door.name for door in self._doors)
+
+    def open(self, door: Door) -> None:
+        """Start a door; `BridgeError` where that is not possible."""
+        if self._closed:
+            raise BridgeError("the doors are closed")
+        try:
+            self.call(door.start(self._gateway), _LONGEST_START_S)
+        except BaseException:
+            self.call(door.stop(), _LONGEST_START_S)
+            raise
+        self._doors.append(door)
+
+    def call(self, work: Coroutine[Any, Any, T], timeout_s: float | None = None) -> T:
+        """Run a coroutine in the doors' thread and wait for its result."""
+        return asyncio.run_coroutine_threadsafe(work, self._loop).result(timeout_s)
+
+    def close(self) -> None:
+        """Stop all doors and the thread; a second time nothing happens."""
+        if self._closed:
+            return
+        self._closed = True
+        for door in reversed(self._doors):
+            self.call(door.stop(), _LONGEST_START_S)
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    def __enter__(self) -> Doors:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self.close()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        self._loop.run_forever()
+        left = asyncio.all_tasks(self._loop)
+        for task in left:
+            task.cancel()
+        self._loop.run_until_complete(asyncio.gather(*left, return_exceptions=True))
+        self._loop.run_until_complete(self._loop.shutdown_asyncgens())
+
+
+def wake_of(loop: asyncio.AbstractEventLoop, callback: Callable[[], object]) -> Callable[[], None]:
+    """A `graph.session.Wake` that has `callback` called in `loop`, also while that is closing."""
+
+    def wake() -> None:
+        try:
+            loop.call_soon_threadsafe(callback)
+        except RuntimeError:  # the loop has ended: nobody is left to be told
+            return
+
+    return wake
+
+
+def check_address(host: str, *, anywhere: bool, flag: str) -> None:
+    """`BridgeError` for an address beyond loopback without the explicit consent `anywhere`.
+
+    flag: how a user gives that consent.
+    """
+    if host in {"127.0.0.1", "::1", "localhost"} or anywhere:
+        return
+    raise BridgeError(
+        f"{host} can be reached from other machines, and whoever reaches it commands the UAVs; "
+        f"allow that with {flag}, or listen on 127.0.0.1"
+    )

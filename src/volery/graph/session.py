@@ -1,0 +1,297 @@
+"""The graph for programs outside of the simulation's thread: what every door stands on.
+
+A door opens one `Session` for each of its clients. All its methods may be called by any thread.
+What a client publishes and calls is posted to the simulation's thread, which takes it in between
+two ticks, in the order of arrival; what it receives waits in a bounded `Mailbox` that keeps the
+newest. A client that does not read loses messages of its own and delays nobody.
+
+    session = gateway.open("rosbridge 127.0.0.1:51234")
+    mailbox = session.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=loop_wakes_up)
+    ...
+    for published in mailbox.take():
+        send(published.cdr)
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Any
+
+from volery.core.errors import GraphError
+from volery.graph.graph import Graph, Publisher, Subscription
+from volery.graph.messages import Published, message_type
+from volery.graph.reply import Reply
+
+Post = Callable[[Callable[[], Any]], "Future[Any]"]
+"""Has a function called by the simulation's thread; the future holds its result or error."""
+Wake = Callable[[], None]
+"""Tells a door's thread, from the simulation's, that there is something to take; must not block."""
+Handler = Callable[[Any, Reply], None]
+"""Takes a request in the simulation's thread, at once, and answers through the reply later."""
+
+DEFAULT_DEPTH = 10
+MOST_DEPTH = 100_000
+
+
+@dataclass(frozen=True)
+class MailboxInfo:
+    """How a subscription of an outside client fares."""
+
+    topic: str
+    received: int
+    dropped: int
+    waiting: int
+
+
+class Mailbox:
+    """Messages of one topic that await one outside client: the newest `depth` of them."""
+
+    def __init__(self, topic: str, depth: int, wake: Wake) -> None:
+        self.topic = topic
+        self._waiting: deque[Published] = deque()
+        self._depth = depth
+        self._wake = wake
+        self._lock = threading.Lock()
+        self._received = 0
+        self._dropped = 0
+
+    def put(self, published: Published) -> None:
+        """Add a message; the oldest one goes where there is no room."""
+        with self._lock:
+            self._received += 1
+            was_empty = not self._waiting
+            if len(self._waiting) >= self._depth:
+                self._waiting.popleft()
+                self._dropped += 1
+            self._waiting.append(published)
+        if was_empty:
+            self._wake()
+
+    def take(self, most: int | None = None) -> list[Published]:
+        """Remove and return what waits, oldest first, at most `most` messages."""
+        with self._lock:
+            if most is None or most >= len(self._waiting):
+                taken = list(self._waiting)
+                self._waiting.clear()
+                return taken
+            return [self._waiting.popleft() for _ in range(most)]
+
+    @property
+    def info(self) -> MailboxInfo:
+        """Counts so far."""
+        with self._lock:
+            return MailboxInfo(self.topic, self._received, self._dropped, len(self._waiting))
+
+
+@dataclass(frozen=True)
+class SessionInfo:
+    """Who is connected, and to what."""
+
+    name: str
+    publishes: tuple[str, ...]
+    mailboxes: tuple[MailboxInfo, ...]
+    offers: tuple[str, ...]
+
+
+class Gateway:
+    """Where doors open sessions for their clients."""
+
+    def __init__(self, graph: Graph, post: Post) -> None:
+        self.graph = graph
+        self._post = post
+        self._sessions: list[Session] = []
+        self._lock = threading.Lock()
+
+    def open(self, name: str) -> Session:
+        """Begin the session of one client; `name` tells people who it is."""
+        session = Session(self, name)
+        with self._lock:
+            self._sessions.append(session)
+        return session
+
+    def sessions(self) -> list[SessionInfo]:
+        """Everybody who is connected, in the order of arrival."""
+        with self._lock:
+            return [session.info for session in self._sessions]
+
+    def post(self, action: Callable[[], Any]) -> Future[Any]:
+        """Have `action()` called by the simulation's thread."""
+        return self._post(action)
+
+    def forget(self, session: Session) -> None:
+        """Strike a session that has ended off the list; used by `Session`."""
+        with self._lock:
+            if session in self._sessions:
+                self._sessions.remove(session)
+
+
+class Session:
+    """One outside client's part in the graph; `close` takes everything back."""
+
+    def __init__(self, gateway: Gateway, name: str) -> None:
+        self.name = name
+        self._gateway = gateway
+        self._graph = gateway.graph
+        self._lock = threading.RLock()
+        self._publishers: dict[str, Publisher] = {}
+        self._mailboxes: dict[Mailbox, Subscription] = {}
+        self._offers: dict[str, set[Reply]] = {}
+        self._closed = False
+
+    @property
+    def graph(self) -> Graph:
+        """The graph, for questions about topics and services."""
+        return self._graph
+
+    # ------------------------------------------------------------------------------------ topics
+
+    def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
+        """Announce that the client will publish on `topic`. `GraphError` for a wrong type.
+
+        Again with the same type: nothing changes.
+        """
+        with self._lock:
+            self._check_open()
+            old = self._publishers.get(topic)
+            if old is not None and old.msgtype == msgtype and old.latched == latched:
+                return
+            self._publishers[topic] = self._graph.advertise(topic, msgtype, latched=latched)
+            if old is not None:
+                old.cancel()
+
+    def unadvertise(self, topic: str) -> None:
+        """Publish on `topic` no more. `GraphError` if it did not."""
+        with self._lock:
+            publisher = self._publishers.pop(topic, None)
+        if publisher is None:
+            raise GraphError(f"{self.name} does not publish '{topic}'")
+        publisher.cancel()
+
+    def published_type(self, topic: str) -> str | None:
+        """Type that the client has announced for `topic`; None if it has not."""
+        publisher = self._publishers.get(topic)
+        return None if publisher is None else publisher.msgtype
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Publish a message of the announced type; its arrays must not be written to any more."""
+        publisher = self._publishers.get(topic)
+        if publisher is None:
+            raise GraphError(f"{self.name} has not advertised '{topic}'")
+        self._gateway.post(lambda: publisher.publish(message))
+
+    def subscribe(
+        self,
+        topic: str,
+        msgtype: str | None = None,
+        *,
+        depth: int = DEFAULT_DEPTH,
+        wake: Wake,
+    ) -> Mailbox:
+        """Begin to receive `topic`, which must exist or be given a type.
+
+        What latched publishers sent before waits in the mailbox already. `wake` is called, from the
+        simulation's thread, whenever a message comes to an empty mailbox.
+        """
+        if not 1 <= depth <= MOST_DEPTH:
+            raise GraphError(f"queue depth must be 1 to {MOST_DEPTH}, not {depth}")
+        mailbox = Mailbox(topic, depth, wake)
+        with self._lock:
+            self._check_open()
+            self._mailboxes[mailbox] = self._graph.attach(topic, mailbox.put, msgtype)
+        return mailbox
+
+    def unsubscribe(self, mailbox: Mailbox) -> None:
+        """Receive no more; what waits can still be taken."""
+        with self._lock:
+            subscription = self._mailboxes.pop(mailbox, None)
+        if subscription is not None:
+            subscription.cancel()
+
+    # ---------------------------------------------------------------------------------- services
+
+    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+        """Call a service; `reply` gets the response or a `GraphError`, in some other thread."""
+
+        def ask() -> None:
+            try:
+                self._graph.call_async(service, request, reply)
+            except GraphError as error:
+                reply.fail(error)
+
+        self._gateway.post(ask).add_done_callback(lambda asked: _tell_failure(asked, reply))
+
+    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+        """Offer a service. `GraphError` if somebody does so already.
+
+        `handler(request, reply)` is called in the simulation's thread and must not block. Requests
+        not answered when the client leaves fail.
+        """
+        message_type(f"{srvtype}_Request")
+        with self._lock:
+            self._check_open()
+            if service in self._offers:
+                raise GraphError(f"{self.name} offers service '{service}' already")
+            pending: set[Reply] = set()
+
+            def handle(request: Any, reply: Reply) -> None:
+                pending.add(reply)
+                reply.when_done(lambda: pending.discard(reply))
+                handler(request, reply)
+
+            self._graph.offer_async(service, srvtype, handle)
+            self._offers[service] = pending
+
+    def withdraw(self, service: str) -> None:
+        """Offer a service no more; its open requests fail. `GraphError` if it was not offered."""
+        with self._lock:
+            pending = self._offers.pop(service, None)
+        if pending is None:
+            raise GraphError(f"{self.name} does not offer service '{service}'")
+        self._graph.withdraw(service)
+        for reply in tuple(pending):
+            reply.fail(GraphError(f"service '{service}': {self.name} has left"))
+
+    # --------------------------------------------------------------------------------------- end
+
+    def close(self) -> None:
+        """Take back everything; a second time nothing happens."""
+        with self._lock:
+            self._closed = True
+            topics, mailboxes = tuple(self._publishers), tuple(self._mailboxes)
+            services = tuple(self._offers)
+        for topic in topics:
+            self.unadvertise(topic)
+        for mailbox in mailboxes:
+            self.unsubscribe(mailbox)
+        for service in services:
+            self.withdraw(service)
+        self._gateway.forget(self)
+
+    @property
+    def info(self) -> SessionInfo:
+        """What the client does at present."""
+        with self._lock:
+            return SessionInfo(
+                self.name,
+                tuple(self._publishers),
+                tuple(mailbox.info for mailbox in self._mailboxes),
+                tuple(self._offers),
+            )
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise GraphError(f"{self.name} has left")
+
+
+def _tell_failure(asked: Future[Any], reply: Reply) -> None:
+    """Answer a caller whose question was never asked, or broke in the asking."""
+    if asked.cancelled():
+        reply.fail(GraphError("the simulation has ended"))
+        return
+    error = asked.exception()
+    if error is not None:
+        reply.fail(GraphError(f"the service failed: {type(error).__name__}: {error}"))

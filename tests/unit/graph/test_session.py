@@ -1,0 +1,219 @@
+"""Clients outside of the simulation's thread: sessions, mailboxes, services both ways."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import Future
+
+import pytest
+
+from volery.core.errors import GraphError
+from volery.graph.graph import Graph
+from volery.graph.messages import String, message_type
+from volery.graph.reply import Reply
+from volery.graph.session import Gateway
+
+STRING = "std_msgs/msg/String"
+TRIGGER = "std_srvs/srv/Trigger"
+Response = message_type(f"{TRIGGER}_Response")
+
+
+class Bench:
+    """A graph whose posts are done when `work_off` says so."""
+
+    def __init__(self):
+        self.graph = Graph(lambda: 5)
+        self.posted = []
+        self.gateway = Gateway(self.graph, self._post)
+
+    def _post(self, action):
+        future = Future()
+        self.posted.append((action, future))
+        return future
+
+    def work_off(self):
+        while self.posted:
+            action, future = self.posted.pop(0)
+            try:
+                future.set_result(action())
+            except Exception as error:
+                future.set_exception(error)
+        self.graph.deliver()
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+def quiet():
+    """A wake that nobody needs."""
+
+
+def texts(mailbox):
+    return [published.message.data for published in mailbox.take()]
+
+
+def test_messages_go_both_ways(bench):
+    session, wakes = bench.gateway.open("client"), []
+    mailbox = session.subscribe("/out", STRING, wake=lambda: wakes.append(1))
+    seen = []
+    bench.graph.subscribe("/in", seen.append, STRING)
+    session.advertise("/in", STRING)
+    session.publish("/in", String("hello"))
+    bench.graph.advertise("/out", STRING).publish(String("there"))
+    assert not seen
+    bench.work_off()
+    assert seen[0].message.data == "hello"
+    assert wakes == [1]
+    assert texts(mailbox) == ["there"]
+
+
+def test_a_mailbox_keeps_the_newest_and_counts_the_rest(bench):
+    session = bench.gateway.open("slow")
+    mailbox = session.subscribe("/out", STRING, depth=3, wake=quiet)
+    publisher = bench.graph.advertise("/out", STRING)
+    for k in range(10):
+        publisher.publish(String(str(k)))
+    bench.work_off()
+    assert mailbox.info.received == 10
+    assert mailbox.info.dropped == 7
+    assert mailbox.info.waiting == 3
+    assert texts(mailbox) == ["7", "8", "9"]
+
+
+def test_some_may_be_taken_and_the_rest_later(bench):
+    mailbox = bench.gateway.open("c").subscribe("/out", STRING, wake=quiet)
+    publisher = bench.graph.advertise("/out", STRING)
+    for k in range(4):
+        publisher.publish(String(str(k)))
+    bench.work_off()
+    assert [p.message.data for p in mailbox.take(3)] == ["0", "1", "2"]
+    assert texts(mailbox) == ["3"]
+
+
+def test_the_late_find_what_was_latched(bench):
+    bench.graph.advertise("/map", STRING, latched=True).publish(String("kept"))
+    bench.work_off()
+    mailbox = bench.gateway.open("late").subscribe("/map", STRING, wake=quiet)
+    assert texts(mailbox) == ["kept"]
+
+
+def test_what_a_client_latched_goes_with_it(bench):
+    session = bench.gateway.open("short")
+    session.advertise("/map", STRING, latched=True)
+    session.publish("/map", String("kept"))
+    bench.work_off()
+    session.close()
+    assert texts(bench.gateway.open("late").subscribe("/map", STRING, wake=quiet)) == []
+
+
+def test_a_service_of_the_simulation(bench):
+    bench.graph.offer("/do", TRIGGER, lambda _request: Response(True, "done"))
+    answers, failures = [], []
+    session = bench.gateway.open("caller")
+    session.call("/do", None, Reply(answers.append, failures.append))
+    assert not answers
+    bench.work_off()
+    assert answers[0].message == "done"
+    session.call("/nobody", None, Reply(answers.append, failures.append))
+    bench.work_off()
+    assert "nobody offers" in str(failures[0])
+
+
+def test_a_service_that_breaks_is_the_callers_business(bench):
+    def broken(_request):
+        raise ZeroDivisionError("oh")
+
+    bench.graph.offer("/do", TRIGGER, broken)
+    failures = []
+    bench.gateway.open("caller").call("/do", None, Reply(print, failures.append))
+    bench.work_off()
+    assert "ZeroDivisionError" in str(failures[0])
+
+
+def test_a_service_of_one_client_for_another(bench):
+    server, caller = bench.gateway.open("server"), bench.gateway.open("caller")
+    requests, answers, failures = [], [], []
+    server.offer("/do", TRIGGER, lambda request, reply: requests.append((request, reply)))
+    caller.call("/do", None, Reply(answers.append, failures.append))
+    bench.work_off()
+    requests[0][1].answer(Response(True, "from outside"))
+    requests[0][1].answer(Response(False, "again"))
+    assert [answer.message for answer in answers] == ["from outside"]
+    with pytest.raises(GraphError, match="from outside"):
+        bench.graph.call("/do")
+
+
+def test_who_leaves_fails_those_who_wait_for_him(bench):
+    server, failures, requests = bench.gateway.open("server"), [], []
+    server.offer("/do", TRIGGER, lambda request, reply: requests.append(reply))
+    bench.gateway.open("caller").call("/do", None, Reply(print, failures.append))
+    bench.work_off()
+    server.close()
+    assert "server has left" in str(failures[0])
+    assert not bench.graph.has_service("/do")
+    requests[0].answer(Response(True, "too late"))
+    assert len(failures) == 1
+
+
+def test_closing_takes_everything_back(bench):
+    session = bench.gateway.open("visitor")
+    session.advertise("/in", STRING)
+    mailbox = session.subscribe("/out", STRING, wake=quiet)
+    session.offer("/do", TRIGGER, lambda request, reply: None)
+    (info,) = bench.gateway.sessions()
+    assert (info.name, info.publishes, info.offers) == ("visitor", ("/in",), ("/do",))
+    session.close()
+    session.close()
+    assert bench.gateway.sessions() == []
+    counts = {t.name: (t.publishers, t.subscribers) for t in bench.graph.topics()}
+    assert counts == {"/in": (0, 0), "/out": (0, 0)}
+    bench.graph.advertise("/out", STRING).publish(String("nobody"))
+    bench.work_off()
+    assert texts(mailbox) == []
+    with pytest.raises(GraphError, match="has left"):
+        session.advertise("/in", STRING)
+
+
+@pytest.mark.parametrize(
+    ("attempt", "words"),
+    [
+        (lambda s: s.subscribe("/x", "no/msg/Such", wake=quiet), "unknown message type"),
+        (lambda s: s.subscribe("/x", wake=quiet), "no topic"),
+        (lambda s: s.subscribe("/x", STRING, depth=0, wake=quiet), "depth"),
+        (lambda s: s.advertise("bad name", STRING), "valid name"),
+        (lambda s: s.publish("/y", String("")), "not advertised"),
+        (lambda s: s.unadvertise("/y"), "does not publish"),
+        (lambda s: s.withdraw("/y"), "does not offer"),
+    ],
+)
+def test_what_cannot_be_is_refused(bench, attempt, words):
+    with pytest.raises(GraphError, match=words):
+        attempt(bench.gateway.open("client"))
+
+
+def test_nothing_is_lost_or_doubled_while_clients_come_and_go(bench):
+    publisher = bench.graph.advertise("/out", STRING, latched=True)
+    stop, trouble = threading.Event(), []
+
+    def visit():
+        while not stop.is_set():
+            session = bench.gateway.open("visitor")
+            mailbox = session.subscribe("/out", STRING, depth=1000, wake=quiet)
+            numbers = [int(text) for text in texts(mailbox)]
+            session.close()
+            numbers += [int(text) for text in texts(mailbox)]
+            if numbers != list(range(numbers[0], numbers[0] + len(numbers))) if numbers else False:
+                trouble.append(numbers)
+
+    threads = [threading.Thread(target=visit) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for k in range(3000):
+        publisher.publish(String(str(k)))
+        bench.graph.deliver()
+    stop.set()
+    for thread in threads:
+        thread.join()
+    assert not trouble
