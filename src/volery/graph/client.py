@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
 from volery.core.errors import GraphError
 from volery.graph.graph import Graph
+from volery.graph.reply import Reply
 from volery.graph.thinking import Thinker
 
 
@@ -15,17 +17,24 @@ class Answer:
 
     def __init__(self) -> None:
         self._response: Any = None
+        self._error: GraphError | None = None
         self._done = False
         self._callbacks: list[Callable[[Answer], None]] = []
 
     def done(self) -> bool:
-        """Whether the response is there."""
+        """Whether the response is there, or will never be."""
         return self._done
 
+    def exception(self) -> GraphError | None:
+        """Why there is no response; None where there is one, or may still be."""
+        return self._error
+
     def result(self) -> Any:
-        """The response; `GraphError` while it is not there."""
+        """The response; `GraphError` while it is not there, or where there is none."""
         if not self._done:
             raise GraphError("the service has not answered yet; use add_done_callback")
+        if self._error is not None:
+            raise self._error
         return self._response
 
     def add_done_callback(self, callback: Callable[[Answer], None]) -> None:
@@ -37,7 +46,16 @@ class Answer:
 
     def answer(self, response: Any) -> None:
         """Set the response and call back."""
-        self._response, self._done = response, True
+        self._response = response
+        self._finish()
+
+    def fail(self, error: GraphError) -> None:
+        """Say that there will be no response, and call back."""
+        self._error = error
+        self._finish()
+
+    def _finish(self) -> None:
+        self._done = True
         for callback in self._callbacks:
             callback(self)
 
@@ -63,15 +81,32 @@ class Client:
         return self._graph.call(self.service, request)
 
     def call_async(self, request: Any | None = None) -> Answer:
-        """Call; the answer comes at once, or for a node with a latency as input after it."""
+        """Call; the answer comes at once, or later from a service outside.
+
+        For a node with a latency it is input of a callback of its own.
+        """
         answer = Answer()
 
-        def ask() -> None:
-            response = self._graph.call(self.service, request)
+        def settle(how: Callable[[], None]) -> None:
             if self._thinker is None:
-                answer.answer(response)
+                how()
             else:
-                self._thinker.think(lambda: answer.answer(response))
+                self._thinker.think(how)
+
+        def ask() -> None:
+            here = threading.get_ident()
+
+            def come_back(how: Callable[[], None]) -> None:
+                if threading.get_ident() == here:
+                    settle(how)
+                else:
+                    self._graph.post(lambda: settle(how))
+
+            reply = Reply(
+                lambda response: come_back(lambda: answer.answer(response)),
+                lambda error: come_back(lambda: answer.fail(error)),
+            )
+            self._graph.call_async(self.service, request, reply)
 
         if self._thinker is None or not self._thinker.hold_back(ask):
             ask()

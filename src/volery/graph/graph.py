@@ -121,16 +121,31 @@ class _Service:
 
 
 class Graph:
-    """All topics and services; `now_ns` tells the simulated time of a publication."""
+    """All topics and services.
 
-    def __init__(self, now_ns: Callable[[], int]) -> None:
+    `now_ns` tells the simulated time of a publication. `post` has a function called in the thread
+    of the simulation: what comes from other threads gets there through it.
+    """
+
+    def __init__(
+        self,
+        now_ns: Callable[[], int],
+        post: Callable[[Callable[[], Any]], Any] | None = None,
+    ) -> None:
         self._now_ns = now_ns
+        self._post = post
         self._topics: dict[str, _Topic] = {}
         self._services: dict[str, _Service] = {}
         self._to_all: list[Callback] = []
         self._queue: deque[_Letter] = deque()
         self._members = threading.RLock()
         """Held by whoever changes topics, publishers, subscribers or services."""
+
+    def post(self, action: Callable[[], Any]) -> None:
+        """Have `action()` called in the simulation's thread; `GraphError` where that has none."""
+        if self._post is None:
+            raise GraphError("this graph has no thread of its own to post to")
+        self._post(action)
 
     # ---------------------------------------------------------------------------------- topics
 
@@ -159,11 +174,16 @@ class Graph:
             topic.kept.pop(publisher, None)
 
     def subscribe(
-        self, topic: str, callback: Callback, msgtype: str | type[Any] | None = None
+        self,
+        topic: str,
+        callback: Callback,
+        msgtype: str | type[Any] | None = None,
+        *,
+        depth: int = 10,  # noqa: ARG002
     ) -> Subscription:
         """Call `callback` with each message of `topic`, which must exist or be given a type.
 
-        What latched publishers sent before comes first, with the next delivery; its `time_ns` is
+        depth: how many messages may wait; in lock step none ever does. What latched publishers sent before comes first, with the next delivery; its `time_ns` is
         that of this subscription.
         """
         with self._members:

@@ -16,7 +16,7 @@ names that start with `~/` belong to the node.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Protocol
 
 from volery.core.errors import GraphError, NodeError, VoleryError
@@ -45,6 +45,8 @@ class Context:
     timers: Timers
     now_ns: Callable[[], int]
     latency_ns: int = 0
+    remap: Mapping[str, str] = field(default_factory=dict)
+    """Other names for topics and services: absolute name of the node's to that of the graph."""
 
 
 class Clock:
@@ -117,13 +119,13 @@ class Node:
     def create_subscription(
         self, msg_type: type[Any], topic: str, callback: Callable[[Any], None], qos: int = 10
     ) -> Subscription:
-        """Call `callback(message)` for each message of `topic`."""
+        """Call `callback(message)` for each message of `topic`; of more than `qos` the newest."""
         _check_depth(qos)
 
         def receive(published: Published) -> None:
             self._run(lambda: callback(published.message), f"message on {published.topic}")
 
-        return self._context.graph.subscribe(self.resolve(topic), receive, msg_type)
+        return self._context.graph.subscribe(self.resolve(topic), receive, msg_type, depth=qos)
 
     def create_timer(self, period_s: float, callback: Callable[[], None]) -> None:
         """Call `callback` each `period_s` of simulated time."""
@@ -200,12 +202,12 @@ class Node:
             ) from error
 
     def resolve(self, name: str) -> str:
-        """Absolute name of a topic or service."""
-        if name.startswith("/"):
-            return name
+        """Absolute name of a topic or service, as the launch profile wants it."""
         if name.startswith("~/"):
-            return f"{self._namespace}/{self._name}/{name[2:]}"
-        return f"{self._namespace}/{name}"
+            name = f"{self._namespace}/{self._name}/{name[2:]}"
+        elif not name.startswith("/"):
+            name = f"{self._namespace}/{name}"
+        return self._context.remap.get(name, name)
 
     def unused_overrides(self) -> list[str]:
         """Overrides that no `declare_parameter` asked for: most likely misspelt."""

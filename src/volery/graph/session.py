@@ -14,6 +14,7 @@ newest. A client that does not read loses messages of its own and delays nobody.
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -33,6 +34,7 @@ Wake = Callable[[], None]
 Handler = Callable[[Any, Reply], None]
 """Takes a request in the simulation's thread, at once, and answers through the reply later."""
 
+_arrivals = itertools.count()
 DEFAULT_DEPTH = 10
 MOST_DEPTH = 100_000
 
@@ -52,7 +54,7 @@ class Mailbox:
 
     def __init__(self, topic: str, depth: int, wake: Wake) -> None:
         self.topic = topic
-        self._waiting: deque[Published] = deque()
+        self._waiting: deque[tuple[int, Published]] = deque()
         self._depth = depth
         self._wake = wake
         self._lock = threading.Lock()
@@ -67,12 +69,16 @@ class Mailbox:
             if len(self._waiting) >= self._depth:
                 self._waiting.popleft()
                 self._dropped += 1
-            self._waiting.append(published)
+            self._waiting.append((next(_arrivals), published))
         if was_empty:
             self._wake()
 
     def take(self, most: int | None = None) -> list[Published]:
         """Remove and return what waits, oldest first, at most `most` messages."""
+        return [published for _, published in self.take_numbered(most)]
+
+    def take_numbered(self, most: int | None = None) -> list[tuple[int, Published]]:
+        """Like `take`, with numbers that tell the order of arrival among all mailboxes."""
         with self._lock:
             if most is None or most >= len(self._waiting):
                 taken = list(self._waiting)

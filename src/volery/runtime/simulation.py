@@ -78,7 +78,7 @@ class Simulation:
         self._fleet = build_fleet(scenario, starts, names)
         add_bodies(self.scene, starts)
         fitted = self._fitted = fit_sensors(scenario, starts)
-        self.graph = Graph(lambda: self.time_ns)
+        self.graph = Graph(lambda: self.time_ns, self.post)
         self.gateway = Gateway(self.graph, self.post)
         """Where clients of other threads join the graph."""
         self._publisher = _make_publisher(self.graph, fitted)

@@ -1,0 +1,167 @@
+"""A graph of a node's own process: every name in it stands for the same name elsewhere."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from volery.core.errors import GraphError
+from volery.graph.graph import AsyncHandler, Callback, Graph, Publisher, Subscription
+from volery.graph.link import Link
+from volery.graph.messages import Published, type_name
+from volery.graph.reply import Reply
+from volery.graph.session import DEFAULT_DEPTH, Mailbox
+
+_CALL_TIMEOUT_S = 10.0
+
+
+class MirroredGraph(Graph):
+    """Publications go out through a link, what others publish comes in through it.
+
+    Callbacks run in the thread that calls `hand_out`; `wake`, called by the link's thread, says
+    that there is something to do.
+    """
+
+    def __init__(self, link: Link, now_ns: Callable[[], int], wake: Callable[[], None]) -> None:
+        self._posted: list[Callable[[], Any]] = []
+        super().__init__(now_ns, self._keep)
+        self._link = link
+        self._wake = wake
+        self._mailboxes: dict[str, Mailbox] = {}
+        self._readers: dict[str, list[Callback]] = {}
+
+    # ------------------------------------------------------------------------------------ topics
+
+    def advertise(
+        self, topic: str, msgtype: str | type[Any], *, latched: bool = False
+    ) -> Publisher:
+        """Announce a publisher here and there."""
+        name = msgtype if isinstance(msgtype, str) else type_name(msgtype)
+        self._link.advertise(topic, name, latched=latched)
+        return _RemotePublisher(super().advertise(topic, name, latched=latched), self._link)
+
+    def subscribe(
+        self,
+        topic: str,
+        callback: Callback,
+        msgtype: str | type[Any] | None = None,
+        *,
+        depth: int = DEFAULT_DEPTH,
+    ) -> Subscription:
+        """Call `callback` with each message that comes through the link.
+
+        The first subscriber of a topic decides how many may wait.
+        """
+        name = type_name(msgtype) if isinstance(msgtype, type) else msgtype
+        if topic not in self._mailboxes:
+            self._mailboxes[topic] = self._link.subscribe(topic, name, depth=depth, wake=self._wake)
+        readers = self._readers.setdefault(topic, [])
+        readers.append(callback)
+        return Subscription(readers, callback)
+
+    def hand_out(self) -> bool:
+        """Call back for everything that has come, in the order of arrival; whether there was any.
+
+        What comes meanwhile waits for the next call.
+        """
+        come = [
+            (number, topic, published)
+            for topic, mailbox in self._mailboxes.items()
+            for number, published in mailbox.take_numbered()
+        ]
+        come.sort(key=_number)
+        for _, topic, published in come:
+            for callback in tuple(self._readers[topic]):
+                callback(published)
+        posted = [self._posted.pop(0) for _ in range(len(self._posted))]
+        for action in posted:
+            action()
+        return bool(come or posted)
+
+    # ---------------------------------------------------------------------------------- services
+
+    def offer(self, service: str, srvtype: str, handler: Callable[[Any], Any]) -> None:
+        """Offer a service over there; its handler runs here, in `hand_out`."""
+
+        def ask(request: Any, reply: Reply) -> None:
+            self.post(lambda: _answer(handler, request, reply))
+
+        self._link.offer(service, srvtype, ask)
+
+    def offer_async(self, service: str, srvtype: str, ask: AsyncHandler) -> None:
+        """Like `offer`, for answers that come later."""
+        self._link.offer(service, srvtype, lambda q, reply: self.post(lambda: ask(q, reply)))
+
+    def has_service(self, service: str) -> bool:  # noqa: ARG002
+        """Whether to try: only a call tells whether somebody over there answers."""
+        return True
+
+    def call(self, service: str, request: Any | None = None) -> Any:
+        """Call and wait for the response; `GraphError` where none comes in time."""
+        come, answers, failures = threading.Event(), [], []  # type: ignore[var-annotated]
+        reply = Reply(answers.append, failures.append)
+        reply.when_done(come.set)
+        self._link.call(service, request, reply)
+        if not come.wait(_CALL_TIMEOUT_S):
+            raise GraphError(f"service '{service}' did not answer within {_CALL_TIMEOUT_S:.0f} s")
+        while not answers and not failures:  # told just before the answer is handed over
+            threading.Event().wait(0.001)
+        if failures:
+            raise failures[0]
+        return answers[0]
+
+    def call_async(self, service: str, request: Any | None, reply: Reply) -> None:
+        """Call; the answer comes from the link's thread."""
+        self._link.call(service, request, reply)
+
+    def _keep(self, action: Callable[[], Any]) -> None:
+        self._posted.append(action)
+        self._wake()
+
+
+class _RemotePublisher(Publisher):
+    """Publishes through the link; whether anybody listens over there is not known."""
+
+    def __init__(self, local: Publisher, link: Link) -> None:
+        self._local = local
+        self._link = link
+        self.latched = local.latched
+
+    @property
+    def topic(self) -> str:
+        """Name of the topic."""
+        return self._local.topic
+
+    @property
+    def msgtype(self) -> str:
+        """Type of its messages."""
+        return self._local.msgtype
+
+    @property
+    def wanted(self) -> bool:
+        """True: somebody may listen."""
+        return True
+
+    def publish(self, message: Any) -> None:
+        """Send a message."""
+        name = getattr(message, "__msgtype__", None)
+        if name != self.msgtype:
+            raise GraphError(f"topic '{self.topic}' carries {self.msgtype}, not {name}")
+        self._link.publish(self.topic, message)
+
+    def cancel(self) -> None:
+        """Publish no more."""
+        self._local.cancel()
+
+
+def _number(entry: tuple[int, str, Published]) -> int:
+    return entry[0]
+
+
+def _answer(handler: Callable[[Any], Any], request: Any, reply: Reply) -> None:
+    try:
+        reply.answer(handler(request))
+    except Exception as error:  # the caller's business too
+        reply.fail(GraphError(f"{type(error).__name__}: {error}"))
+        raise

@@ -1,0 +1,40 @@
+"""What a program needs of a graph that lies elsewhere, whoever carries the messages."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from volery.graph.reply import Reply
+from volery.graph.session import Handler, Mailbox, Wake
+
+
+class Link(Protocol):
+    """One client's part in a graph; see `graph.session.Session`, which is the nearest one.
+
+    All methods may be called by any thread; replies and wakes come from the link's own.
+    """
+
+    name: str
+
+    def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
+        """Announce that messages will be published on `topic`."""
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Publish a message of the announced type."""
+
+    def subscribe(
+        self, topic: str, msgtype: str | None = None, *, depth: int = ..., wake: Wake
+    ) -> Mailbox:
+        """Begin to receive `topic`."""
+
+    def unsubscribe(self, mailbox: Mailbox) -> None:
+        """Receive no more."""
+
+    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+        """Call a service of the graph."""
+
+    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+        """Offer a service to the graph."""
+
+    def close(self) -> None:
+        """Take back everything."""

@@ -1,0 +1,192 @@
+"""Nodes outside of the simulation: the same class, on a link."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from volery.bridges.node_host import NodeHost
+from volery.core.errors import GraphError, NodeError
+from volery.graph.graph import Graph
+from volery.graph.messages import Clock, String, Time, message_type
+from volery.graph.node import Node
+from volery.graph.session import Gateway
+
+TRIGGER = "std_srvs/srv/Trigger"
+Response = message_type(f"{TRIGGER}_Response")
+
+
+class World:
+    """A graph with a thread of its own, as a running simulation is."""
+
+    def __init__(self):
+        from volery.engine.commands import Inbox
+
+        self.inbox = Inbox()
+        self.now_ns = 0
+        self.graph = Graph(lambda: self.now_ns, self.inbox.post)
+        self.gateway = Gateway(self.graph, self.inbox.post)
+        self.clock = self.graph.advertise("/clock", Clock)
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self):
+        while not self._over.wait(0.001):
+            self.inbox.work_off()
+            self.graph.deliver()
+
+    def tick(self, time_ns):
+        self.now_ns = time_ns
+        stamp = Time(time_ns // 10**9, time_ns % 10**9)
+        self.inbox.post(lambda: self.clock.publish(Clock(stamp))).result(5.0)
+
+    def do(self, action):
+        return self.inbox.post(action).result(5.0)
+
+    def close(self):
+        self._over.set()
+        self._thread.join()
+
+
+@pytest.fixture
+def world():
+    world = World()
+    yield world
+    world.close()
+
+
+class Parrot(Node):
+    """Repeats what it hears, on a timer too, and serves."""
+
+    def __init__(self, **options):
+        super().__init__("parrot", **options)
+        self.word = self.declare_parameter("word", "polly").value
+        self.times = []
+        self.out = self.create_publisher(String, "said", 10)
+        self.create_subscription(String, "heard", self.on_heard)
+        self.create_timer(0.5, self.on_timer)
+        self.create_service(TRIGGER, "do", self.on_do)
+        self.ask = self.create_client(TRIGGER, "/there/do")
+
+    def on_heard(self, message):
+        if message.data == "break":
+            raise ValueError("broken")
+        self.out.publish(String(f"{self.word} {message.data}"))
+
+    def on_timer(self):
+        self.times.append(self.get_clock().now_ns())
+
+    def on_do(self, _request, response):
+        response.success, response.message = True, self.word
+        return response
+
+
+def spin_until(host, condition, timeout_s=5.0):
+    end = time.monotonic() + timeout_s
+    host.spin(lambda: condition() or time.monotonic() > end)
+    assert condition()
+
+
+def test_topics_and_services_both_ways(world):
+    session = world.gateway.open("node")
+    host = NodeHost(session)
+    node = Parrot(context=host.context(), namespace="/uav1", parameter_overrides={"word": "hi"})
+    said, answers = [], []
+    world.do(lambda: world.graph.subscribe("/uav1/said", said.append, String))
+    world.do(lambda: world.graph.offer("/there/do", TRIGGER, lambda _r: Response(True, "there")))
+    heard = world.graph.advertise("/uav1/heard", String)
+    world.do(lambda: heard.publish(String("you")))
+    spin_until(host, lambda: said)
+    assert said[0].message.data == "hi you"
+
+    assert node.ask.call().message == "there"
+    node.ask.call_async().add_done_callback(lambda a: answers.append(a.result().message))
+    other = world.gateway.open("caller")
+    from volery.graph.reply import Reply
+
+    other.call("/uav1/do", None, Reply(lambda r: answers.append(r.message), answers.append))
+    spin_until(host, lambda: len(answers) == 2)
+    assert sorted(answers) == ["hi", "there"]
+
+
+def test_a_service_that_nobody_offers(world):
+    host = NodeHost(world.gateway.open("node"))
+    node = Parrot(context=host.context())
+    with pytest.raises(GraphError, match="nobody offers"):
+        node.ask.call()
+    failed = []
+    node.ask.call_async().add_done_callback(failed.append)
+    spin_until(host, lambda: failed)
+    assert "nobody offers" in str(failed[0].exception())
+    with pytest.raises(GraphError, match="nobody offers"):
+        failed[0].result()
+
+
+def test_timers_go_by_the_simulated_clock(world):
+    host = NodeHost(world.gateway.open("node"), clock="simulated")
+    node = Parrot(context=host.context())
+    assert node.get_clock().now_ns() == 0
+    for time_ns in range(0, 2_000_000_001, 100_000_000):
+        world.tick(time_ns)
+    spin_until(host, lambda: host.now_ns() == 2_000_000_000)
+    assert node.times == [500_000_000, 1_000_000_000, 1_500_000_000, 2_000_000_000]
+
+
+def test_a_simulation_that_starts_again_keeps_timers_going(world):
+    host = NodeHost(world.gateway.open("node"))
+    node = Parrot(context=host.context())
+    world.tick(10_000_000_000)
+    spin_until(host, lambda: host.now_ns() == 10_000_000_000)
+    world.tick(10_600_000_000)
+    spin_until(host, lambda: len(node.times) == 1)
+    world.tick(0)
+    spin_until(host, lambda: host.now_ns() == 0)
+    world.tick(600_000_000)
+    spin_until(host, lambda: len(node.times) == 2)
+
+
+def test_without_a_clock_the_computers_counts(world):
+    host = NodeHost(world.gateway.open("node"), clock="wall")
+    node = Parrot(context=host.context())
+    spin_until(host, lambda: node.times)
+    assert abs(node.times[0] - time.time_ns()) < 5_000_000_000
+
+
+def test_what_a_node_breaks_ends_the_host_with_its_name(world):
+    host = NodeHost(world.gateway.open("node"))
+    Parrot(context=host.context(), namespace="/uav1")
+    heard = world.graph.advertise("/uav1/heard", String)
+    world.do(lambda: heard.publish(String("break")))
+    with pytest.raises(NodeError, match="uav1/parrot"):
+        host.spin(lambda: False)
+
+
+def test_a_profile_renames(world):
+    host = NodeHost(world.gateway.open("node"))
+    Parrot(context=host.context({"/uav1/heard": "/mavros/text"}), namespace="/uav1")
+    assert world.graph.topic_type("/mavros/text") == "std_msgs/msg/String"
+    assert world.graph.topic_type("/uav1/heard") is None
+
+
+def test_the_order_of_arrival_is_kept_across_topics(world):
+    class Listener(Node):
+        def __init__(self, **options):
+            super().__init__("listener", **options)
+            self.seen = []
+            for topic in ("b", "a"):
+                self.create_subscription(String, topic, lambda m: self.seen.append(m.data))
+
+    host = NodeHost(world.gateway.open("node"))
+    node = Listener(context=host.context())
+    a, b = world.graph.advertise("/a", String), world.graph.advertise("/b", String)
+
+    def speak():
+        for k in range(5):
+            (a if k % 2 else b).publish(String(str(k)))
+
+    world.do(speak)
+    spin_until(host, lambda: len(node.seen) == 5)
+    assert node.seen == list("01234")
