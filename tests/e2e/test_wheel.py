@@ -33,7 +33,7 @@ def test_wheel_in_a_clean_environment(tmp_path):
         "world/data/forests/bei_trees.csv",
         "vehicle/airframes/f450.toml",
         "sensors/models/utm_30lx.toml",
-        "graph/definitions/Trigger.srv",
+        "graph/definitions/std_srvs/srv/Trigger.srv",
         "py.typed",
     ):
         assert any(name.endswith(suffix) for name in names), suffix

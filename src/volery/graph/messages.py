@@ -1,7 +1,7 @@
 """Messages: the ROS 2 types that Volery speaks, and what a published one carries.
 
 Types are plain dataclasses with numpy arrays from `rosbags`; no ROS installation is needed.
-Services that the store lacks are registered from the definition files in `definitions/`.
+Types that its store lacks come from the definition files in `definitions/`.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.store import Typestore
+from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.stores import ros2_jazzy as _ros2
 
 from volery.core.clock import stamp_from_ns
+from volery.graph.definition_store import DefinitionStore
 
 Time = _ros2.builtin_interfaces__msg__Time
 Point = _ros2.geometry_msgs__msg__Point
@@ -52,20 +52,41 @@ MultiDOFJointTrajectory = _ros2.trajectory_msgs__msg__MultiDOFJointTrajectory
 MultiDOFJointTrajectoryPoint = _ros2.trajectory_msgs__msg__MultiDOFJointTrajectoryPoint
 
 _DEFINITIONS = Path(__file__).parent / "definitions"
-_SERVICES = {"Trigger.srv": "std_srvs/srv/Trigger"}
 
 
 @cache
-def typestore() -> Typestore:
-    """The ROS 2 types (Jazzy) and our own registered definitions."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    for file, name in _SERVICES.items():
-        request, response = (_DEFINITIONS / file).read_text(encoding="utf-8").split("---\n")
-        for part, definition in (("Request", request), ("Response", response)):
-            # rosbags files every definition under msg/; services belong under srv/
-            (fields,) = get_types_from_msg(definition, name).values()
-            store.register({f"{name}_{part}": fields})
+def typestore() -> DefinitionStore:
+    """The ROS 2 types (Jazzy) and those of our own definition files.
+
+    The files are read one by one when a type of theirs is first asked for.
+    """
+    store = DefinitionStore(get_typestore(Stores.ROS2_JAZZY), __name__)
+    store.index_folder(_DEFINITIONS)
     return store
+
+
+def add_definitions(folder: str | Path) -> list[str]:
+    """Register the `.msg`, `.srv` and `.action` files of a folder of packages.
+
+    Returns the names of the types, `package/srv/Name_Request` and `_Response` for a service.
+
+    Raises
+    ------
+    GraphError
+        A definition is broken, names an unknown type or contradicts a type that is known; the
+        message names file and line, and none of the folder's types is registered.
+
+    """
+    return typestore().add_folder(Path(folder))
+
+
+def __getattr__(name: str) -> Any:
+    """Classes of our definition files by their Python name, so that messages can be pickled."""
+    if "__" in name.strip("_"):
+        found = typestore().types.get(name.replace("__", "/"))
+        if found is not None:
+            return found
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def message_type(name: str) -> type[Any]:

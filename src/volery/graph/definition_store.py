@@ -1,0 +1,190 @@
+"""A typestore that learns types from definition files, each when it is first asked for.
+
+Making a dataclass takes about half a millisecond, so of the types in a folder only those in use
+are made: `store.types["std_srvs/srv/Trigger_Request"]` reads the file that defines it.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import TypesysError
+from rosbags.typesys.store import Typestore
+
+from volery.core.errors import GraphError
+from volery.graph.definition_files import (
+    Definition,
+    DefinitionFile,
+    find_definition_files,
+    read_definition_file,
+)
+
+EMPTY_MEMBER = "structure_needs_at_least_one_member"
+"""The byte that a message without fields has in ROS 2, and only there."""
+
+
+class _LazyDict(dict[str, Any]):
+    """A dict that loads a pending type before it answers for it."""
+
+    def __init__(self, present: dict[str, Any], pending: Callable[[str], bool]) -> None:
+        super().__init__(present)
+        self._pending = pending
+
+    def __missing__(self, name: str) -> Any:
+        if self._pending(name):
+            return dict.__getitem__(self, name)
+        raise KeyError(name)
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(name) or (isinstance(name, str) and self._pending(name))
+
+    def get(self, name: str, default: Any = None) -> Any:
+        try:
+            return self[name]
+        except KeyError:
+            return default
+
+
+class DefinitionStore(Typestore):
+    """Types of a store and of folders of definition files. Safe to use from several threads."""
+
+    def __init__(self, base: Typestore, module: str) -> None:
+        super().__init__()
+        self._files: dict[str, DefinitionFile] = {}
+        self._loading: set[str] = set()
+        self._lock = threading.RLock()
+        self._module = module
+        self._definitions: dict[str, Definition] = {}
+        self.types = _LazyDict(dict(base.types), self._load)
+        self.fielddefs = _LazyDict(dict(base.fielddefs), self._load)
+
+    def names(self) -> list[str]:
+        """Names of all types, loaded or not, sorted."""
+        return sorted({*self.fielddefs, *self._files})
+
+    def default_of(self, msgtype: str, field: str) -> Any:
+        """Value that a definition file gives a field; None where it starts at zero."""
+        definition = self._definitions.get(msgtype)
+        return None if definition is None else definition.defaults.get(field)
+
+    def constant_text(self, msgtype: str, constant: str) -> str | None:
+        """A constant as its file writes it; None where the type is from no file."""
+        definition = self._definitions.get(msgtype)
+        return None if definition is None else definition.constant_texts.get(constant)
+
+    def index_folder(self, folder: Path) -> None:
+        """Make the types of a folder known unread; a broken file is an error on first use."""
+        for file in find_definition_files(folder):
+            for name in file.names:
+                if not dict.__contains__(self.fielddefs, name):
+                    self._files.setdefault(name, file)
+
+    def add_folder(self, folder: Path) -> list[str]:
+        """Read a folder and register its types, all or none. Returns their names.
+
+        A type that is known already with the same fields is passed over.
+
+        Raises
+        ------
+        GraphError
+            A file is broken, names an unknown type, repeats a type of another file, or defines a
+            known type with other fields; a type contains itself.
+
+        """
+        found: dict[str, Definition] = {}
+        for file in find_definition_files(folder):
+            for definition in read_definition_file(file):
+                other = found.get(definition.name)
+                if other is not None:
+                    raise GraphError(
+                        f"{definition.source}: {definition.name} is defined in {other.source} too"
+                    )
+                found[definition.name] = definition
+        with self._lock:
+            for definition in found.values():
+                self._check(definition, found)
+            _check_cycles(found)
+            self._register(d for n, d in found.items() if n not in self.fielddefs)
+        return sorted(found)
+
+    def _check(self, definition: Definition, found: dict[str, Definition]) -> None:
+        name = definition.name
+        for nested, line in definition.nested:
+            if nested not in found and nested not in self.fielddefs:
+                raise GraphError(f"{definition.source}:{line}: unknown type '{nested}'")
+        known = self.fielddefs.get(name)
+        if known is not None and _shape(known[1]) != _shape(definition.fields):
+            raise GraphError(f"{definition.source}: {name} is known already with other fields")
+
+    def _load(self, name: str) -> bool:
+        """Register a pending type; False where none of that name is pending."""
+        with self._lock:
+            if dict.__contains__(self.types, name):
+                return True  # another thread was faster
+            file = self._files.get(name)
+            if file is None or name in self._loading:
+                return False
+            definitions = read_definition_file(file)
+            inside = {part.name for part in definitions}
+            for part in definitions:
+                for nested, line in part.nested:
+                    if nested not in inside and nested not in self.fielddefs:
+                        raise GraphError(f"{part.source}:{line}: unknown type '{nested}'")
+            self._loading |= inside
+            try:
+                self._register(definitions)
+            finally:
+                self._loading -= inside
+            for part in inside:
+                self._files.pop(part, None)
+        return True
+
+    def _register(self, definitions: Iterable[Definition]) -> None:
+        new = {d.name: d for d in definitions}
+        if not new:
+            return
+        try:
+            self.register({d.name: (d.constants, d.fields) for d in new.values()})
+        except TypesysError as error:
+            source = next(iter(new.values())).source
+            raise GraphError(f"{source}: {error}") from None
+        for name in new:
+            # Where pickle finds the class again; rosbags' own module holds the newest type only.
+            self.types[name].__module__ = self._module
+        self._definitions.update(new)
+
+
+def _shape(fields: Any) -> Any:
+    return [(name, described) for name, described in fields if name != EMPTY_MEMBER]
+
+
+def _check_cycles(found: dict[str, Definition]) -> None:
+    """No type may contain itself: its messages would never end."""
+    done: set[str] = set()
+
+    def visit(name: str, above: tuple[str, ...]) -> None:
+        if name in above:
+            loop = " > ".join((*above[above.index(name) :], name))
+            raise GraphError(f"{found[name].source}: {name} contains itself: {loop}")
+        if name in done or name not in found:
+            return
+        for nested, _ in found[name].nested:
+            visit(nested, (*above, name))
+        done.add(name)
+
+    for name in found:
+        visit(name, ())
+
+
+def element_type(described: Any) -> str | None:
+    """Message type of a field, or of its elements; None for numbers and strings."""
+    kind, detail = described
+    if kind == Nodetype.NAME:
+        return str(detail)
+    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        return element_type(detail[0])
+    return None
