@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from volery.bridges.disk_file import DiskFile
-from volery.core.errors import RecordingError
+from volery.core.errors import GraphError, RecordingError
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -200,7 +200,7 @@ class BagLog(Log):
     def __init__(self, path: Path, compression: Compression = "lz4") -> None:
         from rosbags.rosbag1 import Writer
 
-        from volery.bridges.ros1_messages import Ros1Encoder
+        from volery.graph.ros1 import ros1_codec
 
         super().__init__(path)
         if compression == "zstd":
@@ -215,7 +215,7 @@ class BagLog(Log):
         self._file = DiskFile(path, append=True)
         writer.bio = cast("io.BufferedWriter", self._file)
         self._writer = writer
-        self._encoder = Ros1Encoder(_ros2_typestore())
+        self._codec = ros1_codec()
         self._connections: dict[str, Any] = {}
         self._sequences: dict[str, int] = {}
 
@@ -223,15 +223,20 @@ class BagLog(Log):
         topic, msgtype = published.topic, published.msgtype
         connection = self._connections.get(topic)
         if connection is None:
-            self._encoder.learn(msgtype)
-            store = self._encoder.typestore
-            connection = self._writer.add_connection(topic, msgtype, typestore=store)
+            connection = self._connect(topic, msgtype)
             self._connections[topic] = connection
             self._sequences[topic] = 0
         sequence = self._sequences[topic]
         self._sequences[topic] = sequence + 1
-        data = self._encoder.encode(published.message, msgtype, sequence)
+        data = self._codec.encode(published.message, msgtype, sequence)
         self._writer.write(connection, published.time_ns, data)
+
+    def _connect(self, topic: str, msgtype: str) -> Any:
+        try:
+            definition, md5 = self._codec.definition_text(msgtype), self._codec.md5(msgtype)
+        except GraphError as error:
+            raise RecordingError(f"{topic} cannot be recorded: {error}") from None
+        return self._writer.add_connection(topic, msgtype, msgdef=definition, md5sum=md5)
 
     def _end_chunk(self) -> None:
         self._writer.write_chunk(self._writer.chunks[-1])

@@ -1,0 +1,136 @@
+"""Messages as CDR, the wire form of ROS 2: encoding and checked decoding."""
+
+from __future__ import annotations
+
+import struct
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
+from rosbags.serde import SerdeError
+from rosbags.typesys.base import normalize_fieldname
+
+from volery.core.errors import GraphError
+from volery.graph.definition_files import NUMBERS
+from volery.graph.definition_store import element_type
+from volery.graph.messages import typestore
+
+_HEADER_BYTES = 4
+_BIG_ENDIAN = b"\x00\x00"
+_LITTLE_ENDIAN = b"\x00\x01"
+_ALIGNMENT_BYTES = 3
+"""Most bytes of padding behind a message: writers fill up to a multiple of four."""
+
+CODING_ERRORS = (
+    SerdeError,
+    struct.error,
+    ValueError,
+    TypeError,
+    AttributeError,
+    IndexError,
+    OverflowError,
+)
+"""What the generated coders raise for a message or bytes that do not fit the type."""
+
+
+def encode_cdr(message: Any, msgtype: str) -> bytes:
+    """CDR of a message, little-endian, with its four bytes of header.
+
+    Raises
+    ------
+    GraphError
+        The type is unknown, or the message does not fit it.
+
+    """
+    known(msgtype)
+    try:
+        return bytes(typestore().serialize_cdr(message, msgtype))
+    except (*CODING_ERRORS, AssertionError) as error:
+        raise GraphError(f"the message does not fit {msgtype}: {error}") from None
+
+
+def decode_cdr(data: bytes | bytearray | memoryview, msgtype: str) -> Any:
+    """Message read from CDR (version 1, either byte order) with its four bytes of header.
+
+    Its arrays are read-only and independent of `data`.
+
+    Raises
+    ------
+    GraphError
+        The type is unknown, or the bytes are not one message of that type: too short, too long,
+        a length that lies, text that is not UTF-8.
+
+    """
+    known(msgtype)
+    view = memoryview(data).cast("B")
+    kind = bytes(view[:2])
+    if len(view) < _HEADER_BYTES or kind not in (_LITTLE_ENDIAN, _BIG_ENDIAN):
+        raise GraphError(f"{msgtype}: not CDR of version 1 (header {bytes(view[:4]).hex()})")
+    store = typestore()
+    definition = store.get_msgdef(msgtype)
+    # A copy that begins behind the header: arrays in it are aligned and nobody else's.
+    body = bytes(view[_HEADER_BYTES:])
+    little = kind == _LITTLE_ENDIAN
+    decode = definition.deserialize_cdr_le if little else definition.deserialize_cdr_be
+    try:
+        message, end = decode(body, 0, definition.cls, store)
+    except CODING_ERRORS as error:
+        raise GraphError(f"{msgtype}: {len(view)} bytes are not such a message: {error}") from None
+    if not end <= len(body) <= end + _ALIGNMENT_BYTES:
+        raise GraphError(
+            f"{msgtype}: the message has {end + _HEADER_BYTES} bytes, {len(view)} were given"
+        )
+    if not little or _has_bools(msgtype):
+        _own_arrays(message, msgtype)
+    return message
+
+
+def known(msgtype: str) -> None:
+    """Raise `GraphError` unless the graph knows the type."""
+    if msgtype not in typestore().types:
+        raise GraphError(f"message type '{msgtype}' is not known")
+
+
+def own_array(values: NDArray[Any]) -> NDArray[Any]:
+    """The array aligned and read-only, its bools 0 or 1; copied only where that needs it."""
+    if values.dtype == np.bool_:
+        values = values.view(np.uint8) != 0
+    elif not values.flags.aligned:
+        values = values.copy()
+    values.setflags(write=False)
+    return values
+
+
+def is_number_array(described: Any) -> bool:
+    """Whether a field is an array of numbers, which messages hold as a numpy array."""
+    kind, detail = described
+    if kind not in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        return False
+    (inner, inner_detail), _ = detail
+    return inner == Nodetype.BASE and inner_detail[0] in NUMBERS
+
+
+@cache
+def _has_bools(msgtype: str) -> bool:
+    """Whether a type, or one it is made of, holds an array of bools."""
+    for _, described in typestore().fielddefs[msgtype][1]:
+        if is_number_array(described) and described[1][0][1][0] == "bool":
+            return True
+        inner = element_type(described)
+        if inner and _has_bools(inner):
+            return True
+    return False
+
+
+def _own_arrays(message: Any, msgtype: str) -> None:
+    for field, described in typestore().fielddefs[msgtype][1]:
+        name = normalize_fieldname(field)
+        value = getattr(message, name)
+        inner = element_type(described)
+        if inner:
+            for item in value if isinstance(value, list) else [value]:
+                _own_arrays(item, inner)
+        elif is_number_array(described):
+            setattr(message, name, own_array(value))

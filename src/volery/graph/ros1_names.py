@@ -1,0 +1,75 @@
+"""Names of types in the two generations of ROS."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal
+
+from volery.core.errors import GraphError
+
+_PACKAGES = {"rosapi_msgs": "rosapi"}
+"""Packages whose interfaces moved to another package in ROS 2."""
+_OLD_PACKAGES = {old: new for new, old in _PACKAGES.items()}
+_TYPES = {
+    "builtin_interfaces/msg/Time": "std_msgs/Time",
+    "builtin_interfaces/msg/Duration": "std_msgs/Duration",
+}
+"""ROS 1 has these two as basic types, and messages that hold nothing but one of them."""
+_OLD_TYPES = {
+    **{old: new for new, old in _TYPES.items()},
+    **{old.replace("/", "/msg/"): new for new, old in _TYPES.items()},
+}
+_NAME = re.compile(r"([A-Za-z]\w*)/(?:(msg|srv|action)/)?([A-Za-z]\w*)", re.ASCII)
+_PART = re.compile(r"(.+)_(Request|Response|Goal|Result|Feedback)")
+
+
+def ros1_name(msgtype: str) -> str:
+    """ROS 1 name of a type: `std_msgs/msg/String` is `std_msgs/String` there.
+
+    Parts of a service lose their underscore: `std_srvs/srv/SetBool_Request` is
+    `std_srvs/SetBoolRequest`. A name in ROS 1 form is returned as it is.
+
+    Raises
+    ------
+    GraphError
+        The text is not the name of a type.
+
+    """
+    if msgtype in _TYPES:
+        return _TYPES[msgtype]
+    package, kind, name = _split(msgtype)
+    if kind in ("srv", "action"):
+        part = _PART.fullmatch(name)
+        name = part[1] + part[2] if part else name
+    return f"{_PACKAGES.get(package, package)}/{name}"
+
+
+def ros2_name(name: str, kind: Literal["msg", "srv", "action"] = "msg") -> str:
+    """ROS 2 name of a type given in either spelling.
+
+    Parameters
+    ----------
+    name
+        `std_msgs/String` or `std_msgs/msg/String`.
+    kind
+        What a name of two parts names.
+
+    Raises
+    ------
+    GraphError
+        The text is not the name of a type, or names another kind.
+
+    """
+    if name in _OLD_TYPES:
+        return _OLD_TYPES[name]
+    package, given, base = _split(name)
+    if given and given != kind:
+        raise GraphError(f"'{name}' names a {given}, not a {kind}")
+    return f"{_OLD_PACKAGES.get(package, package)}/{kind}/{base}"
+
+
+def _split(name: str) -> tuple[str, str | None, str]:
+    match = _NAME.fullmatch(name) if isinstance(name, str) else None
+    if match is None:
+        raise GraphError(f"{name!r} is not the name of a ROS type, such as 'std_msgs/String'")
+    return match[1], match[2], match[3]

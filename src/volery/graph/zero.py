@@ -1,0 +1,77 @@
+"""Messages whose every field is zero, empty or at the default of its definition file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from rosbags.interfaces import Nodetype
+
+from volery.core.errors import GraphError
+from volery.graph.definition_store import EMPTY_MEMBER
+from volery.graph.messages import typestore
+
+DTYPES: dict[str, np.dtype[Any]] = {
+    "bool": np.dtype(np.bool_),
+    "byte": np.dtype(np.int8),
+    "char": np.dtype(np.uint8),
+    "float32": np.dtype(np.float32),
+    "float64": np.dtype(np.float64),
+    **{
+        f"{sign}int{bits}": np.dtype(f"{sign}int{bits}")
+        for sign in ("", "u")
+        for bits in (8, 16, 32, 64)
+    },
+}
+"""numpy's form of each number type, as decoders hand it out."""
+
+Maker = Callable[[], Any]
+
+
+def zero_message(msgtype: str) -> Any:
+    """A new message of zeros, empty strings and empty arrays; fixed arrays have their length.
+
+    Arrays are read-only: replace them, do not write into them. GraphError if the type is unknown.
+    """
+    return message_maker(msgtype)()
+
+
+@cache
+def message_maker(msgtype: str) -> Maker:
+    """What makes messages of zeros of a type."""
+    store = typestore()
+    if msgtype not in store.types:
+        raise GraphError(f"message type '{msgtype}' is not known")
+    cls: Any = store.types[msgtype]
+    makers = [
+        value_maker(described, store.default_of(msgtype, name))
+        for name, described in store.fielddefs[msgtype][1]
+        if name != EMPTY_MEMBER
+    ]
+    return lambda: cls(*[make() for make in makers])
+
+
+def value_maker(described: Any, default: Any = None) -> Maker:
+    """What makes the zero, or the default, of a field."""
+    kind, detail = described
+    if kind == Nodetype.NAME:
+        return message_maker(detail)
+    if kind == Nodetype.BASE:
+        base = detail[0]
+        zero: Any = "" if base == "string" else DTYPES[base].type(0).item()
+        value = zero if default is None else default
+        return lambda: value
+    (inner, inner_detail), size = detail
+    length = size if kind == Nodetype.ARRAY else 0
+    if inner == Nodetype.NAME:
+        make = message_maker(inner_detail)
+        return lambda: [make() for _ in range(length)]
+    if inner_detail[0] == "string":
+        strings = [""] * length if default is None else default
+        return lambda: list(strings)
+    dtype = DTYPES[inner_detail[0]]
+    array = np.zeros(length, dtype) if default is None else np.array(default, dtype)
+    array.setflags(write=False)
+    return lambda: array
