@@ -268,6 +268,33 @@ class Fleet(FleetCommands):
         self._bodies["separation_budget"][i] = 0.0
         self._wake(i)
 
+    def put(
+        self, i: int, position: ArrayLike, attitude: ArrayLike, *, in_air: bool = True
+    ) -> None:
+        """Put UAV `i` at a pose at once: (3,) m, map; (4,) map from body. Its motion goes on there.
+
+        If it flies it holds there; if it stood and this is `in_air`, its rotors turn and it hovers.
+        A wreck stays one.
+        """
+        position = checked("position", position, (3,), MAX_COORDINATE)
+        attitude = checked_attitude(attitude)
+        self._bodies["position_map"][i] = self.history.position[:, i] = position
+        self._bodies["attitude"][i] = self.history.attitude[:, i] = attitude
+        self._bodies["contact_budget"][i] = 0.0
+        self._bodies["separation_budget"][i] = 0.0
+        self._begin_anew(i, in_air)
+
+    def push(self, i: int, velocity: ArrayLike, omega_body: ArrayLike) -> None:
+        """Let UAV `i` move at (3,) m/s, map, and turn at (3,) rad/s, FLU, from one step to the next.
+
+        If it flies it brakes from there, and holds.
+        """
+        velocity = checked("velocity", velocity, (3,), 100.0)
+        omega_body = checked("rates", omega_body, (3,), 100.0)
+        self._bodies["velocity_map"][i] = velocity
+        self._bodies["omega_body"][i] = omega_body
+        self._begin_anew(i, in_air=False)
+
     # ------------------------------------------------------------------------------ contacts
 
     def crash(self, i: int) -> None:
@@ -370,6 +397,19 @@ class Fleet(FleetCommands):
             fit_rotors(self._bodies[i], plant, health)
             charge_battery(self._bodies[i], plant, float(charge[i]))
             self._pilots["full_thrust"][i] = self.airframes[i].max_rotor_thrust
+
+    def _begin_anew(self, i: int, in_air: bool) -> None:
+        """Let the controllers of UAV `i` begin from its present motion."""
+        self._wake(i)
+        if self._bodies["crashed"][i]:
+            return
+        if self.mode(i) is not FlightMode.LANDED:
+            self._pilots["level"][i] = ControlLevel.STOPPED
+            self._enter_guided(i, FlightMode.HOLD)["braking"] = True
+        elif in_air:
+            self._start_in_air(i)
+        if len(self._references) == len(self):
+            self._references[i, :, :4] = self._bodies["attitude"][i]
 
     def _start_in_air(self, i: int) -> None:
         airframe = self.airframes[i]

@@ -12,6 +12,7 @@ import time
 
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
+from volery.engine.stepping import OnSteps, StepQueue, StepRequest
 
 _SLICE_S = 0.005
 _PROMPT_SLICE_S = 0.001
@@ -23,7 +24,7 @@ _SLACK_S = 0.25
 
 
 class Pacer:
-    """How fast a simulation runs. All but `begin`, `next_steps` and `wait` may be called anywhere.
+    """How fast a simulation runs. What is not for "the thread that runs" may be called anywhere.
 
     Starts unpaused and at full speed.
     """
@@ -33,7 +34,8 @@ class Pacer:
         self._woken = False
         self._paused = False
         self._speed: float | None = None
-        self._steps = 0  # single ones asked for and not made yet
+        self._steps = StepQueue()  # single ones asked for and not made yet
+        self._in_hand: StepRequest | None = None  # the one whose steps are being made
         self._reached_ns = 0
         self._wall_start = 0.0  # `_sim_start_ns` was, or is, due at this wall time
         self._sim_start_ns = 0
@@ -67,8 +69,8 @@ class Pacer:
         """Go on at the speed from before the pause; what was missed is not caught up."""
         with self._changed:
             self._paused = False
-            self._steps = 0
             self._restart()
+        self.drop_steps("the simulation goes on")
 
     def set_speed(self, speed: float | None) -> None:
         """Run at `speed` times real time from here on, None for as fast as possible."""
@@ -79,15 +81,27 @@ class Pacer:
                 self._speed = speed
                 self._restart()
 
-    def single_steps(self, steps: int) -> None:
-        """Let a paused run make that many physics steps more and wait again."""
+    def single_steps(self, steps: int, on_steps: OnSteps | None = None) -> StepRequest:
+        """Let a paused run make that many physics steps more and wait again.
+
+        on_steps: told of each piece that is made and of the end, which may come early.
+        """
         if steps < 1:
             raise CommandError(f"a single step is at least 1 step, not {steps}")
+        request = StepRequest(steps, on_steps)
         with self._changed:
             if not self._paused:
                 raise CommandError("single steps are made while paused; call pause() first")
-            self._steps += steps
+            self._steps.add(request)
             self._changed.notify()
+        return request
+
+    def drop_steps(self, reason: str, only: StepRequest | None = None) -> None:
+        """Make no more of the single steps asked for, or of `only` one request."""
+        with self._changed:
+            dropped = self._steps.drop(reason, only)
+        for request in dropped:
+            request.tell()
 
     def be_prompt(self) -> None:
         """Make slices of `_PROMPT_SLICE_S`: what is commanded acts that soon in wall time."""
@@ -112,12 +126,19 @@ class Pacer:
         """Physics steps of `dt_ns` to make before the next `wait`; 0 while paused."""
         with self._changed:
             if self._paused:
-                steps = min(self._steps, _FULL_SPEED_SLICE)
-                self._steps -= steps
-                return steps
+                self._in_hand = self._steps.first
+                return 0 if self._in_hand is None else min(self._in_hand.left, _FULL_SPEED_SLICE)
             if self._speed is None:
                 return _FULL_SPEED_SLICE
             return max(1, round(self._slice_s * self._speed * NS_PER_S) // dt_ns)
+
+    def made(self, steps: int) -> None:
+        """Note that the steps of `next_steps` were made, or some of them."""
+        with self._changed:
+            request, self._in_hand = self._in_hand, None
+            told = request is not None and self._steps.count(request, steps)
+        if request is not None and told:
+            request.tell()
 
     def wait(self, time_ns: int) -> bool:
         """Hold the run at simulated `time_ns`, at most a moment; whether it must be held further.
@@ -133,12 +154,12 @@ class Pacer:
 
     def _must_wait(self) -> bool:
         if self._paused:
-            return self._steps == 0
+            return not self._steps
         return self._speed is not None and self._ahead_s(self._speed) > 0.0
 
     def _wait_a_moment(self) -> None:
         if self._paused:
-            if self._steps == 0:
+            if not self._steps:
                 before = time.perf_counter()
                 self._changed.wait(_LONGEST_WAIT_S)
                 self._paused_s += time.perf_counter() - before

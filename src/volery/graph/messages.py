@@ -26,6 +26,7 @@ Quaternion = _ros2.geometry_msgs__msg__Quaternion
 Transform = _ros2.geometry_msgs__msg__Transform
 TransformStamped = _ros2.geometry_msgs__msg__TransformStamped
 Twist = _ros2.geometry_msgs__msg__Twist
+TwistStamped = _ros2.geometry_msgs__msg__TwistStamped
 TwistWithCovariance = _ros2.geometry_msgs__msg__TwistWithCovariance
 TwistWithCovarianceStamped = _ros2.geometry_msgs__msg__TwistWithCovarianceStamped
 Vector3 = _ros2.geometry_msgs__msg__Vector3
@@ -124,3 +125,10 @@ class Published:
     def cdr(self) -> bytes:
         """The message in CDR, the ROS 2 wire form."""
         return bytes(typestore().serialize_cdr(self.message, self.msgtype))
+
+    @cached_property
+    def ros1(self) -> bytes:
+        """The message in ROS 1's wire form; its headers' `seq` is 0."""
+        from volery.graph.ros1 import ros1_codec  # it is built upon this module
+
+        return ros1_codec().encode(self.message, self.msgtype)

@@ -5,55 +5,52 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from volery.control.flight_modes import FlightMode
+from volery.core import rotations
 from volery.core.errors import CommandError
 from volery.graph.graph import Graph
-from volery.graph.messages import MultiDOFJointTrajectory, Published, Twist, message_type
+from volery.graph.messages import (
+    MultiDOFJointTrajectory,
+    PoseStamped,
+    Published,
+    Twist,
+    TwistStamped,
+    header,
+)
+from volery.runtime.services.offering import offer_command
 from volery.runtime.trajectory_messages import follow_message
 from volery.runtime.uav import Uav
 
 _TRIGGER = "std_srvs/srv/Trigger"
 
 
-def open_commands(graph: Graph, uav: Uav) -> None:
-    """Listen to `/uavN/cmd_vel` and `/uavN/trajectory`, offer the services of one UAV.
+def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> None:
+    """Listen to `cmd_vel`, `goal_pose` and `trajectory` of one UAV, offer its plain services.
 
-    A Twist is taken in the level heading frame, a trajectory as `follow_message` says. During
-    take-off and on the ground they are ignored, and so are those that are none: a refused command
-    on a topic has nobody to tell. The services take_off, hold, land and return_home answer with
-    `success` and a reason.
+    A Twist is taken in the level heading frame, a pose and a trajectory in the map. During take-off
+    and on the ground they are ignored, and so are those that are none: a refused command on a topic
+    has nobody to tell. A Twist that is taken comes out again on `cmd_vel/applied`, stamped with the
+    simulated time from which it is in force, by which clients measure round trips. The services
+    take_off, hold, land and return_home answer with `success` and a reason.
     """
-    response_type = message_type(f"{_TRIGGER}_Response")
+    applied = graph.advertise(f"/{uav.name}/cmd_vel/applied", TwistStamped)
 
-    def on_twist(published: Published) -> None:
-        if uav.mode is FlightMode.TAKE_OFF:
-            return
-        linear, angular = published.message.linear, published.message.angular
-        try:
-            uav.command_velocity([linear.x, linear.y, linear.z], angular.z)
-        except (CommandError, AttributeError):
-            return
+    def on_twist(twist: Any) -> None:
+        linear, angular = twist.linear, twist.angular
+        uav.command_velocity([linear.x, linear.y, linear.z], angular.z)
+        if applied.wanted:
+            stamp = header(now_ns(), f"{uav.name}/base_link")
+            applied.publish(TwistStamped(header=stamp, twist=twist))
 
-    def on_trajectory(published: Published) -> None:
-        if uav.mode is FlightMode.TAKE_OFF:
-            return
-        try:
-            follow_message(uav, published.message)
-        except (CommandError, AttributeError):
-            return
-
-    def serve(action: Callable[[], None]) -> Callable[[Any], Any]:
-        def handle(_request: Any) -> Any:
-            try:
-                action()
-            except CommandError as error:
-                return response_type(success=False, message=str(error))
-            return response_type(success=True, message="")
-
-        return handle
-
-    graph.subscribe(f"/{uav.name}/cmd_vel", on_twist, Twist)
-    graph.subscribe(f"/{uav.name}/trajectory", on_trajectory, MultiDOFJointTrajectory)
+    topics: dict[str, tuple[type[Any], Callable[[Any], None]]] = {
+        "cmd_vel": (Twist, on_twist),
+        "goal_pose": (PoseStamped, lambda pose: go_to_message(uav, pose)),
+        "trajectory": (MultiDOFJointTrajectory, lambda message: follow_message(uav, message)),
+    }
+    for name, (message_class, take) in topics.items():
+        graph.subscribe(f"/{uav.name}/{name}", _careful(uav, take), message_class)
     actions: dict[str, Callable[[], None]] = {
         "take_off": uav.take_off,
         "hold": uav.hold,
@@ -61,4 +58,35 @@ def open_commands(graph: Graph, uav: Uav) -> None:
         "return_home": uav.return_home,
     }
     for name, action in actions.items():
-        graph.offer(f"/{uav.name}/{name}", _TRIGGER, serve(action))
+        offer_command(graph, f"/{uav.name}/{name}", _TRIGGER, _without_request(action))
+
+
+def go_to_message(uav: Uav, message: Any) -> None:
+    """Send `uav` to a PoseStamped in the map; a rotation of zeros keeps the heading.
+
+    Raises `CommandError`, also for another frame.
+    """
+    if message.header.frame_id not in ("", "map"):
+        raise CommandError(f"goals are in 'map', not in '{message.header.frame_id}'")
+    place, turn = message.pose.position, message.pose.orientation
+    q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=np.float64)
+    if not np.isfinite(q).all():
+        raise CommandError("the rotation of a goal must be finite")
+    yaw = float(rotations.yaw_of(q)) if float(np.linalg.norm(q)) > 0.5 else None
+    uav.go_to([place.x, place.y, place.z], yaw)
+
+
+def _careful(uav: Uav, take: Callable[[Any], None]) -> Callable[[Published], None]:
+    def receive(published: Published) -> None:
+        if uav.mode is FlightMode.TAKE_OFF:
+            return
+        try:
+            take(published.message)
+        except (CommandError, AttributeError):
+            return
+
+    return receive
+
+
+def _without_request(action: Callable[[], None]) -> Callable[[Any], None]:
+    return lambda _request: action()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,8 @@ _SEARCH_RADIUS_M = 30.0
 _ROOM_TO_STAND_M = 1.5
 _SINK_M = 0.002
 """Height above the ground at which a UAV is put down."""
+_DROP_M = 0.3
+_HINT = ' (placement = "nearest_free" finds a place by itself)'
 _CLIMB_LOOKS = 4
 """Heights at which `nearest_free` wants room, from the ground to the take-off altitude."""
 
@@ -60,7 +63,7 @@ def place_uavs(
             place = _nominal_place(group, k, airframe, terrain)
             if group.placement == "nearest_free":
                 place = _nearest_free(place, airframe, altitude, scene, terrain, starts, where)
-            _check(place, airframe, scene, terrain, starts, where)
+            check_place(place, airframe, scene, terrain, starts, where, hint=_HINT)
             starts.append(
                 Start(
                     name,
@@ -69,7 +72,7 @@ def place_uavs(
                     airframe,
                     place,
                     yaw,
-                    on_ground=place[2] - _standing(place[:2], airframe, terrain)[2] < 0.3,
+                    on_ground=stands_on_ground(place, airframe, terrain),
                     takes_off=group.on_start == "take_off",
                 )
             )
@@ -124,14 +127,25 @@ def _nearest_free(
     )
 
 
-def _check(
+def stands_on_ground(place: Array, airframe: Airframe, terrain: Terrain) -> bool:
+    """Whether a UAV at `place` (3,) m stands, or falls so little that it may as well."""
+    return bool(place[2] - _standing(place[:2], airframe, terrain)[2] < _DROP_M)
+
+
+def check_place(
     place: Array,
     airframe: Airframe,
     scene: Scene,
     terrain: Terrain,
-    others: list[Start],
+    others: Sequence[Start],
     where: str,
+    *,
+    hint: str = "",
 ) -> None:
+    """`PlacementError` where a UAV cannot be at `place` (3,) m, map, among `others`.
+
+    where: what the message begins with. hint: what a user may do about a tree.
+    """
     at = f"position_m ({place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f})"
     x0, y0, x1, y1 = terrain.bounds
     if not (x0 <= place[0] <= x1 and y0 <= place[1] <= y1):
@@ -150,8 +164,7 @@ def _check(
     if look.instance[0] >= 0:
         raise PlacementError(
             f"{where}: {at} lies in {scene.instance_name(int(look.instance[0]))}, "
-            f"{look.distance[0]:.2f} m from it; at least {radius:.2f} m is needed "
-            '(placement = "nearest_free" finds a place by itself)'
+            f"{look.distance[0]:.2f} m from it; at least {radius:.2f} m is needed{hint}"
         )
     for other in others:
         distance = float(np.linalg.norm(place - other.position_map))

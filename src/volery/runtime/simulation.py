@@ -5,40 +5,40 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
-import numpy as np
+from numpy.typing import ArrayLike
 
 from volery.control.flight_modes import FlightMode
 from volery.core.clock import ns_from_s, s_from_ns
-from volery.core.errors import CommandError, ScenarioError, SnapshotError
+from volery.core.errors import CommandError, ScenarioError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.engine.faults import FaultPlan
 from volery.engine.pacing import Pacer
 from volery.engine.partners import Partner, check_terms
+from volery.engine.stepping import OnSteps, StepRequest
 from volery.graph.graph import Graph
 from volery.graph.node import Context, Node
 from volery.graph.publishing import GraphPublisher
 from volery.graph.session import Gateway
-from volery.runtime.building import add_bodies, build_fleet, check_free, place
+from volery.runtime.building import add_bodies, build_fleet, place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.command_door import open_commands
 from volery.runtime.digest import Digest
 from volery.runtime.estimation_building import build_estimation
+from volery.runtime.keeping import Keeper
 from volery.runtime.node_loading import start_node
 from volery.runtime.placement import Start
-from volery.runtime.progress import Progress, ProgressTeller
+from volery.runtime.progress import Progress
+from volery.runtime.relocation import Relocator
+from volery.runtime.run_loop import RunLoop
 from volery.runtime.sensor_building import build_banks
-from volery.runtime.sensor_fitting import RESULT_OF, Fitted, fit_sensors, lidar_mounts, refit
-from volery.runtime.snapshot import (
-    Snapshot,
-    check_nodes,
-    check_partners,
-    keep_nodes,
-    put_back_nodes,
-)
+from volery.runtime.sensor_fitting import RESULT_OF, Fitted, fit_sensors, lidar_mounts
+from volery.runtime.services import Services, open_services
+from volery.runtime.snapshot import Snapshot
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
 from volery.runtime.worlds import build_forest, build_terrain
@@ -55,11 +55,21 @@ _DIGEST_PERIOD_S = 0.01
 class Simulation:
     """World, fleet, sensors, graph and nodes of a scenario, on one clock.
 
-    `threads` share the ray casting; results do not depend on their number. Use it as a context
-    manager, or call `close` at the end. Raises `ScenarioError` where the scenario cannot be built.
+    `threads` share the ray casting; results do not depend on their number. `recordings` is the
+    folder in which clients of the graph may record, None: nowhere. `on_load` is called, in the
+    simulation's thread, with the name of a scenario that a client wants instead of this one; None:
+    that is refused. Use it as a context manager, or call `close` at the end. Raises `ScenarioError`
+    where the scenario cannot be built.
     """
 
-    def __init__(self, scenario: Scenario, *, threads: int = 2) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        threads: int = 2,
+        recordings: Path | None = None,
+        on_load: Callable[[str], None] | None = None,
+    ) -> None:
         if threads < 1:
             raise ScenarioError(f"threads must be at least 1 (found {threads})")
         compile_kernels()
@@ -68,7 +78,6 @@ class Simulation:
         self.forest = build_forest(scenario, self.terrain)
         self.scene = Scene(self.terrain, self.forest, threads=threads)
         self._closed = False
-        self._owed_ns = 0
         self._pacer = Pacer()
         self._digest: Digest | None = None
         self._events: list[Event] = []
@@ -77,7 +86,7 @@ class Simulation:
         names = tuple(start.name for start in starts)
         self._fleet = build_fleet(scenario, starts, names)
         add_bodies(self.scene, starts)
-        fitted = self._fitted = fit_sensors(scenario, starts)
+        fitted = fit_sensors(scenario, starts)
         self.graph = Graph(lambda: self.time_ns, self.post)
         self.gateway = Gateway(self.graph, self.post)
         """Where clients of other threads join the graph."""
@@ -104,11 +113,26 @@ class Simulation:
         )
         self.nodes: list[Node] = []
         self._partners: list[Partner] = []
+        self._starts = starts
         self._open_graph(starts)
         self._faults = FaultPlan(self._engine, names)
         self._plan_faults()
-        self._starts = starts
-        self._start_state = self._state()
+        self._loop = RunLoop(self._engine, self._pacer, scenario.duration_s, self._has_ended)
+        self._relocator = Relocator(self._engine, self.scene, self.terrain, starts, fitted)
+        self._services: Services = open_services(self, recordings=recordings, on_load=on_load)
+        self._keeper = Keeper(
+            self._fleet,
+            self._engine,
+            self.graph,
+            self._faults,
+            self._publisher,
+            self._loop,
+            fitted,
+            self.nodes,
+            self._partners,
+            self._events,
+            self._take_off,
+        )
         self._take_off(names)
 
     # -------------------------------------------------------------------------------------- time
@@ -125,10 +149,8 @@ class Simulation:
 
     @property
     def finished(self) -> bool:
-        """Whether the scenario's end has come: its duration, or all UAVs down again."""
-        if self.time_s >= self.scenario.duration_s:
-            return True
-        return self._has_ended()
+        """Whether the end has come: the scenario's duration, all UAVs down again, or `quit`."""
+        return self._loop.finished
 
     def step(self, steps: int = 1) -> None:
         """Advance by physics steps (1 ms each unless the scenario says otherwise)."""
@@ -153,23 +175,7 @@ class Simulation:
         self._check_open()
         if seconds is not None:
             check_seconds(seconds)
-        left = self.scenario.duration_s - self.time_s if seconds is None else seconds
-        start_s = self.time_s
-        end_step = self._fleet.step + self._whole_steps(left, seconds is None)
-        until = self._has_ended if seconds is None else None
-        pacer = self._pacer
-        pacer.begin(speed, self.time_ns)
-        teller = ProgressTeller(on_progress, left, pacer)
-        over = self._fleet.step >= end_step
-        while not over:
-            steps = pacer.next_steps(self._fleet.dt_ns)
-            if steps:
-                self._engine.advance_to(min(end_step, self._fleet.step + steps), until=until)
-            over = self._fleet.step >= end_step or (until is not None and until())
-            while pacer.wait(self.time_ns) and not (over and pacer.paused):
-                self._engine.take_in()
-                teller.tell(self.time_s - start_s)
-            teller.tell(self.time_s - start_s, last=over)
+        self._loop.run(seconds, speed, on_progress)
 
     # From here to `post`, everything may be called by any thread, while the simulation runs or not.
 
@@ -199,16 +205,30 @@ class Simulation:
         """Go on after a pause, without catching up what was missed."""
         self._pacer.resume()
 
+    def quit(self) -> None:
+        """End the present run as soon as may be, and later ones at their start."""
+        self._loop.quit()
+
+    @property
+    def quitting(self) -> bool:
+        """Whether somebody called `quit`."""
+        return self._loop.quitting
+
     def set_speed(self, speed: float | None) -> None:
         """Change the present run's factor of real time; None goes as fast as possible."""
         self._pacer.set_speed(speed)
 
-    def single_step(self, steps: int = 1) -> None:
+    def single_step(self, steps: int = 1, on_steps: OnSteps | None = None) -> StepRequest:
         """Let a paused run advance by physics steps and wait again; `CommandError` if not paused.
 
-        Returns at once: the thread that runs makes the steps. Where none does, use `step`.
+        Returns at once: the thread that runs makes the steps, and tells `on_steps` of them. Where
+        none does, use `step`.
         """
-        self._pacer.single_steps(steps)
+        return self._pacer.single_steps(steps, on_steps)
+
+    def cancel_steps(self, request: StepRequest) -> None:
+        """Make no more steps of a `single_step`."""
+        self._pacer.drop_steps("cancelled", request)
 
     def be_prompt(self) -> None:
         """Keep real time to the physics step from now on, for clients who wait for answers.
@@ -278,6 +298,8 @@ class Simulation:
         """Give threads and scene memory back; nothing can be simulated afterwards."""
         if not self._closed:
             self._closed = True
+            self._pacer.drop_steps("the simulation is closed")
+            self._services.close()
             for partner in self._partners:
                 partner.leave()
             for node in self.nodes:
@@ -298,17 +320,14 @@ class Simulation:
         Raises `SnapshotError` where a node or a lock-step partner does not offer its state, and in
         the middle of a tick: nodes and timers ask for one through `post`.
         """
-        self._check_standing("a snapshot")
-        return Snapshot(self.time_ns, id(self), self._state())
+        self._check_open()
+        return self._keeper.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back, or forward, to a state of this simulation: what follows is the same again."""
-        self._check_standing("to restore a state")
-        if not isinstance(snapshot, Snapshot):
-            raise SnapshotError(f"not a snapshot: {snapshot!r}")
-        if snapshot.owner != id(self):
-            raise SnapshotError("the snapshot is of another simulation")
-        self._put_back(snapshot.state)
+        self._check_open()
+        self._keeper.restore(snapshot)
+        self._pacer.drop_steps("another state was restored")
 
     def reset(self, seed: int | None = None) -> None:
         """Go back to the start, with the scenario's seed or another one.
@@ -316,12 +335,11 @@ class Simulation:
         All that follows is what a fresh simulation does, but for the world: terrain and trees stay
         as they are (a scenario's `world.seed` fixes them apart from all other randomness).
         """
-        self._check_standing("a reset")
+        self._check_open()
         if seed is not None:
             check_seed(seed)
-        self._put_back(self._start_state)
-        self._seed_streams(self.scenario.seed if seed is None else seed)
-        self._take_off(self.uav_names)
+        self._keeper.reset(self.scenario.seed if seed is None else seed)
+        self._pacer.drop_steps("the simulation was reset")
 
     def reset_uav(self, name: str) -> None:
         """Put one UAV back to its start while the others fly on: as it was, mended, charged, new.
@@ -329,59 +347,27 @@ class Simulation:
         Its plant, controllers, sensors, estimate and nodes begin anew, with the noise of the start;
         guidance and sensors keep their phase. `CommandError` where its place is taken.
         """
-        if name not in self.uavs:
-            raise CommandError(f"there is no UAV '{name}'; known: {', '.join(self.uavs)}")
-        row = self.uav_names.index(name)
-        nodes = [k for k, node in enumerate(self.nodes) if node.get_namespace() == f"/{name}"]
-        self._check_standing("a reset", [self.nodes[k] for k in nodes])
-        start = self._start_state["engine"]["fleet"]
-        check_free(self._fleet, row, start["position"][0, row])
-        rows = np.array([row])
-        self._fleet.restart(start, rows)
-        self._engine.collisions.forget(rows)
-        keys = {(f.id.uav, f.id.name): f.key for f in self._fitted if f.id.uav == row}
-        self._engine.restart_sensors(rows, keys)
-        states = self._start_state["nodes"]
-        put_back_nodes([self.nodes[k] for k in nodes], [states[k] for k in nodes])
-        self._faults.mend(row)
-        self._take_off([name])
-
-    def _seed_streams(self, seed: int) -> None:
-        """Give sensors and turbulence the random streams of another run; at the start only."""
-        rows = np.arange(len(self._fleet))
-        self._fleet.seed_turbulence(seed, rows, self.uav_names)
-        fitted = refit(self._fitted, seed)
-        self._engine.restart_sensors(rows, {(f.id.uav, f.id.name): f.key for f in fitted})
-
-    def _state(self) -> dict[str, Any]:
-        return {
-            "engine": self._engine.get_state(),
-            "graph": self.graph.get_state(),
-            "faults": self._faults.get_state(),
-            "publisher": self._publisher.get_state(),
-            "nodes": keep_nodes(self.nodes),
-            "digest": None if self._digest is None else self._digest.get_state(),
-            "events": list(self._events),
-            "owed_ns": self._owed_ns,
-        }
-
-    def _put_back(self, state: dict[str, Any]) -> None:
-        put_back_nodes(self.nodes, state["nodes"])
-        self._engine.set_state(state["engine"])
-        self.graph.set_state(state["graph"])
-        self._faults.set_state(state["faults"])
-        self._publisher.set_state(state["publisher"])
-        if self._digest is not None:
-            self._digest.set_state(state["digest"])
-        self._events[:] = state["events"]
-        self._owed_ns = state["owed_ns"]
-
-    def _check_standing(self, what: str, nodes: Sequence[Node] | None = None) -> None:
         self._check_open()
-        check_nodes(self.nodes if nodes is None else nodes, what)
-        check_partners(self._partners, what)
-        if not self._engine.stands:
-            raise SnapshotError(f"{what} is not possible in the middle of a tick; use post()")
+        self._keeper.reset_uav(self._row_of(name))
+
+    # -------------------------------------------------------------------------------- changing it
+
+    def place_uav(self, name: str, position_map: ArrayLike, attitude: ArrayLike) -> None:
+        """Put a UAV at (3,) m with (4,) x y z w, map from body; its motion goes on there.
+
+        If it flies it holds there; if it stood it hovers where that is in the air. `PlacementError`
+        with the reason where it cannot be there.
+        """
+        self._check_open()
+        self._relocator.place(self._row_of(name), position_map, attitude)
+
+    def push_uav(self, name: str, velocity_map: ArrayLike, omega_map: ArrayLike) -> None:
+        """Let a UAV move at (3,) m/s and turn at (3,) rad/s, map, from which its controllers go on.
+
+        If it flies it brakes, and holds. `CommandError` for what is out of range.
+        """
+        self._check_open()
+        self._relocator.move(self._row_of(name), velocity_map, omega_map)
 
     # -------------------------------------------------------------------------------- what is known
 
@@ -403,7 +389,7 @@ class Simulation:
     def enable_digest(self) -> None:
         """Fingerprint all states and messages from now on; call before the first step."""
         if self._digest is None:
-            self._digest = Digest()
+            self._digest = self._keeper.digest = Digest()
             self.graph.subscribe_all(self._digest.add_message)
 
     def digest(self) -> str:
@@ -443,7 +429,7 @@ class Simulation:
         )
         every(_DIGEST_PERIOD_S, self._take_fingerprint, wanted=lambda: self._digest is not None)
         for uav in self.uavs.values():
-            open_commands(self.graph, uav)
+            open_commands(self.graph, uav, lambda: self.time_ns)
         for start in starts:
             for k, entry in enumerate(self.scenario.types[start.type_name].nodes):
                 where = f"{self.scenario.name}: types.{start.type_name}.nodes[{k}]"
@@ -474,11 +460,10 @@ class Simulation:
         if self._closed:
             raise CommandError("the simulation is closed; make a new one")
 
-    def _whole_steps(self, seconds: float, to_the_end: bool) -> int:
-        if to_the_end:
-            return math.ceil(ns_from_s(max(seconds, 0.0)) / self._fleet.dt_ns)
-        steps, self._owed_ns = divmod(self._owed_ns + ns_from_s(seconds), self._fleet.dt_ns)
-        return steps
+    def _row_of(self, name: str) -> int:
+        if name not in self.uavs:
+            raise CommandError(f"there is no UAV '{name}'; known: {', '.join(self.uavs)}")
+        return self.uav_names.index(name)
 
     def _has_ended(self) -> bool:
         """Whether every UAV has flown and is down for good, where the scenario ends with that."""

@@ -1,0 +1,86 @@
+"""The loop of a run: pieces of simulated time, between which others are heard."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from volery.core.clock import ns_from_s, s_from_ns
+from volery.engine.engine import Engine
+from volery.engine.pacing import Pacer
+from volery.runtime.progress import Progress, ProgressTeller
+
+
+class RunLoop:
+    """Advances `engine` at the pace of `pacer` until `duration_s`, or until `has_ended()`.
+
+    `has_ended` must follow from the simulated world alone.
+    """
+
+    def __init__(
+        self, engine: Engine, pacer: Pacer, duration_s: float, has_ended: Callable[[], bool]
+    ) -> None:
+        self._engine = engine
+        self._pacer = pacer
+        self._duration_s = duration_s
+        self._has_ended = has_ended
+        self.owed_ns = 0
+        """Parts of physics steps that runs have asked for and not got yet."""
+        self.quitting = False
+        """Whether runs are to end at once, now and later."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether the end has come, or somebody quit."""
+        over = s_from_ns(self._engine.time_ns) >= self._duration_s
+        return over or self.quitting or self._has_ended()
+
+    def quit(self) -> None:
+        """End the present run and all later ones at their start; any thread may call it."""
+        self.quitting = True
+        self._pacer.drop_steps("the simulation quits")
+        self._pacer.wake()
+
+    def run(
+        self,
+        seconds: float | None,
+        speed: float | None,
+        on_progress: Callable[[Progress], None] | None,
+    ) -> None:
+        """Advance by `seconds`, None: to the end."""
+        engine, pacer = self._engine, self._pacer
+        start_ns = engine.time_ns
+        left = self._duration_s - s_from_ns(start_ns) if seconds is None else seconds
+        end_step = engine.fleet.step + self._whole_steps(left, seconds is None)
+        until = self._has_ended if seconds is None else None
+        pacer.begin(speed, start_ns)
+        teller = ProgressTeller(on_progress, left, pacer)
+        over = engine.fleet.step >= end_step or self.quitting
+        while not over:
+            self._advance(end_step, until)
+            over = engine.fleet.step >= end_step or (until is not None and until())
+            over = over or self.quitting
+            while pacer.wait(engine.time_ns) and not (over and pacer.paused):
+                engine.take_in()
+                teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns))
+                if self.quitting:
+                    over = True
+                    break
+            teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns), last=over)
+        if self.finished:
+            pacer.drop_steps("the scenario has come to its end")
+
+    def _advance(self, end_step: int, until: Callable[[], bool] | None) -> None:
+        fleet = self._engine.fleet
+        steps = self._pacer.next_steps(fleet.dt_ns)
+        if steps:
+            before = fleet.step
+            self._engine.advance_to(min(end_step, before + steps), until=until)
+            self._pacer.made(min(fleet.step - before, steps))
+
+    def _whole_steps(self, seconds: float, to_the_end: bool) -> int:
+        dt_ns = self._engine.dt_ns
+        if to_the_end:
+            return math.ceil(ns_from_s(max(seconds, 0.0)) / dt_ns)
+        steps, self.owed_ns = divmod(self.owed_ns + ns_from_s(seconds), dt_ns)
+        return steps
