@@ -1,0 +1,66 @@
+"""Finds rospy: in the running environment, in a sourced ROS, or where Debian installs it."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import logging
+import os
+import sys
+import threading
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from volery.core.errors import BridgeError
+
+_DEBIAN = Path("/usr/lib/python3/dist-packages")
+_PACKAGES = "python3-rospy python3-rosmaster ros-std-msgs"
+_lock = threading.Lock()
+
+
+def load_rospy() -> Any:
+    """The module `rospy`, imported on first use.
+
+    Raises
+    ------
+    BridgeError
+        It is not installed, or this Python cannot load it.
+
+    """
+    with _lock:
+        return _load()
+
+
+def rospy_is_installed() -> bool:
+    """Whether `load_rospy` has something to load."""
+    return importlib.util.find_spec("rospy") is not None or bool(_folders())
+
+
+@cache
+def _load() -> Any:
+    added = [] if importlib.util.find_spec("rospy") else _folders()
+    # At the end, and only for now: whatever this environment has itself must win, numpy above all.
+    sys.path.extend(added)
+    logger_class = logging.getLoggerClass()
+    try:
+        return importlib.import_module("rospy")
+    except ImportError as error:
+        raise BridgeError(
+            f"ROS 1 needs rospy, which cannot be loaded ({error}); on Debian: "
+            f"apt-get install --no-install-recommends {_PACKAGES}"
+        ) from None
+    finally:
+        logging.setLoggerClass(logger_class)  # rospy's own is meant for its nodes alone
+        for folder in added:
+            sys.path.remove(folder)
+
+
+def _folders() -> list[str]:
+    """Folders outside of this environment that hold rospy and what it imports."""
+    distribution = os.environ.get("ROS_DISTRO", "noetic")
+    sourced = Path("/opt/ros") / distribution / "lib/python3/dist-packages"
+    for folder in (sourced, _DEBIAN):
+        if (folder / "rospy" / "__init__.py").is_file():
+            return list(dict.fromkeys((str(folder), str(_DEBIAN))))
+    return []
