@@ -190,8 +190,9 @@ class Ros1Codec:
             raise GraphError(f"message type '{msgtype}' is not known")
         package, kind, name = msgtype.split("/")
         # A package that moved may have files under its old name, for what changed in the move.
-        old = f"{ros1_name(msgtype).split('/')[0]}/{kind}/{name}"
-        found = old if package != old.split("/")[0] and old in self._ros2.fielddefs else msgtype
+        old_package, _ = ros1_name(msgtype).split("/")
+        old = f"{old_package}/{kind}/{name}"
+        found = old if package != old_package and old in self._ros2.fielddefs else msgtype
         return found, self._ros2.fielddefs[found]
 
     def _ros1_fields(self, msgtype: str) -> list[tuple[str, Any]]:

@@ -1,0 +1,168 @@
+"""Messages as plain dicts, lists, numbers and strings: the form that rosbridge speaks.
+
+    form = JsonForm()
+    form.encode(twist, "geometry_msgs/msg/Twist")  # {"linear": {"x": 1.0, ...}, ...}
+    form.decode({"linear": {"x": 1.0}}, "geometry_msgs/msg/Twist")
+
+Arrays of bytes become base64 text, other arrays lists. A `JsonForm` with a hook for arrays keeps
+them as numpy arrays instead, for CBOR. Converters are built once a type and form.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
+from rosbags.typesys.base import normalize_fieldname
+
+from volery.core.errors import GraphError
+from volery.graph.definition_store import EMPTY_MEMBER
+from volery.graph.json_decoding import (
+    BYTES,
+    HEADER,
+    ROS1_TIME,
+    TIMES,
+    Convert,
+    decode_plain,
+    plain_fields,
+)
+from volery.graph.ros1 import ros1_codec
+from volery.graph.zero import DTYPES
+
+ArrayHook = Callable[[NDArray[Any], str], Any]
+"""Array of numbers, shape (n,), little-endian, and its ROS type, to what stands in the dict."""
+
+
+class JsonForm:
+    """Converts messages to plain values and back.
+
+    Parameters
+    ----------
+    non_finite_as_null
+        NaN and infinite numbers become None, as JSON has no word for them; else they stay floats.
+        None is read as NaN either way.
+    ros1_names
+        Emit ROS 1 field names (`secs`, `nsecs`, a header's `seq`, `K` for `k`) and fields. Both
+        spellings are read either way.
+    arrays
+        What an array of numbers (bools apart) becomes; without it base64 text for bytes and a list
+        for others. Given a hook, `non_finite_as_null` does not touch arrays.
+
+    """
+
+    def __init__(
+        self,
+        *,
+        non_finite_as_null: bool = True,
+        ros1_names: bool = False,
+        arrays: ArrayHook | None = None,
+    ) -> None:
+        self._null = non_finite_as_null
+        self._ros1_names = ros1_names
+        self._arrays = arrays
+        self._encoders: dict[str, Convert] = {}
+
+    def encode(self, message: Any, msgtype: str) -> dict[str, Any]:
+        """Plain form of a message.
+
+        Raises
+        ------
+        GraphError
+            The type is unknown, or the message does not fit it.
+
+        """
+        encoder = self._encoders.get(msgtype) or self._encoder(msgtype)
+        try:
+            plain: dict[str, Any] = encoder(message)
+        except (AttributeError, TypeError, ValueError) as error:
+            raise GraphError(f"the message does not fit {msgtype}: {error}") from None
+        return plain
+
+    def decode(self, plain: Any, msgtype: str) -> Any:
+        """Message of a plain form: `decode_plain`, whatever the options of this form."""
+        return decode_plain(plain, msgtype)
+
+    def _encoder(self, msgtype: str) -> Convert:
+        if msgtype in self._encoders:
+            return self._encoders[msgtype]
+        fields = plain_fields(msgtype)
+        described = {name: (normalize_fieldname(name), kind) for name, kind in fields}
+        names: list[tuple[str, str | None]] = [(name, name) for name, _ in fields]
+        if self._ros1_names and msgtype in TIMES:
+            names = [(ROS1_TIME[name], name) for name, _ in fields]
+        elif self._ros1_names:
+            names = [(old, new) for old, new in ros1_codec().fields(msgtype) if old != EMPTY_MEMBER]
+        plan = [
+            (old, described[new][0], self._value_encoder(described[new][1]))
+            for old, new in names
+            if new is not None
+        ]
+
+        def encode(message: Any) -> dict[str, Any]:
+            return {
+                key: getattr(message, name) if convert is None else convert(getattr(message, name))
+                for key, name, convert in plan
+            }
+
+        def encode_header(message: Any) -> dict[str, Any]:
+            return {"seq": 0, **encode(message)}
+
+        with_seq = self._ros1_names and msgtype == HEADER
+        self._encoders[msgtype] = encode_header if with_seq else encode
+        return self._encoders[msgtype]
+
+    def _value_encoder(self, described: Any) -> Convert | None:
+        """Converter of a field; None where its value stays as it is."""
+        kind, detail = described
+        if kind == Nodetype.NAME:
+            return self._encoder(detail)
+        if kind == Nodetype.BASE:
+            return self._scalar_encoder(detail[0])
+        (inner, inner_detail), _ = detail
+        if inner == Nodetype.NAME:
+            encode = self._encoder(inner_detail)
+            return lambda values: [encode(value) for value in values]
+        base = inner_detail[0]
+        return list if base == "string" else self._array_encoder(base)
+
+    def _array_encoder(self, base: str) -> Convert:
+        if self._arrays is not None and base != "bool":
+            hook, dtype = self._arrays, DTYPES[base].newbyteorder("<")
+            return lambda values: hook(np.ascontiguousarray(values, dtype), base)
+        if base in BYTES:
+            return _base64_of
+        if base.startswith("float") and self._null:
+            return _floats_without_nan
+        return lambda values: values.tolist()
+
+    def _scalar_encoder(self, base: str) -> Convert | None:
+        if base == "string":
+            return None
+        if base == "bool":
+            return bool
+        if base.startswith("float"):
+            return _float_or_null if self._null else float
+        return int
+
+
+def _float_or_null(value: float) -> float | None:
+    number = float(value)
+    return number if math.isfinite(number) else None
+
+
+def _base64_of(values: NDArray[Any]) -> str:
+    return base64.b64encode(np.ascontiguousarray(values).data).decode("ascii")
+
+
+def _floats_without_nan(values: NDArray[Any]) -> list[float | None]:
+    plain: list[float | None] = values.tolist()
+    finite = np.isfinite(values)
+    if not finite.all():
+        for k in np.flatnonzero(~finite).tolist():
+            plain[k] = None
+    return plain
