@@ -1,0 +1,236 @@
+"""The wire format of Unity's ROS-TCP-Connector and ROS-TCP-Endpoint, version 0.7.
+
+A frame is `u32le length | destination, UTF-8 | u32le length | payload`, without magic or checksum.
+The destination is a topic, a service, or a command `__name` whose payload is JSON. Eight zero
+bytes, an empty frame, only say that the sender lives.
+
+ROS 2 versions of the Connector end destinations and JSON in a NUL that the lengths count.
+
+Source: ROS-TCP-Connector and ROS-TCP-Endpoint v0.7.0, `ROSConnection.cs`, `SysCommand.cs`,
+`client.py`, `tcp_sender.py`.
+"""
+
+from __future__ import annotations
+
+import json
+from struct import Struct
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from volery.core.errors import BridgeError
+
+Generation = Literal["ros1", "ros2"]
+Bytes = bytes | bytearray | memoryview
+
+KEEPALIVE = bytes(8)
+MOST_PAYLOAD_BYTES = 64 << 20
+MOST_DESTINATION_BYTES = 4096
+MOST_JSON_BYTES = 1 << 20
+
+_VERSION = "v0.7.0"
+_LENGTH = Struct("<I")
+_SCRATCH_BYTES = 64 << 10
+_APART_BYTES = 16 << 10
+"""A longer payload that has not come whole is received where it stays, without a copy."""
+
+
+class Frame(NamedTuple):
+    """One frame; the payload may be kept, nobody writes to it any more."""
+
+    destination: str
+    payload: Bytes
+
+
+class FrameParser:
+    """Cuts a stream of bytes into frames.
+
+    Bytes are written where `space` says, `written` tells how many came. Work is linear in them, and
+    memory is what really came, whatever length a frame claims.
+    """
+
+    def __init__(
+        self,
+        most_payload: int = MOST_PAYLOAD_BYTES,
+        most_destination: int = MOST_DESTINATION_BYTES,
+    ) -> None:
+        if most_destination > _SCRATCH_BYTES // 4:
+            raise BridgeError(f"destinations are limited to {_SCRATCH_BYTES // 4} bytes")
+        self._most_payload = most_payload
+        self._most_destination = most_destination
+        self._scratch = memoryview(bytearray(_SCRATCH_BYTES))
+        self._start = 0
+        self._end = 0
+        self._destination_bytes: int | None = None
+        self._destination: str | None = None
+        self._payload_bytes: int | None = None
+        self._apart: memoryview | None = None
+        self._filled = 0
+        self.keepalives = 0
+        """How many have come."""
+
+    def space(self) -> memoryview:
+        """Where the next bytes belong; never empty."""
+        if self._apart is not None:
+            return self._apart[self._filled :]
+        return self._scratch[self._end :]
+
+    def written(self, count: int) -> list[Frame]:
+        """Frames that are whole now that `count` more bytes are there.
+
+        `BridgeError` for a frame over the limits: what follows it means nothing.
+        """
+        frames: list[Frame] = []
+        if self._apart is not None:
+            self._filled += count
+            if self._filled < len(self._apart):
+                return frames
+            payload, self._apart = self._apart.toreadonly(), None
+            self._finish(payload, frames)
+            return frames
+        self._end += count
+        while self._advance(frames):
+            pass
+        self._compact()
+        return frames
+
+    def feed(self, data: Bytes) -> list[Frame]:
+        """Frames that are whole with `data`; `BridgeError` as for `written`."""
+        frames: list[Frame] = []
+        rest = memoryview(data)
+        while rest:
+            space = self.space()
+            count = min(len(space), len(rest))
+            space[:count] = rest[:count]
+            rest = rest[count:]
+            frames += self.written(count)
+        return frames
+
+    def _advance(self, frames: list[Frame]) -> bool:
+        """Read the next part of a frame; False where bytes are missing."""
+        if self._destination_bytes is None:
+            self._destination_bytes = self._length("destination", self._most_destination)
+            return self._destination_bytes is not None
+        if self._destination is None:
+            part = self._take(self._destination_bytes)
+            if part is not None:
+                text = str(part, "utf-8", "replace")
+                self._destination = text.rstrip("\0")
+            return part is not None
+        if self._payload_bytes is None:
+            self._payload_bytes = self._length("payload", self._most_payload)
+            return self._payload_bytes is not None
+        payload = self._take(self._payload_bytes)
+        if payload is not None:
+            self._finish(bytes(payload), frames)
+            return True
+        if self._payload_bytes > _APART_BYTES:
+            self._begin_apart(self._payload_bytes)
+        return False
+
+    def _length(self, what: str, most: int) -> int | None:
+        part = self._take(4)
+        if part is None:
+            return None
+        (length,) = _LENGTH.unpack(part)
+        if length > most:
+            where = "" if self._destination is None else f" to '{self._destination[:100]}'"
+            raise BridgeError(f"a frame{where} claims a {what} of {length} bytes, over {most}")
+        return int(length)
+
+    def _take(self, count: int) -> memoryview | None:
+        if self._end - self._start < count:
+            return None
+        part = self._scratch[self._start : self._start + count]
+        self._start += count
+        return part
+
+    def _begin_apart(self, length: int) -> None:
+        # memory of numpy's is not touched, hence not used, before bytes come
+        self._apart = np.empty(length, np.uint8).data
+        self._filled = self._end - self._start
+        self._apart[: self._filled] = self._scratch[self._start : self._end]
+        self._start = self._end
+
+    def _finish(self, payload: Bytes, frames: list[Frame]) -> None:
+        destination = self._destination or ""
+        if destination or payload:
+            frames.append(Frame(destination, payload))
+        else:
+            self.keepalives += 1
+        self._destination_bytes = self._destination = self._payload_bytes = None
+
+    def _compact(self) -> None:
+        """Move what is left to the front; that is less than a small payload."""
+        left = self._end - self._start
+        if self._start and left:
+            self._scratch[:left] = bytes(self._scratch[self._start : self._end])
+        self._start, self._end = 0, left
+
+
+def head(destination: str, payload_bytes: int) -> bytes:
+    """All of a frame before its payload."""
+    name = destination.encode()
+    return b"".join((_LENGTH.pack(len(name)), name, _LENGTH.pack(payload_bytes)))
+
+
+def frame(destination: str, payload: Bytes) -> bytes:
+    """A whole frame."""
+    return head(destination, len(payload)) + payload
+
+
+def command(name: str, *, nul: bool = False, **fields: Any) -> bytes:
+    """Frame of the command `__name`.
+
+    nul: end the JSON in a NUL; a ROS 2 endpoint cuts the last byte off unseen.
+    """
+    return frame(f"__{name}", json.dumps(fields).encode() + b"\0" * nul)
+
+
+def handshake(generation: Generation) -> bytes:
+    """First frame of an endpoint."""
+    metadata = json.dumps({"protocol": generation.upper()})
+    return command("handshake", version=_VERSION, metadata=metadata)
+
+
+def read_handshake(fields: dict[str, Any]) -> Generation:
+    """Generation of ROS that an endpoint speaks; `BridgeError` if it does not say."""
+    try:
+        metadata = json.loads(fields["metadata"])
+        protocol = str(metadata["protocol"]).lower()
+    except (KeyError, TypeError, ValueError):
+        protocol = ""
+    if protocol == "ros1":
+        return "ros1"
+    if protocol == "ros2":
+        return "ros2"
+    raise BridgeError(f"the endpoint's handshake names neither ROS1 nor ROS2: {fields}")
+
+
+def read_fields(payload: Bytes) -> dict[str, Any]:
+    """Fields of a command; `BridgeError` where they are no JSON object."""
+    if len(payload) > MOST_JSON_BYTES:
+        raise BridgeError(f"{len(payload)} bytes of JSON, over {MOST_JSON_BYTES}")
+    try:
+        fields = json.loads(str(payload, "utf-8").rstrip("\0") or "{}")
+    except (ValueError, RecursionError) as error:
+        raise BridgeError(f"no JSON: {error}") from None
+    if not isinstance(fields, dict):
+        raise BridgeError("no JSON object")
+    return fields
+
+
+def text_field(fields: dict[str, Any], name: str) -> str:
+    """A text that must be there and not be empty; else `BridgeError`."""
+    value = fields.get(name)
+    if not isinstance(value, str) or not value:
+        raise BridgeError(f"'{name}' is missing or no text")
+    return value
+
+
+def number_field(fields: dict[str, Any], name: str) -> int:
+    """A whole number that must be there; else `BridgeError`."""
+    value = fields.get(name)
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise BridgeError(f"'{name}' is missing or no whole number")
+    return value

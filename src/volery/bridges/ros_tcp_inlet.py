@@ -1,0 +1,49 @@
+"""Messages of one topic on their way from a peer into the graph: a bounded queue."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import Any
+
+from volery.graph.session import Gateway, Session
+
+
+class Inlet:
+    """Publishes for a peer; while the simulation is busy the newest `depth` messages wait."""
+
+    def __init__(
+        self, gateway: Gateway, session: Session, topic: str, msgtype: str, depth: int
+    ) -> None:
+        self.topic = topic
+        self.msgtype = msgtype
+        self._gateway = gateway
+        self._session = session
+        self._waiting: deque[Any] = deque(maxlen=depth)
+        self._depth = depth
+        self._under_way = 0
+        self._lock = threading.Lock()
+        self.dropped = 0
+
+    def put(self, message: Any) -> None:
+        """Publish a message, or let it wait in the place of the oldest one."""
+        with self._lock:
+            if self._under_way >= self._depth:
+                self.dropped += len(self._waiting) == self._depth
+                self._waiting.append(message)
+                return
+            self._under_way += 1
+        self._publish(message)
+
+    def _publish(self, message: Any) -> None:
+        self._session.publish(self.topic, message)
+        self._gateway.post(self._arrived)  # posts are done in order: the message is there by then
+
+    def _arrived(self) -> None:
+        with self._lock:
+            if not self._waiting:
+                self._under_way -= 1
+                return
+            message = self._waiting.popleft()
+        if self._session.published_type(self.topic) is not None:
+            self._publish(message)
