@@ -1,0 +1,100 @@
+"""Frames of rosbridge v2: operations as JSON text, as CBOR, inside PNG pictures.
+
+An operation is a dict with the key `op`. A text frame holds JSON, a binary frame CBOR. Large ones
+may travel as a PNG picture or in fragments (`bridges.rosbridge_fragments`).
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import math
+from io import BytesIO
+from typing import Any
+
+from volery.bridges.cbor_form import decode_cbor
+from volery.core.errors import BridgeError
+
+Frame = str | bytes
+"""What one WebSocket message carries."""
+Operation = dict[str, Any]
+
+MOST_MESSAGE_BYTES = 64 * 1024 * 1024
+"""Largest message a server takes unless told otherwise; a 4k rgb8 image has 25 MB."""
+
+_PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+
+
+def decode_frame(frame: Frame) -> Operation:
+    """Operation that a frame holds.
+
+    Raises
+    ------
+    BridgeError
+        It holds none.
+
+    """
+    found = decode_cbor(frame) if isinstance(frame, bytes) else _decode_json(frame)
+    if not isinstance(found, dict) or not isinstance(found.get("op"), str):
+        raise BridgeError("a message must be an object with the key 'op'")
+    return found
+
+
+def encode_json(operation: Operation) -> str:
+    """JSON text, pure ASCII; `BridgeError` for what JSON cannot say."""
+    try:
+        return json.dumps(operation, separators=(",", ":"), allow_nan=False)
+    except (ValueError, TypeError, RecursionError) as error:
+        raise BridgeError(f"not writable as JSON: {error}") from None
+
+
+def encode_png(text: str) -> str:
+    """Operation that carries JSON text as a picture: RGB, nearly square, padded with newlines."""
+    from PIL import Image
+
+    data = text.encode()
+    width = max(1, math.isqrt(len(data) // 3))
+    height = math.ceil(len(data) / (3 * width))
+    image = Image.frombytes("RGB", (width, height), data.ljust(3 * width * height, b"\n"))
+    file = BytesIO()
+    image.save(file, "png", compress_level=1)
+    return encode_json({"op": "png", "data": base64.b64encode(file.getvalue()).decode("ascii")})
+
+
+def decode_png(operation: Operation, most_bytes: int) -> Operation:
+    """Operation inside a picture whose pixels hold at most `most_bytes`.
+
+    Raises
+    ------
+    BridgeError
+        There is no picture, it is too large, or it holds no operation.
+
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    text = operation.get("data")
+    if not isinstance(text, str):
+        raise BridgeError("png: 'data' must be base64 text")
+    try:
+        data = base64.b64decode(text, validate=True)
+        if not data.startswith(_PNG_MAGIC):
+            raise BridgeError("png: 'data' is no PNG picture")
+        with Image.open(BytesIO(data), formats=("PNG",)) as image:
+            if 3 * image.width * image.height > most_bytes:
+                raise BridgeError(f"png: more than {most_bytes} bytes of pixels")
+            pixels = image.convert("RGB").tobytes()
+        inside = pixels.decode().rstrip("\n")
+    except (binascii.Error, UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+        raise BridgeError(f"png: not readable: {error}") from None
+    found = decode_frame(inside)
+    if found["op"] == "png":
+        raise BridgeError("png: a picture inside a picture")
+    return found
+
+
+def _decode_json(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise BridgeError(f"not readable as JSON: {error}") from None
