@@ -268,9 +268,7 @@ class Fleet(FleetCommands):
         self._bodies["separation_budget"][i] = 0.0
         self._wake(i)
 
-    def put(
-        self, i: int, position: ArrayLike, attitude: ArrayLike, *, in_air: bool = True
-    ) -> None:
+    def put(self, i: int, position: ArrayLike, attitude: ArrayLike, *, in_air: bool = True) -> None:
         """Put UAV `i` at a pose at once: (3,) m, map; (4,) map from body. Its motion goes on there.
 
         If it flies it holds there; if it stood and this is `in_air`, its rotors turn and it hovers.
@@ -285,7 +283,7 @@ class Fleet(FleetCommands):
         self._begin_anew(i, in_air)
 
     def push(self, i: int, velocity: ArrayLike, omega_body: ArrayLike) -> None:
-        """Let UAV `i` move at (3,) m/s, map, and turn at (3,) rad/s, FLU, from one step to the next.
+        """Let UAV `i` move at (3,) m/s, map, and turn at (3,) rad/s, FLU, at once.
 
         If it flies it brakes from there, and holds.
         """

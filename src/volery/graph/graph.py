@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from volery.core.errors import GraphError
+from volery.graph.actions import Actions
 from volery.graph.messages import Published, message_type, type_name
 from volery.graph.reply import Reply
 
@@ -136,6 +137,8 @@ class Graph:
         self._post = post
         self._topics: dict[str, _Topic] = {}
         self._services: dict[str, _Service] = {}
+        self.actions = Actions()
+        """Goals that take their time."""
         self._to_all: list[Callback] = []
         self._queue: deque[_Letter] = deque()
         self._members = threading.RLock()
@@ -183,8 +186,8 @@ class Graph:
     ) -> Subscription:
         """Call `callback` with each message of `topic`, which must exist or be given a type.
 
-        depth: how many messages may wait; in lock step none ever does. What latched publishers sent before comes first, with the next delivery; its `time_ns` is
-        that of this subscription.
+        depth: how many messages may wait; in lock step none ever does. What latched publishers
+        sent before comes first, with the next delivery; its `time_ns` is that of this subscription.
         """
         with self._members:
             found = self._known_topic(topic, msgtype)
@@ -222,6 +225,11 @@ class Graph:
                 TopicInfo(t.name, t.msgtype, t.publishers, len(t.callbacks), t.messages, t.latched)
                 for _, t in sorted(self._topics.items())
             ]
+
+    def publishers(self, topic: str) -> int:
+        """How many publish on a topic."""
+        found = self._topics.get(topic)
+        return 0 if found is None else found.publishers
 
     def topic_type(self, topic: str) -> str | None:
         """Type of a topic; None where there is no such topic."""

@@ -30,6 +30,7 @@ from volery.runtime.command_door import open_commands
 from volery.runtime.digest import Digest
 from volery.runtime.estimation_building import build_estimation
 from volery.runtime.keeping import Keeper
+from volery.runtime.lock_step import open_lock_step
 from volery.runtime.node_loading import start_node
 from volery.runtime.placement import Start
 from volery.runtime.progress import Progress
@@ -107,18 +108,22 @@ class Simulation:
         )
         self.uavs: Mapping[str, Uav] = MappingProxyType(
             {
-                s.name: Uav(self._fleet, row, s.name, scenario.types[s.type_name].flight)
+                s.name: Uav(
+                    self._fleet, row, s.name, scenario.types[s.type_name].flight, s.type_name
+                )
                 for row, s in enumerate(starts)
             }
         )
         self.nodes: list[Node] = []
         self._partners: list[Partner] = []
-        self._starts = starts
+        self.starts = starts
+        """Where the UAVs begin, in fleet order."""
         self._open_graph(starts)
         self._faults = FaultPlan(self._engine, names)
         self._plan_faults()
         self._loop = RunLoop(self._engine, self._pacer, scenario.duration_s, self._has_ended)
         self._relocator = Relocator(self._engine, self.scene, self.terrain, starts, fitted)
+        open_lock_step(self)
         self._services: Services = open_services(self, recordings=recordings, on_load=on_load)
         self._keeper = Keeper(
             self._fleet,
@@ -263,6 +268,14 @@ class Simulation:
         self._pacer.wake()
         return future
 
+    def take_in(self) -> None:
+        """Do what other threads have posted, and hand out what that published, without a step.
+
+        For the thread that owns the simulation; `run` and `step` do it by themselves.
+        """
+        self._check_open()
+        self._engine.take_in()
+
     def inject(self, fault: Fault | Mapping[str, Any]) -> None:
         """Let something go wrong: a fault as in a scenario's `faults`, at once if its time is past.
 
@@ -279,17 +292,20 @@ class Simulation:
         period_s: float,
         timeout_s: float = 10.0,
         on_timeout: Literal["stop", "leave"] = "stop",
+        on_meeting: Callable[[int], None] | None = None,
+        is_there: Callable[[], bool] | None = None,
     ) -> Partner:
         """Wait for an outside program each `period_s` of simulated time; see `engine.partners`.
 
         `timeout_s` is wall time; a partner that lets more pass ends the run with `PartnerError`, or
-        is waited for no more.
+        is waited for no more. `on_meeting(time_ns)` is called when a meeting begins; a partner that
+        is not there any more, as `is_there()` says, is waited for no more.
         """
         self._check_open()
         check_terms(period_s, timeout_s, on_timeout, self._fleet.dt_ns)
         if any(partner.name == name and not partner.has_left for partner in self._partners):
             raise CommandError(f"there is a lock-step partner '{name}' already")
-        partner = Partner(name, timeout_s, on_timeout)
+        partner = Partner(name, timeout_s, on_timeout, on_meeting=on_meeting, is_there=is_there)
         self._partners.append(partner)
         self._engine.wait_for(partner, period_s)
         return partner
@@ -441,7 +457,7 @@ class Simulation:
 
     def _take_off(self, names: Sequence[str]) -> None:
         """Let those of the UAVs take off that do so by themselves."""
-        for start in self._starts:
+        for start in self.starts:
             if start.takes_off and start.name in names:
                 self.uavs[start.name].take_off()
 

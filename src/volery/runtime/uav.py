@@ -10,6 +10,7 @@ from volery.control.flight_modes import FlightMode
 from volery.control.setpoints import MAX_COORDINATE, checked
 from volery.control.trajectory import Trajectory
 from volery.scenario.schema import Flight
+from volery.vehicle.airframe import Airframe
 
 Array = NDArray[np.float64]
 
@@ -17,11 +18,20 @@ Array = NDArray[np.float64]
 class Uav:
     """Reads the true state of a UAV and commands it; commands act from the next physics step."""
 
-    def __init__(self, fleet: Fleet, row: int, name: str, flight: Flight) -> None:
+    def __init__(
+        self, fleet: Fleet, row: int, name: str, flight: Flight, type_name: str = ""
+    ) -> None:
         self._fleet = fleet
         self._row = row
         self._flight = flight
         self.name = name
+        self.type_name = type_name
+        """Its type in the scenario."""
+
+    @property
+    def airframe(self) -> Airframe:
+        """What it is made of."""
+        return self._fleet.airframes[self._row]
 
     # ------------------------------------------------------------------------------------- state
 
@@ -46,10 +56,25 @@ class Uav:
         return np.array(self._fleet.state.omega_body[self._row])
 
     @property
+    def acceleration_map(self) -> Array:
+        """(3,) m/s^2, the mean over the last step."""
+        return np.array(self._fleet.state.acceleration_map[self._row])
+
+    @property
+    def angular_acceleration_body(self) -> Array:
+        """(3,) rad/s^2, FLU, the mean over the last step."""
+        return np.array(self._fleet.state.angular_acceleration_body[self._row])
+
+    @property
     def rotor_speed(self) -> Array:
         """(R,) rad/s."""
         rotors = len(self._fleet.airframes[self._row].rotors.places)
         return np.array(self._fleet.state.rotor_speed[self._row, :rotors])
+
+    @property
+    def rotor_reference(self) -> Array:
+        """(R,) rad/s: what the controllers ask of the rotors."""
+        return self._fleet.rotor_reference(self._row)
 
     @property
     def battery_charge(self) -> float:
@@ -103,6 +128,19 @@ class Uav:
     def return_home(self) -> None:
         """Climb, fly back to where it took off and land there."""
         self._fleet.return_home(self._row, self._flight.return_altitude_m)
+
+    def stop(self) -> None:
+        """Stop the rotors at once, wherever it is: it falls. Any flight mode starts them again."""
+        self._fleet.stop_rotors(self._row)
+
+    def set_command_timeout(self, seconds: float) -> None:
+        """Time (s, up to 60) without a velocity command or setpoint after which it holds."""
+        self._fleet.set_command_timeout(seconds, self._row)
+
+    def stop_rotors(self) -> None:
+        """Stop the rotors with the next physics step, in the air too: it falls."""
+        if self.mode not in (FlightMode.LANDED, FlightMode.CRASHED):
+            self.command_rotor_speeds(np.zeros(len(self.airframe.rotors.places)))
 
     # ------------------------------------------------------------------------ lower-level commands
 

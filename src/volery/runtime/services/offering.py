@@ -29,7 +29,7 @@ class Code(IntEnum):
     OPERATION_FAILED = 4
 
 
-class Refused(Exception):
+class RefusedError(Exception):
     """A request that is not fulfilled, with its result code and a reason for people."""
 
     def __init__(self, code: int, reason: str) -> None:
@@ -52,7 +52,7 @@ def filled(name: str, fields: Fields | None = None) -> Any:
 
 def failed(error: Exception) -> Any:
     """The Result that tells of an error."""
-    code = error.code if isinstance(error, Refused) else Code.OPERATION_FAILED
+    code = error.code if isinstance(error, RefusedError) else Code.OPERATION_FAILED
     return result(code, str(error))
 
 
@@ -62,7 +62,7 @@ def offer_result(graph: Graph, name: str, srvtype: str, handler: Handler) -> Non
     def handle(request: Any) -> Any:
         try:
             fields = handler(request)
-        except (Refused, VoleryError) as error:
+        except (RefusedError, VoleryError) as error:
             return filled(f"{srvtype}_Response", {"result": failed(error)})
         return filled(f"{srvtype}_Response", {"result": result(), **(fields or {})})
 
@@ -81,7 +81,7 @@ def offer_result_later(
 
         try:
             ask(request, settle)
-        except (Refused, VoleryError) as error:
+        except (RefusedError, VoleryError) as error:
             settle(error)
 
     graph.offer_async(name, srvtype, handle)
@@ -93,7 +93,7 @@ def offer_command(graph: Graph, name: str, srvtype: str, handler: Handler) -> No
     def handle(request: Any) -> Any:
         try:
             fields = handler(request)
-        except (Refused, VoleryError) as error:
+        except (RefusedError, VoleryError) as error:
             return filled(f"{srvtype}_Response", {"success": False, "message": str(error)})
         return filled(f"{srvtype}_Response", {"success": True, **(fields or {})})
 

@@ -1,11 +1,57 @@
+"""Everything that clients can ask of a simulation, offered in one place."""
+
 from __future__ import annotations
-from typing import Any
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from volery.runtime.services.air_and_faults import offer_air_and_faults
+from volery.runtime.services.entities import Entities
+from volery.runtime.services.features import offer_features
+from volery.runtime.services.kept_states import KeptStates
+from volery.runtime.services.named_poses import offer_named_poses
+from volery.runtime.services.playing import Playing
+from volery.runtime.services.recording import Recording
+from volery.runtime.services.spawning import offer_spawning
+from volery.runtime.services.stepping import offer_steps
+from volery.runtime.services.uav_services import offer_uav_services
+from volery.runtime.services.worlds import offer_worlds
+
+if TYPE_CHECKING:
+    from volery.runtime.simulation import Simulation
 
 
 class Services:
+    """What the services of one simulation hold on to."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+
     def close(self) -> None:
-        pass
+        """Give it back."""
+        self._recording.close()
 
 
-def open_services(simulation: Any, recordings: Any = None, on_load: Any = None) -> Services:
-    return Services()
+def open_services(
+    simulation: Simulation,
+    *,
+    recordings: Path | None = None,
+    on_load: Callable[[str], None] | None = None,
+) -> Services:
+    """Offer the standard's services and ours; what the arguments mean, `Simulation` says."""
+    graph = simulation.graph
+    offer_features(graph, loads_worlds=on_load is not None)
+    Entities(simulation).offer()
+    offer_spawning(simulation)
+    Playing(simulation).offer()
+    offer_steps(simulation)
+    offer_worlds(simulation, on_load)
+    offer_named_poses(graph, simulation.starts)
+    for uav in simulation.uavs.values():
+        offer_uav_services(graph, uav)
+    offer_air_and_faults(simulation)
+    KeptStates(simulation).offer()
+    recording = Recording(graph, recordings)
+    recording.offer()
+    return Services(recording)

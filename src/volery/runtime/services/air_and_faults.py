@@ -1,0 +1,62 @@
+"""Weather, gusts and faults, while the simulation runs: `/volery/...`."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from volery.core.errors import CommandError
+from volery.graph.messages import Vector3
+from volery.runtime.services.offering import Fields, offer_command
+from volery.world.weather import LogProfile, Weather
+
+if TYPE_CHECKING:
+    from volery.runtime.simulation import Simulation
+
+_OURS = "volery_interfaces/srv"
+
+
+def offer_air_and_faults(simulation: Simulation) -> None:
+    """Offer set_weather, get_weather, gust and inject_fault."""
+
+    def set_weather(request: Any) -> None:
+        wind = (request.wind.x, request.wind.y, request.wind.z)
+        weather = simulation.weather
+        simulation.set_weather(replace(weather, velocity_map=wind, w20_m_s=request.w20))
+
+    def get_weather(_request: Any) -> Fields:
+        weather = simulation.weather
+        return {
+            "wind": Vector3(*weather.velocity_map),
+            "w20": weather.w20_m_s,
+            "profile": _profile_name(weather),
+            "gusts": len(weather.gusts),
+        }
+
+    def gust(request: Any) -> None:
+        amplitude = (request.amplitude.x, request.amplitude.y, request.amplitude.z)
+        lasts_s = request.duration if request.duration != 0.0 else math.inf
+        simulation.gust_now(amplitude, request.rise, lasts_s)
+
+    def inject_fault(request: Any) -> None:
+        try:
+            fault = json.loads(request.fault)
+        except (ValueError, RecursionError) as error:
+            raise CommandError(f"fault is not JSON: {error}") from None
+        simulation.inject(fault)
+
+    graph = simulation.graph
+    offer_command(graph, "/volery/set_weather", f"{_OURS}/SetWeather", set_weather)
+    offer_command(graph, "/volery/get_weather", f"{_OURS}/GetWeather", get_weather)
+    offer_command(graph, "/volery/gust", f"{_OURS}/Gust", gust)
+    offer_command(graph, "/volery/inject_fault", f"{_OURS}/InjectFault", inject_fault)
+
+
+def _profile_name(weather: Weather) -> str:
+    if weather.field is not None:
+        return "field"
+    if weather.profile is None:
+        return "uniform"
+    return "log" if isinstance(weather.profile, LogProfile) else "power"

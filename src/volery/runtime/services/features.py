@@ -1,0 +1,59 @@
+"""What this simulator can do, in the words of the standard."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from volery.graph.graph import Graph
+from volery.graph.messages import message_type
+from volery.runtime.services.offering import filled
+
+_SRV = "simulation_interfaces/srv/GetSimulatorFeatures"
+
+
+class Feature(IntEnum):
+    """`simulation_interfaces/msg/SimulatorFeatures`, those that can be had here."""
+
+    NAMED_POSES = 2
+    POSE_BOUNDS = 3
+    ENTITY_TAGS = 4
+    ENTITY_BOUNDS = 5
+    ENTITY_BOUNDS_BOX = 6
+    ENTITY_CATEGORIES = 8
+    ENTITY_STATE_GETTING = 10
+    ENTITY_STATE_SETTING = 11
+    ENTITY_INFO_GETTING = 12
+    SPAWNABLES = 14
+    SIMULATION_RESET = 20
+    SIMULATION_RESET_TIME = 21
+    SIMULATION_RESET_STATE = 22
+    SIMULATION_STATE_GETTING = 24
+    SIMULATION_STATE_SETTING = 25
+    SIMULATION_STATE_PAUSE = 26
+    STEP_SIMULATION_SINGLE = 31
+    STEP_SIMULATION_MULTIPLE = 32
+    STEP_SIMULATION_ACTION = 33
+    WORLD_LOADING = 40
+    WORLD_TAGS = 42
+    WORLD_INFO_GETTING = 44
+    AVAILABLE_WORLDS = 45
+
+
+_ON_CONDITION = {Feature.WORLD_LOADING}
+
+
+def offer_features(graph: Graph, *, loads_worlds: bool) -> None:
+    """Offer `/get_simulator_features`."""
+    features = [f for f in Feature if f not in _ON_CONDITION or loads_worlds]
+    told = filled(
+        "simulation_interfaces/msg/SimulatorFeatures",
+        {
+            "features": np.array(features, dtype=np.uint16),
+            "custom_info": "Volery: entities are UAVs, worlds are scenarios, /volery/* is beside "
+            "the standard",
+        },
+    )
+    response = message_type(f"{_SRV}_Response")
+    graph.offer("/get_simulator_features", _SRV, lambda _request: response(features=told))

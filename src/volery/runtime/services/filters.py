@@ -1,0 +1,114 @@
+"""Which entities a request means: names, categories, tags, places."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.runtime.services.offering import Code, RefusedError
+
+Array = NDArray[np.float64]
+
+_LONGEST_PATTERN = 200
+_POSIX_CLASSES = {
+    "alnum": "a-zA-Z0-9",
+    "alpha": "a-zA-Z",
+    "blank": r" \t",
+    "digit": "0-9",
+    "lower": "a-z",
+    "punct": r"!-/:-@\[-`{-~",
+    "space": r"\s",
+    "upper": "A-Z",
+    "xdigit": "0-9A-Fa-f",
+}
+
+
+class Category(IntEnum):
+    """`simulation_interfaces/msg/EntityCategory`."""
+
+    OBJECT = 0
+    ROBOT = 1
+    HUMAN = 2
+    DYNAMIC_OBJECT = 4
+    STATIC_OBJECT = 5
+
+
+class BoundsType(IntEnum):
+    """`simulation_interfaces/msg/Bounds`."""
+
+    EMPTY = 0
+    BOX = 1
+    CONVEX_HULL = 2
+    SPHERE = 3
+
+
+def name_filter(pattern: str) -> Callable[[str], bool]:
+    """Whether a name holds a match of a POSIX extended regular expression; all, where it is empty.
+
+    Raises `RefusedError` for one that is none.
+    """
+    if len(pattern) > _LONGEST_PATTERN:
+        raise RefusedError(
+            Code.OPERATION_FAILED, f"a filter has at most {_LONGEST_PATTERN} characters"
+        )
+    try:
+        expression = re.compile(_from_posix(pattern))
+    except (re.error, OverflowError, RecursionError) as error:
+        reason = f"filter '{pattern}' is no regular expression: {error}"
+        raise RefusedError(Code.OPERATION_FAILED, reason) from None
+    return lambda name: expression.search(name) is not None
+
+
+def tag_filter(tags: Any) -> Callable[[Sequence[str]], bool]:
+    """Whether something with such tags passes a `TagsFilter`: any (0) or all (1) of its own."""
+    wanted = set(tags.tags)
+    if not wanted:
+        return lambda _own: True
+    if tags.filter_mode not in (0, 1):
+        reason = f"filter_mode is 0 (any) or 1 (all), not {tags.filter_mode}"
+        raise RefusedError(Code.OPERATION_FAILED, reason)
+    if tags.filter_mode == 1:
+        return lambda own: wanted <= set(own)
+    return lambda own: bool(wanted & set(own))
+
+
+def bounds_filter(bounds: Any) -> Callable[[Array, float], bool]:
+    """Whether a ball (position (3,) m, map; radius, m) reaches into `Bounds`; all into empty ones.
+
+    Raises `RefusedError` for convex hulls, and for bounds that are none.
+    """
+    kind = int(bounds.type)
+    points = np.array([[p.x, p.y, p.z] for p in bounds.points], dtype=np.float64).reshape(-1, 3)
+    if kind == BoundsType.EMPTY:
+        return lambda _position, _radius: True
+    if kind == BoundsType.CONVEX_HULL:
+        raise RefusedError(
+            Code.FEATURE_UNSUPPORTED, "convex hulls are not supported; use box or sphere"
+        )
+    if kind not in (BoundsType.BOX, BoundsType.SPHERE):
+        raise RefusedError(Code.OPERATION_FAILED, f"there are no bounds of type {kind}")
+    if len(points) != 2 or not np.isfinite(points).all():
+        raise RefusedError(Code.OPERATION_FAILED, "these bounds need two finite points")
+    if kind == BoundsType.SPHERE:
+        center, reach = points[0], float(points[1, 0])
+        if reach < 0.0:
+            raise RefusedError(Code.OPERATION_FAILED, "the radius of a sphere is not negative")
+        return lambda position, radius: _distance(position, center) <= reach + radius
+    low, high = points.min(axis=0), points.max(axis=0)
+    return lambda position, radius: _distance(position, np.clip(position, low, high)) <= radius
+
+
+def _distance(a: Array, b: Array) -> float:
+    return float(np.linalg.norm(a - b))
+
+
+def _from_posix(pattern: str) -> str:
+    """The classes that Python's expressions lack; all else is written alike in both."""
+    for name, members in _POSIX_CLASSES.items():
+        pattern = pattern.replace(f"[:{name}:]", members)
+    return pattern

@@ -1,0 +1,89 @@
+"""Recording while the simulation runs, into one folder and nowhere else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from volery.bridges.bag import Log, open_log
+from volery.core.errors import RecordingError
+from volery.graph.graph import Graph, Subscription
+from volery.graph.messages import Published
+from volery.runtime.services.offering import Fields, offer_command
+
+_OURS = "volery_interfaces/srv"
+
+
+class Recording:
+    """Offers `/volery/start_recording` and `/volery/stop_recording`: one log at a time."""
+
+    def __init__(self, graph: Graph, folder: Path | None) -> None:
+        self._graph = graph
+        self._folder = None if folder is None else Path(folder)
+        self._log: Log | None = None
+        self._subscription: Subscription | None = None
+        self._failure: RecordingError | None = None
+
+    def offer(self) -> None:
+        """Offer the services."""
+        graph = self._graph
+        offer_command(graph, "/volery/start_recording", f"{_OURS}/StartRecording", self._start)
+        offer_command(graph, "/volery/stop_recording", f"{_OURS}/StopRecording", self._stop)
+
+    def close(self) -> None:
+        """End a recording that is still running."""
+        if self._log is not None:
+            try:
+                self._end()
+            except RecordingError:
+                return  # nobody is left to be told; whole chunks are in the file
+
+    def _start(self, request: Any) -> Fields:
+        if self._log is not None:
+            raise RecordingError(f"{self._log.path.name} is being recorded; stop that first")
+        path = self._checked(request.path)
+        self._failure = None
+        self._log = open_log(path)
+        self._subscription = self._graph.subscribe_all(self._write)
+        return {"path": str(path)}
+
+    def _stop(self, _request: Any) -> Fields:
+        if self._log is None:
+            raise RecordingError("nothing is being recorded")
+        failure = self._failure
+        log = self._end()
+        if failure is not None:
+            raise failure
+        return {"path": str(log.path), "messages": log.messages}
+
+    def _end(self) -> Log:
+        log, self._log = self._log, None
+        assert log is not None
+        self._leave()
+        log.close()
+        return log
+
+    def _leave(self) -> None:
+        if self._subscription is not None:
+            self._subscription.cancel()
+            self._subscription = None
+
+    def _write(self, published: Published) -> None:
+        """A full disk must not end the run: whoever stops the recording is told."""
+        try:
+            if self._log is not None and self._failure is None:
+                self._log.write(published)
+        except RecordingError as error:
+            self._failure = error
+            self._leave()
+
+    def _checked(self, name: str) -> Path:
+        if self._folder is None:
+            raise RecordingError("this simulation was started without a folder for recordings")
+        if not name or "\0" in name:
+            raise RecordingError("the path of a recording is empty or not a path")
+        folder = self._folder.resolve()
+        path = (folder / name).resolve()
+        if path == folder or not path.is_relative_to(folder):
+            raise RecordingError(f"'{name}' lies outside of the folder for recordings")
+        return path

@@ -1,0 +1,54 @@
+"""Services of one UAV that take arguments, and those of readiness: `/uavN/...`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from volery.control.flight_modes import FlightMode
+from volery.core.errors import CommandError
+from volery.graph.graph import Graph
+from volery.runtime.services.offering import Fields, Handler, offer_command
+from volery.runtime.uav import Uav
+
+_TRIGGER = "std_srvs/srv/Trigger"
+_OURS = "volery_interfaces/srv"
+
+
+def offer_uav_services(graph: Graph, uav: Uav) -> None:
+    """Offer what `runtime.command_door` does not: the plain commands stand there."""
+    services: tuple[tuple[str, str, Handler], ...] = (
+        ("arm", _TRIGGER, lambda _request: _arm(uav)),
+        ("disarm", _TRIGGER, lambda _request: _disarm(uav)),
+        ("stop", _TRIGGER, lambda _request: uav.stop_rotors()),
+        ("take_off_to", f"{_OURS}/TakeOffTo", lambda request: uav.take_off(request.altitude)),
+        ("go_to", f"{_OURS}/GoTo", lambda request: _go_to(uav, request)),
+        (
+            "set_command_timeout",
+            f"{_OURS}/SetCommandTimeout",
+            lambda request: uav.set_command_timeout(request.seconds),
+        ),
+    )
+    for name, srvtype, handler in services:
+        offer_command(graph, f"/{uav.name}/{name}", srvtype, handler)
+
+
+def _arm(uav: Uav) -> Fields:
+    """There is no armed state: a landed UAV is ready for a take-off, with its rotors at rest."""
+    if uav.mode is FlightMode.CRASHED:
+        raise CommandError(f"{uav.name} has crashed")
+    if uav.mode is FlightMode.LANDED:
+        return {"message": f"{uav.name} is ready; its rotors turn with take_off"}
+    return {"message": f"{uav.name} flies ({uav.mode.name}); nothing to arm"}
+
+
+def _disarm(uav: Uav) -> Fields:
+    if uav.mode in (FlightMode.LANDED, FlightMode.CRASHED):
+        return {"message": f"the rotors of {uav.name} stand still"}
+    raise CommandError(f"{uav.name} flies ({uav.mode.name}); land, or stop, which lets it fall")
+
+
+def _go_to(uav: Uav, request: Any) -> None:
+    place = request.position
+    if uav.mode is FlightMode.TAKE_OFF:
+        raise CommandError(f"{uav.name} takes off; wait until it holds")
+    uav.go_to([place.x, place.y, place.z], None if request.keep_heading else request.yaw)

@@ -1,0 +1,97 @@
+"""Worlds of the standard: the scenarios of the library."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from volery.core.errors import ScenarioError, VoleryError
+from volery.runtime.services.filters import tag_filter
+from volery.runtime.services.offering import Code, Fields, RefusedError, filled, offer_result
+from volery.runtime.services.spawning import resource
+from volery.scenario import library
+from volery.scenario.load import load_scenario
+from volery.scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    from volery.runtime.simulation import Simulation
+
+_SRV = "simulation_interfaces/srv"
+_UNSUPPORTED_FORMAT = 101
+_NO_RESOURCE = 102
+_PARSE_ERROR = 103
+
+
+def offer_worlds(simulation: Simulation, on_load: Callable[[str], None] | None) -> None:
+    """Offer what is known of worlds, and loading another one where `on_load` does that.
+
+    `on_load(name)` is the owner's business: the process builds another simulation.
+    """
+
+    def available(request: Any) -> Fields:
+        passes = tag_filter(request.filter)
+        if list(request.additional_sources) and not request.continue_on_error:
+            reason = "there are no sources of worlds but the library of scenarios"
+            raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
+        worlds = [_shipped(name) for name in library.names()]
+        return {"worlds": [_world(s) for s in worlds if passes(tags_of(s))]}
+
+    def current(_request: Any) -> Fields:
+        return {"world": _world(simulation.scenario)}
+
+    def load(request: Any) -> Fields:
+        if on_load is None:
+            reason = "this process simulates one scenario; start another one for another world"
+            raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
+        scenario = _wanted(request.world_resource)
+        try:
+            on_load(scenario.name)
+        except VoleryError as error:
+            raise RefusedError(Code.OPERATION_FAILED, str(error)) from None
+        return {"world": _world(scenario)}
+
+    def unload(_request: Any) -> Fields:
+        reason = "a simulation always has its world; load another one, or quit"
+        raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
+
+    graph = simulation.graph
+    offer_result(graph, "/get_available_worlds", f"{_SRV}/GetAvailableWorlds", available)
+    offer_result(graph, "/get_current_world", f"{_SRV}/GetCurrentWorld", current)
+    offer_result(graph, "/load_world", f"{_SRV}/LoadWorld", load)
+    offer_result(graph, "/unload_world", f"{_SRV}/UnloadWorld", unload)
+
+
+def tags_of(scenario: Scenario) -> list[str]:
+    """What a world can be found by: its ground, and `forest` where trees stand."""
+    world = scenario.world
+    return [f"{world.terrain.kind}_ground", *(["forest"] if world.forest is not None else [])]
+
+
+def _wanted(source: Any) -> Scenario:
+    if source.resource_string:
+        raise RefusedError(_UNSUPPORTED_FORMAT, "worlds are loaded by name, not from a string")
+    if not source.uri:
+        raise RefusedError(_NO_RESOURCE, "uri must be the name of a scenario of the library")
+    if source.uri not in library.names():
+        known = ", ".join(library.names())
+        raise RefusedError(Code.NOT_FOUND, f"no scenario '{source.uri}'; known: {known}")
+    try:
+        return _shipped(source.uri)
+    except ScenarioError as error:
+        raise RefusedError(_PARSE_ERROR, str(error)) from None
+
+
+@cache
+def _shipped(name: str) -> Scenario:
+    return load_scenario(name)
+
+
+def _world(scenario: Scenario) -> Any:
+    fields = {
+        "name": scenario.name,
+        "world_resource": resource(scenario.name if scenario.name in library.names() else ""),
+        "description": scenario.description.strip(),
+        "tags": tags_of(scenario),
+    }
+    return filled("simulation_interfaces/msg/WorldResource", fields)
