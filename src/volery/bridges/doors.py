@@ -29,8 +29,9 @@ _LONGEST_START_S = 30.0
 class Door(Protocol):
     """One way into the graph."""
 
-    name: str
-    """What it is and where, for people: `ROS-TCP 127.0.0.1:10000`."""
+    @property
+    def name(self) -> str:
+        """What it is and where, for people: `ROS-TCP 127.0.0.1:10000`."""
 
     async def start(self, gateway: Gateway) -> None:
         """Begin to serve, or to connect. `BridgeError` where that is not possible."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from volery.core.errors import GraphError
@@ -30,6 +30,8 @@ class MirroredGraph(Graph):
         self._wake = wake
         self._mailboxes: dict[str, Mailbox] = {}
         self._readers: dict[str, list[Callback]] = {}
+        self._held: list[tuple[str, Published]] = []
+        self._barrier: tuple[str, Callable[[Published], None]] | None = None
 
     # ------------------------------------------------------------------------------------ topics
 
@@ -60,6 +62,13 @@ class MirroredGraph(Graph):
         readers.append(callback)
         return Subscription(readers, callback)
 
+    def hold_back(self, barrier: str, begin: Callable[[Published], None]) -> None:
+        """Hand messages out only when one on `barrier` has come after them.
+
+        `begin` is called with that one before those that it frees.
+        """
+        self._barrier = barrier, begin
+
     def hand_out(self) -> bool:
         """Call back for everything that has come, in the order of arrival; whether there was any.
 
@@ -70,14 +79,27 @@ class MirroredGraph(Graph):
             for topic, mailbox in self._mailboxes.items()
             for number, published in mailbox.take_numbered()
         ]
-        come.sort(key=_number)
-        for _, topic, published in come:
+        self._held += [(topic, published) for _, topic, published in sorted(come, key=_number)]
+        for topic, published in self._freed():
             for callback in tuple(self._readers[topic]):
                 callback(published)
         posted = [self._posted.pop(0) for _ in range(len(self._posted))]
         for action in posted:
             action()
         return bool(come or posted)
+
+    def _freed(self) -> Iterator[tuple[str, Published]]:
+        """Messages to be handed out now, in order."""
+        if self._barrier is None:
+            freed, self._held = self._held, []
+            yield from freed
+            return
+        barrier, begin = self._barrier
+        while barrier in (topics := [topic for topic, _ in self._held]):
+            end = topics.index(barrier) + 1
+            freed, self._held = self._held[:end], self._held[end:]
+            begin(freed[-1][1])
+            yield from freed
 
     # ---------------------------------------------------------------------------------- services
 

@@ -20,8 +20,10 @@ from typing import Any, Literal
 
 from volery.bridges.mirrored_graph import MirroredGraph
 from volery.core.clock import NS_PER_S, ns_from_s
+from volery.core.errors import GraphError
+from volery.graph.graph import Subscription
 from volery.graph.link import Link
-from volery.graph.messages import Clock, Published
+from volery.graph.messages import Clock, Published, Time, message_type
 from volery.graph.node import Context
 
 ClockKind = Literal["auto", "simulated", "wall"]
@@ -56,8 +58,9 @@ class NodeHost:
         self._alarms: list[_Alarm] = []
         self._numbers = itertools.count()
         self.graph = MirroredGraph(link, self.now_ns, self._woken.set)
+        self._clock: Subscription | None = None
         if clock != "wall":
-            self.graph.subscribe("/clock", self._on_clock, Clock, depth=_CLOCKS_KEPT)
+            self._clock = self.graph.subscribe("/clock", self._on_clock, Clock, depth=_CLOCKS_KEPT)
 
     def context(self, remap: Mapping[str, str] | None = None) -> Context:
         """What a node stands on; `remap` gives topics and services other names."""
@@ -84,14 +87,16 @@ class NodeHost:
         heapq.heappush(self._alarms, alarm)
 
     def _on_clock(self, published: Published) -> None:
-        stamp = published.message.clock
+        self._set_clock(published.message.clock)
+        self._ring_due()
+
+    def _set_clock(self, stamp: Time) -> None:
         before_ns, now_ns = self.now_ns(), stamp.sec * NS_PER_S + stamp.nanosec
         if self._simulated_ns is None or now_ns < before_ns:
             # Another clock from here on, or a simulation that was reset: what was left stays left.
             for alarm in self._alarms:
                 alarm.due_ns += now_ns - before_ns
         self._simulated_ns = now_ns
-        self._ring_due()
 
     def _ring_due(self) -> None:
         now_ns = self.now_ns()
@@ -101,6 +106,33 @@ class NodeHost:
                 alarm.due_ns += (1 + (now_ns - alarm.due_ns) // alarm.period_ns) * alarm.period_ns
                 self._set(alarm)
             alarm.action()
+
+    # --------------------------------------------------------------------------------- lock step
+
+    def join_lock_step(self, name: str, period_s: float, timeout_s: float = 10.0) -> None:
+        """Have the simulation wait for the nodes each `period_s`; before `spin`.
+
+        At each meeting, what the simulation published until then has been handed out and due timers
+        have rung before it goes on: with its physics step as the period the nodes answer as they
+        do inside. `GraphError` where it does not want to wait.
+        """
+        go, done = (f"/volery/lock_step/{name}/{word}" for word in ("go", "done"))
+        self._link.advertise(done, "rosgraph_msgs/msg/Clock")
+
+        def meet(published: Published) -> None:
+            self._ring_due()
+            self._link.publish(done, published.message)
+
+        if self._clock is not None:
+            self._clock.cancel()  # the meetings tell the time
+        self.graph.subscribe(go, meet, Clock)
+        self.graph.hold_back(go, lambda published: self._set_clock(published.message.clock))
+        srvtype = "volery_interfaces/srv/JoinLockStep"
+        request = message_type(f"{srvtype}_Request")(name, period_s, timeout_s)
+        answer = self.graph.call("/volery/join_lock_step", request)
+        if not answer.success:
+            raise GraphError(f"no lock step: {answer.message}")
+        self._set_clock(answer.now)
 
     # --------------------------------------------------------------------------------------- run
 

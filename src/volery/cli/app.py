@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from volery.cli.graph_commands import node, service_app, topic_app
 from volery.cli.guard import guarded
 
 app = typer.Typer(
@@ -17,6 +18,11 @@ app = typer.Typer(
     add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+app.command()(node)
+app.add_typer(topic_app, name="topic")
+app.add_typer(service_app, name="service")
 
 
 def _version(wanted: bool) -> None:
@@ -47,8 +53,9 @@ def run(
     seconds: Annotated[float | None, typer.Option(help="Simulated seconds to fly.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of everything random.")] = None,
     speed: Annotated[
-        str, typer.Option(help="Factor of real time, such as 1 or 2.5, or max.")
-    ] = "max",
+        str | None,
+        typer.Option(help="Factor of real time, such as 1 or 2.5, or max; 1 where doors are open."),
+    ] = None,
     threads: Annotated[
         int | None, typer.Option(min=1, max=256, help="Threads; results do not depend on it.")
     ] = None,
@@ -58,6 +65,16 @@ def run(
     report: Annotated[
         Path | None, typer.Option(help="Write an illustrated report into this folder.")
     ] = None,
+    door: Annotated[
+        list[str] | None,
+        typer.Option(help="Open a door to other programs: NAME or NAME=[HOST:]PORT, repeatable."),
+    ] = None,
+    allow_remote: Annotated[
+        bool, typer.Option("--allow-remote", help="Let doors listen beyond this machine.")
+    ] = False,
+    token: Annotated[
+        str | None, typer.Option(envvar="VOLERY_TOKEN", help="What remote clients must show.")
+    ] = None,
     digest: Annotated[
         bool, typer.Option("--digest", help="Print the SHA-256 over all states and messages.")
     ] = False,
@@ -66,6 +83,8 @@ def run(
     ] = False,
 ) -> None:
     """Fly a scenario.
+
+    Doors: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, sensor-link.
 
     At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
     + and - double and halve the speed, m frees it. Ctrl-C ends the flight and still writes log and
@@ -78,7 +97,10 @@ def run(
         uavs=uavs,
         seconds=seconds,
         seed=seed,
-        speed=parse_speed(speed),
+        speed=parse_speed(speed or ("1" if door else "max")),
+        doors=tuple(door or ()),
+        allow_remote=allow_remote,
+        token=token,
         threads=threads,
         record=record,
         report=report,

@@ -38,6 +38,9 @@ class RunOptions:
     report: Path | None = None
     digest: bool = False
     overwrite: bool = False
+    doors: tuple[str, ...] = ()
+    allow_remote: bool = False
+    token: str | None = None
 
 
 class _StoppedError(Exception):

@@ -6,6 +6,7 @@ import math
 
 import typer
 
+from volery.cli.doors import open_doors
 from volery.cli.flight import Flight, RunOptions
 from volery.cli.guard import INTERRUPTED
 from volery.cli.interrupt import Interrupts
@@ -14,6 +15,8 @@ from volery.cli.targets import check_record, check_report
 from volery.core.errors import ScenarioError
 
 __all__ = ["RunOptions", "fly", "parse_speed"]
+
+_THREADS = 2
 
 
 def parse_speed(text: str) -> float | None:
@@ -55,11 +58,12 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts) -> int:
         check_record(options.record, overwrite=options.overwrite)
     if options.report is not None:
         check_report(options.report)
-    threads = {} if options.threads is None else {"threads": options.threads}
+    threads = _THREADS if options.threads is None else options.threads
     with FlightProgress(scenario.name, scenario.duration_s) as progress:
-        simulation = Simulation(scenario, **threads)
+        simulation = Simulation(scenario, threads=threads)
         try:
             interrupts.be_gentle()
-            return Flight(simulation, options, progress, interrupts).fly()
+            with open_doors(simulation, options):
+                return Flight(simulation, options, progress, interrupts).fly()
         finally:
             simulation.close()

@@ -75,6 +75,11 @@ class FleetCommands:
         rows = slice(None) if i is None else i
         self._pilots["timeout_steps"][rows] = max(1, round(seconds / self._dt))
 
+    def rotor_reference(self, i: int) -> Array:
+        """(R,) rad/s: what the controllers of UAV `i` asked of its rotors in the last step."""
+        rotors = len(self.airframes[i].rotors.places)
+        return np.array(self._pilots["rotor_reference"][i, :rotors])
+
     def command_rotor_speeds(self, i: int, speeds: ArrayLike) -> None:
         """Turn the rotors of UAV `i` at `speeds` (R,) rad/s, if its battery lets them."""
         self._refuse_plants(i, "rotor speeds", IdentifiedModel, Kinematic)
@@ -83,6 +88,15 @@ class FleetCommands:
         speeds = checked_within("rotor speeds", speeds, shape, rotors.max_speed_rad_s)
         pilot = self._enter_low_level(i, ControlLevel.ROTORS)
         pilot["rotor_target"][: len(speeds)] = speeds
+
+    def stop_rotors(self, i: int) -> None:
+        """Stop the rotors of UAV `i` at once, wherever it is; in the air a flight mode starts them.
+
+        A kinematic UAV, which has none, stands still in the air.
+        """
+        pilot = self._enter_low_level(i, ControlLevel.STOPPED)
+        pilot["rotor_target"] = 0.0
+        pilot["thrust"] = 0.0
 
     def command_rates(self, i: int, omega_body: ArrayLike, thrust: float) -> None:
         """Turn UAV `i` at `omega_body` (3,) rad/s, FLU, with `thrust` N along its z axis."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -17,12 +18,23 @@ class Inbox:
 
     def __init__(self) -> None:
         self._waiting: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
+        self._news = threading.Event()
 
     def post(self, action: Callable[[], Any]) -> Future[Any]:
         """Have `action()` called before the next tick; the future holds its result or error."""
         future: Future[Any] = Future()
         self._waiting.append((action, future))
+        self._news.set()
         return future
+
+    def wake(self) -> None:
+        """End a `wait` although nothing was posted."""
+        self._news.set()
+
+    def wait(self, timeout_s: float) -> None:
+        """Wait until something is posted after the last wait, or `wake` is called."""
+        self._news.wait(timeout_s)
+        self._news.clear()
 
     def work_off(self) -> bool:
         """Call everything that waits, in the order of arrival; whether there was anything."""

@@ -165,6 +165,14 @@ class Engine:
         finally:
             self.stands = stood
 
+    def wait(self, timeout_s: float) -> None:
+        """Wait for something to take in, or a `wake`, at most `timeout_s` of wall time."""
+        self.inbox.wait(timeout_s)
+
+    def wake(self) -> None:
+        """End a `wait`; from any thread."""
+        self.inbox.wake()
+
     def horizon(self, step: int) -> int:
         """How far a tick may go that shall not pass `step`."""
         now = self.fleet.step

@@ -18,21 +18,40 @@ import math
 import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError, PartnerError
 
 Action = Callable[[], Any]
 
+_LOOK_S = 0.1
+"""Wall time between two looks whether a partner is still there."""
+
 
 class Partner:
     """One partner; `wait`, `reply` and `leave` belong to its own thread."""
 
-    def __init__(self, name: str, timeout_s: float, on_timeout: Literal["stop", "leave"]) -> None:
+    def __init__(
+        self,
+        name: str,
+        timeout_s: float,
+        on_timeout: Literal["stop", "leave"],
+        *,
+        on_meeting: Callable[[int], None] | None = None,
+        is_there: Callable[[], bool] | None = None,
+    ) -> None:
+        """Take the terms of `add_partner`.
+
+        `on_meeting(time_ns)` tells the partner, in the engine's thread, that it is waited for;
+        `is_there()` whether it still can answer.
+        """
         self.name = name
         self.timeout_s = timeout_s
         self._on_timeout = on_timeout
+        self._on_meeting = on_meeting
+        self._is_there = is_there
+        self._wake: Callable[[], None] = _nothing
         self._changed = threading.Condition()
         self._meeting_ns: int | None = None
         self._actions: tuple[Action, ...] | None = None
@@ -68,31 +87,40 @@ class Partner:
                 raise PartnerError(f"{self.name}: there is no meeting to reply to; wait() first")
             self._actions = actions
             self._changed.notify_all()
+        self._wake()
 
     def leave(self) -> None:
         """Be waited for no more."""
         with self._changed:
             self._left = True
             self._changed.notify_all()
+        self._wake()
 
     # ------------------------------------------------------------------------- the engine's thread
 
-    def call(self, time_ns: int) -> None:
-        """Begin the meeting at `time_ns`."""
+    def call(self, time_ns: int, wake: Callable[[], None]) -> None:
+        """Begin the meeting at `time_ns`; `wake` is called when it is over."""
         with self._changed:
+            self._wake = wake
             self._meeting_ns, self._actions = time_ns, None
             self._changed.notify_all()
+        if self._on_meeting is not None:
+            self._on_meeting(time_ns)
 
-    def collect(self, deadline: float) -> tuple[Action, ...]:
-        """Actions replied; none from a partner that has left. `deadline`: on `time.monotonic`.
+    @property
+    def answered(self) -> bool:
+        """Whether the meeting is over."""
+        if self._is_there is not None and not self._is_there():
+            self._left = True
+        return self._left or self._actions is not None
 
-        Raises `PartnerError` at the deadline, unless the partner agreed to be left behind.
+    def collect(self) -> tuple[Action, ...]:
+        """End the meeting: actions replied, none from a partner that has left.
+
+        Raises `PartnerError` if it has not answered, unless it agreed to be left behind.
         """
         with self._changed:
-            came = self._changed.wait_for(
-                lambda: self._left or self._actions is not None,
-                max(deadline - time.monotonic(), 0.0),
-            )
+            came = self.answered
             meeting_ns, self._meeting_ns = self._meeting_ns, None
             actions, self._actions = self._actions or (), None
             if came:
@@ -118,12 +146,36 @@ def check_terms(period_s: float, timeout_s: float, on_timeout: str, dt_ns: int) 
         raise CommandError(f'on_timeout must be "stop" or "leave", not {on_timeout!r}')
 
 
-def meet(partners: Sequence[Partner], time_ns: int) -> None:
+class Waiting(Protocol):
+    """How the engine waits: it does meanwhile what others post, the partners' own messages too."""
+
+    def take_in(self) -> None:
+        """Do what was posted."""
+
+    def wait(self, timeout_s: float) -> None:
+        """Wait for a post or a wake."""
+
+    def wake(self) -> None:
+        """End the wait; from any thread."""
+
+
+def meet(partners: Sequence[Partner], time_ns: int, engine: Waiting) -> None:
     """Meet all `partners` at once; apply their replies in the order given."""
     start = time.monotonic()
     waited_for = [partner for partner in partners if not partner.has_left]
     for partner in waited_for:
-        partner.call(time_ns)
+        partner.call(time_ns, engine.wake)
     for partner in waited_for:
-        for action in partner.collect(start + partner.timeout_s):
+        while not partner.answered:
+            left_s = start + partner.timeout_s - time.monotonic()
+            if left_s <= 0.0:
+                break
+            engine.wait(min(left_s, _LOOK_S))
+            engine.take_in()
+    for partner in waited_for:
+        for action in partner.collect():
             action()
+
+
+def _nothing() -> None:
+    """Do nothing."""

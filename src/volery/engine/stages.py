@@ -81,7 +81,7 @@ def meet_partners(engine: Engine, _tick: Tick) -> None:
     """Wait for the lock-step partners whose instant has come, and do what they ask."""
     due = engine.partner_agenda.pop_due(engine.fleet.step)
     if due:
-        meet([entry.what for entry in due], engine.time_ns)
+        meet([entry.what for entry in due], engine.time_ns, engine)
         engine.sink.deliver()
 
 

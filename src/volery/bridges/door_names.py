@@ -1,0 +1,107 @@
+"""Doors by name, as the command line asks for them: `rosbridge`, `ros-tcp=127.0.0.1:10001`."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from typing import NamedTuple
+
+from volery.bridges.doors import Door
+from volery.core.errors import BridgeError
+
+
+class Address(NamedTuple):
+    """Where a door listens or connects to."""
+
+    host: str
+    port: int
+
+
+class Terms(NamedTuple):
+    """What holds for all doors of a run."""
+
+    anywhere: bool = False
+    """Whether doors may listen beyond loopback."""
+    token: str | None = None
+    """What clients must show, where the protocol can carry it."""
+
+
+class _Kind(NamedTuple):
+    port: int
+    make: Callable[[Address, Terms], Door]
+    what: str
+
+
+def make_door(text: str, terms: Terms) -> Door:
+    """Door of `NAME` or `NAME=[HOST:]PORT`. `BridgeError` tells which there are."""
+    name, _, address = text.partition("=")
+    kind = _KINDS.get(name)
+    if kind is None:
+        near = difflib.get_close_matches(name, _KINDS, n=1)
+        hint = f" Did you mean '{near[0]}'?" if near else ""
+        raise BridgeError(f"no door '{name}'.{hint} Doors: {', '.join(_KINDS)}")
+    return kind.make(_parse(address, kind.port, text), terms)
+
+
+def describe_doors() -> dict[str, str]:
+    """All doors and what they are."""
+    return {name: kind.what for name, kind in _KINDS.items()}
+
+
+def _parse(address: str, port: int, text: str) -> Address:
+    host = "127.0.0.1"
+    if address:
+        before, colon, after = address.rpartition(":")
+        if colon:
+            host = before.strip("[]")
+        if not after.isdecimal() or not 0 <= int(after) <= 65535:
+            raise BridgeError(f"'{text}': an address is PORT or HOST:PORT, port 0 to 65535")
+        port = int(after)
+    return Address(host, port)
+
+
+def _rosbridge(address: Address, terms: Terms) -> Door:
+    from volery.bridges.rosbridge_server import RosbridgeServer
+
+    return RosbridgeServer(*address, token=terms.token, anywhere=terms.anywhere)
+
+
+def _ros_tcp(address: Address, terms: Terms) -> Door:
+    from volery.bridges.ros_tcp_endpoint import RosTcpEndpoint
+
+    return RosTcpEndpoint(*address, anywhere=terms.anywhere)
+
+
+def _ros_tcp_2(address: Address, terms: Terms) -> Door:
+    from volery.bridges.ros_tcp_endpoint import RosTcpEndpoint
+
+    return RosTcpEndpoint(*address, generation="ros2", anywhere=terms.anywhere)
+
+
+def _ros_tcp_connector(address: Address, _terms: Terms) -> Door:
+    from volery.bridges.ros_tcp_connector import RosTcpConnector
+
+    return RosTcpConnector(*address)
+
+
+def _ros1(_address: Address, _terms: Terms) -> Door:
+    from volery.bridges.ros1 import Ros1Door
+
+    return Ros1Door()
+
+
+def _sensor_link(address: Address, terms: Terms) -> Door:
+    from volery.bridges.sensor_link_server import SensorLink
+
+    image_port = address.port + 1 if address.port else 0
+    return SensorLink(*address, image_port=image_port, anywhere=terms.anywhere)
+
+
+_KINDS = {
+    "rosbridge": _Kind(9090, _rosbridge, "rosbridge v2 server (WebSocket, JSON and CBOR)"),
+    "ros-tcp": _Kind(10000, _ros_tcp, "server for Unity's ROS-TCP-Connector, ROS 1 messages"),
+    "ros-tcp-2": _Kind(10000, _ros_tcp_2, "the same with ROS 2 messages"),
+    "ros-tcp-connector": _Kind(10000, _ros_tcp_connector, "connects to a ROS-TCP-Endpoint"),
+    "ros1": _Kind(0, _ros1, "joins the roscore of ROS_MASTER_URI"),
+    "sensor-link": _Kind(10100, _sensor_link, "binary frames with CRC-16; images on the next port"),
+}

@@ -1,0 +1,58 @@
+"""Launch profiles: the same node in simulation, on the ground and in flight.
+
+A profile is a TOML file that says where a node runs and what its topics are called there. It never
+changes what the node does.
+
+    name = "flight_test"
+    via = "ros1"
+    namespace = "/uav1"
+    clock = "wall"
+
+    [remap]
+    "laser/horizontal/scan" = "/scan"
+    "odom" = "/mavros/local_position/odom"
+
+    [parameters]
+    height_m = 3.0
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from volery.scenario.data_files import load_data_file
+
+Name = Annotated[str, Field(pattern=r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")]
+Namespace = Annotated[str, Field(pattern=r"^(/[A-Za-z_][A-Za-z0-9_]*)*$")]
+
+
+class Profile(BaseModel):
+    """How one node is launched."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str = "default"
+    via: str | None = None
+    """Way into the graph, as `volery node --via` takes it."""
+    namespace: Namespace = ""
+    clock: Literal["auto", "simulated", "wall"] = "auto"
+    remap: dict[Name, Name] = {}
+    """The node's names, relative ones below its namespace, to those of the graph."""
+    parameters: dict[str, Any] = {}
+
+
+def load_profile(path: Path) -> Profile:
+    """Read a profile. Raises `DataFileError` naming file, key and what is allowed."""
+    return load_data_file(path, Profile)
+
+
+def absolute_names(remap: dict[str, str], namespace: str) -> dict[str, str]:
+    """`remap` with relative names made absolute, as `graph.node.Context` takes it."""
+
+    def resolve(name: str) -> str:
+        return name if name.startswith("/") else f"{namespace}/{name}"
+
+    return {resolve(mine): resolve(theirs) for mine, theirs in remap.items()}

@@ -1,0 +1,70 @@
+"""`volery node`: one node as a process of its own, on a simulation's graph or a real vehicle's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from volery.cli.links import DEFAULT_VIA, open_link
+from volery.cli.yaml_form import from_yaml
+from volery.core.errors import BridgeError
+
+
+@dataclass(frozen=True)
+class NodeOptions:
+    """What the command line asked for; None leaves it to the profile."""
+
+    node: str
+    via: str | None
+    namespace: str | None
+    profile: Path | None
+    parameters: Sequence[str] = ()
+    lock_step_s: float | None = None
+
+
+def run_node(options: NodeOptions) -> None:
+    """Run a node until Ctrl-C, or until it fails."""
+    from pydantic import ValidationError
+
+    from volery.bridges.node_host import NodeHost
+    from volery.bridges.profile import Profile, absolute_names, load_profile
+    from volery.runtime.node_loading import start_node
+    from volery.scenario.schema import NodeEntry
+
+    profile = Profile() if options.profile is None else load_profile(options.profile)
+    namespace = profile.namespace if options.namespace is None else options.namespace
+    parameters = {**profile.parameters, **_parameters(options.parameters)}
+    try:
+        entry = NodeEntry(node=options.node, parameters=parameters)
+    except ValidationError:
+        raise BridgeError(f"a node is named module:Class, not '{options.node}'") from None
+    name = options.node.rpartition(":")[2]
+    via = options.via or profile.via or DEFAULT_VIA
+    with closing(open_link(via, name)) as link:
+        host = NodeHost(link, clock=profile.clock)
+        context = host.context(absolute_names(profile.remap, namespace))
+        folder = options.profile.parent if options.profile else None
+        node = start_node(entry, context, namespace, "volery node", folder)
+        if options.lock_step_s is not None:
+            host.join_lock_step(node.get_name(), options.lock_step_s)
+        typer.echo(f"{node.get_name()} runs on {via}; Ctrl-C ends it", err=True)
+        try:
+            host.spin()
+        finally:
+            node.destroy_node()
+
+
+def _parameters(words: Sequence[str]) -> dict[str, Any]:
+    """`NAME:=VALUE` or `NAME=VALUE`, the value as YAML."""
+    found: dict[str, Any] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        if not equals:
+            raise BridgeError(f"--param: NAME=VALUE, not '{word}'")
+        found[name.rstrip(":")] = from_yaml(value)
+    return found

@@ -1,0 +1,152 @@
+"""`volery topic list|type|echo|hz|bw|pub`: a graph's topics from a terminal."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass, field
+
+import typer
+
+from volery.cli.asking import topic_types, type_of_topic
+from volery.cli.links import open_link
+from volery.cli.yaml_form import read_message, to_yaml
+from volery.core.errors import BridgeError
+from volery.graph.link import Link
+from volery.graph.messages import Published
+
+_DEPTH = 1000
+
+
+def list_topics(via: str, *, types: bool) -> None:
+    """Print the topics, one a line."""
+    with closing(open_link(via, "volery_topic_list")) as link:
+        for topic, msgtype in topic_types(link).items():
+            typer.echo(f"{topic} [{msgtype}]" if types else topic)
+
+
+def show_type(via: str, topic: str) -> None:
+    """Print a topic's type."""
+    with closing(open_link(via, "volery_topic_type")) as link:
+        typer.echo(type_of_topic(link, topic))
+
+
+def echo(via: str, topic: str, *, count: int | None, whole: bool) -> None:
+    """Print messages as YAML, each followed by a line of dashes."""
+    left = math.inf if count is None else count
+    for published in messages(via, topic, "volery_topic_echo"):
+        typer.echo(to_yaml(published.message, whole=whole))
+        typer.echo("---")
+        left -= 1
+        if left <= 0:
+            return
+
+
+def messages(via: str, topic: str, name: str) -> Iterator[Published]:
+    """Messages of a topic as they come, without an end."""
+    with closing(open_link(via, name)) as link:
+        come = threading.Event()
+        mailbox = link.subscribe(topic, type_of_topic(link, topic), depth=_DEPTH, wake=come.set)
+        while True:
+            come.wait(0.2)
+            come.clear()
+            yield from mailbox.take()
+
+
+@dataclass
+class Window:
+    """Arrivals of the last messages: wall times (s) and sizes (bytes)."""
+
+    most: int
+    times: list[float] = field(default_factory=list)
+    sizes: list[int] = field(default_factory=list)
+
+    def add(self, time_s: float, size: int) -> None:
+        """Note a message; the oldest is forgotten where there are too many."""
+        self.times.append(time_s)
+        self.sizes.append(size)
+        del self.times[: -self.most], self.sizes[: -self.most]
+
+    def rate_line(self) -> str:
+        """Rate and periods, as `rostopic hz` has them."""
+        periods = [b - a for a, b in zip(self.times, self.times[1:], strict=False)]
+        if not periods:
+            return "no new messages"
+        mean = sum(periods) / len(periods)
+        spread = math.sqrt(sum((p - mean) ** 2 for p in periods) / len(periods))
+        return (
+            f"average rate: {1.0 / mean:.3f}\n\tmin: {min(periods):.4f}s max: {max(periods):.4f}s "
+            f"std dev: {spread:.5f}s window: {len(self.times)}"
+        )
+
+    def bandwidth_line(self) -> str:
+        """Bytes a second and sizes, as `rostopic bw` has them."""
+        if len(self.times) < 2:
+            return "no new messages"
+        span = self.times[-1] - self.times[0]
+        mean = sum(self.sizes) / len(self.sizes)
+        low, high = _bytes(min(self.sizes)), _bytes(max(self.sizes))
+        return (
+            f"average: {_bytes(sum(self.sizes[1:]) / span)}/s\n\tmean: {_bytes(mean)} min: {low} "
+            f"max: {high} window: {len(self.times)}"
+        )
+
+
+def measure(via: str, topic: str, *, window: int, line: Callable[[Window], str]) -> None:
+    """Print a line about a topic's arrivals each second."""
+    seen = Window(window)
+    told = time.monotonic()
+    sizes = line is Window.bandwidth_line
+    for published in _with_pauses(via, topic):
+        now = time.monotonic()
+        if published is not None:
+            seen.add(now, len(published.cdr) if sizes else 0)
+        if now - told >= 1.0:
+            told = now
+            typer.echo(line(seen))
+
+
+def publish(
+    via: str, topic: str, msgtype: str, values: str, *, rate_hz: float, times: int | None
+) -> None:
+    """Publish a message typed as YAML, `times` times or until Ctrl-C."""
+    if not (math.isfinite(rate_hz) and rate_hz > 0.0):
+        raise BridgeError(f"--rate: a positive number, not {rate_hz}")
+    name = msgtype if "/msg/" in msgtype else msgtype.replace("/", "/msg/", 1)
+    message = read_message(values, name)
+    with closing(open_link(via, "volery_topic_pub")) as link:
+        link.advertise(topic, name)
+        _repeat(link, topic, message, 1.0 / rate_hz, times)
+
+
+def _repeat(link: Link, topic: str, message: object, period_s: float, times: int | None) -> None:
+    sent, due = 0, time.monotonic()
+    while times is None or sent < times:
+        link.publish(topic, message)
+        sent += 1
+        due += period_s
+        if times is None or sent < times:
+            time.sleep(max(due - time.monotonic(), 0.0))
+
+
+def _with_pauses(via: str, topic: str) -> Iterator[Published | None]:
+    """Messages, and None at least five times a second."""
+    with closing(open_link(via, "volery_topic_measure")) as link:
+        come = threading.Event()
+        mailbox = link.subscribe(topic, type_of_topic(link, topic), depth=_DEPTH, wake=come.set)
+        while True:
+            come.wait(0.2)
+            come.clear()
+            yield from mailbox.take()
+            yield None
+
+
+def _bytes(size: float) -> str:
+    for unit in ("B", "kB"):
+        if size < 1000.0:
+            return f"{size:.3g} {unit}"
+        size /= 1000.0
+    return f"{size:.3g} MB"

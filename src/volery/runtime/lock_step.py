@@ -1,0 +1,73 @@
+"""Lock-step partners over doors: the simulation waits for programs in other processes.
+
+A client calls `/volery/join_lock_step`, subscribes `/volery/lock_step/NAME/go` and publishes on
+`/volery/lock_step/NAME/done`, both `rosgraph_msgs/Clock`. At each meeting the simulation sends the
+time on `go`, after everything that it has published until then, and stands still until the same
+time comes back on `done`; what the client published before is in force from the next physics step.
+Who unadvertises `done`, or loses the connection, has left.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from volery.core.clock import NS_PER_S
+from volery.core.errors import CommandError
+from volery.engine.partners import Partner
+from volery.graph.graph import Graph
+from volery.graph.messages import Clock, Published, message_type, time_from_ns
+
+SERVICE = "/volery/join_lock_step"
+TYPE = "volery_interfaces/srv/JoinLockStep"
+
+
+def open_lock_step(simulation: Any) -> None:
+    """Offer `SERVICE` on the graph of a `Simulation`."""
+    response = message_type(f"{TYPE}_Response")
+
+    def join(request: Any) -> Any:
+        try:
+            _Meetings(simulation, request.name, request.period_s, request.timeout_s)
+        except CommandError as error:
+            return response(success=False, message=str(error), now=time_from_ns(0))
+        return response(success=True, message="", now=time_from_ns(simulation.time_ns))
+
+    simulation.graph.offer(SERVICE, TYPE, join)
+
+
+class _Meetings:
+    """The meetings with one client."""
+
+    def __init__(self, simulation: Any, name: str, period_s: float, timeout_s: float) -> None:
+        if not name.isidentifier():
+            raise CommandError(f"'{name}' is no name for a partner: letters, digits and _")
+        graph: Graph = simulation.graph
+        self._graph = graph
+        self._done = f"/volery/lock_step/{name}/done"
+        if graph.publishers(self._done) == 0:
+            raise CommandError(f"advertise {self._done} before joining, and subscribe .../go")
+        self._partner: Partner = simulation.add_partner(
+            name,
+            period_s=period_s,
+            timeout_s=timeout_s,
+            on_timeout="leave",
+            on_meeting=self._begin,
+            is_there=lambda: graph.publishers(self._done) > 0,
+        )
+        self._go = graph.advertise(f"/volery/lock_step/{name}/go", Clock)
+        self._subscription = graph.subscribe(self._done, self._end, Clock)
+        self._meeting_ns = -1
+
+    def _begin(self, time_ns: int) -> None:
+        self._meeting_ns = time_ns
+        self._go.publish(Clock(time_from_ns(time_ns)))
+        self._graph.deliver()
+
+    def _end(self, published: Published) -> None:
+        if self._partner.has_left:
+            self._subscription.cancel()
+            return
+        stamp = published.message.clock
+        if stamp.sec * NS_PER_S + stamp.nanosec == self._meeting_ns:
+            self._meeting_ns = -1
+            self._partner.reply()
