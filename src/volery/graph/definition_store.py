@@ -139,8 +139,8 @@ class DefinitionStore(Typestore):
                 self._register(definitions)
             finally:
                 self._loading -= inside
-            for part in inside:
-                self._files.pop(part, None)
+            for loaded in inside:
+                self._files.pop(loaded, None)
         return True
 
     def _register(self, definitions: Iterable[Definition]) -> None:

@@ -261,10 +261,10 @@ def _integer_decoder(base: str) -> Convert:
             whole = isinstance(value, (float, np.floating)) and float(value).is_integer()
             if not whole and not isinstance(value, np.integer):
                 raise _Mismatch(f"must be an integer, not {_shown(value)}")
-            value = int(value)
-        if not least <= value <= greatest:
-            raise _Mismatch(f"must be {least} to {greatest}, not {_shown(value)}")
-        return value - 256 if wraps and value > 127 else value
+        number = int(value)
+        if not least <= number <= greatest:
+            raise _Mismatch(f"must be {least} to {greatest}, not {_shown(number)}")
+        return number - 256 if wraps and number > 127 else number
 
     return decode
 

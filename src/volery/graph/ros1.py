@@ -258,16 +258,25 @@ class Ros1Codec:
             sized = generate_getsize_ros1(entries, store)
             serialize = generate_serialize_ros1(entries, store)
         unused: Any = _unused
+        getsize, size = sized
         return Msgdef(
-            msgtype,
-            entries,
-            self._maker(msgtype, fields, names),
-            *(0, *[unused] * 5),
-            sized[1],
-            sized[0],
-            serialize,
-            generate_deserialize_ros1(entries, store),
-            *[unused] * 4,
+            name=msgtype,
+            fields=entries,
+            cls=self._maker(msgtype, fields, names),
+            size_cdr=0,
+            getsize_cdr=unused,
+            serialize_cdr_le=unused,
+            serialize_cdr_be=unused,
+            deserialize_cdr_le=unused,
+            deserialize_cdr_be=unused,
+            size_ros1=size,
+            getsize_ros1=getsize,
+            serialize_ros1=serialize,
+            deserialize_ros1=generate_deserialize_ros1(entries, store),
+            getsize_ros1_to_cdr=unused,
+            ros1_to_cdr=unused,
+            getsize_cdr_to_ros1=unused,
+            cdr_to_ros1=unused,
         )
 
     def _maker(
