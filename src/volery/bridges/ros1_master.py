@@ -54,9 +54,9 @@ class Ros1Master:
             raise BridgeError(f"ROS master: {method}: {text}")
         return value
 
-    def knows(self, node_uri: str) -> bool:
-        """Whether the node is registered; a master that began anew knows nobody. `OSError`."""
+    def knows_service(self, service: str) -> bool:
+        """Whether somebody offers a service. `OSError` where the master does not answer."""
         try:
-            return bool(self.ask("lookupNode", self._node_name) == node_uri)
+            return bool(self.ask("lookupService", service))
         except BridgeError:
             return False

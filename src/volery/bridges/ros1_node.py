@@ -138,7 +138,9 @@ class Ros1Node:
 
     def register_again(self) -> bool:
         """Register all that there is if the master has forgotten; whether it had. `OSError`."""
-        if self.master.knows(self._rospy.get_node_uri()):
+        # rospy registers this service when the node begins, and nothing else does so later: a master
+        # that knows it knows all, while new topics may come to a new master at any time.
+        if self.master.knows_service(f"{self.name}/get_loggers"):
             return False
         registration = self._rospy.impl.registration
         topics, services = registration.get_topic_manager(), registration.get_service_manager()

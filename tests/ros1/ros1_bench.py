@@ -1,0 +1,235 @@
+"""A ROS 1 master of the test's own, programs around it, and a graph with a thread."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import json
+import os
+import queue
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from concurrent.futures import Future
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from volery.bridges.ros1_environment import rospy_is_installed
+from volery.graph.graph import Graph
+from volery.graph.messages import Clock, time_from_ns
+from volery.graph.session import Gateway
+
+HERE = Path(__file__).parent
+CLOCK = "rosgraph_msgs/msg/Clock"
+SYSTEM_PYTHON = "/usr/bin/python3"
+_TOOLS = ("rosmaster", "rostopic", "rosservice", "rosbag")
+
+
+def require_ros1():
+    """Skip the tests of a module where ROS 1 is not installed."""
+    missing = [tool for tool in _TOOLS if shutil.which(tool) is None]
+    if not rospy_is_installed():
+        missing.insert(0, "rospy")
+    if missing:
+        pytest.skip(f"no {', '.join(missing)}: see .ci/install_ros1", allow_module_level=True)
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def wait_until(condition, seconds=10.0):
+    """Whether a condition comes true in time."""
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+class Master:
+    """A rosmaster on loopback, and the environment of its nodes, which is set in this process."""
+
+    def __init__(self):
+        self._port = free_port()
+        self._folder = tempfile.mkdtemp(prefix="volery-ros1-")
+        self._process = None
+        self.uri = f"http://127.0.0.1:{self._port}"
+        os.environ.update(
+            ROS_MASTER_URI=self.uri,
+            ROS_IP="127.0.0.1",
+            ROS_HOSTNAME="127.0.0.1",
+            ROS_HOME=self._folder,
+            ROS_LOG_DIR=self._folder,
+        )
+
+    def start(self):
+        self._process = subprocess.Popen(
+            ["rosmaster", "--core", "-p", str(self._port)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+        def answers():
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self._port)):
+                return True
+
+        assert wait_until(answers)
+
+    def stop(self):
+        if self._process is not None:
+            end(self._process)
+            self._process = None
+
+    def close(self):
+        self.stop()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+@cache
+def shared_master():
+    """The process's master: rospy stays with the first one that it meets."""
+    master = Master()
+    atexit.register(master.close)
+    master.start()
+    return master
+
+
+def end(process):
+    """End a process by its own id, and wait until it has gone."""
+    if process.poll() is None:
+        process.terminate()
+        try:
+            process.wait(3.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait(3.0)
+
+
+def tool(*command, seconds=15.0):
+    """What a command of ROS prints."""
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=seconds, check=False, env=os.environ.copy()
+    )
+    return done.stdout + done.stderr
+
+
+class Program:
+    """A program that prints JSON values, one a line; use it as a context manager."""
+
+    def __init__(self, *command):
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=HERE
+        )
+        self._lines = queue.SimpleQueue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            if line.startswith(("[", '"', "{")):
+                with contextlib.suppress(ValueError):
+                    self._lines.put(json.loads(line))
+        self._lines.put(EOFError())
+
+    def next(self, seconds=10.0):
+        """The next value."""
+        value = self._lines.get(timeout=seconds)
+        if isinstance(value, EOFError):
+            raise value
+        return value
+
+    def tell(self, line):
+        self.process.stdin.write(f"{line}\n")
+        self.process.stdin.flush()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()  # rospy takes seconds to leave in good order
+        self.process.wait(3.0)
+        self._reader.join(3.0)
+        self.process.stdin.close()
+        self.process.stdout.close()
+
+
+def peer(*arguments):
+    """A plain rospy program that has begun."""
+    return Program(SYSTEM_PYTHON, str(HERE / "peer.py"), *arguments)
+
+
+def ours(script):
+    """A program of this project in a process of its own."""
+    return Program(sys.executable, str(HERE / script))
+
+
+class LiveGraph:
+    """A graph with a thread that does what is posted, as a simulation has one."""
+
+    def __init__(self):
+        self.graph = Graph(time.time_ns)
+        self.gateway = Gateway(self.graph, self.post)
+        self._posted = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def post(self, action):
+        future = Future()
+        self._posted.put((action, future))
+        return future
+
+    def do(self, action):
+        """Have something done in the graph's thread and wait for it."""
+        return self.post(action).result(10.0)
+
+    def publisher(self, topic, msgtype, **options):
+        """A function that publishes."""
+        made = self.graph.advertise(topic, msgtype, **options)
+        return lambda message: self.do(lambda: made.publish(message))
+
+    def collect(self, topic, msgtype):
+        """A list that fills with the messages of a topic."""
+        seen = []
+        self.graph.subscribe(topic, lambda published: seen.append(published.message), msgtype)
+        return seen
+
+    @contextlib.contextmanager
+    def clock(self, period_s=0.02):
+        """Publishes `/clock` meanwhile, in step with the computer's."""
+        publish, stop, start = self.publisher("/clock", CLOCK), threading.Event(), time.monotonic()
+
+        def tick():
+            while not stop.wait(period_s):
+                publish(Clock(time_from_ns(int((time.monotonic() - start) * 1e9))))
+
+        ticking = threading.Thread(target=tick)
+        ticking.start()
+        try:
+            yield
+        finally:
+            stop.set()
+            ticking.join()
+
+    def _run(self):
+        while (job := self._posted.get()) is not None:
+            action, future = job
+            try:
+                result = action()
+                self.graph.deliver()
+                future.set_result(result)
+            except Exception as error:
+                future.set_exception(error)
+
+    def close(self):
+        self._posted.put(None)
+        self._thread.join()

@@ -1,0 +1,391 @@
+"""The simulation in a real ROS 1 graph: Debian's tools and plain rospy programs around it."""
+
+from __future__ import annotations
+
+import gc
+import re
+import sys
+import threading
+
+import numpy as np
+import pytest
+from ros1_bench import (
+    LiveGraph,
+    ours,
+    peer,
+    require_ros1,
+    shared_master,
+    tool,
+    wait_until,
+)
+from rosbags.highlevel import AnyReader
+
+from volery.bridges.doors import Doors
+from volery.bridges.ros1 import Ros1Door
+from volery.bridges.ros1_environment import load_rospy
+from volery.bridges.ros1_node import join_ros1
+from volery.core.errors import BridgeError, GraphError
+from volery.graph.messages import (
+    Header,
+    String,
+    TFMessage,
+    Time,
+    Twist,
+    Vector3,
+    message_type,
+)
+from volery.graph.reply import Reply
+
+require_ros1()
+pytestmark = [  # rospy uses what is deprecated and forgets to close sockets
+    pytest.mark.filterwarnings("ignore:notifyAll:DeprecationWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+STRING = "std_msgs/msg/String"
+HEADER = "std_msgs/msg/Header"
+TWIST = "geometry_msgs/msg/Twist"
+TRIGGER = "std_srvs/srv/Trigger"
+Triggered = message_type(f"{TRIGGER}_Response")
+UNICODE = "Grüße, 無人機 🚁"
+
+
+@pytest.fixture(scope="module")
+def master():
+    return shared_master()
+
+
+@pytest.fixture(scope="module")
+def live(master):
+    live = LiveGraph()
+    with live.clock():
+        yield live
+    live.close()
+    gc.collect()
+
+
+@pytest.fixture(scope="module")
+def door(live, master):
+    door = Ros1Door(use_sim_time=True, remote_services={"/remote": TRIGGER})
+    with Doors(live.gateway) as doors:
+        doors.open(door)
+        yield door
+    assert "/use_sim_time" not in tool("rosparam", "list")
+
+
+@pytest.fixture
+def registered(door, live):
+    """Waits until the door has registered a topic or service of the graph."""
+
+    def wait(name, method="getTopicTypes"):
+        node = join_ros1("volery")
+
+        def known():
+            if method == "getTopicTypes":
+                return name in dict(node.master.ask(method))
+            try:
+                return bool(node.master.ask("lookupService", name))
+            except BridgeError:
+                return False
+
+        assert wait_until(known)
+
+    return wait
+
+
+def wanted(live, topic):
+    """Whether somebody subscribes to a topic of the graph."""
+    return any(t.name == topic and t.subscribers for t in live.graph.topics())
+
+
+def test_topics_are_listed_with_their_types(live, registered):
+    live.publisher("/uav1/listed", "sensor_msgs/msg/LaserScan")
+    live.publisher("/map_tree", "octomap_msgs/msg/Octomap")  # no package of it is installed
+    registered("/uav1/listed")
+    registered("/map_tree")
+    listed = tool("rostopic", "list", "-v")
+    assert "/uav1/listed [sensor_msgs/LaserScan] 1 publisher" in listed
+    assert "/map_tree [octomap_msgs/Octomap] 1 publisher" in listed
+    assert "/use_sim_time" in tool("rosparam", "list")
+
+
+def test_nothing_is_taken_from_the_graph_while_nobody_listens(live, registered):
+    publish = live.publisher("/idle", STRING)
+    registered("/idle")
+    assert not wanted(live, "/idle")
+    with peer("listen", "/idle", "--count=1") as listener:
+        assert listener.next() == "ready"
+        assert wait_until(lambda: wanted(live, "/idle"))
+        publish(String(UNICODE))
+        assert listener.next() == [UNICODE, "0", "/volery"]
+    assert wait_until(lambda: not wanted(live, "/idle"))
+
+
+def test_clock_and_transforms(live, registered):
+    transforms = live.publisher("/tf_static", "tf2_msgs/msg/TFMessage", latched=True)
+    transforms(TFMessage([]))
+    registered("/tf_static")
+    assert re.search(r"secs: \d+\n\s+nsecs:\s+\d+\n", tool("rostopic", "echo", "-n1", "/clock"))
+    assert "transforms: []" in tool("rostopic", "echo", "-n1", "/tf_static")
+
+
+def test_rates_are_measured(live, registered):
+    publish = live.publisher("/rated", STRING)
+    registered("/rated")
+    stop = threading.Event()
+
+    def talk():
+        while not stop.wait(0.02):
+            publish(String("x"))
+
+    talking = threading.Thread(target=talk)
+    talking.start()
+    try:
+        command = ("timeout", "-sINT", "3", "rostopic", "hz", "--wall-time", "-w20", "/rated")
+        measured = re.findall(r"average rate: ([\d.]+)", tool(*command))
+    finally:
+        stop.set()
+        talking.join()
+    assert 30.0 < float(measured[-1]) < 51.0
+
+
+def test_sequence_numbers_count_what_was_sent(live, registered):
+    publish = live.publisher("/counted", HEADER)
+    registered("/counted")
+    with peer("headers", "/counted", "--count=3") as listener:
+        assert listener.next() == "ready"
+        assert wait_until(lambda: wanted(live, "/counted"))
+        for k in range(3):
+            publish(Header(Time(k, 7), "map"))
+        assert [listener.next() for _ in range(3)] == [
+            [k, k * 1_000_000_000 + 7, "map"] for k in range(3)
+        ]
+
+
+def test_a_wrong_md5_sum_is_refused_and_others_are_served(live, registered):
+    publish = live.publisher("/summed", STRING)
+    registered("/summed")
+    with peer("listen", "/summed", "--altered") as wrong, peer("listen", "/summed") as right:
+        assert wrong.next() == "ready"
+        assert right.next() == "ready"
+        assert wait_until(lambda: wanted(live, "/summed"))
+        publish(String("fits"))
+        assert right.next()[0] == "fits"
+        with pytest.raises(Exception):  # noqa: B017, PT011
+            wrong.next(0.5)
+
+
+def test_the_late_get_what_was_latched_each_publisher_s_own(live, registered):
+    first = live.publisher("/latched", STRING, latched=True)
+    second = live.publisher("/latched", STRING, latched=True)
+    first(String("old"))
+    first(String("first"))
+    second(String("second"))
+    registered("/latched")
+    for _ in range(2):
+        with peer("listen", "/latched", "--count=2") as late:
+            assert late.next() == "ready"
+            got = [late.next() for _ in range(2)]
+        assert sorted(text for text, _, _ in got) == ["first", "second"]
+        assert {latching for _, latching, _ in got} == {"1"}
+    with peer("listen", "/latched", "--count=5") as early:
+        assert early.next() == "ready"
+        assert {early.next()[0] for _ in range(2)} == {"first", "second"}
+        with peer("listen", "/latched", "--count=2") as later:
+            assert later.next() == "ready"
+            assert {later.next()[0] for _ in range(2)} == {"first", "second"}
+        first(String("new"))
+        assert early.next()[0] == "new"  # and nothing twice
+
+
+def test_a_slow_reader_delays_nobody(live, registered):
+    publish = live.publisher("/flood", STRING)
+    registered("/flood")
+    with peer("hang", "/flood") as slow, peer("listen", "/flood", "--count=1000000") as quick:
+        assert slow.next() == "ready"
+        assert quick.next() == "ready"
+        assert wait_until(lambda: wanted(live, "/flood"))
+        threading.Event().wait(0.5)
+        big = "x" * 200_000
+        for _ in range(100):
+            publish(String(big))
+        publish(String("last"))
+        last = ""
+        while last != "last":
+            last = quick.next()[0]
+
+
+def subscribed():
+    """Topics with subscribers in ROS 1, and who they are."""
+    return join_ros1("volery").master.ask("getSystemState")[1]
+
+
+def test_commands_come_in_and_do_not_come_back(live, registered):
+    live.publisher("/uav1/cmd_vel", TWIST)  # the graph may have publishers of its own
+    seen = live.collect("/uav1/cmd_vel", TWIST)
+    registered("/uav1/cmd_vel")
+    assert wait_until(lambda: "/uav1/cmd_vel" in dict(subscribed()))
+    twist = "{linear: {x: 1.5}, angular: {z: -0.5}}"
+    echo = threading.Thread(
+        target=lambda: heard.append(tool("timeout", "3", "rostopic", "echo", "/uav1/cmd_vel"))
+    )
+    heard = []
+    echo.start()
+    kind = "geometry_msgs/Twist"
+    tool("timeout", "-sINT", "2", "rostopic", "pub", "-r5", "/uav1/cmd_vel", kind, twist)
+    echo.join()
+    assert len(seen) >= 3
+    assert seen[0] == Twist(Vector3(1.5, 0.0, 0.0), Vector3(0.0, 0.0, -0.5))
+    assert heard[0].count("linear") <= len(seen)  # each once
+
+
+def test_topics_without_publishers_come_in_as_they_appear(live, door):
+    with peer("talk", "/from_outside") as talker:
+        assert talker.next() == "ready"
+        seen = live.collect("/from_outside", STRING)
+        talked = 0
+        while not seen and talked < 100:
+            talker.tell(f"{talked} {UNICODE}")
+            talked += 1
+            threading.Event().wait(0.05)
+        assert seen[0].data.endswith(UNICODE)
+    assert "/from_outside" in {t for s in live.gateway.sessions() for t in s.publishes}
+
+
+def test_services_of_the_graph(live, registered):
+    live.graph.offer("/trigger", TRIGGER, lambda _request: Triggered(True, f"done, {UNICODE}"))
+    bool_response = message_type("std_srvs/srv/SetBool_Response")
+    live.graph.offer("/set", "std_srvs/srv/SetBool", lambda q: bool_response(q.data, f"{q.data}"))
+
+    def broken(_request):
+        raise GraphError("out of order")
+
+    live.graph.offer("/broken", TRIGGER, broken)
+    registered("/broken", "lookupService")
+    assert "success: True" in tool("rosservice", "call", "/trigger")
+    assert "std_srvs/Trigger" in tool("rosservice", "type", "/trigger")
+    assert 'message: "True"' in tool("rosservice", "call", "/set", "data: true")
+    assert "out of order" in tool("rosservice", "call", "/broken")
+    with peer("call", "/trigger") as caller:
+        assert caller.next() == [True, f"done, {UNICODE}"]
+    with peer("call", "/trigger", "--altered") as caller:
+        assert "md5sums do not match" in caller.next()
+    live.graph.withdraw("/broken")
+    assert wait_until(lambda: "/broken" not in tool("rosservice", "list"))
+
+
+def test_services_of_ros1_for_the_graph(live, door):
+    def call():
+        come, got = threading.Event(), []
+        reply = Reply(got.append, got.append)
+        reply.when_done(come.set)
+        live.do(lambda: live.graph.call_async("/remote", None, reply))
+        assert come.wait(10.0)
+        wait_until(lambda: got)
+        return got[0]
+
+    assert isinstance(call(), GraphError)
+    with peer("serve", "/remote") as server:
+        assert server.next() == "ready"
+        assert call().message == "from rospy, übrigens"
+
+
+def test_a_bag_is_recorded(live, registered, tmp_path):
+    scans = live.publisher("/uav1/recorded", HEADER)
+    kept = live.publisher("/map_recorded", "octomap_msgs/msg/Octomap", latched=True)
+    octomap = message_type("octomap_msgs/msg/Octomap")
+    tree = np.arange(-50, 50, dtype=np.int8)
+    kept(octomap(Header(Time(3, 4), "map"), True, "OcTree", 0.25, tree))
+    registered("/uav1/recorded")
+    registered("/map_recorded")
+    bag = tmp_path / "flight.bag"
+    done = []
+    command = (
+        "rosbag",
+        "record",
+        "-O",
+        str(bag),
+        "--duration=3",
+        "/uav1/recorded",
+        "/map_recorded",
+    )
+    recording = threading.Thread(target=lambda: done.append(tool(*command)))
+    recording.start()
+    assert wait_until(lambda: wanted(live, "/uav1/recorded"))
+    for k in range(5):
+        scans(Header(Time(k, 0), "laser"))
+    recording.join()
+    with AnyReader([bag]) as reader:
+        read = [(c.topic, reader.deserialize(d, c.msgtype)) for c, _, d in reader.messages()]
+    headers = [message for topic, message in read if topic == "/uav1/recorded"]
+    assert [message.stamp.sec for message in headers] == [0, 1, 2, 3, 4]
+    (map_read,) = [message for topic, message in read if topic == "/map_recorded"]
+    np.testing.assert_array_equal(map_read.data, tree)
+
+
+def test_one_node_a_process(door):
+    with pytest.raises(BridgeError, match="one a process"):
+        join_ros1("another")
+
+
+def test_a_program_of_ours(live, registered):
+    live.publisher("/latched", STRING, latched=True)
+    live.graph.offer("/trigger_ours", TRIGGER, lambda _: Triggered(True, "yes"))
+    seen = live.collect("/from_program", STRING)
+    headers = live.collect("/headers_in", HEADER)
+    registered("/latched")
+    del headers
+    if not live.graph.has_service("/trigger"):
+        live.graph.offer("/trigger", TRIGGER, lambda _: Triggered(True, f"done, {UNICODE}"))
+    registered("/trigger", "lookupService")
+    with ours("client_program.py") as program:
+        text, received = program.next(20.0)
+        assert text in {"new", "second"}
+        assert received >= 1
+        assert program.next() == "topic '/headers_in' carries std_msgs/msg/Header"
+        assert program.next() == f"done, {UNICODE}"
+        assert "nobody offers" in program.next()
+        assert program.next() == "offered"
+        assert wait_until(lambda: [m.data for m in seen] == ["published"])
+        assert "answered" in tool("rosservice", "call", "/program")
+        program.tell("end")
+        assert program.next() == []
+
+
+def test_a_master_that_began_anew_is_told_everything(live, master, registered):
+    publish = live.publisher("/lasting", STRING)
+    registered("/lasting")
+    master.stop()
+    master.start()
+    live.publisher("/appeared_meanwhile", STRING)
+    registered("/lasting")
+    registered("/appeared_meanwhile")
+    registered("/trigger", "lookupService")
+    with peer("listen", "/lasting") as listener:
+        assert listener.next() == "ready"
+        assert wait_until(lambda: wanted(live, "/lasting"))
+        publish(String("still here"))
+        assert listener.next()[0] == "still here"
+    assert wait_until(lambda: "/use_sim_time" in tool("rosparam", "list"))
+
+
+def test_no_master_is_a_clear_refusal(tmp_path):
+    program = (
+        "from volery.bridges.ros1_node import join_ros1\n"
+        "from volery.core.errors import BridgeError\n"
+        "try: join_ros1('late', master_uri='http://127.0.0.1:9')\n"
+        "except BridgeError as error: print(error)\n"
+        "try: join_ros1('late', master_uri='nonsense')\n"
+        "except BridgeError as error: print(error)\n"
+        "try: join_ros1('late', master_uri='http://127.0.0.1:9', host='10.0.0.1')\n"
+        "except BridgeError as error: print(error)\n"
+    )
+    said = tool(sys.executable, "-c", program)
+    assert "no ROS master answers at http://127.0.0.1:9" in said
+    assert "'nonsense' is no address of a ROS master" in said
+    assert "allow that with" in said
+
+
+def test_numpy_stays_the_environments_own():
+    load_rospy()
+    assert "dist-packages" not in np.__file__
