@@ -42,6 +42,8 @@ class Outbox:
         self._session = session
         self.payloads = payloads
         """How messages become bytes; an endpoint's handshake may change it."""
+        self.ends_in_nul = False
+        """Whether the peer expects its commands to end in a NUL."""
         self._wake = wake
         self._on_error = on_error
         self._commands: deque[bytes] = deque()

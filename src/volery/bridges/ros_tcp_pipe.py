@@ -18,8 +18,8 @@ from volery.core.errors import BridgeError
 _BATCHES_A_TURN = 16
 """After so many others have their turn."""
 _FAREWELL_S = 1.0
-_UNANSWERED_MS = 15_000
-"""So long may sent bytes stay without acknowledgement before the peer's machine counts as dead."""
+_PROBES = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
+"""The kernel asks a peer who is silent for 5 s, every 5 s, at most 3 times, whether it lives."""
 
 
 class Pipe:
@@ -55,8 +55,9 @@ class Pipe:
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        if hasattr(socket, "TCP_USER_TIMEOUT"):
-            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNANSWERED_MS)
+        for option, value in _PROBES.items():
+            if hasattr(socket, option):
+                sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
         self._loop.add_reader(sock, self._readable)
 
     def flush(self) -> None:

@@ -1,11 +1,8 @@
 """What one client of our ROS-TCP endpoint says, and what it is answered; without a socket.
 
 Whatever a client does wrong is told to it with `__error` and harms nobody else.
-
-A service that fails, or that nobody offers, is answered with `__error` and then with a `__response`
-of zero bytes: Unity's Connector knows no failure and would wait for ever. Zero bytes make its
-deserializer throw into the code that awaits the response (read in `ROSConnection.cs` and
-`MessageDeserializer.cs`, v0.7.0; a response type without fields arrives as if nothing had failed).
+A service that fails, or that nobody offers, is answered with `__error`, and with the empty response
+that `ros_tcp_calls` explains.
 """
 
 from __future__ import annotations
@@ -16,6 +13,7 @@ from typing import Any
 
 from volery.bridges import ros_tcp
 from volery.bridges.ros_tcp import Frame, Generation, number_field, text_field
+from volery.bridges.ros_tcp_calls import Calls
 from volery.bridges.ros_tcp_inlet import Inlet
 from volery.bridges.ros_tcp_outbox import Outbox
 from volery.bridges.ros_tcp_payloads import (
@@ -31,8 +29,6 @@ from volery.graph.session import DEFAULT_DEPTH, Gateway, Wake
 MOST_DEPTH = 1000
 MOST_REGISTRATIONS = 10_000
 """Topics and services of one client."""
-MOST_CALLS = 1000
-"""Calls of one client that may be open at once."""
 _FIRST_REQUEST = 1001
 """As ROS-TCP-Endpoint counts."""
 
@@ -60,7 +56,7 @@ class EndpointSession:
         self._called: dict[str, str] = {}
         self._offered: set[str] = set()
         self._requests = _Requests()
-        self._calls: set[Reply] = set()
+        self._calls = Calls(self._session, self.outbox, self.complain)
         self._body: tuple[str, int, Body] | None = None
         self._commands: dict[str, Callable[[Fields], None]] = {
             "__publish": self._publish,
@@ -165,54 +161,13 @@ class EndpointSession:
         self._body = ("request", number, lambda frame: self._call(number, frame))
 
     def _call(self, number: int, frame: Frame) -> None:
-        """Call a service of the graph for the client."""
-        name = frame.destination
-
-        def fail(error: Exception) -> None:
-            self.complain(f"service '{name}': {error}")
-            self._respond(number, name, b"")
-
-        try:
-            srvtype = self._type_called(name)
-            request = self._payloads.decode(frame.payload, f"{srvtype}_Request")
-            if len(self._calls) >= MOST_CALLS:
-                raise BridgeError(f"over {MOST_CALLS} calls at once")
-        except (BridgeError, GraphError) as error:
-            fail(error)
-            return
-
-        def respond(response: Any) -> None:
-            try:
-                body = self._payloads.encode(response, f"{srvtype}_Response")
-            except GraphError as error:
-                fail(error)
-            else:
-                self._respond(number, name, body)
-
-        reply = Reply(respond, fail)
-        self._calls.add(reply)
-        reply.when_done(lambda: self._calls.discard(reply))
-        self._session.call(absolute(name), request, reply)
-
-    def _type_called(self, name: str) -> str:
-        offered = self._session.graph.services().get(absolute(name))
-        called = self._called.get(name)
-        if offered is None:
-            raise GraphError("nobody offers it")
-        if called is not None and called != offered:
-            raise GraphError(f"its type is {offered}, not {called}")
-        return offered
-
-    def _respond(self, number: int, name: str, body: ros_tcp.Bytes) -> None:
-        header = ros_tcp.command("response", srv_id=number)
-        self.outbox.put(header + ros_tcp.frame(name, body))
+        self._calls.call(number, frame, self._called.get(frame.destination))
 
     def _lack_body(self, what: str, number: int) -> None:
         """Unity's queues may drop a body behind its header."""
         self.complain(f"__{what} {number} came without its body")
         if what == "request":
-            # a body to "" would be taken for a keepalive
-            self._respond(number, "/", b"")
+            self._calls.respond(number, "/", b"")
 
     # ---------------------------------------------------------- services that the client offers
 

@@ -1,0 +1,319 @@
+"""The ROS-TCP connector against our own endpoint on another graph, and against plain sockets."""
+
+from __future__ import annotations
+
+import json
+import socket
+import struct
+import threading
+import time
+
+import numpy as np
+import pytest
+from ros_tcp_client import Loop, cdr_string, frame, ros1_string, until
+
+from volery.bridges.doors import Doors
+from volery.bridges.ros_tcp_connector import RosTcpConnector
+from volery.bridges.ros_tcp_endpoint import RosTcpEndpoint
+from volery.core.errors import BridgeError
+from volery.graph.messages import String, Twist, Vector3, message_type
+from volery.graph.reply import Reply
+
+STRING = "std_msgs/msg/String"
+TWIST = "geometry_msgs/msg/Twist"
+TRIGGER = "std_srvs/srv/Trigger"
+Response = message_type(f"{TRIGGER}_Response")
+
+
+@pytest.fixture
+def here():
+    """The simulation's graph, with its doors."""
+    loop = Loop()
+    with Doors(loop.gateway) as loop.doors:
+        yield loop
+    loop.close()
+
+
+@pytest.fixture
+def there():
+    """Somebody else's graph, with an endpoint."""
+    loop = Loop()
+    with Doors(loop.gateway) as loop.doors:
+        yield loop
+    loop.close()
+
+
+def join(here, there, generation="ros1", **options):
+    endpoint = RosTcpEndpoint(port=0, generation=generation)
+    there.doors.open(endpoint)
+    connector = RosTcpConnector(port=endpoint.port, **options)
+    here.doors.open(connector)
+    until(lambda: connector.state == generation)
+    return endpoint, connector
+
+
+def collect(loop, topic, msgtype=STRING):
+    seen = []
+    loop.do(lambda: loop.graph.subscribe(topic, seen.append, msgtype))
+    return seen
+
+
+def topics(loop):
+    return {t.name: t for t in loop.graph.topics()}
+
+
+@pytest.mark.parametrize("generation", ["ros1", "ros2"])
+def test_topics_and_commands_cross(here, there, generation):
+    out = here.graph.advertise("/uav1/status", STRING)
+    commands = collect(here, "/uav1/cmd_vel", TWIST)
+    join(here, there, generation)
+    seen = collect(there, "/uav1/status")
+    until(lambda: topics(there)["/uav1/status"].publishers == 1)
+    here.publish(out, String("flies"))
+    until(lambda: seen)
+    assert seen[0].message.data == "flies"
+    until(lambda: topics(there).get("/uav1/cmd_vel"))
+    zero = Vector3(0.0, 0.0, 0.0)
+    there.publish(there.graph.advertise("/uav1/cmd_vel", TWIST), Twist(Vector3(1.5, 0, 0), zero))
+    until(lambda: commands)
+    assert commands[0].message.linear.x == 1.5
+
+
+def test_topics_that_begin_later_cross_too(here, there):
+    join(here, there)
+    seen = collect(there, "/late")
+    out = here.graph.advertise("/late", STRING)
+    until(lambda: topics(there)["/late"].publishers == 1)
+    here.publish(out, String("x"))
+    until(lambda: seen)
+
+
+def test_nothing_comes_back(here, there):
+    """Commands received are not sent, and what was sent is not received."""
+    commands = collect(here, "/uav1/cmd_vel", TWIST)
+    out = here.graph.advertise("/uav1/status", STRING)
+    own = collect(here, "/uav1/status")
+    join(here, there, subscribe=["/uav*/cmd_vel", "/uav*/status"])
+    until(lambda: "/uav1/cmd_vel" in topics(there))
+    echoes = collect(there, "/uav1/cmd_vel", TWIST)
+    zero = Vector3(0.0, 0.0, 0.0)
+    command = there.graph.advertise("/uav1/cmd_vel", TWIST)
+    for _ in range(5):
+        there.publish(command, Twist(zero, zero))
+        here.publish(out, String("x"))
+    until(lambda: len(commands) == 5)
+    time.sleep(0.7)
+    assert len(echoes) == 5
+    assert len(commands) == 5
+    assert len(own) == 5
+
+
+def test_only_what_is_selected_crosses(here, there):
+    for topic in ("/uav1/odom", "/uav1/camera/image", "/clock"):
+        here.graph.advertise(topic, STRING)
+    here.graph.offer("/uav1/land", TRIGGER, lambda _request: Response(True, ""))
+    join(here, there, publish=["/uav1/*"], services=[])
+    until(lambda: "/uav1/camera/image" in topics(there))
+    assert set(topics(there)) == {"/uav1/odom", "/uav1/camera/image"}
+    assert not there.graph.services()
+
+
+@pytest.mark.parametrize("generation", ["ros1", "ros2"])
+def test_services_can_be_called_from_there(here, there, generation):
+    here.graph.offer("/uav1/land", TRIGGER, lambda _request: Response(True, "down"))
+    join(here, there, generation)
+    until(lambda: there.graph.has_service("/uav1/land"))
+    answers, failures = [], []
+    reply = Reply(answers.append, failures.append)
+    there.do(lambda: there.graph.call_async("/uav1/land", None, reply))
+    until(lambda: answers)
+    assert answers[0].message == "down"
+
+
+def test_a_call_that_fails_here_fails_there(here, there):
+    def broken(_request):
+        raise ZeroDivisionError("oh")
+
+    here.graph.offer("/do", TRIGGER, broken)
+    _, connector = join(here, there)
+    until(lambda: there.graph.has_service("/do"))
+    failures = []
+    there.do(lambda: there.graph.call_async("/do", None, Reply(print, failures.append)))
+    until(lambda: failures)
+    assert any("oh" in note for note in connector.notes)
+
+
+def test_latched_messages_stay_latched(here, there):
+    here.publish(here.graph.advertise("/map", STRING, latched=True), String("kept"))
+    join(here, there)
+    until(lambda: "/map" in topics(there) and topics(there)["/map"].messages)
+    there.do(lambda: None)
+    seen = collect(there, "/map")
+    there.do(lambda: None)
+    until(lambda: seen)
+    assert seen[0].message.data == "kept"
+
+
+def test_it_connects_again_and_registers_again(here, there):
+    out = here.graph.advertise("/uav1/status", STRING)
+    endpoint, connector = join(here, there)
+    until(lambda: "/uav1/status" in topics(there))
+    there.doors.call(endpoint.stop())
+    until(lambda: connector.state == "not connected")
+    assert not here.gateway.sessions()
+    there.doors.open(RosTcpEndpoint(port=endpoint.port))
+    until(lambda: connector.state == "ros1")
+    seen = collect(there, "/uav1/status")
+    until(lambda: topics(there)["/uav1/status"].publishers == 1)
+    here.publish(out, String("again"))
+    until(lambda: seen)
+    assert any("has left" in note for note in connector.notes)
+
+
+def test_it_may_start_before_the_endpoint(here, there):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    connector = RosTcpConnector(port=port)
+    here.doors.open(connector)
+    until(lambda: connector.notes)
+    assert "cannot connect" in connector.notes[0]
+    assert "not connected" in connector.name
+    there.doors.open(RosTcpEndpoint(port=port))
+    until(lambda: connector.state == "ros1")
+
+
+def test_large_messages_cross(here, there):
+    from volery.graph.messages import header
+
+    msgtype = "sensor_msgs/msg/Image"
+    data = np.arange(8 << 20, dtype=np.uint8)
+    image = message_type(msgtype)(header(5, "c"), 1, len(data), "mono8", 0, len(data), data)
+    out = here.graph.advertise("/image", msgtype)
+    join(here, there)
+    seen = collect(there, "/image", msgtype)
+    until(lambda: topics(there)["/image"].publishers == 1)
+    here.publish(out, image)
+    until(lambda: seen)
+    assert np.array_equal(seen[0].message.data, data)
+
+
+class PlainEndpoint:
+    """An endpoint that says what the test says, and keeps what it is told."""
+
+    def __init__(self, *greeting):
+        self.server = socket.create_server(("127.0.0.1", 0))
+        self.port = self.server.getsockname()[1]
+        self.frames = []
+        self.sock = None
+        self._greeting = b"".join(greeting)
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def commands(self, name):
+        return [
+            json.loads(payload.rstrip(b"\0"))
+            for destination, payload in tuple(self.frames)
+            if destination == f"__{name}"
+        ]
+
+    def close(self):
+        self.server.close()
+        if self.sock is not None:
+            self.sock.close()
+
+    def _run(self):
+        self.sock, _ = self.server.accept()
+        self.sock.sendall(self._greeting)
+        file = self.sock.makefile("rb")
+        while True:
+            parts = []
+            for _ in range(2):
+                length = file.read(4)
+                if len(length) < 4:
+                    return
+                parts.append(file.read(struct.unpack("<I", length)[0]))
+            self.frames.append((parts[0].decode(), parts[1]))
+
+
+def handshake(metadata):
+    return frame("__handshake", json.dumps({"version": "v0.7.0", "metadata": metadata}).encode())
+
+
+@pytest.fixture
+def meet(here):
+    endpoints = []
+
+    def meet(*greeting, **options):
+        endpoint = PlainEndpoint(*greeting)
+        endpoints.append(endpoint)
+        connector = RosTcpConnector(port=endpoint.port, **options)
+        here.doors.open(connector)
+        return endpoint, connector
+
+    yield meet
+    for endpoint in endpoints:
+        endpoint.close()
+
+
+@pytest.mark.parametrize(("generation", "ending"), [("ROS1", b"}"), ("ROS2", b"\0")])
+def test_it_speaks_as_unity_does(here, meet, generation, ending):
+    here.graph.advertise("/out", STRING, latched=True)
+    collect(here, "/uav1/cmd_vel", TWIST)
+    here.graph.offer("/do", TRIGGER, lambda _request: Response(True, ""))
+    endpoint, _ = meet(handshake(json.dumps({"protocol": generation})))
+    until(lambda: endpoint.commands("unity_service"))
+    assert endpoint.frames[0] == ("", b"")
+    assert endpoint.frames[1][1].endswith(ending)
+    assert endpoint.commands("publish") == [
+        {"topic": "/out", "message_name": "std_msgs/String", "queue_size": 10, "latch": True}
+    ]
+    assert endpoint.commands("subscribe") == [
+        {"topic": "/uav1/cmd_vel", "message_name": "geometry_msgs/Twist"}
+    ]
+    assert endpoint.commands("unity_service") == [
+        {"topic": "/do", "message_name": "std_srvs/Trigger"}
+    ]
+
+
+def test_an_old_endpoint_without_handshake_is_one_of_ros_1(here, meet):
+    out = here.graph.advertise("/out", STRING)
+    endpoint, connector = meet(handshake_s=0.2)
+    until(lambda: endpoint.commands("publish"))
+    here.publish(out, String("x"))
+    until(lambda: ("/out", ros1_string("x")) in endpoint.frames)
+    assert any("no handshake" in note for note in connector.notes)
+
+
+def test_keepalives_each_idle_second(here, meet):
+    endpoint, _ = meet(handshake('{"protocol": "ROS1"}'))
+    until(lambda: endpoint.frames.count(("", b"")) >= 3, 6.0)
+
+
+def test_the_endpoints_words_are_kept_and_nonsense_is_survived(here, meet):
+    seen = collect(here, "/uav1/cmd_vel", TWIST)
+    endpoint, connector = meet(
+        handshake('{"protocol": "ROS2"}'),
+        frame("__error", b'{"text": "Unknown message class"}'),
+        frame("/nobody/asked", b"x"),
+        frame("__request", b"{bad"),
+        frame("__new_command", b"{}"),
+    )
+    until(lambda: endpoint.commands("subscribe"))
+    endpoint.sock.sendall(frame("/uav1/cmd_vel", cdr_string("no twist")))
+    endpoint.sock.sendall(frame("/uav1/cmd_vel", b"\0\1\0\0" + struct.pack("<6d", *range(6))))
+    until(lambda: seen)
+    assert seen[0].message.angular.z == 5.0
+    text = "\n".join(connector.notes)
+    for words in ("Unknown message class", "not subscribed", "no JSON", "geometry_msgs/msg/Twist"):
+        assert words in text
+
+
+@pytest.mark.parametrize("metadata", ["{bad", '{"protocol": "ROS3"}', "[]", '{"protocol": 1}'])
+def test_a_handshake_without_sense_ends_the_connection(meet, metadata):
+    _, connector = meet(handshake(metadata))
+    until(lambda: any("neither ROS1 nor ROS2" in note for note in connector.notes))
+    until(lambda: connector.state == "not connected")
+
+
+def test_a_port_must_be_one():
+    with pytest.raises(BridgeError, match="port"):
+        RosTcpConnector(port=0)
