@@ -356,8 +356,9 @@ def test_a_master_that_began_anew_is_told_everything(live, master, registered):
     publish = live.publisher("/lasting", STRING)
     registered("/lasting")
     master.stop()
-    master.start()
     live.publisher("/appeared_meanwhile", STRING)
+    threading.Event().wait(1.5)  # the door looks for topics and for the master
+    master.start()
     registered("/lasting")
     registered("/appeared_meanwhile")
     registered("/trigger", "lookupService")

@@ -119,6 +119,9 @@ class Ros1Door:
         bridge, count, away = self._bridge, 0, False
         while bridge is not None and not self._stopping.wait(_SURVEY_S) and bridge.node.alive:
             count += 1
+            if not threading.main_thread().is_alive():
+                bridge.close()  # else rospy's threads would keep the process from ending
+                return
             try:
                 if count % _MASTER_EACH == 0:
                     again = bridge.node.register_again()

@@ -222,6 +222,9 @@ class Ros1Client:
     def _watch(self) -> None:
         """Register again with a master that began anew."""
         while not self._closed.wait(_MASTER_EACH_S) and self._node.alive:
+            if not threading.main_thread().is_alive():
+                self.close()  # else rospy's threads would keep the process from ending
+                return
             try:
                 self._node.register_again()
             except (OSError, BridgeError):  # it is away

@@ -13,6 +13,7 @@ from volery.bridges.doors import check_address
 from volery.bridges.ros1_environment import load_rospy
 from volery.bridges.ros1_master import Ros1Master
 from volery.bridges.ros1_raw import raw_message_class, raw_service_class
+from volery.bridges.ros1_registrar import Ros1Registrar
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.ros1 import ros1_codec, ros2_name
 
@@ -34,6 +35,7 @@ class Ros1Node:
         self.name = name
         self.master = master
         self._rospy = rospy
+        self._registrar = Ros1Registrar(rospy, master, name)
 
     @property
     def alive(self) -> bool:
@@ -138,22 +140,7 @@ class Ros1Node:
 
     def register_again(self) -> bool:
         """Register all that there is if the master has forgotten; whether it had. `OSError`."""
-        # rospy registers this service when the node begins, and nothing else does so later: a master
-        # that knows it knows all, while new topics may come to a new master at any time.
-        if self.master.knows_service(f"{self.name}/get_loggers"):
-            return False
-        registration = self._rospy.impl.registration
-        topics, services = registration.get_topic_manager(), registration.get_service_manager()
-        kinds = registration.Registration
-        listeners = registration.get_registration_listeners()
-        for kind, names in (
-            (kinds.PUB, topics.get_publications()),
-            (kinds.SUB, topics.get_subscriptions()),
-            (kinds.SRV, services.get_services()),
-        ):
-            for name, what in names:
-                listeners.notify_added(name, what, kind)
-        return True
+        return self._registrar.register_again()
 
 
 def join_ros1(
