@@ -24,6 +24,9 @@ _ROOM_TO_STAND_M = 1.5
 _SINK_M = 0.002
 """Height above the ground at which a UAV is put down."""
 _DROP_M = 0.3
+"""A UAV that is put down no higher than this above the ground counts as standing."""
+_PRESSED_M = 0.02
+"""How deep feet sink in where a UAV has landed, and more."""
 _HINT = ' (placement = "nearest_free" finds a place by itself)'
 _CLIMB_LOOKS = 4
 """Heights at which `nearest_free` wants room, from the ground to the take-off altitude."""
@@ -130,6 +133,12 @@ def _nearest_free(
 def stands_on_ground(place: Array, airframe: Airframe, terrain: Terrain) -> bool:
     """Whether a UAV at `place` (3,) m stands, or falls so little that it may as well."""
     return bool(place[2] - _standing(place[:2], airframe, terrain)[2] < _DROP_M)
+
+
+def lifted(place: Array, airframe: Airframe, terrain: Terrain) -> Array:
+    """`place` (3,) m, with feet that stick in the ground as deep as those of one that lands out."""
+    standing = _standing(place[:2], airframe, terrain)
+    return standing if 0.0 < standing[2] - place[2] < _PRESSED_M else place
 
 
 def check_place(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from volery.core import rotations
 from volery.core.errors import CommandError, PlacementError
 from volery.engine.engine import Engine
-from volery.runtime.placement import Start, check_place, stands_on_ground
+from volery.runtime.placement import Start, check_place, lifted, stands_on_ground
 from volery.runtime.sensor_fitting import Fitted
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
@@ -45,9 +45,10 @@ class Relocator:
         position = np.asarray(position_map, dtype=np.float64)
         if position.shape != (3,) or not np.isfinite(position).all():
             raise PlacementError(f"a position is three finite numbers, not {position_map!r}")
+        fleet, start = self._engine.fleet, self._starts[row]
         try:
+            position = lifted(position, start.airframe, self._terrain)
             self._check(row, position)
-            fleet, start = self._engine.fleet, self._starts[row]
             in_air = not stands_on_ground(position, start.airframe, self._terrain)
             fleet.put(row, position, attitude, in_air=in_air)
         except CommandError as error:

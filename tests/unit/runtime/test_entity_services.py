@@ -1,0 +1,224 @@
+"""Entities by the standard: who is there, where, and putting them elsewhere."""
+
+import numpy as np
+import pytest
+from asking import ask, code_of
+
+OK, UNSUPPORTED, NOT_FOUND, FAILED, INVALID_POSE = 1, 0, 2, 4, 101
+UPRIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+
+
+@pytest.fixture
+def trio(simulate, flat_data):
+    """uav1 and uav2 stand at x = 0 and 20 m, uav3 hovers at 40 m; two types."""
+    flat_data["types"]["scout"] = {"airframe": "f450"}
+    flat_data["uavs"] = [
+        {"type": "f450", "count": 2, "position_m": [0.0, 0.0], "last_position_m": [20.0, 0.0]},
+        {"type": "scout", "position_m": [40.0, 0.0, 5.0]},
+    ]
+    return simulate(flat_data)
+
+
+def names(simulation, **filters):
+    response = ask(simulation, "/get_entities", filters=filters)
+    assert code_of(response) == OK, response.result.error_message
+    return list(response.entities)
+
+
+def put(simulation, name, position, **changes):
+    state = {"pose": {"position": dict(zip("xyz", position)), "orientation": UPRIGHT}}
+    fields = {"set_pose": True, **changes}
+    return ask(simulation, "/set_entity_state", entity=name, state=state, **fields)
+
+
+def test_all_are_listed_in_order(trio):
+    assert names(trio) == ["uav1", "uav2", "uav3"]
+
+
+@pytest.mark.parametrize(
+    ("pattern", "found"),
+    [
+        ("^uav[13]$", ["uav1", "uav3"]),
+        ("[[:digit:]]", ["uav1", "uav2", "uav3"]),
+        ("(v2|v3)", ["uav2", "uav3"]),
+        ("tree", []),
+    ],
+)
+def test_names_are_filtered_by_expressions(trio, pattern, found):
+    assert names(trio, filter=pattern) == found
+
+
+def test_tags_and_categories(trio):
+    assert names(trio, tags={"tags": ["scout", "other"]}) == ["uav3"]
+    assert names(trio, tags={"tags": ["scout", "other"], "filter_mode": 1}) == []
+    assert names(trio, tags={"tags": ["uav", "f450"], "filter_mode": 1}) == ["uav1", "uav2", "uav3"]
+    assert names(trio, categories=[{"category": 1}]) == ["uav1", "uav2", "uav3"]
+    assert names(trio, categories=[{"category": 2}, {"category": 5}]) == []
+
+
+def test_bounds_choose_what_reaches_into_them(trio):
+    box = [{"x": 30.0, "y": 1.0, "z": 1.0}, {"x": 10.0, "y": -1.0, "z": -1.0}]
+    assert names(trio, bounds={"type": 1, "points": box}) == ["uav2"]
+    ball = [{"x": 40.0, "y": 0.0, "z": 0.0}, {"x": 5.0, "y": 0.0, "z": 0.0}]
+    assert names(trio, bounds={"type": 3, "points": ball}) == ["uav3"]
+
+
+@pytest.mark.parametrize(
+    ("filters", "code"),
+    [
+        ({"filter": "(((" }, FAILED),
+        ({"filter": "a" * 300}, FAILED),
+        ({"bounds": {"type": 2}}, UNSUPPORTED),
+        ({"bounds": {"type": 9}}, FAILED),
+        ({"bounds": {"type": 1, "points": [{"x": 1.0}]}}, FAILED),
+        ({"bounds": {"type": 3, "points": [{"x": 1.0}, {"x": -1.0}]}}, FAILED),
+        ({"bounds": {"type": 3, "points": [{"x": float("nan")}, {"x": 1.0}]}}, FAILED),
+        ({"tags": {"tags": ["uav"], "filter_mode": 7}}, FAILED),
+    ],
+)
+def test_bad_filters_are_refused_with_a_reason(trio, filters, code):
+    for service in ("/get_entities", "/get_entities_states"):
+        response = ask(trio, service, filters=filters)
+        assert code_of(response) == code
+        assert response.result.error_message
+
+
+def test_states_are_true_ones_in_the_map(trio):
+    trio.run(0.2)
+    response = ask(trio, "/get_entity_state", entity="uav3")
+    position = response.state.pose.position
+    assert [position.x, position.y, position.z] == trio.uavs["uav3"].position_map.tolist()
+    assert response.state.header.frame_id == "map"
+    assert response.state.header.stamp.nanosec == 200_000_000
+    every = ask(trio, "/get_entities_states", filters={"filter": "uav[23]"})
+    assert list(every.entities) == ["uav2", "uav3"]
+    assert every.states[1].pose.position.x == position.x
+
+
+def test_info_and_bounds(trio):
+    info = ask(trio, "/get_entity_info", entity="uav3").info
+    assert info.category.category == 1
+    assert "scout" in info.tags
+    bounds = ask(trio, "/get_entity_bounds", entity="uav3").bounds
+    assert bounds.type == 1
+    upper, lower = bounds.points
+    assert upper.x > 0.1 > -0.1 > lower.x
+    assert upper.z > lower.z
+
+
+@pytest.mark.parametrize("service", ["state", "info", "bounds"])
+def test_unknown_entities(trio, service):
+    response = ask(trio, f"/get_entity_{service}", entity="nobody")
+    assert code_of(response) == NOT_FOUND
+    assert "nobody" in response.result.error_message
+
+
+def test_a_uav_that_stands_is_put_into_the_air_and_hovers(trio):
+    assert code_of(put(trio, "uav1", (0.0, 10.0, 3.0))) == OK
+    trio.run(3.0)
+    uav = trio.uavs["uav1"]
+    assert np.linalg.norm(uav.position_map - [0.0, 10.0, 3.0]) < 0.3
+    assert uav.mode.name == "HOLD"
+    uav.land()
+    trio.run(10.0)
+    assert uav.mode.name == "LANDED"
+    assert code_of(put(trio, "uav1", (5.0, 10.0, uav.position_map[2]))) == OK
+    trio.run(0.5)
+    assert uav.mode.name == "LANDED"
+    assert not trio.events[-1].kind.name.startswith("COLL")
+
+
+def test_a_uav_that_flies_holds_where_it_was_put(trio):
+    trio.uavs["uav3"].command_velocity([3.0, 0.0, 0.0])
+    trio.run(0.4)
+    assert code_of(put(trio, "uav3", (-30.0, -30.0, 8.0))) == OK
+    trio.run(5.0)
+    uav = trio.uavs["uav3"]
+    assert np.linalg.norm(uav.position_map - [-30.0, -30.0, 8.0]) < 3.0  # it had to brake
+    assert np.linalg.norm(uav.velocity_map) < 0.1
+
+
+def test_twist_alone_and_both(trio):
+    fields = {"state": {"twist": {"linear": {"x": 2.0}}}, "set_twist": True}
+    assert code_of(ask(trio, "/set_entity_state", entity="uav3", **fields)) == OK
+    np.testing.assert_allclose(trio.uavs["uav3"].velocity_map, [2.0, 0.0, 0.0])
+    trio.run(4.0)
+    assert trio.uavs["uav3"].position_map[0] > 40.2
+    assert np.linalg.norm(trio.uavs["uav3"].velocity_map) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("position", "reason"),
+    [
+        ((20.0, 0.2, 0.3), "uav2"),
+        ((0.0, 10.0, -1.0), "under the ground"),
+        ((9999.0, 0.0, 10.0), "beyond the terrain"),
+        ((float("nan"), 0.0, 10.0), "finite"),
+    ],
+)
+def test_places_that_are_none(trio, position, reason):
+    before = trio.uavs["uav1"].position_map
+    response = put(trio, "uav1", position)
+    assert code_of(response) == INVALID_POSE
+    assert reason in response.result.error_message
+    np.testing.assert_array_equal(trio.uavs["uav1"].position_map, before)
+
+
+def test_no_place_inside_a_tree(simulate, wood_data):
+    simulation = simulate(wood_data)
+    x, y, _z = simulation.forest.position_map[7]
+    height = float(simulation.terrain.height(x, y)) + 0.5
+    response = put(simulation, "uav1", (float(x), float(y), height))
+    assert code_of(response) == INVALID_POSE
+    assert "tree" in response.result.error_message
+
+
+def test_states_that_cannot_be_set(trio):
+    assert code_of(put(trio, "nobody", (0.0, 0.0, 5.0))) == NOT_FOUND
+    assert code_of(put(trio, "uav3", (0.0, 0.0, 5.0), set_pose=False)) == FAILED
+    assert code_of(put(trio, "uav3", (0.0, 0.0, 5.0), set_acceleration=True)) == UNSUPPORTED
+    fields = {"state": {"header": {"frame_id": "odom"}}, "set_pose": True}
+    assert code_of(ask(trio, "/set_entity_state", entity="uav3", **fields)) == FAILED
+    fields = {"state": {"twist": {"linear": {"x": float("inf")}}}, "set_twist": True}
+    assert code_of(ask(trio, "/set_entity_state", entity="uav3", **fields)) == FAILED
+    crooked = {"pose": {"position": {"x": 0.0, "y": 9.0, "z": 5.0}, "orientation": {"w": 0.0}}}
+    response = ask(trio, "/set_entity_state", entity="uav3", state=crooked, set_pose=True)
+    assert code_of(response) == INVALID_POSE
+
+
+def test_a_set_state_is_the_same_again(simulate, flat_data):
+    def digest():
+        simulation = simulate(flat_data)
+        simulation.enable_digest()
+        simulation.run(0.1)
+        put(simulation, "uav1", (0.0, 10.0, 3.0))
+        simulation.run(1.0)
+        return simulation.digest()
+
+    assert digest() == digest()
+
+
+def test_spawning_is_honestly_refused(trio):
+    spawnables = ask(trio, "/get_spawnables")
+    assert [s.entity_resource.uri for s in spawnables.spawnables] == ["f450", "scout"]
+    response = ask(trio, "/spawn_entity", name="uav9", entity_resource={"uri": "f450"})
+    assert code_of(response) == UNSUPPORTED
+    assert "scenario" in response.result.error_message
+    several = ask(trio, "/spawn_entities", spawn_requests=[{"name": "a"}, {"name": "b"}])
+    assert code_of(several) == UNSUPPORTED
+    assert [one.result.result for one in several.results] == [UNSUPPORTED] * 2
+    assert code_of(ask(trio, "/delete_entity", entity="uav1")) == UNSUPPORTED
+    assert code_of(ask(trio, "/delete_entity", entity="nobody")) == NOT_FOUND
+
+
+def test_starts_are_named_poses(trio):
+    poses = ask(trio, "/get_named_poses").poses
+    assert [pose.name for pose in poses] == ["uav1_start", "uav2_start", "uav3_start"]
+    assert poses[2].pose.position.z == 5.0
+    chosen = ask(trio, "/get_named_poses", tags={"tags": ["scout"]}).poses
+    assert [pose.name for pose in chosen] == ["uav3_start"]
+    bounds = ask(trio, "/get_named_pose_bounds", name="uav2_start").bounds
+    assert bounds.type == 3
+    assert bounds.points[0].x == 20.0
+    assert bounds.points[1].x > 0.1
+    assert code_of(ask(trio, "/get_named_pose_bounds", name="nowhere")) == NOT_FOUND

@@ -1,0 +1,246 @@
+"""The simulation's state, steps and worlds, by the standard."""
+
+import time
+
+import pytest
+from asking import ask, ask_later, code_of
+from test_pause import InThread, wait_for
+
+from volery.core.errors import CommandError, GraphError
+from volery.graph.actions import GoalStatus
+from volery.graph.messages import message_type
+from volery.scenario import library
+
+STOPPED, PLAYING, PAUSED, QUITTING = range(4)
+OK, UNSUPPORTED, NOT_FOUND, INCORRECT_STATE, FAILED = 1, 0, 2, 3, 4
+ALREADY, WRONG_TRANSITION, NO_RESOURCE = 101, 103, 102
+
+
+def state(simulation):
+    return ask(simulation, "/get_simulation_state").state.state
+
+
+def enter(simulation, wanted):
+    return code_of(ask(simulation, "/set_simulation_state", state={"state": wanted}))
+
+
+def test_features_name_what_works_alone(simulate, flat_data):
+    def features(**options):
+        response = simulate(flat_data, **options).graph.call("/get_simulator_features")
+        return set(response.features.features.tolist())
+
+    plain = features()
+    assert {10, 11, 20, 24, 25, 26, 31, 32, 33, 45} <= plain
+    assert not plain & {0, 1, 7, 9, 13, 40, 41, 43, 50}
+    assert features(on_load=print) - plain == {40}
+
+
+def test_playing_pausing_stopping(simulate, flat_data):
+    simulation = simulate(flat_data)
+    assert state(simulation) == PLAYING
+    assert enter(simulation, PLAYING) == ALREADY
+    simulation.run(0.1)
+    assert enter(simulation, PAUSED) == OK
+    assert simulation.paused
+    assert state(simulation) == PAUSED
+    assert enter(simulation, STOPPED) == OK
+    assert state(simulation) == STOPPED
+    assert simulation.time_ns == 0
+    assert enter(simulation, PAUSED) == WRONG_TRANSITION
+    assert enter(simulation, PLAYING) == OK
+    assert state(simulation) == PLAYING
+    assert not simulation.paused
+    for wanted in (4, 5, 77):
+        assert enter(simulation, wanted) == WRONG_TRANSITION
+
+
+def test_quitting_ends_a_run_and_later_ones(simulate, flat_data):
+    simulation = simulate(flat_data)
+    with InThread(simulation, None, speed=1.0):
+        simulation.post(lambda: enter(simulation, QUITTING)).result(10.0)
+    assert simulation.time_s < 30.0
+    assert simulation.finished
+    assert state(simulation) == QUITTING
+    before = simulation.time_ns
+    simulation.run(1.0)
+    assert simulation.time_ns == before
+    assert enter(simulation, PLAYING) == WRONG_TRANSITION
+
+
+def test_quitting_ends_a_paused_run(simulate, flat_data):
+    simulation = simulate(flat_data)
+    simulation.pause()
+    with InThread(simulation, None):
+        simulation.quit()
+    assert simulation.time_ns == 0
+
+
+def test_reset(simulate, flat_data):
+    simulation = simulate(flat_data)
+    for scope in (0, 1 | 2, 1 | 2 | 4, 255):
+        simulation.run(0.1)
+        assert code_of(ask(simulation, "/reset_simulation", scope=scope)) == OK
+        assert simulation.time_ns == 0
+    for scope, code in ((1, UNSUPPORTED), (2, UNSUPPORTED), (4, UNSUPPORTED), (64, FAILED)):
+        assert code_of(ask(simulation, "/reset_simulation", scope=scope)) == code
+
+
+def test_a_reset_that_cannot_be_is_told(simulate, flat_data):
+    simulation = simulate(flat_data)
+    partner = simulation.add_partner("other", period_s=0.1)
+    response = ask(simulation, "/reset_simulation")
+    assert code_of(response) == FAILED
+    assert "other" in response.result.error_message
+    assert enter(simulation, STOPPED) == 102
+    assert not simulation.paused
+    partner.leave()
+
+
+def test_steps_are_answered_when_they_are_made(simulate, flat_data):
+    simulation = simulate(flat_data)
+    simulation.pause()
+    first = ask_later(simulation, "/step_simulation", steps=7)
+    second = ask_later(simulation, "/step_simulation", steps=250)
+    assert not first
+    with InThread(simulation, 5.0):
+        wait_for(lambda: second)
+        assert simulation.time_ns == 257_000_000
+        assert code_of(first[0]) == code_of(second[0]) == OK
+        simulation.quit()
+
+
+@pytest.mark.parametrize(("steps", "code"), [(0, FAILED), (2**63, FAILED)])
+def test_steps_that_are_none(simulate, flat_data, steps, code):
+    simulation = simulate(flat_data)
+    simulation.pause()
+    (response,) = ask_later(simulation, "/step_simulation", steps=steps)
+    assert code_of(response) == code
+
+
+def test_steps_while_playing_are_refused(simulate, flat_data):
+    simulation = simulate(flat_data)
+    (response,) = ask_later(simulation, "/step_simulation", steps=1)
+    assert code_of(response) == INCORRECT_STATE
+    with pytest.raises(GraphError, match="call_async"):
+        ask(simulation, "/step_simulation", steps=1)
+
+
+@pytest.mark.parametrize(
+    ("end", "why"),
+    [
+        (lambda s: s.resume(), "goes on"),
+        (lambda s: s.reset(), "reset"),
+        (lambda s: s.quit(), "quits"),
+        (lambda s: s.close(), "closed"),
+    ],
+)
+def test_steps_that_are_interrupted_are_answered(simulate, flat_data, end, why):
+    simulation = simulate(flat_data)
+    simulation.pause()
+    answers = ask_later(simulation, "/step_simulation", steps=5)
+    end(simulation)
+    assert code_of(answers[0]) == FAILED
+    assert "0 of 5" in answers[0].result.error_message
+    assert why in answers[0].result.error_message
+
+
+def send(simulation, steps):
+    told, ended = [], []
+    goal = message_type("simulation_interfaces/action/SimulateSteps_Goal")(steps=steps)
+    actions = simulation.graph.actions
+    handle = actions.send("/simulate_steps", goal, told.append, lambda *how: ended.append(how))
+    return handle, told, ended
+
+
+def test_the_action_tells_how_far_it_is(simulate, flat_data):
+    simulation = simulate(flat_data)
+    simulation.pause()
+    goal, told, ended = send(simulation, 350)
+    with InThread(simulation, 5.0):
+        wait_for(lambda: ended)
+        simulation.quit()
+    progress = [(one.completed_steps, one.remaining_steps) for one in told]
+    assert progress == [(100, 250), (200, 150), (300, 50), (350, 0)]
+    ((status, response),) = ended
+    assert status is GoalStatus.SUCCEEDED
+    assert code_of(response) == OK
+    assert not goal.cancel()
+
+
+def test_the_action_can_be_cancelled_and_refused(simulate, flat_data):
+    simulation = simulate(flat_data)
+    _, _, ended = send(simulation, 5)
+    assert ended[0][0] is GoalStatus.ABORTED
+    assert code_of(ended[0][1]) == INCORRECT_STATE
+    simulation.pause()
+    goal, _, ended = send(simulation, 1_000_000)
+    behind, _, ended_behind = send(simulation, 20)
+    assert goal.cancel()
+    assert ended[0][0] is GoalStatus.CANCELED
+    assert not goal.cancel()
+    with InThread(simulation, 5.0):
+        wait_for(lambda: ended_behind)
+        assert simulation.time_ns == 20_000_000
+        simulation.quit()
+    assert behind.status is GoalStatus.SUCCEEDED
+    simulation.graph.actions.withdraw("/simulate_steps")
+    with pytest.raises(GraphError, match="nobody"):
+        send(simulation, 1)
+
+
+def test_worlds_are_the_scenarios_of_the_library(simulate, flat_data):
+    simulation = simulate(flat_data)
+    worlds = ask(simulation, "/get_available_worlds").worlds
+    assert [world.world_resource.uri for world in worlds] == library.names()
+    woods = ask(simulation, "/get_available_worlds", filter={"tags": ["forest"]}).worlds
+    assert 0 < len(woods) < len(worlds)
+    response = ask(simulation, "/get_available_worlds", additional_sources=["/tmp"])
+    assert code_of(response) == UNSUPPORTED
+    current = ask(simulation, "/get_current_world").world
+    assert current.name == "flat"
+    assert current.world_resource.uri == ""
+    assert code_of(ask(simulation, "/unload_world")) == UNSUPPORTED
+
+
+def test_loading_is_the_owners_business(simulate, flat_data):
+    wanted = {"world_resource": {"uri": "hover"}}
+    assert code_of(ask(simulate(flat_data), "/load_world", **wanted)) == UNSUPPORTED
+    loaded = []
+    simulation = simulate(flat_data, on_load=loaded.append)
+    response = ask(simulation, "/load_world", **wanted)
+    assert code_of(response) == OK
+    assert response.world.name == loaded[0] == "hover"
+    for source, code in (
+        ({"uri": "nowhere"}, NOT_FOUND),
+        ({"uri": "../../etc/passwd"}, NOT_FOUND),
+        ({}, NO_RESOURCE),
+        ({"resource_string": "<sdf/>"}, 101),
+    ):
+        assert code_of(ask(simulation, "/load_world", world_resource=source)) == code
+    assert len(loaded) == 1
+
+    def refuse(name):
+        raise CommandError(f"no memory for {name}")
+
+    response = ask(simulate(flat_data, on_load=refuse), "/load_world", **wanted)
+    assert code_of(response) == FAILED
+    assert "no memory" in response.result.error_message
+
+
+def test_requests_of_other_threads_reach_a_paused_run(simulate, flat_data):
+    simulation = simulate(flat_data)
+    session = simulation.gateway.open("client")
+    answers = []
+    simulation.pause()
+    with InThread(simulation, 5.0):
+        from volery.graph.reply import Reply
+
+        request = message_type("simulation_interfaces/srv/StepSimulation_Request")(steps=3)
+        session.call("/step_simulation", request, Reply(answers.append, answers.append))
+        wait_for(lambda: answers)
+        assert code_of(answers[0]) == OK
+        assert simulation.time_ns == 3_000_000
+        time.sleep(0.05)
+        assert simulation.time_ns == 3_000_000
+        simulation.quit()
+    session.close()

@@ -1,0 +1,183 @@
+"""Weather, faults, speed, recording and kept states, as clients of the graph ask for them."""
+
+import json
+
+import pytest
+from asking import ask
+
+from volery.bridges.log_reader import summarize
+from volery.core.errors import RecordingError
+
+
+def refused(response, *words):
+    assert not response.success
+    assert all(word in response.message for word in words), response.message
+
+
+def test_weather(simulate, flat_data):
+    simulation = simulate(flat_data)
+    assert ask(simulation, "/volery/set_weather", wind={"x": 4.0, "y": -1.0}, w20=7.0).success
+    response = ask(simulation, "/volery/get_weather")
+    assert response.success
+    assert (response.wind.x, response.wind.y, response.w20) == (4.0, -1.0, 7.0)
+    assert (response.profile, response.gusts) == ("uniform", 0)
+    refused(ask(simulation, "/volery/set_weather", wind={"x": 1e6}), "out of range")
+    refused(ask(simulation, "/volery/set_weather", w20=float("nan")), "w20")
+    assert simulation.weather.w20_m_s == 7.0
+
+
+def test_gusts(simulate, flat_data):
+    simulation = simulate(flat_data)
+    gust = {"amplitude": {"x": 5.0}, "rise": 0.5}
+    assert ask(simulation, "/volery/gust", **gust, duration=2.0).success
+    assert ask(simulation, "/volery/gust", **gust).success
+    first, second = simulation.weather.gusts
+    assert first.end_s == 2.0
+    assert second.end_s == float("inf")
+    assert ask(simulation, "/volery/get_weather").gusts == 2
+    refused(ask(simulation, "/volery/gust", **gust, duration=0.1), "end_s")
+    refused(ask(simulation, "/volery/gust", amplitude={"x": 5.0}), "rise_s")
+
+
+def test_faults(simulate, flat_data):
+    simulation = simulate(flat_data)
+    fault = {"kind": "motor", "uav": "uav1", "rotor": 1, "thrust_factor": 0.5}
+    assert ask(simulation, "/volery/inject_fault", fault=json.dumps(fault)).success
+    simulation.run(0.01)
+    assert simulation.events[-1].kind.name == "FAULT"
+    refused(ask(simulation, "/volery/inject_fault", fault="{"), "JSON")
+    refused(ask(simulation, "/volery/inject_fault", fault="[1]"), "table")
+    refused(ask(simulation, "/volery/inject_fault", fault='{"kind": "flood"}'), "kind")
+    fault["uav"] = "uav9"
+    refused(ask(simulation, "/volery/inject_fault", fault=json.dumps(fault)), "uav9")
+
+
+def test_speed(simulate, flat_data):
+    simulation = simulate(flat_data)
+    assert ask(simulation, "/volery/set_speed", factor=2.5).success
+    assert simulation.speed == 2.5
+    for factor in (0.0, -3.0):
+        assert ask(simulation, "/volery/set_speed", factor=factor).success
+        assert simulation.speed is None
+    refused(ask(simulation, "/volery/set_speed", factor=float("nan")), "speed")
+
+
+def test_recording(simulate, flat_data, tmp_path):
+    simulation = simulate(flat_data, recordings=tmp_path)
+    started = ask(simulation, "/volery/start_recording", path="day/flight.mcap")
+    assert started.success
+    assert started.path == str(tmp_path / "day" / "flight.mcap")
+    simulation.run(0.2)
+    refused(ask(simulation, "/volery/start_recording", path="b.mcap"), "flight.mcap")
+    stopped = ask(simulation, "/volery/stop_recording")
+    assert stopped.success
+    assert stopped.path == started.path
+    assert stopped.messages > 20
+    refused(ask(simulation, "/volery/stop_recording"), "nothing")
+    assert summarize(tmp_path / "day" / "flight.mcap").messages == stopped.messages
+
+
+@pytest.mark.parametrize(
+    ("path", "word"),
+    [
+        ("../outside.mcap", "outside"),
+        ("/tmp/outside.mcap", "outside"),
+        ("a/../../outside.mcap", "outside"),
+        ("link/outside.mcap", "outside"),
+        (".", "outside"),
+        ("", "empty"),
+        ("a\0b.mcap", "not a path"),
+        ("flight.txt", ".mcap"),
+        ("taken.mcap", "exists"),
+    ],
+)
+def test_recordings_stay_in_their_folder(simulate, flat_data, tmp_path, path, word):
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    (folder / "link").symlink_to(tmp_path)
+    (folder / "taken.mcap").touch()
+    simulation = simulate(flat_data, recordings=folder)
+    refused(ask(simulation, "/volery/start_recording", path=path), word)
+    assert sorted(p.name for p in folder.iterdir()) == ["link", "taken.mcap"]
+
+
+def test_no_folder_no_recording(simulate, flat_data):
+    refused(ask(simulate(flat_data), "/volery/start_recording", path="a.mcap"), "without a folder")
+
+
+def test_a_disk_that_fills_up_ends_the_recording_alone(simulate, flat_data, tmp_path, monkeypatch):
+    simulation = simulate(flat_data, recordings=tmp_path)
+    assert ask(simulation, "/volery/start_recording", path="a.mcap").success
+
+    def fail(_log, _published):
+        raise RecordingError("the disk is full")
+
+    monkeypatch.setattr("volery.bridges.bag.McapLog.write", fail)
+    simulation.run(0.1)
+    assert simulation.time_s == pytest.approx(0.1)
+    refused(ask(simulation, "/volery/stop_recording"), "full")
+    monkeypatch.undo()
+    assert ask(simulation, "/volery/start_recording", path="b.mcap").success
+
+
+def test_the_end_of_a_simulation_ends_its_recording(simulate, flat_data, tmp_path):
+    simulation = simulate(flat_data, recordings=tmp_path)
+    ask(simulation, "/volery/start_recording", path="a.bag")
+    simulation.run(0.1)
+    simulation.close()
+    assert summarize(tmp_path / "a.bag").messages > 10
+
+
+def test_kept_states(simulate, flat_data):
+    simulation = simulate(flat_data)
+    simulation.run(0.5)
+    assert ask(simulation, "/volery/snapshot", name="early").success
+    simulation.run(0.5)
+    assert ask(simulation, "/volery/snapshot", name="late").success
+    listed = ask(simulation, "/volery/list_snapshots")
+    assert list(listed.names) == ["early", "late"]
+    assert [stamp.sec for stamp in listed.stamps] == [0, 1]
+    assert ask(simulation, "/volery/restore", name="early").success
+    assert simulation.time_s == 0.5
+    assert ask(simulation, "/volery/forget_snapshot", name="early").success
+    refused(ask(simulation, "/volery/restore", name="early"), "late")
+    refused(ask(simulation, "/volery/forget_snapshot", name="early"))
+    refused(ask(simulation, "/volery/snapshot", name=""), "characters")
+
+
+def test_kept_states_are_bounded(simulate, flat_data):
+    simulation = simulate(flat_data)
+    for k in range(16):
+        assert ask(simulation, "/volery/snapshot", name=f"state {k}").success
+    refused(ask(simulation, "/volery/snapshot", name="one more"), "forget")
+    assert ask(simulation, "/volery/snapshot", name="state 3").success
+
+
+def test_what_follows_a_restore_is_the_same_again(simulate, flat_data):
+    flat_data["uavs"][0]["on_start"] = "take_off"
+    simulation = simulate(flat_data)
+    simulation.enable_digest()
+    simulation.run(0.5)
+    ask(simulation, "/volery/snapshot", name="there")
+    simulation.run(0.5)
+    first = simulation.digest()
+    simulation.post(lambda: ask(simulation, "/volery/restore", name="there"))
+    simulation.take_in()
+    simulation.run(0.5)
+    assert simulation.digest() == first
+
+
+def test_states_that_cannot_be_kept_are_told(simulate, flat_data):
+    simulation = simulate(flat_data)
+    partner = simulation.add_partner("other", period_s=0.1)
+    refused(ask(simulation, "/volery/snapshot", name="a"), "other")
+    partner.leave()
+
+
+def test_a_uav_begins_anew(simulate, flat_data):
+    simulation = simulate(flat_data)
+    ask(simulation, "/uav1/take_off")
+    simulation.run(1.0)
+    assert ask(simulation, "/volery/reset_uav", name="uav1").success
+    assert simulation.uavs["uav1"].mode.name == "LANDED"
+    refused(ask(simulation, "/volery/reset_uav", name="uav9"), "uav9")
