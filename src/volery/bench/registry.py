@@ -161,6 +161,23 @@ BENCHES: dict[str, Bench] = {
             },
         ),
         Bench(
+            "bridge",
+            "Bridges: messages through the doors, clients in processes of their own; the lines are "
+            "L = alpha S + beta through the medians of 100 messages a size, 0 to 2.5 MB",
+            {
+                "ros_tcp_alpha_s_per_mb": Bound(0.0015, at_most=True),
+                "ros_tcp_beta_s": Bound(0.0004, at_most=True),
+                "ros_tcp_round_trip_ms": Bound(1.2, at_most=True),
+                "ros_tcp_round_trip_p99_ms": Bound(4.0, at_most=True),
+                "rosbridge_round_trip_ms": Bound(2.0, at_most=True),
+                "stop_wall_p95_ms": Bound(1.5, at_most=True),
+                "ros1_one_way_ratio": Bound(1.3, at_most=True),
+                "stream_age_p95_ms": Bound(12.0, at_most=True),
+                "stream_lost": Bound(0.0, at_most=True),
+                "stream_real_time_factor": Bound(0.99),
+            },
+        ),
+        Bench(
             "peers",
             "Peers: other simulators beside Volery, in turns on one core; what each includes is "
             "told in [peers.md](peers.md)",

@@ -25,5 +25,12 @@ def open_link(via: str, name: str) -> Link:
     if scheme == "ros1":
         from volery.bridges.ros1_client import Ros1Client
 
-        return Ros1Client(name, master_uri=f"http://{rest}" if rest else None)
+        return Ros1Client(f"http://{rest}" if rest else None, _ros1_name(name))
     raise BridgeError(f"'{via}' is no way into a graph; use {_WAYS}")
+
+
+def _ros1_name(name: str) -> str:
+    """A node name of its own: a ROS 1 master ends the older of two nodes of one name."""
+    import os
+
+    return f"{name}_{os.getpid()}"

@@ -129,18 +129,17 @@ class Uav:
         """Climb, fly back to where it took off and land there."""
         self._fleet.return_home(self._row, self._flight.return_altitude_m)
 
-    def stop(self) -> None:
-        """Stop the rotors at once, wherever it is: it falls. Any flight mode starts them again."""
-        self._fleet.stop_rotors(self._row)
-
     def set_command_timeout(self, seconds: float) -> None:
         """Time (s, up to 60) without a velocity command or setpoint after which it holds."""
         self._fleet.set_command_timeout(seconds, self._row)
 
     def stop_rotors(self) -> None:
-        """Stop the rotors with the next physics step, in the air too: it falls."""
+        """Stop the rotors with the next physics step, in the air too: it falls.
+
+        A flight mode starts them again. A kinematic UAV stands still in the air.
+        """
         if self.mode not in (FlightMode.LANDED, FlightMode.CRASHED):
-            self.command_rotor_speeds(np.zeros(len(self.airframe.rotors.places)))
+            self._fleet.stop_rotors(self._row)
 
     # ------------------------------------------------------------------------ lower-level commands
 

@@ -1,0 +1,267 @@
+"""The simulation's side of the bench: worlds that run in real time while clients measure."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from volery.bridges.doors import Doors
+from volery.bridges.ros_tcp_endpoint import RosTcpEndpoint
+
+from volery.graph.messages import Header, Time, message_type
+from volery.runtime import Simulation
+from volery.scenario.load import load_scenario, parse_scenario
+from volery.scenario.schema import Scenario
+
+_IMAGE_BYTES = (0, 100_000, 250_000, 500_000, 1_000_000, 2_500_000)
+_IMAGES = 100
+_IMAGE_PERIOD_S = 0.02
+_ROUND_TRIPS = 1000
+_ARTICLE_TRIPS = 10
+_STOPS = 100
+_SAFE_HEIGHT_M = 50.0
+"""It falls a little at each stop."""
+_STREAM_S = 10.0
+_CLIENT_TIMEOUT_S = 120.0
+_IMAGE = "sensor_msgs/msg/Image"
+_TRIGGER = "std_srvs/srv/Trigger"
+
+
+def measure() -> dict[str, float]:
+    """Figures of the bench `bridge`."""
+    figures: dict[str, float] = {}
+    with running(load_scenario("hover")) as world:
+        alpha, beta = fit_line(image_latencies(world))
+        figures["ros_tcp_alpha_s_per_mb"], figures["ros_tcp_beta_s"] = alpha, beta
+        trips = 1e3 * np.array(world.ros_tcp("round_trips", "uav1", _ROUND_TRIPS)["took"])
+        figures["ros_tcp_round_trip_ms"] = float(trips.mean())
+        figures["ros_tcp_round_trip_p99_ms"] = float(np.percentile(trips, 99))
+        means = [
+            1e3 * statistics.mean(world.ros_tcp("round_trips", "uav1", _ARTICLE_TRIPS)["took"])
+            for _ in range(_ARTICLE_TRIPS)
+        ]
+        figures["ros_tcp_round_trip_10x10_ms"] = statistics.mean(means)
+        trips = 1e3 * np.array(world.rosbridge("round_trips", "uav1", _ROUND_TRIPS)["took"])
+        figures["rosbridge_round_trip_ms"] = float(trips.mean())
+        figures["rosbridge_round_trip_p99_ms"] = float(np.percentile(trips, 99))
+        figures["stop_wall_p95_ms"] = 1e3 * float(np.percentile(stop_latencies(world), 95))
+    figures.update(stream_figures())
+    return figures
+
+
+class World:
+    """A simulation in real time, in a thread of its own, with two doors open."""
+
+    def __init__(self, simulation: WatchedSimulation, doors: Doors) -> None:
+        self.simulation = simulation
+        tcp, web = RosTcpEndpoint(port=0), RosbridgeServer(port=0)
+        doors.open(tcp)
+        doors.open(web)
+        self._ports = {"plain_ros_tcp": tcp.port, "plain_rosbridge": web.port}
+
+    def ros_tcp(self, *words: object) -> Any:
+        """What the plain ROS-TCP client measured."""
+        return self.start("plain_ros_tcp", *words)()
+
+    def rosbridge(self, *words: object) -> Any:
+        """What the plain rosbridge client measured."""
+        return self.start("plain_rosbridge", *words)()
+
+    def start(self, client: str, *words: object) -> Any:
+        """Start a client; the function returned waits for its result."""
+        module = f"volery.bench.bridge.{client}"
+        command = [sys.executable, "-m", module, str(self._ports[client]), *map(str, words)]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+        def finish() -> Any:
+            try:
+                out, _ = process.communicate(timeout=_CLIENT_TIMEOUT_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.communicate()
+                raise
+            if process.returncode:
+                raise RuntimeError(f"{module} ended with status {process.returncode}")
+            return json.loads(out)
+
+        return finish
+
+
+class WatchedSimulation(Simulation):
+    """A simulation that lets itself be looked at after each call of the fused step."""
+
+    watch: Callable[[], None] | None = None
+
+    def advanced(self, first_step: int, last_step: int) -> None:
+        """Take in computed steps (called by the engine)."""
+        super().advanced(first_step, last_step)
+        if self.watch is not None:
+            self.watch()
+
+
+@contextmanager
+def running(scenario: Scenario) -> Iterator[World]:
+    """Run `scenario` in real time until the block ends."""
+    with WatchedSimulation(scenario) as simulation:
+        simulation.step(1)  # what compiles does so before anybody measures
+        with Doors(simulation.gateway) as doors:
+            world = World(simulation, doors)
+            simulation.be_prompt()
+            over = threading.Event()
+            thread = threading.Thread(target=_run, args=(simulation, over))
+            thread.start()
+            try:
+                yield world
+            finally:
+                over.set()
+                thread.join()
+
+
+def _run(simulation: Simulation, over: threading.Event) -> None:
+    while not over.is_set():
+        simulation.run(0.5, speed=1.0)
+
+
+def image_latencies(world: World) -> list[tuple[int, float]]:
+    """(bytes, s) of images published by the simulation's thread, one size after the other."""
+    gateway, topic = world.simulation.gateway, "/bench/image"
+    publisher = gateway.post(lambda: world.simulation.graph.advertise(topic, _IMAGE)).result()
+    image = message_type(_IMAGE)
+    finish = world.start("plain_ros_tcp", "sizes", topic, _IMAGES * len(_IMAGE_BYTES))
+    _wait_for_subscriber(world.simulation, topic)
+    for size in _IMAGE_BYTES:
+        pixels = np.zeros(size, np.uint8)
+        pixels.flags.writeable = False
+
+        def publish(pixels: Any = pixels) -> None:
+            stamp = Time(*divmod(time.monotonic_ns(), 10**9))
+            width = len(pixels)
+            publisher.publish(image(Header(stamp, ""), 1, width, "mono8", 0, width, pixels))
+
+        for _ in range(_IMAGES):
+            gateway.post(publish)
+            time.sleep(_IMAGE_PERIOD_S)
+    return [(size, latency) for size, latency in finish()["latencies"]]
+
+
+def fit_line(latencies: list[tuple[int, float]]) -> tuple[float, float]:
+    """L = alpha S + beta, s/MB and s, through the medians of each size."""
+    sizes = sorted({size for size, _ in latencies})
+    medians = [statistics.median(s for size, s in latencies if size == one) for one in sizes]
+    alpha, beta = np.polyfit(np.array(sizes) / 1e6, medians, 1)
+    return float(alpha), float(beta)
+
+
+def stop_latencies(world: World) -> list[float]:
+    """Seconds from a stop request sent until a step has ended with all rotors commanded to 0."""
+    simulation = world.simulation
+    uav, response = simulation.uavs["uav1"], message_type(f"{_TRIGGER}_Response")
+    stopped_ns: list[int] = []
+    flying = False
+
+    def look() -> None:
+        nonlocal flying
+        turning = bool(uav.rotor_reference.any())
+        if flying and not turning:
+            stopped_ns.append(time.monotonic_ns())
+        flying = turning
+
+    def recover(_request: Any) -> Any:
+        uav.go_to([0.0, 0.0, _SAFE_HEIGHT_M])
+        return response(success=True, message="")
+
+    simulation.post(lambda: simulation.graph.offer("/bench/recover", _TRIGGER, recover)).result()
+    simulation.watch = look
+    sent = world.ros_tcp("stops", "uav1", _STOPS)["sent_ns"]
+    return [1e-9 * (stop - send) for send, stop in zip(sent, stopped_ns, strict=True)]
+
+
+def stream_figures() -> dict[str, float]:
+    """Ten UAVs with two LIDARs each, to one client of either kind at once."""
+    lidars = [{"kind": "lidar", "name": name} for name in ("horizontal", "nodding")]
+    scenario = parse_scenario(
+        {
+            "name": "streams",
+            "duration_s": 1e6,
+            "world": {
+                "terrain": {"kind": "flat", "extent_m": 500.0},
+                "forest": {
+                    "kind": "procedural",
+                    "region_m": [0.0, 0.0, 500.0, 500.0],
+                    "trees": 5000,
+                    "species": {"broadleaf": 1.0},
+                },
+            },
+            "types": {"surveyor": {"airframe": "f450", "sensors": lidars}},
+            "uavs": [
+                {
+                    "type": "surveyor",
+                    "count": 10,
+                    "position_m": [50.0, 50.0],
+                    "last_position_m": [450.0, 450.0],
+                    "placement": "nearest_free",
+                }
+            ],
+        }
+    )
+    with running(scenario) as world:
+        topics = [
+            f"/{uav}/laser/{name}/scan"
+            for uav in world.simulation.uav_names
+            for name in ("horizontal", "nodding")
+        ]
+        published: dict[tuple[str, int], int] = {}
+
+        def note(message: Any) -> None:
+            stamp = message.message.header.stamp
+            key = message.topic, stamp.sec * 10**9 + stamp.nanosec
+            published[key] = time.monotonic_ns()
+
+        for topic in topics:
+            world.simulation.graph.subscribe(topic, note)
+        before, wall = world.simulation.time_s, time.perf_counter()
+        clients = [
+            world.start(kind, "streams", _STREAM_S, *topics)
+            for kind in ("plain_ros_tcp", "plain_rosbridge")
+        ]
+        results = [finish()["got"] for finish in clients]
+        factor = (world.simulation.time_s - before) / (time.perf_counter() - wall)
+    return {**stream_ages(results, published), "stream_real_time_factor": factor}
+
+
+def stream_ages(
+    results: list[list[tuple[str, int, int]]], published: dict[tuple[str, int], int]
+) -> dict[str, float]:
+    """Age of scans on arrival, and how many of those between a client's first and last are lost."""
+    ages: list[int] = []
+    lost = 0
+    for got in results:
+        for topic in {topic for topic, _, _ in got}:
+            came = {stamp: at for name, stamp, at in got if name == topic}
+            first, last = min(came), max(came)
+            sent = [s for name, s in published if name == topic and first <= s <= last]
+            lost += len(sent) - len(came)
+            ages += [at - published[topic, stamp] for stamp, at in came.items()]
+    return {
+        "stream_age_p95_ms": 1e-6 * float(np.percentile(ages, 95)),
+        "stream_lost": float(lost),
+        "stream_scans": float(len(ages)),
+    }
+
+
+def _wait_for_subscriber(simulation: Simulation, topic: str, timeout_s: float = 10.0) -> None:
+    end = time.monotonic() + timeout_s
+    while time.monotonic() < end:
+        if any(t.name == topic and t.subscribers for t in simulation.graph.topics()):
+            return
+        time.sleep(0.02)
+    raise RuntimeError(f"nobody subscribed '{topic}' within {timeout_s} s")
