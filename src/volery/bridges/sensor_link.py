@@ -10,7 +10,7 @@ numbers are little-endian and packed without padding:
 | 5 | 1 | u8 | type of the payload, see `Kind` |
 | 6 | 2 | u16 | number of the UAV, from 1; 0: none |
 | 8 | 4 | u32 | n, bytes of payload, at most `limit_of(kind)` |
-| 12 | 4 | u32 | sequence: one more with each message of this type, UAV and sensor, modulo 2**32 |
+| 12 | 4 | u32 | sequence: one more with each frame of this type, UAV and sensor, modulo 2**32 |
 | 16 | 8 | i64 | stamp of the message, ns of simulated time |
 | 24 | 2 | u16 | CRC of bytes 4 to 23: a damaged length is noticed before anyone waits for it |
 | 26 | n | | payload, see `sensor_link_payloads` |
@@ -18,7 +18,7 @@ numbers are little-endian and packed without padding:
 
 The CRC is CRC-16/CCITT-FALSE: polynomial x^16 + x^12 + x^5 + 1 (0x1021), initial value 0xFFFF,
 neither input nor output reflected, nothing xored at the end; of the ASCII text `123456789` it is
-0x29B1. A gap in the sequence tells how many messages a reader was too slow for.
+0x29B1. A gap in the sequence tells how many frames a reader was too slow for.
 """
 
 from __future__ import annotations

@@ -1,0 +1,380 @@
+"""The sensor link over real sockets: several clients, slow ones, broken ones, and poses in."""
+
+from __future__ import annotations
+
+import socket
+import time
+
+import numpy as np
+import pytest
+from ros_tcp_client import Loop, until
+
+from volery.bridges.doors import Doors
+from volery.bridges.sensor_link import FrameParser, Kind, encode_frame
+from volery.bridges.sensor_link_client import SensorLinkClient
+from volery.bridges.sensor_link_payloads import (
+    decode_notice,
+    decode_payload,
+    encode_payload,
+)
+from volery.bridges.sensor_link_server import SensorLink
+from volery.core.errors import BridgeError
+from volery.graph import messages as m
+from volery.graph.cdr import encode_cdr
+from volery.graph.messages import message_type
+
+Image = message_type("sensor_msgs/msg/Image")
+
+
+@pytest.fixture
+def loop():
+    loop = Loop()
+    yield loop
+    loop.close()
+
+
+@pytest.fixture
+def doors(loop):
+    with Doors(loop.gateway) as doors:
+        yield doors
+
+
+@pytest.fixture
+def link(doors):
+    link = SensorLink(port=0, image_port=0)
+    doors.open(link)
+    return link
+
+
+class Plain:
+    """A socket and a parser."""
+
+    def __init__(self, port, receive_buffer=None):
+        self.socket = socket.socket()
+        if receive_buffer:
+            self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+        self.socket.settimeout(10.0)
+        self.socket.connect(("127.0.0.1", port))
+        self.parser = FrameParser()
+        self.frames = []
+
+    def next(self):
+        while not self.frames:
+            data = self.socket.recv(1 << 16)
+            assert data, "the link was closed"
+            self.frames += self.parser.feed(data)
+        return self.frames.pop(0)
+
+    def send(self, kind, uav, message, sequence=0):
+        self.socket.sendall(encode_frame(kind, uav, sequence, 0, encode_payload(kind, message)))
+
+    def close(self):
+        self.socket.close()
+
+
+@pytest.fixture
+def connect():
+    clients = []
+
+    def connect(port, **options):
+        clients.append(Plain(port, **options))
+        return clients[-1]
+
+    yield connect
+    for client in clients:
+        client.close()
+
+
+def sonar(k=0):
+    header = m.header(k * 1_000_000, "uav1/range")
+    return m.Range(header, 0, 0.5, 0.125, 8.0, float(k), 0.0)
+
+
+def scan(k=0):
+    header = m.header(k * 1_000_000, "uav1/laser_horizontal")
+    ranges = np.full(1081, k, np.float32)
+    return m.LaserScan(header, -1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 30.0, ranges, ranges[:0])
+
+
+def image(k=0, side=480):
+    pixels = np.full(3 * side * side, k % 256, np.uint8)
+    return Image(m.header(k * 1_000_000, "cam"), side, side, "rgb8", 0, 3 * side, pixels)
+
+
+def pose(x=1.0, w=1.0, frame="map"):
+    return m.PoseStamped(
+        m.header(7, frame), m.Pose(m.Point(x, 2.0, 3.0), m.Quaternion(0.0, 0.0, 0.0, w))
+    )
+
+
+def wanted(loop, publisher):
+    until(lambda: publisher.wanted)
+
+
+def collect(loop, topic, msgtype=m.PoseStamped):
+    seen = []
+    loop.do(lambda: loop.graph.subscribe(topic, seen.append, msgtype))
+    return seen
+
+
+def test_every_client_gets_what_the_sensors_measure(loop, link, connect):
+    publisher = loop.graph.advertise("/uav12/range", m.Range)
+    assert not publisher.wanted  # nobody is there: nothing is asked for
+    clients = [connect(link.port) for _ in range(3)]
+    wanted(loop, publisher)
+    until(lambda: len(link.clients) == 3)
+    for k in range(5):
+        loop.publish(publisher, sonar(k))
+    for client in clients:
+        for k in range(5):
+            frame = client.next()
+            assert (frame.kind, frame.uav, frame.sequence) == (Kind.SONAR, 12, k)
+            name, message = decode_payload(frame.kind, frame.payload, frame.stamp_ns)
+            assert name == "range"
+            assert encode_cdr(message, "sensor_msgs/msg/Range") == encode_cdr(
+                sonar(k), "sensor_msgs/msg/Range"
+            )
+    for client in clients:
+        client.close()
+    until(lambda: not publisher.wanted)
+
+
+def test_sensors_that_come_later_are_found(loop, link, connect):
+    client = connect(link.port)
+    until(lambda: link.clients)
+    publisher = loop.graph.advertise("/uav3/laser/nodding/scan", m.LaserScan)
+    wanted(loop, publisher)
+    loop.publish(publisher, scan(1))
+    assert client.next().uav == 3
+
+
+def test_poses_go_in(loop, link, connect):
+    loop.graph.advertise("/uav2/odom", m.Odometry)
+    commands, goals = collect(loop, "/uav2/pose_command"), collect(loop, "/uav2/goal_pose")
+    client = connect(link.port)
+    client.send(Kind.POSE_COMMAND, 2, pose(4.0))
+    client.send(Kind.GOAL_POSE, 2, pose(5.0, w=0.0))
+    until(lambda: commands and goals)
+    assert commands[0].message.pose.position.x == 4.0
+    assert goals[0].message.pose.position.x == 5.0
+    assert goals[0].message.header.frame_id == "map"
+
+
+@pytest.mark.parametrize(
+    ("kind", "uav", "message", "words"),
+    [
+        (Kind.POSE_COMMAND, 9, pose(), "no UAV 9"),
+        (Kind.POSE_COMMAND, 2, pose(w=0.5), "length 1"),
+        (Kind.POSE_COMMAND, 2, pose(w=0.0), "length 1"),
+        (Kind.POSE_COMMAND, 2, pose(float("nan")), "finite"),
+        (Kind.POSE_COMMAND, 2, pose(frame="odom"), "'map'"),
+        (Kind.SONAR, 2, sonar(), "not taken here"),
+    ],
+)
+def test_what_cannot_be_done_is_told(loop, link, connect, kind, uav, message, words):
+    loop.graph.advertise("/uav2/odom", m.Odometry)
+    client = connect(link.port)
+    client.send(kind, uav, message, sequence=77)
+    frame = client.next()
+    assert frame.kind == Kind.NOTICE
+    assert words in decode_notice(frame.payload)
+    assert "77" in decode_notice(frame.payload)
+
+
+def test_damage_is_counted_and_what_follows_is_taken(loop, link, connect):
+    loop.graph.advertise("/uav2/odom", m.Odometry)
+    seen = collect(loop, "/uav2/pose_command")
+    client = connect(link.port)
+    whole = encode_frame(Kind.POSE_COMMAND, 2, 0, 0, encode_payload(Kind.POSE_COMMAND, pose()))
+    broken = bytearray(whole)
+    broken[40] ^= 4
+    client.socket.sendall(b"\x00\xaaV" + bytes(broken) + whole)
+    until(lambda: seen)
+    (info,) = link.clients
+    assert (info.received, info.corrupt) == (1, 1)
+
+
+def test_who_speaks_another_version_is_told_once(link, connect):
+    client = connect(link.port)
+    frame = bytearray(encode_frame(Kind.POSE_COMMAND, 2, 0, 0, b""))
+    frame[4] = 2
+    from test_sensor_link import slow_crc
+
+    frame[24:26] = slow_crc(bytes(frame[4:24])).to_bytes(2, "little")
+    client.socket.sendall(bytes(frame) * 3)
+    assert "version 1" in decode_notice(client.next().payload)
+    until(lambda: link.clients[0].corrupt == 3)
+    assert link.clients[0].waiting == 0
+
+
+def test_who_does_not_read_loses_his_own_oldest_only(loop, link, connect):
+    publisher = loop.graph.advertise("/uav1/laser/horizontal/scan", m.LaserScan)
+    slow, quick = connect(link.port, receive_buffer=4096), connect(link.port)
+    wanted(loop, publisher)
+    until(lambda: len(link.clients) == 2)
+    for k in range(3000):
+        loop.publish(publisher, scan(k))
+        assert quick.next().sequence == k
+    info = next(info for info in link.clients if info.dropped)
+    assert info.dropped > 1000
+    assert info.waiting <= 20
+    numbers = [slow.next().sequence]
+    while numbers[-1] < 2999:
+        numbers.append(slow.next().sequence)
+    assert numbers == sorted(set(numbers))
+    assert numbers[-20:] == list(range(2980, 3000))
+
+
+def test_images_have_a_port_of_their_own(loop, link, connect):
+    camera = loop.graph.advertise("/uav1/camera/image_raw", Image)
+    laser = loop.graph.advertise("/uav1/laser/horizontal/scan", m.LaserScan)
+    sensors, images = connect(link.port), connect(link.image_port)
+    wanted(loop, camera)
+    wanted(loop, laser)
+    loop.publish(camera, image(3))
+    loop.publish(laser, scan(4))
+    assert sensors.next().kind == Kind.LASER_SCAN
+    frame = images.next()
+    name, found = decode_payload(frame.kind, frame.payload, frame.stamp_ns)
+    assert name == "camera/image_raw"
+    assert encode_cdr(found, "sensor_msgs/msg/Image") == encode_cdr(
+        image(3), "sensor_msgs/msg/Image"
+    )
+
+
+def test_pictures_that_nobody_reads_delay_no_scan(loop, link, connect):
+    camera = loop.graph.advertise("/uav1/camera/image_raw", Image)
+    laser = loop.graph.advertise("/uav1/laser/horizontal/scan", m.LaserScan)
+    sensors, images = connect(link.port), connect(link.image_port, receive_buffer=1 << 16)
+    wanted(loop, camera)
+    wanted(loop, laser)
+    ages = []
+    for k in range(60):
+        loop.post(lambda k=k: camera.publish(image(k, 640)))
+        began = time.perf_counter()
+        loop.publish(laser, scan(k))
+        assert sensors.next().sequence == k
+        ages.append(time.perf_counter() - began)
+    assert np.median(ages) < 0.02
+    info = next(info for info in link.clients if "images" in info.name)
+    assert info.waiting <= 1
+    frames = [images.next()]
+    while frames[-1].stamp_ns < 59_000_000:  # the newest comes whatever was left out before it
+        frames.append(images.next())
+    numbers = [frame.sequence for frame in frames]
+    assert numbers == sorted(set(numbers))
+    assert len(numbers) < 60
+
+
+def test_images_at_a_rate_of_their_own(loop, doors, connect):
+    link = SensorLink(port=0, image_port=0, image_rate_hz=10.0)
+    doors.open(link)
+    clock = [0]
+    loop.graph._now_ns = lambda: clock[0]
+    camera = loop.graph.advertise("/uav1/camera/image_raw", Image)
+    images = connect(link.image_port)
+    wanted(loop, camera)
+    stamps = []
+    for k in range(20):
+        clock[0] = k * 33_000_000
+        loop.publish(camera, image(k, 8))
+        time.sleep(0.005)
+    clock[0] = 1_000_000  # the simulation went back
+    loop.publish(camera, image(99, 8))
+    while 99_000_000 not in stamps:
+        stamps.append(images.next().stamp_ns)
+    assert len(stamps) == 8  # 0.63 s hold seven, and the last
+
+
+def test_a_port_in_use(link, doors):
+    with pytest.raises(BridgeError, match=r"in use.*choose another"):
+        doors.open(SensorLink(port=link.port, image_port=0))
+    with pytest.raises(BridgeError, match="in use"):
+        doors.open(SensorLink(port=0, image_port=link.image_port))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"host": "0.0.0.0"}, "anywhere"),
+        ({"image_rate_hz": 0.0}, "rate"),
+    ],
+)
+def test_what_cannot_be_opened(options, words):
+    with pytest.raises(BridgeError, match=words):
+        SensorLink(**options)
+
+
+def test_closing_lets_all_go(loop, link, doors, connect):
+    clients = [connect(link.port), connect(link.image_port)]
+    until(lambda: len(link.clients) == 2)
+    doors.close()
+    for client in clients:
+        with pytest.raises((AssertionError, ConnectionError)):
+            client.next()
+    assert loop.gateway.sessions() == []
+
+
+# ------------------------------------------------------------------------------ the ROS side
+
+
+@pytest.fixture
+def ros():
+    loop = Loop()
+    yield loop
+    loop.close()
+
+
+def joined(ros, link):
+    doors = Doors(ros.gateway)
+    client = SensorLinkClient(port=link.port, image_port=link.image_port)
+    doors.open(client)
+    return doors, client
+
+
+def test_two_graphs_joined(loop, link, ros):
+    loop.graph.advertise("/uav1/odom", m.Odometry)
+    laser = loop.graph.advertise("/uav1/laser/horizontal/scan", m.LaserScan)
+    camera = loop.graph.advertise("/uav1/camera/image_raw", Image)
+    scans = collect(ros, "/uav1/laser/horizontal/scan", m.LaserScan)
+    images = collect(ros, "/uav1/camera/image_raw", Image)
+    goals = collect(loop, "/uav1/goal_pose")
+    doors, client = joined(ros, link)
+    with doors:
+        wanted(loop, laser)
+        wanted(loop, camera)
+        for k in range(10):
+            loop.publish(laser, scan(k))
+        loop.publish(camera, image(5))
+        until(lambda: len(scans) == 10 and images)
+        for k, published in enumerate(scans):
+            assert published.cdr == encode_cdr(scan(k), "sensor_msgs/msg/LaserScan")
+        until(lambda: ros.graph.topic_type("/uav1/goal_pose"))
+        commander = ros.graph.advertise("/uav1/goal_pose", m.PoseStamped)
+        ros.publish(commander, pose(8.0))
+        until(lambda: goals)
+        assert goals[0].cdr == encode_cdr(pose(8.0), "geometry_msgs/msg/PoseStamped")
+        ros.publish(commander, pose(9.0, w=0.5))
+        until(lambda: client.notices)
+        assert "length 1" in client.notices[0]
+        assert (client.lost, client.refused) == (0, 0)
+
+
+def test_the_ros_side_joins_again(loop, link, doors, ros):
+    publisher = loop.graph.advertise("/uav1/range", m.Range)
+    seen = collect(ros, "/uav1/range", m.Range)
+    ros_doors, _ = joined(ros, link)
+    with ros_doors:
+        wanted(loop, publisher)
+        doors.call(link.stop())
+        until(lambda: not publisher.wanted)
+        again = SensorLink(port=link.port, image_port=link.image_port)
+        doors.open(again)
+        wanted(loop, publisher)
+        loop.publish(publisher, sonar(1))
+        until(lambda: seen)
+
+
+def test_nobody_listens(ros):
+    with Doors(ros.gateway) as doors, pytest.raises(BridgeError, match="nobody listens"):
+        doors.open(SensorLinkClient(port=1))
