@@ -105,7 +105,7 @@ class RosTcpConnector:
             try:
                 sock = await _connect(*self._address)
             except (OSError, TimeoutError) as error:
-                self._notes.append(f"cannot connect: {error or 'no answer'}")
+                self._note(f"cannot connect: {error or 'no answer'}")
             else:
                 if await self._serve(gateway, sock):
                     pause_s = _FIRST_PAUSE_S
@@ -115,7 +115,7 @@ class RosTcpConnector:
     async def _serve(self, gateway: Gateway, sock: socket.socket) -> bool:
         """Play Unity's part until the connection ends; whether it ever began in earnest."""
         host, port = self._address
-        note = self._notes.append
+        note = self._note
         open_session = partial(
             UnitySession, gateway, f"ros-tcp to {host}:{port}", self._selection, self._depth, note
         )
@@ -132,6 +132,10 @@ class RosTcpConnector:
             connection.pipe.close("the door was closed")
         note(f"the connection has ended: {connection.ended.result()}")
         return connection.session.generation is not None
+
+    def _note(self, text: str) -> None:
+        if not self._notes or self._notes[-1] != text:
+            self._notes.append(text)
 
 
 class _Connection:

@@ -104,7 +104,7 @@ class Pipe:
             self._broken(str(error))
             self.finish()
         if self._outbox.crowded and self._open and not self._ending:
-            self._reading = False
+            self._reading = False  # who does not read our answers is not asked for more
             self._loop.remove_reader(self._sock)
 
     def _write(self) -> None:
@@ -117,6 +117,7 @@ class Pipe:
                         return
                 self._forget(self._sock.sendmsg(self._unsent))
                 self.last_sent_s = self._loop.time()
+                self._read_again()
         except (BlockingIOError, InterruptedError):
             pass
         except OSError as error:
@@ -124,15 +125,17 @@ class Pipe:
             return
         self._block(True)
 
+    def _read_again(self) -> None:
+        if not self._reading and not self._outbox.crowded:
+            self._reading = True
+            self._loop.add_reader(self._sock, self._readable)
+
     def _idle(self) -> None:
         """All is sent."""
         self._block(False)
         if self._ending:
             with contextlib.suppress(OSError):
                 self._sock.shutdown(socket.SHUT_WR)
-        elif not self._reading:
-            self._reading = True
-            self._loop.add_reader(self._sock, self._readable)
 
     def _block(self, blocked: bool) -> None:
         if blocked and not self._blocked:

@@ -124,7 +124,7 @@ class EndpointSession:
     def _message(self, frame: Frame) -> None:
         inlet = self._inlets.get(frame.destination)
         if inlet is None:
-            raise BridgeError("not registered to be published; send __publish first")
+            raise BridgeError(f"Not registered to publish topic '{frame.destination[:200]}'")
         inlet.put(self._payloads.decode(frame.payload, inlet.msgtype))
 
     def _subscribe(self, fields: Fields) -> None:

@@ -7,6 +7,7 @@ one way. `__remove_*` is never sent, since Unity's endpoint closes the connectio
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -21,6 +22,8 @@ from volery.core.errors import BridgeError, GraphError
 from volery.graph.graph import TopicInfo
 from volery.graph.session import Gateway, Wake
 
+_REFUSED = re.compile(r"Not registered to publish topic '([^']+)'")
+"""What endpoints say to each message whose type they do not know."""
 _NOTES = ("__error", "__warn", "__log")
 
 
@@ -113,7 +116,7 @@ class UnitySession:
             if frame.destination == "__request":
                 self._request = number_field(ros_tcp.read_fields(frame.payload), "srv_id")
             elif frame.destination in _NOTES:
-                self._note(str(ros_tcp.read_fields(frame.payload).get("text", ""))[:1000])
+                self._hear(str(ros_tcp.read_fields(frame.payload).get("text", "")))
             elif frame.destination.startswith("__"):
                 return  # an answer that was not asked for
             elif number is not None:
@@ -126,6 +129,13 @@ class UnitySession:
     def close(self) -> None:
         """Leave the graph."""
         self._session.close()
+
+    def _hear(self, text: str) -> None:
+        """Keep what the endpoint says, and send no more of what it cannot take."""
+        refused = _REFUSED.search(text)
+        if refused:
+            self.outbox.end_stream(refused[1])
+        self._note(text[:1000])
 
     def _message(self, frame: Frame) -> None:
         inlet = self._inlets.get(frame.destination)

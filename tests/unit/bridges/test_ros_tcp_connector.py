@@ -283,6 +283,17 @@ def test_an_old_endpoint_without_handshake_is_one_of_ros_1(here, meet):
     assert any("no handshake" in note for note in connector.notes)
 
 
+def test_what_the_endpoint_cannot_take_is_sent_once(here, meet):
+    out = here.graph.advertise("/out", STRING)
+    endpoint, _ = meet(handshake('{"protocol": "ROS1"}'))
+    until(lambda: endpoint.commands("publish"))
+    here.publish(out, String("x"))
+    until(lambda: ("/out", ros1_string("x")) in endpoint.frames)
+    text = "Not registered to publish topic '/out'! Valid publish topics are: dict_keys([]) "
+    endpoint.sock.sendall(frame("__error", json.dumps({"text": text}).encode()))
+    until(lambda: not here.gateway.sessions()[0].mailboxes)
+
+
 def test_keepalives_each_idle_second(here, meet):
     endpoint, _ = meet(handshake('{"protocol": "ROS1"}'))
     until(lambda: endpoint.frames.count(("", b"")) >= 3, 6.0)

@@ -302,7 +302,7 @@ def test_one_clients_service_for_another(loop, serve, connect):
 @pytest.mark.parametrize(
     ("destination", "payload", "words"),
     [
-        ("/unknown", b"abc", "not registered"),
+        ("/unknown", b"abc", "Not registered"),
         ("__no_such", b"{}", "no such command"),
         ("__subscribe", b"{bad", "JSON"),
         ("__subscribe", b"[1]", "JSON object"),
@@ -321,7 +321,7 @@ def test_one_clients_service_for_another(loop, serve, connect):
         ("/in", b"\xff\0", "String"),
         ("/in", b"", "String"),
         ("/in", ros1_string("x") + b"more", "String"),
-        ("\ud7ff" * 1300, b"", "not registered"),
+        ("\ud7ff" * 1300, b"", "Not registered"),
     ],
 )
 def test_mistakes_are_told_and_forgiven(loop, client, destination, payload, words):

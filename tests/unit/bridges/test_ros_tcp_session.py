@@ -1,0 +1,204 @@
+"""Sessions of ROS-TCP fed with frames that make sense in part, or none, without sockets."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ros_tcp_client import cdr_string, frame, ros1_string
+
+from volery.bridges.ros_tcp import FrameParser
+from volery.bridges.ros_tcp_session import EndpointSession
+from volery.bridges.ros_tcp_unity import Selection, UnitySession
+from volery.core.errors import BridgeError
+from volery.graph.graph import Graph
+from volery.graph.messages import String, message_type
+from volery.graph.reply import Reply
+from volery.graph.session import Gateway
+
+STRING = "std_msgs/msg/String"
+TRIGGER = "std_srvs/srv/Trigger"
+Response = message_type(f"{TRIGGER}_Response")
+
+
+class Bench:
+    """A graph in this thread, with something on it."""
+
+    def __init__(self):
+        self.graph = Graph(lambda: 5)
+        self.gateway = Gateway(self.graph, self._post)
+        self.posted = []
+        self.publisher = self.graph.advertise("/out", STRING, latched=True)
+        self.graph.subscribe("/uav1/cmd_vel", lambda _: None, "geometry_msgs/msg/Twist")
+        self.graph.offer("/do", TRIGGER, lambda _request: Response(True, "done"))
+        self.before = self.counts()
+
+    def _post(self, action):
+        from concurrent.futures import Future
+
+        future = Future()
+        self.posted.append((action, future))
+        return future
+
+    def work_off(self):
+        while self.posted:
+            action, future = self.posted.pop(0)
+            try:
+                future.set_result(action())
+            except Exception as error:
+                future.set_exception(error)
+        self.graph.deliver()
+
+    def counts(self):
+        topics = {
+            t.name: (t.publishers, t.subscribers)
+            for t in self.graph.topics()
+            if t.publishers or t.subscribers
+        }
+        return topics, set(self.graph.services())
+
+
+def drain(session):
+    """Frames that the session would send."""
+    parser, found = FrameParser(), []
+    while parts := session.outbox.gather():
+        for part in parts:
+            found += parser.feed(part)
+    return found
+
+
+names = st.sampled_from(["/out", "/do", "/in", "/a", "b", "/uav1/cmd_vel", "/a b", "", "__x", "/ü"])
+types = st.sampled_from(
+    ["std_msgs/String", "std_msgs/msg/String", "geometry_msgs/Twist", "std_srvs/Trigger", "x", ""]
+)
+anything = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner),
+    max_leaves=5,
+)
+fields = st.fixed_dictionaries(
+    {},
+    optional={
+        "topic": names | anything,
+        "message_name": types | anything,
+        "queue_size": st.integers(-2, 10_000) | anything,
+        "latch": st.booleans() | anything,
+        "srv_id": st.integers(0, 3) | st.integers(1001, 1003) | anything,
+        "text": st.text(max_size=10) | anything,
+        "metadata": st.sampled_from(['{"protocol": "ROS1"}', '{"protocol": "ROS2"}']) | anything,
+    },
+)
+COMMANDS = """publish subscribe ros_service unity_service request response topic_list
+remove_publisher remove_subscriber remove_ros_service remove_unity_service handshake error log warn
+no"""
+commands = st.sampled_from([f"__{name}" for name in COMMANDS.split()])
+payloads = st.one_of(
+    st.binary(max_size=50),
+    st.text(max_size=10).map(ros1_string),
+    st.text(max_size=10).map(cdr_string),
+    st.just(bytes(48)),
+    st.just(b"\0\1\0\0" + bytes(48)),
+)
+steps = st.lists(
+    st.one_of(
+        st.tuples(commands, fields.map(lambda f: json.dumps(f).encode())),
+        st.tuples(commands, st.binary(max_size=20)),
+        st.tuples(names, payloads),
+        st.sampled_from(["work", "publish", "call", "drain", "keepalive"]),
+    ),
+    max_size=25,
+)
+
+
+def play(bench, session, script):
+    """Feed a session; returns replies that were neither answered nor failed while it lived."""
+    parser, calls = FrameParser(), []
+    for step in script:
+        if step == "work":
+            bench.work_off()
+        elif step == "publish":
+            bench.publisher.publish(String("x"))
+            bench.work_off()
+        elif step == "call":
+            for service in bench.graph.services():
+                calls.append(Reply(lambda _: None, lambda _: None))
+                bench.graph.call_async(service, None, calls[-1])
+        elif step == "drain":
+            drain(session)
+        else:
+            data = bytes(8) if step == "keepalive" else frame(*step)
+            for one in parser.feed(data):
+                session.take(one)
+    return calls
+
+
+@pytest.mark.parametrize("generation", ["ros1", "ros2"])
+@settings(max_examples=400, deadline=None)
+@given(script=steps)
+def test_no_client_breaks_the_endpoint(generation, script):
+    bench = Bench()
+    session = EndpointSession(bench.gateway, "fuzz", generation, 10, lambda: None)
+    calls = play(bench, session, script)
+    bench.work_off()
+    for one in drain(session):
+        if one.destination.startswith("__"):
+            json.loads(bytes(one.payload))
+    session.close()
+    bench.work_off()
+    assert bench.counts() == bench.before
+    assert all(call.done for call in calls)
+    assert not bench.gateway.sessions()
+
+
+@pytest.mark.parametrize("generation", [None, "ros1", "ros2"])
+@settings(max_examples=200, deadline=None)
+@given(script=steps)
+def test_no_endpoint_breaks_the_connector(generation, script):
+    bench = Bench()
+    session = UnitySession(bench.gateway, "fuzz", Selection(), 10, lambda _: None, lambda: None)
+    if generation is not None:
+        session.begin(generation)
+    with contextlib.suppress(BridgeError):  # a handshake without sense
+        play(bench, session, script)
+        session.refresh()
+    bench.work_off()
+    drain(session)
+    session.close()
+    bench.work_off()
+    assert bench.counts() == bench.before
+
+
+def test_a_message_that_cannot_be_said_is_told_once():
+    bench = Bench()
+    session = EndpointSession(bench.gateway, "c", "ros1", 10, lambda: None)
+    for one in FrameParser().feed(
+        frame("__subscribe", b'{"topic": "/out", "message_name": "std_msgs/String"}')
+    ):
+        session.take(one)
+    for _ in range(3):
+        bench.publisher.publish(String(3))
+        bench.work_off()
+        found = [(f.destination, bytes(f.payload)) for f in drain(session)]
+    assert found == []
+    assert bench.counts() == bench.before
+
+
+def test_topics_take_turns():
+    bench = Bench()
+    session = EndpointSession(bench.gateway, "c", "ros1", 10, lambda: None)
+    for topic in ("/out", "/in"):
+        fields = json.dumps({"topic": topic, "message_name": "std_msgs/String"}).encode()
+        for one in FrameParser().feed(frame("__subscribe", fields)):
+            session.take(one)
+    other = bench.graph.advertise("/in", STRING)
+    for k in range(3):
+        bench.publisher.publish(String(str(k)))
+    for k in range(3):
+        other.publish(String(str(k)))
+    bench.work_off()
+    session.complain("first")
+    found = [f.destination for f in drain(session)]
+    assert found == ["__handshake", "__error", *["/out", "/in"] * 3]
