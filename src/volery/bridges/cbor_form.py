@@ -152,7 +152,7 @@ def _add_array(values: NDArray[Any], parts: list[Any]) -> None:
         parts.append(_head(_TAG, _TAGS[kind]))
         values = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))
     parts.append(_head(_BYTE_STRING, values.nbytes))
-    parts.append(memoryview(np.ascontiguousarray(values)).cast("B") if values.size else b"")
+    parts.append(np.ascontiguousarray(values).data.cast("B") if values.size else b"")
 
 
 _ADDERS: dict[type, Any] = {
@@ -185,7 +185,5 @@ def _refuse(*_: Any) -> Any:
     raise ValueError("the only tags allowed are those of typed arrays")
 
 
-_REFUSED = {
-    tag: _refuse
-    for tag in (*range(6), 25, 28, 29, 30, 35, 36, 37, 52, 54, 100, 256, 258, 260, 261, 1004, 43000)
-}
+_BUILT_IN = (*range(6), 25, 28, 29, 30, 35, 36, 37, 52, 54, 100, 256, 258, 260, 261, 1004, 43000)
+_REFUSED = dict.fromkeys(_BUILT_IN, _refuse)

@@ -13,7 +13,9 @@ import math
 from io import BytesIO
 from typing import Any
 
-from volery.bridges.cbor_form import decode_cbor
+import numpy as np
+
+from volery.bridges.cbor_form import MOST_DEPTH, decode_cbor
 from volery.core.errors import BridgeError
 
 Frame = str | bytes
@@ -42,9 +44,22 @@ def decode_frame(frame: Frame) -> Operation:
 
 
 def encode_json(operation: Operation) -> str:
-    """JSON text, pure ASCII; `BridgeError` for what JSON cannot say."""
+    """JSON text, pure ASCII. Arrays become lists, bytes base64, numbers that are not finite null.
+
+    Raises
+    ------
+    BridgeError
+        It holds what JSON cannot say.
+
+    """
     try:
-        return json.dumps(operation, separators=(",", ":"), allow_nan=False)
+        return _dump(operation)
+    except ValueError:
+        pass  # a number that is not finite, which is rare
+    except (TypeError, RecursionError) as error:
+        raise BridgeError(f"not writable as JSON: {error}") from None
+    try:
+        return _dump(_with_nulls(operation, 0))
     except (ValueError, TypeError, RecursionError) as error:
         raise BridgeError(f"not writable as JSON: {error}") from None
 
@@ -98,3 +113,32 @@ def _decode_json(text: str) -> Any:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
         raise BridgeError(f"not readable as JSON: {error}") from None
+
+
+def _dump(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), allow_nan=False, default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    """What arrives as CBOR and leaves as JSON."""
+    if isinstance(value, np.ndarray):
+        if value.dtype == np.uint8:
+            return base64.b64encode(value.tobytes()).decode("ascii")
+        return value.tolist()
+    if isinstance(value, (bytes, bytearray)):
+        return base64.b64encode(value).decode("ascii")
+    raise TypeError(f"a {type(value).__name__}")
+
+
+def _with_nulls(value: Any, depth: int) -> Any:
+    if depth > 2 * MOST_DEPTH:
+        raise ValueError("nested too deeply")
+    if isinstance(value, dict):
+        return {key: _with_nulls(inner, depth + 1) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_with_nulls(inner, depth + 1) for inner in value]
+    if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+        return _with_nulls(value.tolist(), depth + 1)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
