@@ -11,14 +11,13 @@ import numpy as np
 from volery.control.fleet import Fleet
 from volery.core.errors import SnapshotError
 from volery.engine.engine import Engine
-from volery.engine.events import Event
 from volery.engine.faults import FaultPlan
 from volery.engine.partners import Partner
 from volery.graph.graph import Graph
 from volery.graph.node import Node
 from volery.graph.publishing import GraphPublisher
 from volery.runtime.building import check_free
-from volery.runtime.digest import Digest
+from volery.runtime.outlet import Outlet
 from volery.runtime.run_loop import RunLoop
 from volery.runtime.sensor_fitting import Fitted, refit
 from volery.runtime.snapshot import (
@@ -47,9 +46,8 @@ class Keeper:
     fitted: Sequence[Fitted]
     nodes: list[Node]
     partners: list[Partner]
-    events: list[Event]
+    outlet: Outlet
     take_off: Callable[[Sequence[str]], None]
-    digest: Digest | None = None
     _start: dict[str, Any] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -104,14 +102,15 @@ class Keeper:
             raise SnapshotError(f"{what} is not possible in the middle of a tick; use post()")
 
     def _state(self) -> dict[str, Any]:
+        digest = self.outlet.digest
         return {
             "engine": self.engine.get_state(),
             "graph": self.graph.get_state(),
             "faults": self.faults.get_state(),
             "publisher": self.publisher.get_state(),
             "nodes": keep_nodes(self.nodes),
-            "digest": None if self.digest is None else self.digest.get_state(),
-            "events": list(self.events),
+            "digest": None if digest is None else digest.get_state(),
+            "events": list(self.outlet.events),
             "owed_ns": self.loop.owed_ns,
         }
 
@@ -121,7 +120,7 @@ class Keeper:
         self.graph.set_state(state["graph"])
         self.faults.set_state(state["faults"])
         self.publisher.set_state(state["publisher"])
-        if self.digest is not None:
-            self.digest.set_state(state["digest"])
-        self.events[:] = state["events"]
+        if self.outlet.digest is not None:
+            self.outlet.digest.set_state(state["digest"])
+        self.outlet.events[:] = state["events"]
         self.loop.owed_ns = state["owed_ns"]

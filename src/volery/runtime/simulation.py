@@ -11,8 +11,7 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
-from volery.control.flight_modes import FlightMode
-from volery.core.clock import ns_from_s, s_from_ns
+from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError, ScenarioError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
@@ -21,23 +20,22 @@ from volery.engine.pacing import Pacer
 from volery.engine.partners import Partner, check_terms
 from volery.engine.stepping import OnSteps, StepRequest
 from volery.graph.graph import Graph
-from volery.graph.node import Context, Node
-from volery.graph.publishing import GraphPublisher
+from volery.graph.node import Node
 from volery.graph.session import Gateway
 from volery.runtime.building import add_bodies, build_fleet, place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.command_door import open_commands
-from volery.runtime.digest import Digest
 from volery.runtime.estimation_building import build_estimation
+from volery.runtime.graph_building import all_down, make_publisher, plan_faults, start_nodes
 from volery.runtime.keeping import Keeper
 from volery.runtime.lock_step import open_lock_step
-from volery.runtime.node_loading import start_node
+from volery.runtime.outlet import Outlet
 from volery.runtime.placement import Start
 from volery.runtime.progress import Progress
 from volery.runtime.relocation import Relocator
 from volery.runtime.run_loop import RunLoop
 from volery.runtime.sensor_building import build_banks
-from volery.runtime.sensor_fitting import RESULT_OF, Fitted, fit_sensors, lidar_mounts
+from volery.runtime.sensor_fitting import fit_sensors, lidar_mounts
 from volery.runtime.services import Services, open_services
 from volery.runtime.snapshot import Snapshot
 from volery.runtime.uav import Uav
@@ -45,7 +43,6 @@ from volery.runtime.warm_up import compile_kernels
 from volery.runtime.worlds import build_forest, build_terrain
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario
-from volery.sensors.samples import JointAngles, Samples
 from volery.world.scene import Scene
 from volery.world.weather import Weather
 
@@ -80,8 +77,6 @@ class Simulation:
         self.scene = Scene(self.terrain, self.forest, threads=threads)
         self._closed = False
         self._pacer = Pacer()
-        self._digest: Digest | None = None
-        self._events: list[Event] = []
 
         starts = place(scenario, self.scene, self.terrain)
         names = tuple(start.name for start in starts)
@@ -91,7 +86,9 @@ class Simulation:
         self.graph = Graph(lambda: self.time_ns, self.post)
         self.gateway = Gateway(self.graph, self.post)
         """Where clients of other threads join the graph."""
-        self._publisher = _make_publisher(self.graph, fitted)
+        self._publisher = make_publisher(self.graph, fitted)
+        self.outlet = Outlet(self._fleet, self.graph, self._publisher)
+        """Where steps, measurements and events go."""
         self.mounts = lidar_mounts(fitted, planar=True)
         self.cloud_mounts = lidar_mounts(fitted, planar=False)
         estimation = build_estimation(scenario, fitted, self._fleet)
@@ -102,7 +99,7 @@ class Simulation:
             self.terrain,
             self._banks,
             names,
-            self,
+            self.outlet,
             crash_on_contact=scenario.physics.on_contact == "crash",
             estimation=estimation,
         )
@@ -120,7 +117,7 @@ class Simulation:
         """Where the UAVs begin, in fleet order."""
         self._open_graph(starts)
         self._faults = FaultPlan(self._engine, names)
-        self._plan_faults()
+        plan_faults(self._faults, scenario)
         self._loop = RunLoop(self._engine, self._pacer, scenario.duration_s, self._has_ended)
         self._relocator = Relocator(self._engine, self.scene, self.terrain, starts, fitted)
         open_lock_step(self)
@@ -135,7 +132,7 @@ class Simulation:
             fitted,
             self.nodes,
             self._partners,
-            self._events,
+            self.outlet,
             self._take_off,
         )
         self._take_off(names)
@@ -395,7 +392,7 @@ class Simulation:
     @property
     def events(self) -> tuple[Event, ...]:
         """Everything that happened so far, oldest first."""
-        return tuple(self._events)
+        return tuple(self.outlet.events)
 
     @property
     def stage_seconds(self) -> dict[str, float]:
@@ -404,73 +401,35 @@ class Simulation:
 
     def enable_digest(self) -> None:
         """Fingerprint all states and messages from now on; call before the first step."""
-        if self._digest is None:
-            self._digest = self._keeper.digest = Digest()
-            self.graph.subscribe_all(self._digest.add_message)
+        self.outlet.enable_digest()
 
     def digest(self) -> str:
         """SHA-256 over all states and sensor messages since `enable_digest`."""
-        if self._digest is None:
+        if self.outlet.digest is None:
             raise CommandError("call enable_digest() before the run")
-        return self._digest.hexdigest()
-
-    # ------------------------------------------------------------------------ the engine's sink
-
-    def advanced(self, first_step: int, last_step: int) -> None:
-        """Take in computed steps (called by the engine)."""
-        if self._digest is not None:
-            self._digest.add_steps(self._fleet.history, first_step, last_step)
-
-    def sampled(self, samples: Samples) -> None:
-        """Publish measurements (called by the engine)."""
-        self._publisher.publish(samples)
-
-    def happened(self, event: Event) -> None:
-        """Keep and publish an event (called by the engine)."""
-        self._events.append(event)
-        self._publisher.publish_event(event)
-
-    def deliver(self) -> None:
-        """Hand out queued messages (called by the engine)."""
-        self.graph.deliver()
+        return self.outlet.digest.hexdigest()
 
     # ----------------------------------------------------------------------------------- building
 
     def _open_graph(self, starts: tuple[Start, ...]) -> None:
-        publisher, every = self._publisher, self._engine.every
+        publisher, outlet, every = self._publisher, self.outlet, self._engine.every
         every(
             _CLOCK_PERIOD_S,
             lambda: publisher.publish_clock(self.time_ns),
             wanted=lambda: publisher.clock_wanted,
         )
-        every(_DIGEST_PERIOD_S, self._take_fingerprint, wanted=lambda: self._digest is not None)
+        every(_DIGEST_PERIOD_S, outlet.take_fingerprint, wanted=lambda: outlet.digest is not None)
         for uav in self.uavs.values():
             open_commands(self.graph, uav, lambda: self.time_ns)
-        for start in starts:
-            for k, entry in enumerate(self.scenario.types[start.type_name].nodes):
-                where = f"{self.scenario.name}: types.{start.type_name}.nodes[{k}]"
-                latency_ns = ns_from_s(entry.latency_s)
-                context = Context(self.graph, self._engine, lambda: self.time_ns, latency_ns)
-                self.nodes.append(
-                    start_node(entry, context, f"/{start.name}", where, self.scenario.folder)
-                )
+        self.nodes += start_nodes(
+            self.scenario, starts, self.graph, self._engine, lambda: self.time_ns
+        )
 
     def _take_off(self, names: Sequence[str]) -> None:
         """Let those of the UAVs take off that do so by themselves."""
         for start in self.starts:
             if start.takes_off and start.name in names:
                 self.uavs[start.name].take_off()
-
-    def _plan_faults(self) -> None:
-        for k, fault in enumerate(self.scenario.faults):
-            try:
-                self._faults.add(fault)
-            except CommandError as error:
-                raise ScenarioError(f"{self.scenario.name}: faults[{k}]: {error}") from None
-
-    def _take_fingerprint(self) -> None:
-        if self._digest is not None:
-            self._digest.add_states(self._fleet)
 
     def _check_open(self) -> None:
         if self._closed:
@@ -483,23 +442,4 @@ class Simulation:
 
     def _has_ended(self) -> bool:
         """Whether every UAV has flown and is down for good, where the scenario ends with that."""
-        if self.scenario.ends_when != "all_landed":
-            return False
-        modes = [uav.mode for uav in self.uavs.values()]
-        flown = {e.uav for e in self._events}
-        return all(
-            mode is FlightMode.CRASHED or (mode is FlightMode.LANDED and name in flown)
-            for name, mode in zip(self.uavs, modes, strict=True)
-        )
-
-
-def _make_publisher(graph: Graph, fitted: list[Fitted]) -> GraphPublisher:
-    publisher = GraphPublisher(graph)
-    for sensor in fitted:
-        if sensor.lidar is not None:
-            publisher.announce_lidar(sensor.id, sensor.lidar, sensor.topic, sensor.mount)
-        else:
-            publisher.announce(sensor.id, RESULT_OF[sensor.spec.kind], sensor.mount)
-        if sensor.mount.nods:
-            publisher.announce(sensor.id, JointAngles, sensor.mount)
-    return publisher
+        return self.scenario.ends_when == "all_landed" and all_down(self.uavs, self.outlet.events)

@@ -26,7 +26,7 @@ def names(simulation, **filters):
 
 
 def put(simulation, name, position, **changes):
-    state = {"pose": {"position": dict(zip("xyz", position)), "orientation": UPRIGHT}}
+    state = {"pose": {"position": dict(zip("xyz", position, strict=True)), "orientation": UPRIGHT}}
     fields = {"set_pose": True, **changes}
     return ask(simulation, "/set_entity_state", entity=name, state=state, **fields)
 
@@ -66,7 +66,7 @@ def test_bounds_choose_what_reaches_into_them(trio):
 @pytest.mark.parametrize(
     ("filters", "code"),
     [
-        ({"filter": "(((" }, FAILED),
+        ({"filter": "((("}, FAILED),
         ({"filter": "a" * 300}, FAILED),
         ({"bounds": {"type": 2}}, UNSUPPORTED),
         ({"bounds": {"type": 9}}, FAILED),

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -16,7 +16,6 @@ import numpy as np
 
 from volery.bridges.doors import Doors
 from volery.bridges.ros_tcp_endpoint import RosTcpEndpoint
-
 from volery.graph.messages import Header, Time, message_type
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario, parse_scenario
@@ -61,7 +60,7 @@ def measure() -> dict[str, float]:
 class World:
     """A simulation in real time, in a thread of its own, with two doors open."""
 
-    def __init__(self, simulation: WatchedSimulation, doors: Doors) -> None:
+    def __init__(self, simulation: Simulation, doors: Doors) -> None:
         self.simulation = simulation
         tcp, web = RosTcpEndpoint(port=0), RosbridgeServer(port=0)
         doors.open(tcp)
@@ -96,22 +95,10 @@ class World:
         return finish
 
 
-class WatchedSimulation(Simulation):
-    """A simulation that lets itself be looked at after each call of the fused step."""
-
-    watch: Callable[[], None] | None = None
-
-    def advanced(self, first_step: int, last_step: int) -> None:
-        """Take in computed steps (called by the engine)."""
-        super().advanced(first_step, last_step)
-        if self.watch is not None:
-            self.watch()
-
-
 @contextmanager
 def running(scenario: Scenario) -> Iterator[World]:
     """Run `scenario` in real time until the block ends."""
-    with WatchedSimulation(scenario) as simulation:
+    with Simulation(scenario) as simulation:
         simulation.step(1)  # what compiles does so before anybody measures
         with Doors(simulation.gateway) as doors:
             world = World(simulation, doors)
@@ -180,7 +167,7 @@ def stop_latencies(world: World) -> list[float]:
         return response(success=True, message="")
 
     simulation.post(lambda: simulation.graph.offer("/bench/recover", _TRIGGER, recover)).result()
-    simulation.watch = look
+    simulation.outlet.watch = look
     sent = world.ros_tcp("stops", "uav1", _STOPS)["sent_ns"]
     return [1e-9 * (stop - send) for send, stop in zip(sent, stopped_ns, strict=True)]
 

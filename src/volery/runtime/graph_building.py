@@ -1,0 +1,70 @@
+"""What of a scenario takes part in the graph: sensors' topics, nodes, faults and the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from volery.control.flight_modes import FlightMode
+from volery.core.clock import ns_from_s
+from volery.core.errors import CommandError, ScenarioError
+from volery.engine.engine import Engine
+from volery.engine.events import Event
+from volery.engine.faults import FaultPlan
+from volery.graph.graph import Graph
+from volery.graph.node import Context, Node
+from volery.graph.publishing import GraphPublisher
+from volery.runtime.node_loading import start_node
+from volery.runtime.placement import Start
+from volery.runtime.sensor_fitting import RESULT_OF, Fitted
+from volery.runtime.uav import Uav
+from volery.scenario.schema import Scenario
+from volery.sensors.samples import JointAngles
+
+
+def make_publisher(graph: Graph, fitted: Sequence[Fitted]) -> GraphPublisher:
+    """Advertise what the sensors publish."""
+    publisher = GraphPublisher(graph)
+    for sensor in fitted:
+        if sensor.lidar is not None:
+            publisher.announce_lidar(sensor.id, sensor.lidar, sensor.topic, sensor.mount)
+        else:
+            publisher.announce(sensor.id, RESULT_OF[sensor.spec.kind], sensor.mount)
+        if sensor.mount.nods:
+            publisher.announce(sensor.id, JointAngles, sensor.mount)
+    return publisher
+
+
+def start_nodes(
+    scenario: Scenario,
+    starts: Sequence[Start],
+    graph: Graph,
+    engine: Engine,
+    now_ns: Callable[[], int],
+) -> list[Node]:
+    """The nodes that run beside the UAVs, in fleet order."""
+    nodes = []
+    for start in starts:
+        for k, entry in enumerate(scenario.types[start.type_name].nodes):
+            where = f"{scenario.name}: types.{start.type_name}.nodes[{k}]"
+            context = Context(graph, engine, now_ns, ns_from_s(entry.latency_s))
+            nodes.append(start_node(entry, context, f"/{start.name}", where, scenario.folder))
+    return nodes
+
+
+def plan_faults(plan: FaultPlan, scenario: Scenario) -> None:
+    """Plan the scenario's faults; `ScenarioError` names the one that cannot be."""
+    for k, fault in enumerate(scenario.faults):
+        try:
+            plan.add(fault)
+        except CommandError as error:
+            raise ScenarioError(f"{scenario.name}: faults[{k}]: {error}") from None
+
+
+def all_down(uavs: Mapping[str, Uav], events: Sequence[Event]) -> bool:
+    """Whether every UAV has flown and is down for good."""
+    modes = [uav.mode for uav in uavs.values()]
+    flown = {event.uav for event in events}
+    return all(
+        mode is FlightMode.CRASHED or (mode is FlightMode.LANDED and name in flown)
+        for name, mode in zip(uavs, modes, strict=True)
+    )
