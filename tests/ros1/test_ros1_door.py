@@ -198,7 +198,7 @@ def test_the_late_get_what_was_latched_each_publisher_s_own(live, registered):
         assert early.next()[0] == "new"  # and nothing twice
 
 
-def test_a_slow_reader_delays_nobody(live, registered):
+def test_a_slow_reader_delays_nobody(live, door, registered):
     publish = live.publisher("/flood", STRING)
     registered("/flood")
     with peer("hang", "/flood") as slow, peer("listen", "/flood", "--count=1000000") as quick:
@@ -207,12 +207,13 @@ def test_a_slow_reader_delays_nobody(live, registered):
         assert wait_until(lambda: wanted(live, "/flood"))
         threading.Event().wait(0.5)
         big = "x" * 200_000
-        for _ in range(100):
+        for _ in range(200):
             publish(String(big))
         publish(String("last"))
         last = ""
         while last != "last":
             last = quick.next()[0]
+        assert wait_until(lambda: door.dropped.get("/flood", 0) > 50)
 
 
 def subscribed():

@@ -21,7 +21,8 @@ from concurrent.futures import TimeoutError as FutureTimeout
 from typing import Any
 
 from volery.bridges.ros1_node import Ros1Node, join_ros1
-from volery.bridges.ros1_outlet import Outlet, Pump
+from volery.bridges.ros1_outlet import Outlet
+from volery.bridges.ros1_pump import Pump
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.graph import TopicInfo
 from volery.graph.reply import Reply
@@ -83,6 +84,11 @@ class Ros1Door:
         self._bridge: _Bridge | None = None
         self._steward: threading.Thread | None = None
         self._stopping = threading.Event()
+
+    @property
+    def dropped(self) -> dict[str, int]:
+        """Messages that slow ROS 1 subscribers have missed, by topic, where there are any."""
+        return {} if self._bridge is None else self._bridge.dropped
 
     async def start(self, gateway: Gateway) -> None:
         """Join the ROS 1 graph. `BridgeError` without rospy or a master."""
@@ -209,6 +215,12 @@ class _Bridge:
             self._update_inlet(topics[name], publishers, subscribers)
         self._update_services()
 
+    @property
+    def dropped(self) -> dict[str, int]:
+        """What slow subscribers have missed, by topic."""
+        counts = {name: outlet.dropped for name, outlet in tuple(self._outlets.items())}
+        return {name: count for name, count in counts.items() if count}
+
     def close(self) -> None:
         """Take everything back."""
         for inlet in self._inlets.values():
@@ -229,19 +241,18 @@ class _Bridge:
     def _subscribers(self, topic: TopicInfo) -> int:
         """How many others subscribe to it."""
         outlet = self._outlets.get(topic.name)
-        return topic.subscribers - (outlet is not None and outlet.holds is not None)
+        return topic.subscribers - (outlet is not None and outlet.holds)
 
     def _update_outlet(self, topic: TopicInfo, publishers: int) -> None:
         outlet = self._outlets.get(topic.name)
         if outlet is None:
             if publishers and self._speaks(topic):
-                made = Outlet(
-                    self.node, self._session, topic.name, topic.msgtype, latched=topic.latched
+                names = topic.name, topic.msgtype
+                self._outlets[topic.name] = Outlet(
+                    self.node, self._session, self._pump, names, latched=topic.latched
                 )
-                self._outlets[topic.name] = made
-                self._pump.add(made)
-        elif outlet.connected != (outlet.holds is not None):
-            self._pump.wake(outlet)
+        elif not outlet.is_current:
+            outlet.wake()
 
     def _update_inlet(self, topic: TopicInfo, publishers: int, subscribers: int) -> None:
         name = topic.name

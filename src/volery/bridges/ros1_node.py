@@ -44,26 +44,28 @@ class Ros1Node:
 
     # ------------------------------------------------------------------------------------ topics
 
-    def publisher(
-        self, topic: str, msgtype: str, *, latched: bool = False, listener: Any = None
-    ) -> Any:
-        """A `rospy.Publisher` of raw messages. `GraphError` for an unknown type.
-
-        latched: what subscribers are told. Without a listener rospy keeps the last message for
-        those to come; a listener sends them what there is.
-        """
+    def publisher(self, topic: str, msgtype: str, *, latched: bool = False) -> Any:
+        """A `rospy.Publisher` of raw messages. `GraphError` for an unknown type."""
         made = raw_message_class(msgtype)
-        keeps = latched and listener is None
-        told = {"latching": "1"} if latched else None
-        bulky = made.__name__ in _BULKY
-        return self._rospy.Publisher(
+        depth = _QUEUES[0] if made.__name__ in _BULKY else _QUEUES[1]
+        return self._rospy.Publisher(topic, made, latch=latched, queue_size=depth)
+
+    def outlet(
+        self, topic: str, msgtype: str, on_change: Callable[[], None], *, latched: bool
+    ) -> Any:
+        """A `rospy.Publisher` to whose connections somebody else writes. `GraphError`: the type.
+
+        on_change: called when subscribers have come or gone. latched: what they are told.
+        """
+        publisher = self._rospy.Publisher(
             topic,
-            made,
-            subscriber_listener=_listener(self._rospy, listener),
-            latch=keeps,
-            headers=told,
-            queue_size=_QUEUES[0] if bulky else _QUEUES[1],
+            raw_message_class(msgtype),
+            subscriber_listener=_listener(self._rospy, on_change),
+            headers={"latching": "1" if latched else "0"},
+            queue_size=1,
         )
+        publisher.impl.set_queue_size(None)  # no thread for each connection
+        return publisher
 
     def subscriber(self, topic: str, msgtype: str, receive: Callable[[bytes, str], None]) -> Any:
         """A `rospy.Subscriber`; `receive(data, sender)` is called in a thread of its own."""
@@ -221,18 +223,16 @@ def _begin(rospy: Any, name: str, uri: str) -> None:
             del os.environ[setting]
 
 
-def _listener(rospy: Any, listener: Any) -> Any:
-    """A listener of rospy's kind that tells `listener` of subscribers that come and go."""
-    if listener is None:
-        return None
+def _listener(rospy: Any, on_change: Callable[[], None]) -> Any:
+    """A listener of rospy's kind."""
 
     class Listener(rospy.SubscribeListener):  # type: ignore[misc]
         """Passes on."""
 
-        def peer_subscribe(self, _topic: str, _all: Any, publish_to_it: Any) -> None:
-            listener.on_come(publish_to_it)
+        def peer_subscribe(self, *_: Any) -> None:
+            on_change()
 
-        def peer_unsubscribe(self, _topic: str, _number: int) -> None:
-            listener.on_gone()
+        def peer_unsubscribe(self, *_: Any) -> None:
+            on_change()
 
     return Listener()

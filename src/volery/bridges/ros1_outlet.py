@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import logging
-import os
-import queue
-import socket
-import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 from volery.bridges.ros1_node import Ros1Node
-from volery.bridges.ros1_raw import raw_message_class
+from volery.bridges.ros1_pump import Pump, Reader
 from volery.core.errors import GraphError
 from volery.graph.messages import Published
 from volery.graph.ros1 import ros1_codec
@@ -23,7 +19,6 @@ _DEPTH = 1000
 _OWN_KEPT = 1000
 
 _log = logging.getLogger(__name__)
-_Send = Callable[[Any], None]
 
 
 class Outlet:
@@ -33,45 +28,38 @@ class Outlet:
     """
 
     def __init__(
-        self, node: Ros1Node, session: Session, topic: str, msgtype: str, *, latched: bool
+        self, node: Ros1Node, session: Session, pump: Pump, info: tuple[str, str], *, latched: bool
     ) -> None:
-        self.topic = topic
-        self.msgtype = msgtype
+        self.topic, self.msgtype = info
         self.latched = latched
+        self.wake = pump.waker(self)
         self._session = session
+        self._pump = pump
         self._encode = ros1_codec().encode
-        self._raw = raw_message_class(msgtype)
         self._mailbox: Mailbox | None = None
-        self._newcomers: queue.SimpleQueue[_Send] = queue.SimpleQueue()
+        self._connections: list[Any] = []
+        self._readers: dict[Any, Reader] = {}
         self._own: OrderedDict[int, Any] = OrderedDict()
         self._sequence = 0
+        self._dropped = 0
         self._complained = False
-        self._wake: Callable[[], None] = _nothing
-        self._publisher = node.publisher(topic, msgtype, latched=latched, listener=self)
-
-    def start(self, wake: Callable[[], None]) -> None:
-        """Have `serve` called by `wake`."""
-        self._wake = wake
-        wake()
+        self._publisher = node.outlet(self.topic, self.msgtype, self.wake, latched=latched)
+        self.wake()
 
     @property
-    def connected(self) -> bool:
-        """Whether anybody subscribes."""
-        return bool(self._publisher.get_num_connections())
+    def is_current(self) -> bool:
+        """Whether it listens to the graph just while somebody subscribes."""
+        return bool(self._publisher.get_num_connections()) == self.holds
 
     @property
-    def holds(self) -> Mailbox | None:
-        """The mailbox, while somebody subscribes."""
-        return self._mailbox
+    def holds(self) -> bool:
+        """Whether it listens to the graph."""
+        return self._mailbox is not None
 
-    def on_come(self, send: _Send) -> None:
-        """Somebody subscribes; `send` publishes to nobody else."""
-        self._newcomers.put(send)
-        self._wake()
-
-    def on_gone(self) -> None:
-        """Somebody has left."""
-        self._wake()
+    @property
+    def dropped(self) -> int:
+        """Messages that subscribers have missed because they were slow."""
+        return self._dropped + sum(reader.dropped for reader in tuple(self._readers.values()))
 
     def leave_out(self, message: Any) -> None:
         """Do not send a message that came from ROS 1 itself."""
@@ -82,14 +70,14 @@ class Outlet:
 
     def serve(self) -> None:
         """Send what waits; begin or end to listen to the graph as subscribers come and go."""
-        newcomers = list(_drain(self._newcomers))
-        if not self.connected:
+        newcomers = self._meet()
+        if not self._readers:
             self._let_go()
             return
-        if newcomers or self._mailbox is None:
-            _send_at_once(self._publisher.impl.connections)
-        if self._mailbox is None:
-            self._mailbox = self._subscribe()  # it holds what was latched, for all
+        if self._mailbox is None:  # a new mailbox holds what was latched, for all of them
+            self._mailbox = self._session.subscribe(
+                self.topic, self.msgtype, depth=_DEPTH, wake=self.wake
+            )
             newcomers = []
         kept = self._kept() if self.latched and newcomers else []
         fresh = self._mailbox.take()
@@ -98,16 +86,36 @@ class Outlet:
             if id(published) not in known:
                 self._send(published, newcomers)
         for published in fresh:
-            if self._own.pop(id(published.message), None) is None:
-                self._send(published, [self._publisher.publish])
+            if not self._own or self._own.pop(id(published.message), None) is None:
+                self._send(published, self._readers.values())
 
     def close(self) -> None:
         """Publish no more, once the pump has ended."""
         self._let_go()
         self._publisher.unregister()
+        for reader in self._readers.values():
+            reader.close()
 
-    def _subscribe(self) -> Mailbox:
-        return self._session.subscribe(self.topic, self.msgtype, depth=_DEPTH, wake=self._wake)
+    def _meet(self) -> list[Reader]:
+        """Bring the readers up to date with rospy's connections; those that are new."""
+        connections = self._publisher.impl.connections  # rospy replaces the list at each change
+        if connections is self._connections:
+            return []
+        self._connections = connections
+        for gone in [known for known in self._readers if known not in connections]:
+            reader = self._readers.pop(gone)
+            reader.close()
+            self._dropped += reader.dropped
+        newcomers = []
+        for connection in connections:
+            if connection not in self._readers:
+                try:
+                    reader = self._pump.reader(connection)
+                except (OSError, TypeError):  # it has closed already
+                    continue
+                self._readers[connection] = reader
+                newcomers.append(reader)
+        return newcomers
 
     def _kept(self) -> list[Published]:
         """What latched publishers of the graph have sent last."""
@@ -115,74 +123,23 @@ class Outlet:
         self._session.unsubscribe(glance)
         return glance.take()
 
-    def _send(self, published: Published, targets: Iterable[_Send]) -> None:
+    def _send(self, published: Published, readers: Iterable[Reader]) -> None:
         try:
             data = self._encode(published.message, self.msgtype, self._sequence)
         except GraphError as error:
-            self._complain(error)
+            if not self._complained:
+                self._complained = True
+                _log.warning("ROS 1 topic %s: %s", self.topic, error)
             return
         self._sequence += 1
-        for send in targets:
-            send(self._raw(data))
-
-    def _complain(self, error: Exception) -> None:
-        """Say once what cannot be sent."""
-        if not self._complained:
-            self._complained = True
-            _log.warning("ROS 1 topic %s: %s", self.topic, error)
+        for reader in tuple(readers):
+            reader.send(data)
 
     def _let_go(self) -> None:
         if self._mailbox is not None:
             self._session.unsubscribe(self._mailbox)
             self._mailbox = None
             self._own.clear()
-
-
-class Pump:
-    """The thread in which outlets send, so that neither the simulation nor other doors wait."""
-
-    def __init__(self) -> None:
-        self._ready: queue.SimpleQueue[Outlet | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._run, name="volery-ros1", daemon=True)
-        self._thread.start()
-
-    def add(self, outlet: Outlet) -> None:
-        """Serve an outlet from now on."""
-        outlet.start(lambda: self._ready.put(outlet))
-
-    def wake(self, outlet: Outlet) -> None:
-        """Serve an outlet once more."""
-        self._ready.put(outlet)
-
-    def close(self) -> None:
-        """End the thread; what waits is not sent."""
-        self._ready.put(None)
-        self._thread.join()
-
-    def _run(self) -> None:
-        while (outlet := self._ready.get()) is not None:
-            try:
-                outlet.serve()
-            except Exception as error:  # one topic's trouble must not end the others
-                _log.warning("ROS 1 topic %s: %s: %s", outlet.topic, type(error).__name__, error)
-
-
-def _send_at_once(connections: Iterable[Any]) -> None:
-    """Switch Nagle's algorithm off, which rospy does only for subscribers that ask for it."""
-    for connection in connections:
-        number = connection.fileno()
-        if number is None:
-            continue
-        try:
-            with socket.socket(fileno=os.dup(number)) as same:
-                same.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        except OSError:  # it is closing
-            continue
-
-
-def _drain(source: queue.SimpleQueue[_Send]) -> Iterable[_Send]:
-    while not source.empty():
-        yield source.get_nowait()
 
 
 def _nothing() -> None:
