@@ -15,7 +15,6 @@ import asyncio
 import itertools
 import threading
 import time
-from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import Any
@@ -24,8 +23,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidHandshake, InvalidURI, WebSocketException
 
 from volery.bridges.rosbridge_client_state import ClientState
-from volery.bridges.rosbridge_server import CBOR_PROTOCOL
-from volery.bridges.rosbridge_wire import MOST_MESSAGE_BYTES, Frame
+from volery.bridges.rosbridge_forms import Generation
+from volery.bridges.rosbridge_wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES, Frame
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.reply import Reply
 from volery.graph.session import DEFAULT_DEPTH, Handler, Mailbox, SessionInfo, Wake
@@ -46,6 +45,8 @@ class RosbridgeClient:
         Who it is, for people.
     token
         Shown to the server, if given.
+    generation
+        Spelling of types and times that the server understands; ours understands both.
     connect_timeout_s
         How long to try at first; 0: do not wait, keep trying in the background.
 
@@ -64,6 +65,7 @@ class RosbridgeClient:
         token: str | None = None,
         connect_timeout_s: float = 5.0,
         max_message_bytes: int = MOST_MESSAGE_BYTES,
+        generation: Generation = "ros2",
     ) -> None:
         if not url.startswith(("ws://", "wss://")):
             raise BridgeError(f"'{url}' is no address of a rosbridge: ws://HOST:PORT")
@@ -72,11 +74,12 @@ class RosbridgeClient:
         self._most_bytes = max_message_bytes
         self._loop = asyncio.new_event_loop()
         self._wanted = asyncio.Event()
-        self._state = ClientState(token, self._wake_writer)
+        self._state = ClientState(token, self._wake_writer, generation)
         self._connected = threading.Event()
         self._trouble = "no answer"
         self._closed = False
         self._connections = 0
+        self._main = self._loop.create_task(self._keep_connected())
         self._thread = threading.Thread(target=self._run, name=f"{name}-rosbridge", daemon=True)
         self._thread.start()
         if connect_timeout_s:
@@ -213,7 +216,6 @@ class RosbridgeClient:
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
-        self._main = self._loop.create_task(self._keep_connected())
         try:
             self._loop.run_until_complete(self._main)
         except asyncio.CancelledError:
@@ -279,6 +281,3 @@ class RosbridgeClient:
                 if next(turns) % 32 == 0:
                     await asyncio.sleep(0)
             await self._wanted.wait()
-
-
-_ = Callable

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from volery.bridges.cbor_form import encode_cbor
+from volery.bridges.rosbridge_forms import Generation
 from volery.bridges.rosbridge_fragments import Assembly
 from volery.bridges.rosbridge_wire import (
     MOST_MESSAGE_BYTES,
@@ -29,7 +30,7 @@ from volery.graph.json_decoding import decode_plain
 from volery.graph.json_form import JsonForm
 from volery.graph.messages import Published, typestore
 from volery.graph.reply import Reply
-from volery.graph.ros1_names import ros2_name
+from volery.graph.ros1_names import ros1_name, ros2_name
 from volery.graph.session import MOST_DEPTH, Handler, Mailbox, SessionInfo, Wake
 
 MOST_WAITING = 1000
@@ -73,7 +74,7 @@ class ClientState:
 
     """
 
-    def __init__(self, token: str | None, wake: Wake) -> None:
+    def __init__(self, token: str | None, wake: Wake, generation: Generation = "ros2") -> None:
         self.complaints: deque[str] = deque(maxlen=MOST_COMPLAINTS)
         self.dropped = 0
         self._token = token
@@ -81,8 +82,11 @@ class ClientState:
         self._lock = threading.RLock()
         self._connected = False
         self._cbor = False
-        self._plain = JsonForm()
-        self._typed = JsonForm(non_finite_as_null=False, arrays=lambda values, _type: values)
+        self._ros1 = generation == "ros1"
+        self._plain = JsonForm(ros1_names=self._ros1)
+        self._typed = JsonForm(
+            non_finite_as_null=False, ros1_names=self._ros1, arrays=lambda values, _type: values
+        )
         self._announced: dict[str, tuple[str, bool]] = {}
         self._topics: dict[str, _Topic] = {}
         self._offers: dict[str, _Offer] = {}
@@ -104,11 +108,17 @@ class ClientState:
             if self._token is not None:
                 self._order({"op": "auth", "token": self._token})
             for topic, (msgtype, latched) in self._announced.items():
-                self._order(_advertise(topic, msgtype, latched))
+                self._order(self._advertisement(topic, msgtype, latched))
             for name, topic_ in self._topics.items():
-                self._order(_subscribe(name, topic_))
+                self._order(self._subscription(name, topic_))
             for service, offer in self._offers.items():
-                self._order({"op": "advertise_service", "service": service, "type": offer.srvtype})
+                self._order(
+                    {
+                        "op": "advertise_service",
+                        "service": service,
+                        "type": self._spelled(offer.srvtype),
+                    }
+                )
 
     def lose(self, why: str) -> None:
         """The connection is gone: open calls fail, publications are dropped."""
@@ -155,7 +165,7 @@ class ClientState:
         with self._lock:
             if self._announced.get(topic) != (msgtype, latched):
                 self._announced[topic] = (msgtype, latched)
-                self._order(_advertise(topic, msgtype, latched))
+                self._order(self._advertisement(topic, msgtype, latched))
 
     def unadvertise(self, topic: str, who: str) -> None:
         """Take an announcement back."""
@@ -205,8 +215,8 @@ class ClientState:
             if found.msgtype != msgtype:
                 raise GraphError(f"topic '{topic}' carries {found.msgtype}, not {msgtype}")
             found.mailboxes.append(mailbox)
-            found.depth = max(m_depth for m_depth in (found.depth, depth))
-            self._order(_subscribe(topic, found))
+            found.depth = max(found.depth, depth)
+            self._order(self._subscription(topic, found))
         return mailbox
 
     def unsubscribe(self, mailbox: Mailbox) -> None:
@@ -271,7 +281,9 @@ class ClientState:
             if service in self._offers:
                 raise GraphError(f"service '{service}' is offered already")
             self._offers[service] = _Offer(srvtype, handler)
-            self._order({"op": "advertise_service", "service": service, "type": srvtype})
+            self._order(
+                {"op": "advertise_service", "service": service, "type": self._spelled(srvtype)}
+            )
 
     def withdraw(self, service: str, who: str) -> None:
         """Offer a service no more; its open requests fail."""
@@ -282,6 +294,27 @@ class ClientState:
             self._order({"op": "unadvertise_service", "service": service})
         for reply in tuple(offer.pending):
             reply.fail(GraphError(f"service '{service}': {who} has left"))
+
+    # ------------------------------------------------------------------------------------- words
+
+    def _spelled(self, name: str) -> str:
+        return ros1_name(name) if self._ros1 else name
+
+    def _advertisement(self, topic: str, msgtype: str, latched: bool) -> Operation:
+        spelled = self._spelled(msgtype)
+        return {"op": "advertise", "topic": topic, "type": spelled, "latch": latched}
+
+    def _offering(self, service: str, srvtype: str) -> Operation:
+        return {"op": "advertise_service", "service": service, "type": self._spelled(srvtype)}
+
+    def _subscription(self, name: str, topic: _Topic) -> Operation:
+        return {
+            "op": "subscribe",
+            "topic": name,
+            "type": self._spelled(topic.msgtype),
+            "queue_length": topic.depth,
+            "compression": "cbor",
+        }
 
     # ------------------------------------------------------------------------------------- input
 
@@ -360,20 +393,6 @@ class ClientState:
             offer.handler(request, reply)
         except Exception as error:  # a handler's mistake is the caller's answer
             reply.fail(GraphError(f"{type(error).__name__}: {error}"))
-
-
-def _advertise(topic: str, msgtype: str, latched: bool) -> Operation:
-    return {"op": "advertise", "topic": topic, "type": msgtype, "latch": latched}
-
-
-def _subscribe(name: str, topic: _Topic) -> Operation:
-    return {
-        "op": "subscribe",
-        "topic": name,
-        "type": topic.msgtype,
-        "queue_length": topic.depth,
-        "compression": "cbor",
-    }
 
 
 def _type_of(values: Any) -> str:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import itertools
+import logging
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
+from weakref import WeakSet
 
 from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
@@ -19,13 +22,13 @@ from volery.bridges.doors import check_address, wake_of
 from volery.bridges.rosapi import Parameters, RosApi
 from volery.bridges.rosbridge_forms import Forms, Generation
 from volery.bridges.rosbridge_protocol import RosbridgePeer, Shared, shows_token
-from volery.bridges.rosbridge_wire import MOST_MESSAGE_BYTES
+from volery.bridges.rosbridge_wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES
 from volery.core.errors import BridgeError
 from volery.graph.session import Gateway
 
+_log = logging.getLogger(__name__)
+
 LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
-CBOR_PROTOCOL = "rosbridge-cbor"
-"""WebSocket subprotocol by which a client learns that it may send CBOR."""
 DEFAULT_PORT = 9090
 MOST_CLIENTS = 1000
 
@@ -98,6 +101,8 @@ class RosbridgeServer:
         self._server: Server | None = None
         self._rosapi: RosApi | None = None
         self._clients: set[ServerConnection] = set()
+        self._shown: WeakSet[ServerConnection] = WeakSet()
+        """Clients whose request for a connection carried the token."""
         self._gateway: Gateway | None = None
         self._shared = Shared()
 
@@ -126,7 +131,7 @@ class RosbridgeServer:
             raise BridgeError(f"{self.host} can be reached from other machines: set a --token")
         graph = gateway.graph
         self._gateway = gateway
-        self._shared = Shared(Forms(self._generation), graph.now_ns, self._token, self._most_bytes)
+        self._shared = Shared(Forms(self._generation), graph._now_ns, self._token, self._most_bytes)
         try:
             self._server = await serve(
                 self._serve,
@@ -179,7 +184,8 @@ class RosbridgeServer:
             return connection.respond(HTTPStatus.UNAUTHORIZED, "wrong token\n")
         if len(self._clients) >= MOST_CLIENTS:
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "too many clients\n")
-        connection.shown = given is not None  # type: ignore[attr-defined]
+        if given is not None:
+            self._shown.add(connection)
         return None
 
     def _knows(self, origin: str, host: str) -> bool:
@@ -213,20 +219,24 @@ class RosbridgeServer:
             self._shared,
             wake=wake_of(loop, wanted.set),
             post=post,
-            authorized=bool(getattr(connection, "shown", False)),
+            authorized=connection in self._shown,
         )
         self._clients.add(connection)
         read = asyncio.Event()
-        writer = asyncio.create_task(_write(connection, peer, wanted, read))
+        tasks = [
+            asyncio.create_task(_read(connection, peer, read)),
+            asyncio.create_task(_write(connection, peer, wanted, read)),
+        ]
         try:
-            await _read(connection, peer, read)
-        except ConnectionClosed:
-            pass  # in whatever way it has left
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
             self._clients.discard(connection)
             peer.close()
-            writer.cancel()
-            await asyncio.gather(writer, return_exceptions=True)
+            for task in tasks:
+                task.cancel()
+            for outcome in await asyncio.gather(*tasks, return_exceptions=True):
+                if isinstance(outcome, Exception) and not isinstance(outcome, ConnectionClosed):
+                    _log.error("serving %s failed", session.name, exc_info=outcome)
 
 
 async def _read(connection: ServerConnection, peer: RosbridgePeer, read: asyncio.Event) -> None:
@@ -242,8 +252,8 @@ async def _read(connection: ServerConnection, peer: RosbridgePeer, read: asyncio
         while peer.congested:  # it asks for more than it reads
             read.clear()
             await read.wait()
-    for frame in peer.frames(time.monotonic()):
-        await connection.send(frame)
+    for answer in peer.frames(time.monotonic()):
+        await connection.send(answer)
     await connection.close(1008, peer.refused[:100])
 
 
@@ -252,22 +262,18 @@ async def _write(
 ) -> None:
     """Send what the peer has to say, as fast as the client reads."""
     turns = itertools.count(1)
-    try:
-        while True:
-            wanted.clear()
-            for frame in peer.frames(time.monotonic()):
-                await connection.send(frame)
-                read.set()
-                if next(turns) % _FRAMES_A_TURN == 0:
-                    await asyncio.sleep(0)
-            now_s = time.monotonic()
-            due_s = peer.due_s(now_s)
-            try:
-                await asyncio.wait_for(wanted.wait(), None if due_s is None else due_s - now_s)
-            except TimeoutError:
-                continue
-    except ConnectionClosed:
-        return  # the reader notices too
+    while True:
+        wanted.clear()
+        for frame in peer.frames(time.monotonic()):
+            await connection.send(frame)
+            read.set()
+            if next(turns) % _FRAMES_A_TURN == 0:
+                await asyncio.sleep(0)
+        read.set()
+        now_s = time.monotonic()
+        due_s = peer.due_s(now_s)
+        with suppress(TimeoutError):
+            await asyncio.wait_for(wanted.wait(), None if due_s is None else due_s - now_s)
 
 
 def _select_subprotocol(_connection: ServerConnection, offered: Sequence[Any]) -> Any:

@@ -22,6 +22,8 @@ Frame = str | bytes
 """What one WebSocket message carries."""
 Operation = dict[str, Any]
 
+CBOR_PROTOCOL = "rosbridge-cbor"
+"""WebSocket subprotocol by which a client learns that it may send CBOR."""
 MOST_MESSAGE_BYTES = 64 * 1024 * 1024
 """Largest message a server takes unless told otherwise; a 4k rgb8 image has 25 MB."""
 
