@@ -79,6 +79,7 @@ class Outbox:
             self._ready.append(stream)
             self._stir()
 
+        self.payloads.learn(msgtype)
         mailbox = self._session.subscribe(topic, msgtype, depth=depth, wake=stir)
         self.end_stream(destination)
         stream.mailbox = mailbox

@@ -27,6 +27,9 @@ class Payloads(Protocol):
     def decode(self, data: Bytes, msgtype: str) -> Any:
         """The message; `GraphError` where the bytes are none."""
 
+    def learn(self, msgtype: str) -> None:
+        """Prepare for a type, some milliseconds, that its first message need not wait."""
+
     def short(self, msgtype: str) -> str:
         """Name of a type as Unity writes it: `std_msgs/String`, `std_srvs/SetBool`."""
 
@@ -45,6 +48,10 @@ class Ros1Payloads:
     def decode(self, data: Bytes, msgtype: str) -> Any:
         """The message; `GraphError` where the bytes are none."""
         return ros1_codec().decode(data, msgtype)
+
+    def learn(self, msgtype: str) -> None:
+        """Prepare for a type, some milliseconds, that its first message need not wait."""
+        ros1_codec().learn(msgtype)
 
     def short(self, msgtype: str) -> str:
         """Name of a type as Unity writes it."""
@@ -70,6 +77,10 @@ class Ros2Payloads:
         if len(data) == _CDR_HEADER_BYTES and not _has_fields(msgtype):
             data = bytes(data) + b"\0"  # Unity leaves out the byte that stands for nothing
         return decode_cdr(data, msgtype)
+
+    def learn(self, msgtype: str) -> None:
+        """Prepare for a type, some milliseconds, that its first message need not wait."""
+        typestore().get_msgdef(msgtype)
 
     def short(self, msgtype: str) -> str:
         """Name of a type as Unity writes it."""

@@ -17,6 +17,10 @@ from volery.core.errors import BridgeError
 
 _BATCHES_A_TURN = 16
 """After so many others have their turn."""
+_FRAMES_A_TURN = 32
+"""Who sends more at once is read from in small bites, so that a flood delays nobody else."""
+_BITE_BYTES = 2048
+_LARGEST_BITE_BYTES = 16 << 20
 _FAREWELL_S = 1.0
 _PROBES = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
 """The kernel asks a peer who is silent for 5 s, every 5 s, at most 3 times, whether it lives."""
@@ -47,6 +51,7 @@ class Pipe:
         self._closed = closed
         self._unsent: list[Bytes] = []
         self._blocked = False
+        self._bite = _BITE_BYTES
         self._reading = True
         self._ending = False
         self._open = True
@@ -85,7 +90,7 @@ class Pipe:
 
     def _readable(self) -> None:
         try:
-            count = self._sock.recv_into(self.parser.space())
+            count = self._sock.recv_into(self.parser.space()[: self._bite])
         except (BlockingIOError, InterruptedError):
             return
         except OSError as error:
@@ -98,7 +103,10 @@ class Pipe:
         if self._ending:  # what is not read would make the kernel withdraw our last words
             return
         try:
-            for frame in self.parser.written(count):
+            frames = self.parser.written(count)
+            flood = len(frames) > _FRAMES_A_TURN
+            self._bite = _BITE_BYTES if flood else min(2 * self._bite, _LARGEST_BITE_BYTES)
+            for frame in frames:
                 self._take(frame)
         except BridgeError as error:
             self._broken(str(error))

@@ -110,6 +110,7 @@ class EndpointSession:
         topic = absolute(name)
         self._check_room(self._inlets, name)
         self._session.advertise(topic, msgtype, latched=bool(fields.get("latch", False)))
+        self._payloads.learn(msgtype)
         # in ROS a queue of 0 has no end
         depth = min(max(depth, 1), MOST_DEPTH) if depth else MOST_DEPTH
         self._inlets[name] = Inlet(self._gateway, self._session, topic, msgtype, depth)

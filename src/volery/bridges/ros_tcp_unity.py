@@ -145,6 +145,7 @@ class UnitySession:
 
     def _receive(self, topic: TopicInfo) -> None:
         self._session.advertise(topic.name, topic.msgtype)
+        self.outbox.payloads.learn(topic.msgtype)
         self._inlets[topic.name] = Inlet(
             self._gateway, self._session, topic.name, topic.msgtype, self._depth
         )

@@ -545,3 +545,28 @@ def test_offers_elsewhere_stay_unharmed(loop, client):
     assert loop.do(lambda: loop.graph.call("/do")).message == "inside"
     with pytest.raises(GraphError):
         loop.do(lambda: loop.graph.call("/other"))
+
+
+def test_a_flood_of_one_client_delays_no_other(loop, serve, connect):
+    port = serve().port
+    flooding, other = connect(port), connect(port)
+    flooding.command("publish", topic="/in", message_name="std_msgs/String")
+    other.synchronize()
+    many, stop = frame("/in", ros1_string("x")) * 5000, threading.Event()
+
+    def flood():
+        while not stop.is_set():
+            flooding.sock.sendall(many)
+
+    thread = threading.Thread(target=flood)
+    thread.start()
+    waits = []
+    try:
+        for _ in range(30):
+            start = time.perf_counter()
+            other.synchronize()
+            waits.append(time.perf_counter() - start)
+    finally:
+        stop.set()
+        thread.join()
+    assert sorted(waits)[15] < 0.1
