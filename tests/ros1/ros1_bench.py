@@ -8,6 +8,7 @@ import json
 import os
 import queue
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -117,10 +118,20 @@ def end(process):
 
 def tool(*command, seconds=15.0):
     """What a command of ROS prints."""
-    done = subprocess.run(
-        command, capture_output=True, text=True, timeout=seconds, check=False, env=os.environ.copy()
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
     )
-    return done.stdout + done.stderr
+    try:
+        return process.communicate(timeout=seconds)[0]
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)  # those it started, too
+        process.wait(3.0)
+        process.stdout.close()
 
 
 class Program:

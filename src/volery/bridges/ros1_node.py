@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import socket
 import threading
@@ -24,6 +25,7 @@ _QUEUES = (10, 500)
 _RECEIVE_BYTES = 1 << 20
 _HEADER_TIMEOUT_S = 3.0
 
+_log = logging.getLogger(__name__)
 _lock = threading.Lock()
 _nodes: list[Ros1Node] = []
 
@@ -48,7 +50,13 @@ class Ros1Node:
         """A `rospy.Publisher` of raw messages. `GraphError` for an unknown type."""
         made = raw_message_class(msgtype)
         depth = _QUEUES[0] if made.__name__ in _BULKY else _QUEUES[1]
-        return self._rospy.Publisher(topic, made, latch=latched, queue_size=depth)
+        found: list[Any] = []
+        listener = _listener(self._rospy, lambda: _hurry(found))
+        publisher = self._rospy.Publisher(
+            topic, made, subscriber_listener=listener, latch=latched, queue_size=depth
+        )
+        found.append(publisher)
+        return publisher
 
     def outlet(
         self, topic: str, msgtype: str, on_change: Callable[[], None], *, latched: bool
@@ -183,6 +191,7 @@ def join_ros1(
             return node
         _set_address(host, anywhere=anywhere)
         _check_master(master)
+        _warn_of_loopback(master)
         _begin(rospy, name, uri)
         _nodes.append(Ros1Node(rospy, f"/{name}", master))
         return _nodes[0]
@@ -207,6 +216,24 @@ def _set_address(host: str | None, *, anywhere: bool) -> None:
         os.environ["ROS_IP"] = given
 
 
+def _warn_of_loopback(master: Ros1Master) -> None:
+    """Say that nodes of a master elsewhere cannot reach this one."""
+    own = os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or ""
+    if not (own == "localhost" or own.startswith("127.")):
+        return
+    try:
+        there = socket.gethostbyname(master.host)
+    except OSError:
+        return
+    if not there.startswith("127."):
+        _log.warning(
+            "the ROS master is at %s, and nodes of other machines cannot reach this one at %s; "
+            "set ROS_IP or host",
+            master.host,
+            own,
+        )
+
+
 def _begin(rospy: Any, name: str, uri: str) -> None:
     os.environ["ROS_MASTER_URI"] = uri
     setting = "ROS_PYTHON_LOG_CONFIG_FILE"
@@ -221,6 +248,17 @@ def _begin(rospy: Any, name: str, uri: str) -> None:
     finally:
         if before is None:
             del os.environ[setting]
+
+
+def _hurry(publishers: list[Any]) -> None:
+    """Switch Nagle's algorithm off, which rospy does only for subscribers that ask for it."""
+    for publisher in publishers:
+        for connection in publisher.impl.connections if publisher.impl else ():
+            try:
+                with socket.socket(fileno=os.dup(connection.fileno())) as same:
+                    same.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            except (OSError, TypeError):  # it is closing
+                continue
 
 
 def _listener(rospy: Any, on_change: Callable[[], None]) -> Any:

@@ -1,0 +1,48 @@
+"""Where rospy is looked for, and what is said where there is none."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+
+import pytest
+
+from volery.bridges import ros1_environment
+from volery.bridges.ros1_shared import Sharing
+from volery.core.errors import BridgeError
+
+
+@pytest.mark.skipif(importlib.util.find_spec("rospy") is not None, reason="rospy is in the way")
+def test_what_to_install_is_said(monkeypatch, tmp_path):
+    monkeypatch.setattr(ros1_environment, "_DEBIAN", tmp_path)
+    monkeypatch.setenv("ROS_DISTRO", "none_such")
+    assert not ros1_environment.rospy_is_installed()
+    with pytest.raises(BridgeError, match=r"apt-get install .*python3-rospy"):
+        ros1_environment._load.__wrapped__()
+
+
+def test_debians_folder_is_on_the_path_only_while_rospy_is_imported(monkeypatch, tmp_path):
+    if importlib.util.find_spec("rospy") is not None:
+        pytest.skip("rospy is in the way")
+    package = tmp_path / "rospy"
+    package.mkdir()
+    (package / "__init__.py").write_text("import sys\nPATH = list(sys.path)\nimport numpy\n")
+    monkeypatch.setattr(ros1_environment, "_DEBIAN", tmp_path)
+    monkeypatch.setenv("ROS_DISTRO", "none_such")
+    monkeypatch.delitem(sys.modules, "rospy", raising=False)
+    assert ros1_environment.rospy_is_installed()
+    loaded = ros1_environment._load.__wrapped__()
+    assert loaded.PATH[-1] == str(tmp_path)
+    assert str(tmp_path) not in sys.path
+    monkeypatch.delitem(sys.modules, "rospy")
+
+
+def test_which_topics_are_taken_from_ros1():
+    sharing = Sharing(("/uav*", "/clock", "/rosout"), ("*/cmd_vel",))
+    assert sharing.has("/uav1/odom")
+    assert not sharing.has("/rosout")
+    assert not sharing.has("/private")
+    assert sharing.takes("/uav1/image", publishers=0, subscribers=1)
+    assert not sharing.takes("/uav1/image", publishers=0, subscribers=0)
+    assert not sharing.takes("/uav1/odom", publishers=1, subscribers=2)
+    assert sharing.takes("/uav1/cmd_vel", publishers=1, subscribers=1)
