@@ -1,0 +1,523 @@
+"""rosbridge over real sockets: a plain WebSocket client, our own client, roslibpy, roslib."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+import cbor2
+import numpy as np
+import pytest
+from rosbridge_bench import SET_BOOL, STEPS, STRING, TRIGGER, FakeSimulation, trigger_response
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from volery.bridges.doors import Doors
+from volery.bridges.rosbridge_client import RosbridgeClient
+from volery.bridges.rosbridge_server import RosbridgeServer
+from volery.core.errors import BridgeError, GraphError
+from volery.graph import messages as m
+from volery.graph.reply import Reply
+
+IMAGE = "sensor_msgs/msg/Image"
+
+
+@pytest.fixture
+def simulation():
+    simulation = FakeSimulation()
+    yield simulation
+    simulation.close()
+
+
+@pytest.fixture
+def doors(simulation):
+    with Doors(simulation.gateway) as doors:
+        yield doors
+
+
+@pytest.fixture
+def server(doors):
+    server = RosbridgeServer(port=0)
+    doors.open(server)
+    return server
+
+
+def url_of(server):
+    return f"ws://127.0.0.1:{server.port}"
+
+
+class Plain:
+    """A client made of nothing but a WebSocket."""
+
+    def __init__(self, server, **options):
+        self._entry = connect(url_of(server), max_size=None, **options)
+
+    def __enter__(self):
+        self.socket = self._entry.__enter__()
+        return self
+
+    def __exit__(self, *exception):
+        self._entry.__exit__(*exception)
+
+    def send(self, op, **fields):
+        self.socket.send(json.dumps({"op": op, **fields}))
+
+    def read(self, timeout=10):
+        frame = self.socket.recv(timeout)
+        return cbor2.loads(frame) if isinstance(frame, bytes) else json.loads(frame)
+
+    def synchronize(self):
+        """Wait until the server has taken in everything sent so far."""
+        self.send("unadvertise_service", service="/nothing", id="sync")
+        while self.read().get("id") != "sync":
+            pass
+
+
+def until(condition, timeout_s=10.0):
+    end = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.005)
+
+
+def image(size):
+    header = m.header(1, "camera")
+    return m.message_type(IMAGE)(header, 1, size, "mono8", 0, size, np.zeros(size, np.uint8))
+
+
+def test_topics_both_ways(simulation, server):
+    with Plain(server) as client:
+        seen = []
+        simulation.graph.subscribe("/in", seen.append, STRING)
+        client.send("advertise", topic="/in", type="std_msgs/String")
+        client.send("publish", topic="/in", msg={"data": "grüße 🚁"})
+        until(lambda: seen)
+        assert seen[0].message.data == "grüße 🚁"
+        client.send("subscribe", topic="/out", type="std_msgs/String")
+        client.synchronize()
+        simulation.publish("/out", m.String("zurück 🛬"))
+        assert client.read()["msg"] == {"data": "zurück 🛬"}
+
+
+def test_late_joiners_get_what_is_latched(simulation, server):
+    simulation.publish("/map", m.String("here"), latched=True)
+    with Plain(server) as client:
+        client.send("subscribe", topic="/map")
+        assert client.read()["msg"] == {"data": "here"}
+
+
+def test_services_both_ways(simulation, server):
+    response = m.message_type(f"{SET_BOOL}_Response")
+    simulation.graph.offer("/arm", SET_BOOL, lambda request: response(request.data, "armed"))
+    with Plain(server) as client, Plain(server) as other:
+        client.send("call_service", service="/arm", args={"data": True}, id="1")
+        assert client.read()["values"] == {"success": True, "message": "armed"}
+        client.send("advertise_service", service="/do", type=TRIGGER)
+        client.synchronize()
+        other.send("call_service", service="/do", id="2")
+        request = client.read()
+        values = {"success": True, "message": "did"}
+        client.send("service_response", service="/do", id=request["id"], values=values, result=True)
+        assert other.read()["values"] == values
+
+
+@pytest.mark.parametrize("compression", ["none", "cbor", "cbor-raw"])
+def test_eight_megabytes_both_ways(simulation, server, compression):
+    with Plain(server) as client:
+        client.send("subscribe", topic="/image", type=IMAGE, compression=compression)
+        client.synchronize()
+        simulation.publish("/image", image(8_000_000))
+        found = client.read(30)["msg"]
+        assert len(found["bytes"] if compression == "cbor-raw" else found["data"]) >= 8_000_000
+        seen = []
+        simulation.graph.subscribe("/back", seen.append, IMAGE)
+        client.send("advertise", topic="/back", type=IMAGE)
+        operation = {"op": "publish", "topic": "/back", "msg": {"data": bytes(8_000_000)}}
+        client.socket.send(cbor2.dumps(operation))
+        until(lambda: seen, 30)
+        assert seen[0].message.data.shape == (8_000_000,)
+
+
+def test_a_client_that_does_not_read_disturbs_nobody(simulation, server):
+    with Plain(server, ping_interval=None) as sleeper, Plain(server) as reader:
+        wanted = {"topic": "/image", "type": IMAGE, "compression": "cbor", "queue_length": 2}
+        sleeper.send("subscribe", **wanted)
+        sleeper.synchronize()
+        sleeper.socket.socket.settimeout(None)
+        reader.send("subscribe", **wanted | {"queue_length": 100})
+        reader.synchronize()
+        publisher = simulation.graph.advertise("/image", IMAGE)
+        message = image(1_000_000)
+        for _ in range(60):
+            simulation.do(lambda: publisher.publish(message))
+            assert reader.read()["op"] == "publish"
+        infos = {s.name: s.mailboxes for s in simulation.gateway.sessions() if s.mailboxes}
+        dropped = sorted(mailboxes[0].dropped for mailboxes in infos.values())
+        assert dropped[0] == 0
+        assert dropped[1] > 20
+
+
+def test_throttled_streams(simulation, server):
+    with Plain(server) as client:
+        client.send("subscribe", topic="/out", type=STRING, throttle_rate=200)
+        client.synchronize()
+        publisher = simulation.graph.advertise("/out", STRING)
+        for k in range(50):
+            simulation.do(lambda k=k: publisher.publish(m.String(str(k))))
+        began = time.monotonic()
+        first, second = client.read(), client.read()
+        assert (first["msg"]["data"], second["msg"]["data"]) == ("0", "49")
+        assert 0.1 < time.monotonic() - began < 5.0
+        with pytest.raises(TimeoutError):
+            client.read(0.3)
+
+
+def test_unknown_types_are_told(server):
+    with Plain(server) as client:
+        client.send("subscribe", topic="/x", type="no_pkg/Nothing", id="s")
+        status = client.read()
+        assert (status["op"], status["id"]) == ("status", "s")
+        assert "no_pkg/msg/Nothing" in status["msg"]
+
+
+def test_who_leaves_is_forgotten(simulation, server):
+    with Plain(server) as client:
+        client.send("advertise_service", service="/do", type=TRIGGER)
+        client.synchronize()
+        assert simulation.graph.has_service("/do")
+    until(lambda: not simulation.graph.has_service("/do"))
+    assert [s.name for s in simulation.gateway.sessions()] == ["rosapi"]
+    until(lambda: server.clients == 0)
+
+
+@pytest.mark.parametrize(
+    ("headers", "welcome"),
+    [
+        ({}, True),
+        ({"Origin": "http://localhost:5173"}, True),
+        ({"Origin": "http://127.0.0.1:8080"}, True),
+        ({"Origin": "https://listed.example"}, True),
+        ({"Origin": "https://evil.example"}, False),
+        ({"Origin": "http://localhost.evil.example"}, False),
+        ({"Origin": "null"}, False),
+    ],
+)
+def test_whose_pages_are_let_in(doors, headers, welcome):
+    server = RosbridgeServer(port=0, origins=["https://listed.example"])
+    doors.open(server)
+    if welcome:
+        with connect(url_of(server), additional_headers=headers):
+            return
+    with (
+        pytest.raises(InvalidStatus, match="403"),
+        connect(url_of(server), additional_headers=headers),
+    ):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("origin", "host", "token", "welcome"),
+    [
+        ("http://192.168.1.5:8080", "192.168.1.5:9090", None, True),
+        ("http://rebound.example", "rebound.example:9090", None, False),
+        ("http://lab.example", "lab.example:9090", "secret", True),
+        ("http://[::2]", "[::2]:9090", None, True),
+        ("http://192.168.1.5", "192.168.1.6:9090", None, False),
+    ],
+)
+def test_pages_from_where_they_connect_to(origin, host, token, welcome):
+    assert RosbridgeServer(token=token)._knows(origin, host) is welcome
+
+
+def test_the_token(doors):
+    server = RosbridgeServer(port=0, token="secret")
+    doors.open(server)
+    with connect(f"{url_of(server)}/?token=secret") as socket:
+        socket.send('{"op": "bogus"}')
+        assert "unknown operation" in socket.recv(10)
+    bearer = {"Authorization": "Bearer secret"}
+    with connect(url_of(server), additional_headers=bearer) as socket:
+        socket.send('{"op": "bogus"}')
+        assert "unknown operation" in socket.recv(10)
+    with connect(url_of(server)) as socket:
+        socket.send('{"op": "bogus"}')
+        assert "not authorized" in socket.recv(10)
+        with pytest.raises(ConnectionClosed):
+            socket.recv(10)
+    with pytest.raises(InvalidStatus, match="401"), connect(f"{url_of(server)}/?token=no"):
+        pass
+
+
+def test_one_path_only(doors):
+    server = RosbridgeServer(port=0, path="/rosbridge")
+    doors.open(server)
+    with connect(f"{url_of(server)}/rosbridge"):
+        pass
+    with pytest.raises(InvalidStatus, match="404"), connect(f"{url_of(server)}/else"):
+        pass
+
+
+def test_doors_that_cannot_open(doors, server):
+    with pytest.raises(BridgeError, match=f"{server.port}.*choose another"):
+        doors.open(RosbridgeServer(port=server.port))
+    with pytest.raises(BridgeError, match="other machines"):
+        doors.open(RosbridgeServer("0.0.0.0", 0, token="secret"))
+    with pytest.raises(BridgeError, match="token"):
+        doors.open(RosbridgeServer("0.0.0.0", 0, anywhere=True))
+
+
+def test_broken_frames_end_nobody(server):
+    with Plain(server) as client, Plain(server) as other:
+        for frame in ("", "[" * 50_000, b"\xff" * 100, '{"op": []}', "\ud7ff"):
+            client.socket.send(frame)
+            assert client.read()["level"] == "error"
+        other.synchronize()
+
+
+def test_half_open_sockets_and_nonsense(server):
+    idle = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(20)]
+    idle[0].sendall(b"\x00\xff" * 1000)
+    with Plain(server) as client:
+        client.synchronize()
+    for half_open in idle:
+        half_open.close()
+
+
+# -------------------------------------------------------------------------------- our own client
+
+
+@pytest.fixture
+def client(server):
+    client = RosbridgeClient(url_of(server), name="node")
+    yield client
+    client.close()
+
+
+def test_a_program_joins(simulation, client):
+    seen, woken = [], threading.Event()
+    simulation.graph.subscribe("/in", seen.append, "sensor_msgs/msg/LaserScan")
+    client.advertise("/in", "sensor_msgs/msg/LaserScan")
+    ranges = np.linspace(0, 1, 1081, dtype=np.float32)
+    zero = np.zeros(0, np.float32)
+    scan = m.LaserScan(m.header(5, "a"), *[0.5] * 7, ranges, zero)
+    client.publish("/in", scan)
+    until(lambda: seen)
+    assert seen[0].message.ranges.tobytes() == ranges.tobytes()
+    mailbox = client.subscribe("/in", wake=woken.set)
+    until(lambda: simulation.graph.topics()[0].subscribers == 2)
+    client.publish("/in", scan)
+    assert woken.wait(10)
+    (published,) = mailbox.take()
+    assert published.time_ns == 5
+    assert published.message.ranges.tobytes() == ranges.tobytes()
+    client.unsubscribe(mailbox)
+    until(lambda: simulation.graph.topics()[0].subscribers == 1)
+    client.unadvertise("/in")
+    assert client.info.publishes == ()
+
+
+def ask(client, service, request=None):
+    answers, done = [], threading.Event()
+
+    def take(answer):
+        answers.append(answer)
+        done.set()
+
+    client.call(service, request, Reply(take, take))
+    assert done.wait(10)
+    return answers[0]
+
+
+def test_its_services(simulation, client):
+    simulation.graph.offer("/do", TRIGGER, lambda _request: trigger_response(True, "sim"))
+    assert ask(client, "/do").message == "sim"
+    assert ask(client, "/do", m.message_type(f"{TRIGGER}_Request")()).message == "sim"
+    assert isinstance(ask(client, "/none"), GraphError)
+    client.offer(
+        "/mine", TRIGGER, lambda _request, reply: reply.answer(trigger_response(True, "x"))
+    )
+    client.offer("/broken", TRIGGER, lambda _request, _reply: 1 / 0)
+    until(lambda: simulation.graph.has_service("/broken"))
+    assert ask(client, "/mine").message == "x"
+    assert "ZeroDivisionError" in str(ask(client, "/broken"))
+    client.withdraw("/mine")
+    until(lambda: not simulation.graph.has_service("/mine"))
+
+
+def test_it_comes_back_and_announces_everything_again(simulation, doors):
+    first = RosbridgeServer(port=0)
+    doors.open(first)
+    client = RosbridgeClient(url_of(first), name="node")
+    try:
+        client.advertise("/in", STRING)
+        mailbox = client.subscribe("/out", STRING, wake=lambda: None)
+        client.offer("/mine", TRIGGER, lambda _r, reply: reply.answer(trigger_response(True, "x")))
+        until(lambda: simulation.graph.has_service("/mine"))
+        doors.call(first.stop())
+        until(lambda: not client.connected)
+        client.publish("/in", m.String("lost"))
+        assert client.dropped == 1
+        assert "no connection" in str(ask(client, "/mine"))
+        doors.open(RosbridgeServer(port=first.port))
+        client.wait_until_connected(20)
+        assert client.connections == 2
+        until(lambda: simulation.graph.has_service("/mine"))
+        counts = {t.name: (t.publishers, t.subscribers) for t in simulation.graph.topics()}
+        assert counts == {"/in": (1, 0), "/out": (0, 1)}
+        simulation.publish("/out", m.String("again"))
+        until(lambda: mailbox.info.received)
+        assert mailbox.take()[0].message.data == "again"
+    finally:
+        client.close()
+    with pytest.raises(GraphError, match="has left"):
+        client.publish("/in", m.String(""))
+
+
+def test_nobody_answers():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+    with pytest.raises(BridgeError, match="nobody speaks rosbridge"):
+        RosbridgeClient(f"ws://127.0.0.1:{port}", connect_timeout_s=0.3)
+    with pytest.raises(BridgeError, match="no address"):
+        RosbridgeClient("http://127.0.0.1")
+
+
+@pytest.mark.parametrize(
+    ("attempt", "words"),
+    [
+        (lambda c: c.subscribe("/x", "no/msg/Such", wake=print), "unknown message type"),
+        (lambda c: c.subscribe("/x", wake=print), "no topic"),
+        (lambda c: c.subscribe("/x", STRING, depth=0, wake=print), "depth"),
+        (lambda c: c.publish("/y", m.String("")), "not advertised"),
+        (lambda c: c.unadvertise("/y"), "does not publish"),
+        (lambda c: c.withdraw("/y"), "does not offer"),
+    ],
+)
+def test_what_a_program_cannot_do(client, attempt, words):
+    with pytest.raises(GraphError, match=words):
+        attempt(client)
+
+
+# ------------------------------------------------------------------------------ clients of others
+
+
+def test_roslibpy(simulation, server):
+    roslibpy = pytest.importorskip("roslibpy")
+    response = m.message_type(f"{SET_BOOL}_Response")
+    simulation.graph.offer("/arm", SET_BOOL, lambda request: response(request.data, "armed"))
+    seen, got = [], []
+    simulation.graph.subscribe("/in", seen.append, STRING)
+    ros = roslibpy.Ros("127.0.0.1", server.port)
+    ros.run(timeout=10)
+    try:
+        talker = roslibpy.Topic(ros, "/in", "std_msgs/String")
+        talker.publish(roslibpy.Message({"data": "from roslibpy"}))
+        until(lambda: seen)
+        assert seen[0].message.data == "from roslibpy"
+        roslibpy.Topic(ros, "/out", "std_msgs/String").subscribe(got.append)
+        until(lambda: any(t.name == "/out" and t.subscribers for t in simulation.graph.topics()))
+        simulation.publish("/out", m.String("to roslibpy"))
+        until(lambda: got)
+        assert got[0]["data"] == "to roslibpy"
+        service = roslibpy.Service(ros, "/arm", "std_srvs/SetBool")
+        assert (
+            service.call(roslibpy.ServiceRequest({"data": True}), timeout=10)["message"] == "armed"
+        )
+        mine = roslibpy.Service(ros, "/mine", "std_srvs/Trigger")
+
+        def answer(_request, reply):
+            reply.update(success=True, message="by roslibpy")
+            return True
+
+        mine.advertise(answer)
+        until(lambda: simulation.graph.has_service("/mine"))
+        answers = []
+        simulation.do(
+            lambda: simulation.graph.call_async("/mine", None, Reply(answers.append, print))
+        )
+        until(lambda: answers)
+        assert answers[0].message == "by roslibpy"
+        _ask_rosapi(roslibpy, ros)
+    finally:
+        ros.close()
+
+
+def _ask_rosapi(roslibpy, ros):
+    assert "/in" in ros.get_topics()
+    assert ros.get_topic_type("/in") == STRING
+    assert "/arm" in ros.get_services()
+    assert ros.get_service_type("/arm") == SET_BOOL
+    assert ros.get_topics_for_type("std_msgs/String") == ["/in", "/out"]
+    assert "/volery" in ros.get_nodes()
+    assert ros.get_message_details("geometry_msgs/Twist")["typedefs"][0]["fieldnames"] == [
+        "linear",
+        "angular",
+    ]
+    assert ros.get_service_request_details("std_srvs/SetBool")["typedefs"][0]["fieldnames"] == [
+        "data"
+    ]
+    parameter = roslibpy.Param(ros, "/speed")
+    parameter.set(3.5)
+    assert parameter.get() == 3.5
+    assert "/speed" in ros.get_params()
+    parameter.delete()
+    assert ros.get_time()["secs"] == 5
+
+
+def _roslib_folder():
+    """Folder whose node_modules hold npm's roslib and ws; None where there is none."""
+    named = os.environ.get("VOLERY_ROSLIB")
+    folders = [Path(named)] if named else [Path("/tmp/roslibjs")]
+    return next((f for f in folders if (f / "node_modules/roslib").is_dir()), None)
+
+
+def test_roslib(simulation, server):
+    node, folder = shutil.which("node"), _roslib_folder()
+    if node is None or folder is None:
+        pytest.skip("needs node, and VOLERY_ROSLIB to name a folder where `npm i roslib` was run")
+    response = m.message_type(f"{SET_BOOL}_Response")
+    simulation.graph.offer("/arm", SET_BOOL, lambda request: response(request.data, "armed"))
+    goals = []
+    simulation.graph.actions.offer("/step", STEPS, goals.append)
+    simulation.graph.subscribe("/echo", lambda p: echo.publish(p.message), STRING)
+    echo = simulation.graph.advertise("/echoed", STRING)
+    ranges = np.array([1.5, np.inf, 2.5], np.float32)
+    scan = m.LaserScan(m.header(5, "a"), *[0.5] * 7, ranges, np.zeros(0, np.float32))
+    simulation.publish("/scan", scan, latched=True)
+    script = Path(__file__).with_name("roslib_client.mjs")
+    copy = folder / "volery_roslib_client.mjs"  # imports are looked for beside the script
+    shutil.copy(script, copy)
+    process = subprocess.Popen(
+        [node, str(copy), url_of(server)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        until(lambda: goals or process.poll() is not None, 60)
+        if goals:
+            goals[0].feedback(m.message_type(f"{STEPS}_Feedback")(1, 1))
+            result = m.message_type(f"{STEPS}_Result")
+            goals[0].succeed(result(m.message_type("simulation_interfaces/msg/Result")(1, "ok")))
+        out, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+        copy.unlink()
+    assert process.returncode == 0, out + err
+    found = json.loads(out)
+    assert found["echo"] == "grüße 🚁"
+    assert found["none"] == [1.5, None, 2.5]
+    assert found["cbor"] == ["Float32Array", 1.5, "Infinity", 2.5]
+    assert found["png"] == [1.5, None, 2.5]
+    assert found["raw"] > 40
+    assert found["arm"] == {"success": True, "message": "armed"}
+    assert found["mine"] == {"success": True, "message": "by roslib"}
+    assert "/scan" in found["topics"]
+    assert "refused" in found["failed"] or "nobody offers" in found["failed"]
+    assert found["feedback"]["completed_steps"] == 1
+    assert found["result"]["result"]["error_message"] == "ok"
+    assert found["parameter"] == {"a": 1}
