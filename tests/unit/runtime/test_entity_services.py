@@ -222,3 +222,19 @@ def test_starts_are_named_poses(trio):
     assert bounds.points[0].x == 20.0
     assert bounds.points[1].x > 0.1
     assert code_of(ask(trio, "/get_named_pose_bounds", name="nowhere")) == NOT_FOUND
+
+
+@pytest.mark.parametrize("plant", ["rigid_body", "kinematic", "identified"])
+def test_other_plants_and_estimates_move_along(simulate, flat_data, plant):
+    """A UAV that flies on an estimate believes in its new place at once, and stays there."""
+    kind = flat_data["types"]["f450"]
+    kind["plant"] = plant
+    kind["sensors"] = [{"kind": "imu"}, {"kind": "gnss"}, {"kind": "estimate"}]
+    flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 6.0]
+    simulation = simulate(flat_data)
+    simulation.run(0.5)
+    assert code_of(put(simulation, "uav1", (60.0, -40.0, 9.0))) == OK
+    simulation.run(4.0)
+    uav = simulation.uavs["uav1"]
+    assert np.linalg.norm(uav.position_map - [60.0, -40.0, 9.0]) < 6.0
+    assert np.linalg.norm(uav.velocity_map) < 1.5
