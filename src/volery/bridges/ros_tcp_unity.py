@@ -92,18 +92,36 @@ class UnitySession:
         """Register topics and services that are new."""
         if self.generation is None:
             return
-        for topic in self._session.graph.topics():
+        for topic, register in self._new_topics():
             try:
-                if topic.name not in self._inlets and self._selection.receives(topic):
-                    self._receive(topic)
-                elif topic.name not in self._sent and self._selection.sends(topic):
-                    self._send(topic)
+                register(topic)
             except GraphError as error:
                 self._note(str(error))
         for name, srvtype in self._session.graph.services().items():
             if self._served.get(name) != srvtype and _matches(name, self._selection.services):
                 self._served[name] = srvtype
                 self._command("unity_service", topic=name, message_name=self._short(srvtype))
+
+    def _new_topics(self) -> list[tuple[TopicInfo, Callable[[TopicInfo], None]]]:
+        """Topics not registered yet, and what does that.
+
+        All their types are learnt before the first one is registered: it is sent from then on, and
+        its messages should not wait.
+        """
+        new: list[tuple[TopicInfo, Callable[[TopicInfo], None]]] = []
+        for topic in self._session.graph.topics():
+            if topic.name in self._inlets or topic.name in self._sent:
+                continue
+            receives = self._selection.receives(topic)
+            if receives or self._selection.sends(topic):
+                try:
+                    self.outbox.payloads.learn(topic.msgtype)
+                except GraphError as error:
+                    self._sent.add(topic.name)
+                    self._note(f"'{topic.name}' cannot be sent: {error}")
+                else:
+                    new.append((topic, self._receive if receives else self._send))
+        return new
 
     def take(self, frame: Frame) -> None:
         """Do what a frame asks for. `BridgeError` for a handshake that cannot be understood."""
@@ -145,7 +163,6 @@ class UnitySession:
 
     def _receive(self, topic: TopicInfo) -> None:
         self._session.advertise(topic.name, topic.msgtype)
-        self.outbox.payloads.learn(topic.msgtype)
         self._inlets[topic.name] = Inlet(
             self._gateway, self._session, topic.name, topic.msgtype, self._depth
         )

@@ -461,10 +461,10 @@ def test_commands_do_not_pile_up_while_the_simulation_is_busy(loop, client):
 
 
 def test_the_half_open_are_noticed_by_their_silence(loop, serve, connect):
-    port = serve(silence_s=0.4).port
+    port = serve(silence_s=1.0).port
     silent, mute = connect(port), connect(port, keepalive=False)
     lively = connect(port)
-    end = time.monotonic() + 1.2
+    end = time.monotonic() + 2.0
     while time.monotonic() < end:
         lively.sock.sendall(bytes(8))
         time.sleep(0.1)
@@ -569,4 +569,4 @@ def test_a_flood_of_one_client_delays_no_other(loop, serve, connect):
     finally:
         stop.set()
         thread.join()
-    assert sorted(waits)[15] < 0.1
+    assert sorted(waits)[15] < 0.3

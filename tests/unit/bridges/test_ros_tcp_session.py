@@ -136,7 +136,7 @@ def play(bench, session, script):
 
 
 @pytest.mark.parametrize("generation", ["ros1", "ros2"])
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(script=steps)
 def test_no_client_breaks_the_endpoint(generation, script):
     bench = Bench()
@@ -154,7 +154,7 @@ def test_no_client_breaks_the_endpoint(generation, script):
 
 
 @pytest.mark.parametrize("generation", [None, "ros1", "ros2"])
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(script=steps)
 def test_no_endpoint_breaks_the_connector(generation, script):
     bench = Bench()
