@@ -268,7 +268,8 @@ def test_a_topic_of_another_type_is_left_out(tmp_path):
 
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_a_cut_log_is_played_up_to_the_cut(tmp_path, flight, suffix):
-    messages = flight(12.0)
+    # Range has no variance in ROS 1
+    messages = [p for p in flight(12.0) if p.topic != "/uav1/range"]
     path = write(tmp_path / f"x{suffix}", messages)
     path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
     world = World()

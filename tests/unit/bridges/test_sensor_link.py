@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import time
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -67,6 +69,12 @@ def test_golden_frame() -> None:
         "d0ed"  # CRC 0xEDD0 of all
     )
     assert frame == slow_frame(127, 3, 0x01020304, 1_500_000_000, b"hello")
+
+
+def test_the_page_shows_that_frame() -> None:
+    page = Path(__file__).parents[3] / "docs" / "sensor_link.md"
+    (shown,) = re.findall(r"^    (aa564c59 [0-9a-f ]+)$", page.read_text(), re.MULTILINE)
+    assert bytes.fromhex(shown) == slow_frame(127, 3, 0x01020304, 1_500_000_000, b"hello")
 
 
 frames = st.builds(

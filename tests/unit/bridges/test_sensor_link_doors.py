@@ -22,6 +22,8 @@ from volery.core.errors import BridgeError
 from volery.graph import messages as m
 from volery.graph.cdr import encode_cdr
 from volery.graph.messages import message_type
+from volery.runtime import Simulation
+from volery.scenario.load import load_scenario
 
 Image = message_type("sensor_msgs/msg/Image")
 
@@ -332,6 +334,10 @@ def joined(ros, link):
     return doors, client
 
 
+def subscribed(gateway):
+    return {box.topic for session in gateway.sessions() for box in session.mailboxes}
+
+
 def test_two_graphs_joined(loop, link, ros):
     loop.graph.advertise("/uav1/odom", m.Odometry)
     laser = loop.graph.advertise("/uav1/laser/horizontal/scan", m.LaserScan)
@@ -358,6 +364,25 @@ def test_two_graphs_joined(loop, link, ros):
         until(lambda: client.notices)
         assert "length 1" in client.notices[0]
         assert (client.lost, client.refused) == (0, 0)
+
+
+def test_a_flight_seen_from_the_ros_side(ros):
+    """What comes over the link is what the simulation publishes, byte for byte."""
+    sent, heard = {}, []
+    scenario = load_scenario("hover")
+    with Simulation(scenario, threads=1) as simulation, Doors(simulation.gateway) as doors:
+        link = SensorLink(port=0, image_port=0)
+        doors.open(link)
+        ros.do(lambda: ros.graph.subscribe_all(heard.append))
+        ros_doors, client = joined(ros, link)
+        simulation.graph.subscribe_all(lambda p: sent.setdefault((p.topic, p.cdr)))
+        with ros_doors:
+            until(lambda: "/uav1/imu" in subscribed(simulation.gateway))
+            simulation.run(1.0)
+            until(lambda: {p.topic for p in heard} >= {"/uav1/imu", "/uav1/odom"})
+        assert client.refused == client.corrupt == 0
+    assert len(heard) > 20
+    assert all((published.topic, published.cdr) in sent for published in heard)
 
 
 def test_the_ros_side_joins_again(loop, link, doors, ros):
