@@ -296,18 +296,19 @@ class RosApi:
 
     def _get_param(self, request: Any) -> dict[str, Any]:
         value = self._parameters.get(request.name)
-        return {"value": request.default_value or "null" if value is None else value}
+        if value is None and not request.default_value:
+            why = f"no parameter '{request.name}'"
+            return {"value": "null", "successful": False, "reason": why}
+        return {"value": request.default_value if value is None else value, "successful": True}
 
     def _set_param(self, request: Any) -> dict[str, Any]:
-        self._parameters.set(request.name, request.value)
-        return {}
+        return _tried(lambda: self._parameters.set(request.name, request.value))
+
+    def _delete_param(self, request: Any) -> dict[str, Any]:
+        return _tried(lambda: self._parameters.delete(request.name))
 
     def _has_param(self, request: Any) -> dict[str, Any]:
         return {"exists": self._parameters.get(request.name) is not None}
-
-    def _delete_param(self, request: Any) -> dict[str, Any]:
-        self._parameters.delete(request.name)
-        return {}
 
     def _search_param(self, request: Any) -> dict[str, Any]:
         found = self._parameters.get(request.name) is not None
@@ -316,3 +317,12 @@ class RosApi:
 
 def _topics_of(info: SessionInfo) -> set[str]:
     return {mailbox.topic for mailbox in info.mailboxes}
+
+
+def _tried(action: Callable[[], None]) -> dict[str, Any]:
+    """How an action went, as rosapi tells it."""
+    try:
+        action()
+    except GraphError as error:
+        return {"successful": False, "reason": str(error)}
+    return {"successful": True}

@@ -33,7 +33,7 @@ found.echo = (await echoed).data;
 found.arm = await call("/arm", "std_srvs/SetBool", { data: true });
 found.failed = await call("/nobody", "std_srvs/Trigger", {}).catch(String);
 const mine = new Service({ ros, name: "/mine", serviceType: "std_srvs/Trigger" });
-mine.advertise((request, response) => {
+await mine.advertise((request, response) => {
   response.success = true;
   response.message = "by roslib";
   return true;

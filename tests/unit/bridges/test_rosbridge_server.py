@@ -427,9 +427,8 @@ def test_roslibpy(simulation, server):
         until(lambda: got)
         assert got[0]["data"] == "to roslibpy"
         service = roslibpy.Service(ros, "/arm", "std_srvs/SetBool")
-        assert (
-            service.call(roslibpy.ServiceRequest({"data": True}), timeout=10)["message"] == "armed"
-        )
+        request = roslibpy.ServiceRequest({"data": True})
+        assert service.call(request, timeout=10)["message"] == "armed"
         mine = roslibpy.Service(ros, "/mine", "std_srvs/Trigger")
 
         def answer(_request, reply):
@@ -468,7 +467,23 @@ def _ask_rosapi(roslibpy, ros):
     assert parameter.get() == 3.5
     assert "/speed" in ros.get_params()
     parameter.delete()
-    assert ros.get_time()["secs"] == 5
+
+
+def test_roslibpy_as_a_ros1_client(simulation, doors):
+    roslibpy = pytest.importorskip("roslibpy")
+    server, got = RosbridgeServer(port=0, generation="ros1"), []
+    doors.open(server)
+    simulation.publish("/stamp", m.header(3_000_000_004, "map"), latched=True)
+    ros = roslibpy.Ros("127.0.0.1", server.port)
+    ros.run(timeout=10)
+    try:
+        assert ros.get_time()["secs"] == 5
+        assert ros.get_topic_type("/stamp") == "std_msgs/Header"
+        roslibpy.Topic(ros, "/stamp", "std_msgs/Header").subscribe(got.append)
+        until(lambda: got)
+        assert got[0]["stamp"] == {"secs": 3, "nsecs": 4}
+    finally:
+        ros.close()
 
 
 def _roslib_folder():

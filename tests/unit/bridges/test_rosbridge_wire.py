@@ -7,6 +7,7 @@ import io
 import json
 import math
 import struct
+from contextlib import suppress
 
 import cbor2
 import numpy as np
@@ -109,19 +110,15 @@ def test_cbor_that_is_refused(data):
 @settings(deadline=None)
 @given(st.binary(max_size=200))
 def test_no_bytes_do_harm(data):
-    try:
+    with suppress(BridgeError):
         decode_frame(data)
-    except BridgeError:
-        pass
 
 
 @settings(deadline=None)
 @given(st.text(max_size=200))
 def test_no_text_does_harm(text):
-    try:
+    with suppress(BridgeError):
         decode_frame(text)
-    except BridgeError:
-        pass
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, "1" * 10_000, '{"op": 5}', "[]", "nul"])
