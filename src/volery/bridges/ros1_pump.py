@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
+import select
 import selectors
 import socket
 import struct
@@ -116,12 +117,14 @@ class Pump:
     """Serves topics in a thread of its own, so that neither the simulation nor other doors wait."""
 
     def __init__(self) -> None:
-        self._selector = selectors.DefaultSelector()
+        self._selector = selectors.EpollSelector()
         self._ready: deque[Served] = deque()
-        self._bell, self._rope = socket.socketpair()
-        self._bell.setblocking(False)
-        self._rope.setblocking(False)
-        self._selector.register(self._bell, selectors.EVENT_READ)
+        self._bell = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._poll = select.epoll()
+        # Edge-triggered: each ring is told of once, without a read, which would let go of the GIL.
+        self._poll.register(self._bell, select.EPOLLIN | select.EPOLLET)
+        self._poll.register(self._selector.fileno(), select.EPOLLIN)
+        self._lock = threading.Lock()
         self._closing = False
         self._thread = threading.Thread(target=self._run, name="volery-ros1", daemon=True)
         self._thread.start()
@@ -144,23 +147,23 @@ class Pump:
         self._closing = True
         self._ring()
         self._thread.join()
+        self._poll.close()
         self._selector.close()
-        self._bell.close()
-        self._rope.close()
+        with self._lock:
+            os.close(self._bell)
+            self._bell = -1
 
     def _ring(self) -> None:
-        try:
-            self._rope.send(b"\0")
-        except (BlockingIOError, OSError):  # it rings already, or has ended
-            return
+        with self._lock:
+            if self._bell >= 0:
+                os.eventfd_write(self._bell, 1)
 
     def _run(self) -> None:
         while not self._closing:
-            for key, _ in self._selector.select():
-                if key.data is None:
-                    self._bell.recv(4096)
-                else:
-                    key.data.flush()
+            for number, _ in self._poll.poll():
+                if number != self._bell:
+                    for key, _ in self._selector.select(0):
+                        key.data.flush()
             while self._ready and not self._closing:
                 self._serve(self._ready.popleft())
 
