@@ -91,9 +91,9 @@ class Reader:
 
     def close(self) -> None:
         """Send no more; nothing happens a second time."""
-        if self._waiting:
+        if self._waiting and self._selector.get_map() is not None:  # None once the pump has ended
             self._selector.unregister(self._socket)
-            self._waiting.clear()
+        self._waiting.clear()
         self._socket.close()
 
     def _keep(self, rest: memoryview) -> None:

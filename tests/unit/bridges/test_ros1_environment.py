@@ -12,29 +12,31 @@ from volery.bridges.ros1_shared import Sharing
 from volery.core.errors import BridgeError
 
 
-@pytest.mark.skipif(importlib.util.find_spec("rospy") is not None, reason="rospy is in the way")
-def test_what_to_install_is_said(monkeypatch, tmp_path):
+@pytest.fixture
+def elsewhere(monkeypatch, tmp_path):
+    """A folder in Debian's place, for an environment without rospy."""
     monkeypatch.setattr(ros1_environment, "_DEBIAN", tmp_path)
     monkeypatch.setenv("ROS_DISTRO", "none_such")
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
+    monkeypatch.setitem(sys.modules, "rospy", None)
+    return tmp_path
+
+
+def test_what_to_install_is_said(elsewhere):
     assert not ros1_environment.rospy_is_installed()
     with pytest.raises(BridgeError, match=r"apt-get install .*python3-rospy"):
         ros1_environment._load.__wrapped__()
 
 
-def test_debians_folder_is_on_the_path_only_while_rospy_is_imported(monkeypatch, tmp_path):
-    if importlib.util.find_spec("rospy") is not None:
-        pytest.skip("rospy is in the way")
-    package = tmp_path / "rospy"
+def test_debians_folder_is_on_the_path_only_while_rospy_is_imported(elsewhere, monkeypatch):
+    package = elsewhere / "rospy"
     package.mkdir()
     (package / "__init__.py").write_text("import sys\nPATH = list(sys.path)\nimport numpy\n")
-    monkeypatch.setattr(ros1_environment, "_DEBIAN", tmp_path)
-    monkeypatch.setenv("ROS_DISTRO", "none_such")
-    monkeypatch.delitem(sys.modules, "rospy", raising=False)
+    monkeypatch.delitem(sys.modules, "rospy")
     assert ros1_environment.rospy_is_installed()
     loaded = ros1_environment._load.__wrapped__()
-    assert loaded.PATH[-1] == str(tmp_path)
-    assert str(tmp_path) not in sys.path
-    monkeypatch.delitem(sys.modules, "rospy")
+    assert loaded.PATH[-1] == str(elsewhere)
+    assert str(elsewhere) not in sys.path
 
 
 def test_which_topics_are_taken_from_ros1():

@@ -112,6 +112,15 @@ def test_who_has_gone_is_given_up(pair, selector):
     reader.close()
 
 
+def test_what_still_waits_goes_with_the_pump(pair):
+    ours, _ = pair
+    pump = Pump()
+    reader = pump.reader(Connection(ours))
+    reader.send(b"x" * 1_000_000)
+    pump.close()
+    reader.close()
+
+
 def test_one_that_breaks_leaves_the_others_alone():
     class Topic:
         def __init__(self, topic):
