@@ -75,7 +75,7 @@ class SensorLink:
         image_rate_hz: float | None = None,
         depth: int = DEPTH,
     ) -> None:
-        check_address(host, anywhere=anywhere, flag="anywhere=True or --anywhere")
+        check_address(host, anywhere=anywhere, flag="anywhere=True or --allow-remote")
         self._host = host
         self._sensors = _Port(host, port, SENSORS, "sensor link", depth, 0)
         period_ns = period_from_hz(image_rate_hz)
