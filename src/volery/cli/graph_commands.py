@@ -32,7 +32,9 @@ def node(
     node: Annotated[str, typer.Argument(help="module:Class.")],
     via: Annotated[
         str | None,
-        typer.Option(help="Way into the graph: rosbridge://HOST:PORT (default) or ros1."),
+        typer.Option(
+            envvar="VOLERY_VIA", help="Way into the graph: rosbridge://HOST:PORT (default) or ros1."
+        ),
     ] = None,
     namespace: Annotated[str | None, typer.Option(help="Such as /uav1.")] = None,
     profile: Annotated[

@@ -1,0 +1,198 @@
+"""`volery run --door ...` and the programs that join it: terminal tools, nodes, the example."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("roslibpy")
+ROOT = Path(__file__).parents[2]
+VOLERY = [sys.executable, "-m", "volery.cli"]
+
+
+class Run:
+    """A simulation in a process of its own, its doors on free ports."""
+
+    def __init__(self, *doors, scenario="hover", seconds=120):
+        words = [word for door in doors for word in ("--door", f"{door}=0")]
+        self.process = subprocess.Popen(
+            [*VOLERY, "run", scenario, "--seconds", str(seconds), *words],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.ports = [self._port() for _ in doors]
+        self._reader = threading.Thread(target=self.process.stderr.read)
+        self._reader.start()
+
+    def _port(self):
+        for line in self.process.stderr:
+            found = re.match(r"open .*127\.0\.0\.1:(\d+)", line)
+            if found:
+                return int(found[1])
+        raise AssertionError(f"ended with {self.process.wait()} before its doors were open")
+
+    def close(self):
+        self.process.terminate()
+        self.process.wait(20)
+        self._reader.join()
+        self.process.stderr.close()
+
+
+@pytest.fixture(scope="module")
+def run():
+    run = Run("rosbridge", "ros-tcp")
+    yield run
+    run.close()
+
+
+def volery(run, *words, timeout_s=40.0, ok=True):
+    environment = {**os.environ, "VOLERY_VIA": f"rosbridge://127.0.0.1:{run.ports[0]}"}
+    done = subprocess.run(
+        [*VOLERY, *words],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=timeout_s,
+        env=environment,
+    )
+    assert (done.returncode == 0) is ok, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stdout if ok else done.stderr
+
+
+def test_topics_are_listed_with_their_types(run):
+    lines = volery(run, "topic", "list", "--types").splitlines()
+    assert "/uav1/odom [nav_msgs/msg/Odometry]" in lines
+    assert "/clock [rosgraph_msgs/msg/Clock]" in lines
+    assert volery(run, "topic", "type", "/uav1/imu").strip() == "sensor_msgs/msg/Imu"
+
+
+def test_a_message_is_printed_as_yaml(run):
+    from ruamel.yaml import YAML
+
+    text = volery(run, "topic", "echo", "/uav1/odom", "--once")
+    message = YAML(typ="safe", pure=True).load(text.removesuffix("---\n"))
+    assert message["child_frame_id"] == "uav1/base_link"
+    assert isinstance(message["pose"]["pose"]["position"]["z"], float)
+
+
+def test_a_command_is_published_and_flown(run):
+    volery(run, "service", "call", "/uav1/hold")
+    twist = "{linear: {x: 1.0}}"
+    words = ("topic", "pub", "/uav1/cmd_vel", "geometry_msgs/Twist", twist, "-r", "20", "-t", "20")
+    volery(run, *words)
+    text = volery(run, "topic", "echo", "/uav1/ground_truth/odom", "--once")
+    x = float(re.search(r"x: (\S+)", text)[1])
+    assert x > 0.2
+
+
+def test_services_are_listed_and_called(run):
+    assert "/uav1/take_off [std_srvs/srv/Trigger]" in volery(run, "service", "list", "-t")
+    answer = volery(run, "service", "call", "/get_entities")
+    assert "entities: [uav1]" in answer
+    assert "success: false" in volery(run, "service", "call", "/uav1/take_off")
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("topic", "echo", "/nope"), "no topic '/nope'"),
+        (("topic", "pub", "/x", "no_msgs/Such"), "no_msgs/msg/Such"),
+        (("topic", "pub", "/x", "std_msgs/String", "{data: 3}"), "data must be"),
+        (("topic", "pub", "/x", "std_msgs/String", "{data"), "no YAML"),
+        (("service", "call", "/nope"), "nobody offers"),
+        (("service", "call", "/uav1/go_to", "{position: {x: bad}}"), "position.x must be"),
+        (("node", "nonsense"), "module:Class"),
+        (("node", "no_such_module:Node"), "cannot be imported"),
+        (("topic", "list", "--via", "pigeon://post"), "no way into a graph"),
+        (("topic", "list", "--via", "rosbridge://127.0.0.1:1"), "nobody speaks rosbridge"),
+    ],
+)
+def test_slips_are_told_in_a_line(run, words, reason):
+    assert reason in volery(run, *words, ok=False)
+
+
+def test_a_node_runs_beside(run, tmp_path):
+    (tmp_path / "echoing.py").write_text(
+        "from volery.graph.messages import String\n"
+        "from volery.graph.node import Node\n"
+        "class Echo(Node):\n"
+        "    def __init__(self, **options):\n"
+        "        super().__init__('echo', **options)\n"
+        "        out = self.create_publisher(String, 'out', 10)\n"
+        "        word = self.declare_parameter('word', 'x').value\n"
+        "        self.create_timer(0.1, lambda: out.publish(String(word)))\n"
+    )
+    profile = tmp_path / "profile.toml"
+    profile.write_text('namespace = "/uav1"\n[remap]\nout = "/renamed"\n')
+    via = f"rosbridge://127.0.0.1:{run.ports[0]}"
+    node = subprocess.Popen(
+        [*VOLERY, "node", "echoing:Echo", "--via", via, "--profile", profile, "-p", "word=hello"],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert "echo runs on" in node.stderr.readline()
+        for _ in range(50):
+            if "/renamed" in volery(run, "topic", "list"):
+                break
+        assert "data: hello" in volery(run, "topic", "echo", "/renamed", "--once")
+    finally:
+        node.terminate()
+        node.wait(20)
+        node.stderr.close()
+
+
+def test_the_example_flies_a_square(run):
+    volery(run, "service", "call", "/uav1/hold")
+    done = subprocess.run(
+        [sys.executable, ROOT / "examples/06_fly_from_outside.py", str(run.ports[0]), "1.5"],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stderr
+    width = float(re.search(r"([\d.]+) m wide", done.stdout)[1])
+    assert 0.8 < width < 2.5
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("--door", "rosbrige"), "Did you mean 'rosbridge'"),
+        (("--door", "rosbridge=x"), "PORT or HOST:PORT"),
+        (("--door", "rosbridge=0.0.0.0:0"), "other machines"),
+    ],
+)
+def test_doors_that_cannot_be_opened(words, reason):
+    done = subprocess.run(
+        [*VOLERY, "run", "hover", "--seconds", "1", *words],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 2
+    assert reason in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_port_in_use_is_told(run):
+    done = subprocess.run(
+        [*VOLERY, "run", "hover", "--seconds", "1", "--door", f"rosbridge={run.ports[0]}"],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 2
+    assert str(run.ports[0]) in done.stderr
+    assert "Traceback" not in done.stderr
