@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import threading
+from contextlib import contextmanager
 
 import pytest
 
 from volery import Simulation
 from volery.autonomy.gap_following import GapFollowing
+from volery.bridges.doors import Doors
 from volery.bridges.node_host import NodeHost
+from volery.bridges.rosbridge_client import RosbridgeClient
+from volery.bridges.rosbridge_server import RosbridgeServer
 from volery.core.errors import GraphError
 from volery.scenario.load import parse_scenario
 
@@ -76,13 +80,26 @@ def fly_inside():
         return commands, simulation.uavs["uav1"].position_map
 
 
-def fly_outside():
-    with Simulation(scenario(with_node=False)) as simulation:
+@contextmanager
+def in_memory(simulation):
+    yield lambda: simulation.gateway.open("gap_following")
+
+
+@contextmanager
+def over_rosbridge(simulation):
+    server = RosbridgeServer(port=0)
+    with Doors(simulation.gateway) as doors:
+        doors.open(server)
+        yield lambda: RosbridgeClient(f"ws://127.0.0.1:{server.port}", name="gap_following")
+
+
+def fly_outside(way):
+    with Simulation(scenario(with_node=False)) as simulation, way(simulation) as open_link:
         commands = listen(simulation)
         flying, trouble = threading.Event(), []
 
         def run_node():
-            session = simulation.gateway.open("gap_following")
+            session = open_link()
             host = NodeHost(session, clock="simulated")
             try:
                 GapFollowing(
@@ -108,9 +125,10 @@ def fly_outside():
         return commands, simulation.uavs["uav1"].position_map
 
 
-def test_a_lock_step_partner_outside_flies_what_the_node_inside_flies():
+@pytest.mark.parametrize("way", [in_memory, over_rosbridge])
+def test_a_lock_step_partner_outside_flies_what_the_node_inside_flies(way):
     inside, place = fly_inside()
-    outside, other_place = fly_outside()
+    outside, other_place = fly_outside(way)
     assert len(inside) > 50
     assert outside == inside
     assert (place == other_place).all()
