@@ -133,13 +133,14 @@ class Outbox:
         self._ready.append(stream)
         try:
             payload = self.payloads.published(taken[0])
+            size = sum(len(part) for part in payload)
         except GraphError as error:
             self.end_stream(stream.destination)
             self._on_error(f"'{stream.destination}' cannot be sent: {error}")
             return 0
-        head = ros_tcp.head(stream.destination, len(payload))
-        parts += (head, payload)
-        return len(head) + len(payload)
+        head = ros_tcp.head(stream.destination, size)
+        parts += (head, *payload)
+        return len(head) + size
 
     def _stir(self) -> None:
         if not self._woken:

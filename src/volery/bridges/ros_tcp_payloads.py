@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from volery.bridges.ros_tcp import Bytes, Generation
+from volery.bridges.ros_tcp_views import parts_of
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.cdr import CODING_ERRORS, decode_cdr, encode_cdr
 from volery.graph.definition_store import EMPTY_MEMBER
@@ -18,10 +19,10 @@ _CDR_HEADER_BYTES = 4
 class Payloads(Protocol):
     """How messages become bytes and come back."""
 
-    def published(self, published: Published) -> Bytes:
-        """Bytes of a message of the graph."""
+    def published(self, published: Published) -> list[Bytes]:
+        """Bytes of a message of the graph, in parts; `GraphError` as `encode`."""
 
-    def encode(self, message: Any, msgtype: str) -> Bytes:
+    def encode(self, message: Any, msgtype: str) -> bytes:
         """Bytes of a message; `GraphError` where it cannot be said in this generation."""
 
     def decode(self, data: Bytes, msgtype: str) -> Any:
@@ -37,11 +38,11 @@ class Payloads(Protocol):
 class Ros1Payloads:
     """Plain ROS 1 serialization."""
 
-    def published(self, published: Published) -> Bytes:
-        """Bytes of a message of the graph, made once for all clients; `GraphError` as `encode`."""
-        return published.ros1
+    def published(self, published: Published) -> list[Bytes]:
+        """Bytes of a message of the graph, in parts; `GraphError` as `encode`."""
+        return parts_of(published, self.encode) or [published.ros1]
 
-    def encode(self, message: Any, msgtype: str) -> Bytes:
+    def encode(self, message: Any, msgtype: str) -> bytes:
         """Bytes of a message; `GraphError` where it does not fit its type."""
         return ros1_codec().encode(message, msgtype)
 
@@ -61,14 +62,14 @@ class Ros1Payloads:
 class Ros2Payloads:
     """CDR with its header of four bytes."""
 
-    def published(self, published: Published) -> Bytes:
-        """Bytes of a message of the graph, made once for all clients; `GraphError` as `encode`."""
+    def published(self, published: Published) -> list[Bytes]:
+        """Bytes of a message of the graph, in parts; `GraphError` as `encode`."""
         try:
-            return published.cdr
+            return parts_of(published, self.encode) or [published.cdr]
         except (*CODING_ERRORS, AssertionError) as error:
             raise GraphError(f"the message does not fit {published.msgtype}: {error}") from None
 
-    def encode(self, message: Any, msgtype: str) -> Bytes:
+    def encode(self, message: Any, msgtype: str) -> bytes:
         """Bytes of a message; `GraphError` where it does not fit its type."""
         return encode_cdr(message, msgtype)
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 import contextlib
 import json
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ros_tcp_client import cdr_string, frame, ros1_string
 
 from volery.bridges.ros_tcp import FrameParser
+from volery.bridges.ros_tcp_payloads import payloads_of
 from volery.bridges.ros_tcp_session import EndpointSession
 from volery.bridges.ros_tcp_unity import Selection, UnitySession
-from volery.core.errors import BridgeError
+from volery.core.errors import BridgeError, GraphError
 from volery.graph.graph import Graph
-from volery.graph.messages import String, message_type
+from volery.graph.messages import Published, String, message_type
 from volery.graph.reply import Reply
 from volery.graph.session import Gateway
 
@@ -202,3 +204,41 @@ def test_topics_take_turns():
     session.complain("first")
     found = [f.destination for f in drain(session)]
     assert found == ["__handshake", "__error", *["/out", "/in"] * 3]
+
+
+def large_messages():
+    from volery.graph import messages as m
+
+    bits = np.random.default_rng(3).integers(0, 256, 40_000).astype(np.uint8)
+    head = m.header(7, "ünï")
+    fields = [m.PointField("x", 0, 7, 1), m.PointField("longer", 4, 7, 1)]
+    grid = message_type("nav_msgs/msg/OccupancyGrid")
+    info = message_type("nav_msgs/msg/MapMetaData")
+    pose = m.Pose(m.Point(1.0, 2.0, 3.0), m.Quaternion(0.0, 0.0, 0.0, 1.0))
+    image = message_type("sensor_msgs/msg/Image")
+    for is_dense in (True, False):
+        yield m.PointCloud2(head, 1, 2500, fields, False, 16, 40_000, bits, is_dense)
+    yield image(head, 200, 200, "mono8", 0, 200, bits)
+    yield image(head, 100, 200, "mono8", 0, 200, bits[::2])
+    yield image(head, 1, 10, "mono8", 0, 10, bits[:10])
+    yield message_type("sensor_msgs/msg/CompressedImage")(head, "png", bits)
+    yield grid(head, info(m.Time(0, 0), 0.1, 200, 200, pose), bits.view(np.int8))
+
+
+@pytest.mark.parametrize("generation", ["ros1", "ros2"])
+@pytest.mark.parametrize("message", list(large_messages()), ids=lambda m: type(m).__name__)
+def test_large_messages_in_parts_are_the_same_bytes(generation, message):
+    published = Published("/x", message.__msgtype__, 0, message)
+    parts = payloads_of(generation).published(published)
+    whole = published.ros1 if generation == "ros1" else published.cdr
+    assert b"".join(parts) == whole
+    assert (len(parts) > 1) == (message.data.nbytes > 16384 and message.data.flags.c_contiguous)
+
+
+def test_a_large_message_that_does_not_fit_is_refused():
+    (*_, message) = large_messages()
+    message.data = message.data.astype(np.float64)
+    published = Published("/x", message.__msgtype__, 0, message)
+    for generation in ("ros1", "ros2"):
+        with pytest.raises(GraphError, match="OccupancyGrid"):
+            payloads_of(generation).published(published)
