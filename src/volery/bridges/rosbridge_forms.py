@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import base64
+import secrets
 from collections import OrderedDict
 from collections.abc import Callable
+from itertools import chain, zip_longest
 from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from volery.bridges.cbor_form import encode_cbor
 from volery.bridges.rosbridge_wire import Frame, encode_json, encode_png
@@ -20,6 +26,8 @@ MOST_KEPT = 64
 """Messages kept for a second client; they are taken within the same turn of the loop as a rule."""
 MOST_KEPT_BYTES = 32 * 1024 * 1024
 
+_BYTES = {"uint8", "char", "byte"}
+
 
 class Forms:
     """Encodes messages for all clients of a server. For one thread."""
@@ -27,6 +35,10 @@ class Forms:
     def __init__(self, generation: Generation = "ros2") -> None:
         self.generation = generation
         self._json = JsonForm(ros1_names=generation == "ros1")
+        self._splicing = JsonForm(ros1_names=generation == "ros1", arrays=self._json_array)
+        self._mark = f"<{secrets.token_hex(16)}>"
+        """Stands where base64 text goes; no message can hold it by chance."""
+        self._base64: list[str] = []
         self._cbor = JsonForm(
             ros1_names=generation == "ros1",
             non_finite_as_null=False,
@@ -70,8 +82,24 @@ class Forms:
         return frame
 
     def _json_frame(self, published: Published, topic: str) -> Frame:
-        plain = self._json.encode(published.message, published.msgtype)
-        return encode_json({"op": "publish", "topic": topic, "msg": plain})
+        self._base64.clear()
+        plain = self._splicing.encode(published.message, published.msgtype)
+        text = encode_json({"op": "publish", "topic": topic, "msg": plain})
+        if not self._base64:
+            return text
+        parts = text.split(self._mark)
+        return "".join(chain.from_iterable(zip_longest(parts, self._base64, fillvalue="")))
+
+    def _json_array(self, values: NDArray[Any], base: str) -> Any:
+        """Array as JSON; base64 waits apart, for the writer would look at its every letter."""
+        if base in _BYTES:
+            self._base64.append(base64.b64encode(values.data).decode("ascii"))
+            return self._mark
+        plain: list[Any] = values.tolist()
+        if values.dtype.kind == "f":
+            for k in np.flatnonzero(~np.isfinite(values)).tolist():
+                plain[k] = None
+        return plain
 
     def _cbor_frame(self, published: Published, topic: str) -> Frame:
         plain = self._cbor.encode(published.message, published.msgtype)

@@ -209,7 +209,7 @@ class RosbridgeServer:
         loop = asyncio.get_running_loop()
         address = connection.remote_address or ("?", 0)
         session = self._gateway.open(f"rosbridge {address[0]}:{address[1]}")
-        wanted = asyncio.Event()
+        bell = _Bell(loop)
 
         def post(action: Any) -> None:
             wake_of(loop, action)()
@@ -217,7 +217,7 @@ class RosbridgeServer:
         peer = RosbridgePeer(
             session,
             self._shared,
-            wake=wake_of(loop, wanted.set),
+            wake=bell.ring,
             post=post,
             authorized=connection in self._shown,
         )
@@ -225,7 +225,7 @@ class RosbridgeServer:
         read = asyncio.Event()
         tasks = [
             asyncio.create_task(_read(connection, peer, read)),
-            asyncio.create_task(_write(connection, peer, wanted, read)),
+            asyncio.create_task(_write(connection, peer, bell, read)),
         ]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -237,6 +237,25 @@ class RosbridgeServer:
             for outcome in await asyncio.gather(*tasks, return_exceptions=True):
                 if isinstance(outcome, Exception) and not isinstance(outcome, ConnectionClosed):
                     _log.error("serving %s failed", session.name, exc_info=outcome)
+
+
+class _Bell:
+    """Wakes a writer from any thread; rung often before it is heard, it costs the ringer once."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self.heard = asyncio.Event()
+        self._wake = wake_of(loop, self.heard.set)
+        self._rung = False
+
+    def ring(self) -> None:
+        if not self._rung:
+            self._rung = True
+            self._wake()
+
+    def silence(self) -> None:
+        """Called before looking at what there is: who rings afterwards is heard again."""
+        self.heard.clear()
+        self._rung = False
 
 
 async def _read(connection: ServerConnection, peer: RosbridgePeer, read: asyncio.Event) -> None:
@@ -258,12 +277,12 @@ async def _read(connection: ServerConnection, peer: RosbridgePeer, read: asyncio
 
 
 async def _write(
-    connection: ServerConnection, peer: RosbridgePeer, wanted: asyncio.Event, read: asyncio.Event
+    connection: ServerConnection, peer: RosbridgePeer, bell: _Bell, read: asyncio.Event
 ) -> None:
     """Send what the peer has to say, as fast as the client reads."""
     turns = itertools.count(1)
     while True:
-        wanted.clear()
+        bell.silence()
         for frame in peer.frames(time.monotonic()):
             await connection.send(frame)
             read.set()
@@ -273,7 +292,7 @@ async def _write(
         now_s = time.monotonic()
         due_s = peer.due_s(now_s)
         with suppress(TimeoutError):
-            await asyncio.wait_for(wanted.wait(), None if due_s is None else due_s - now_s)
+            await asyncio.wait_for(bell.heard.wait(), None if due_s is None else due_s - now_s)
 
 
 def _select_subprotocol(_connection: ServerConnection, offered: Sequence[Any]) -> Any:

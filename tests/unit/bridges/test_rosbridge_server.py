@@ -145,11 +145,10 @@ def test_eight_megabytes_both_ways(simulation, server, compression):
 
 
 def test_a_client_that_does_not_read_disturbs_nobody(simulation, server):
-    with Plain(server, ping_interval=None) as sleeper, Plain(server) as reader:
+    with Plain(server, close_timeout=0.1) as sleeper, Plain(server) as reader:
         wanted = {"topic": "/image", "type": IMAGE, "compression": "cbor", "queue_length": 2}
         sleeper.send("subscribe", **wanted)
         sleeper.synchronize()
-        sleeper.socket.socket.settimeout(None)
         reader.send("subscribe", **wanted | {"queue_length": 100})
         reader.synchronize()
         publisher = simulation.graph.advertise("/image", IMAGE)

@@ -255,3 +255,15 @@ def test_a_message_is_encoded_once_for_all():
     for _ in range(200):
         forms.frame(scan(), "cbor", "/scan")
     assert len(forms._kept) <= 64
+
+
+def test_bytes_in_json_are_base64():
+    fields = [m.PointField("x", 0, 7, 1)]
+    header = m.header(1, "a")
+    data = np.arange(250, dtype=np.uint8)
+    cloud = m.PointCloud2(header, 1, 250, fields, False, 1, 250, data, True)
+    published = m.Published("/cloud", "sensor_msgs/msg/PointCloud2", 1, cloud)
+    found = json.loads(Forms().frame(published, "none", "/cloud"))["msg"]
+    assert base64.b64decode(found["data"]) == data.tobytes()
+    assert (found["fields"][0]["name"], found["is_dense"]) == ("x", True)
+    assert found == Forms().plain(cloud, published.msgtype)
