@@ -42,6 +42,7 @@ lint: $(VENV)/.installed-tests ## style, types, layers
 	$(BIN)/lint-imports
 
 test: lint ## install what tests need, check everything, run the tests
+	@.ci/install_ros1
 	$(BIN)/python -m volery.runtime.warm_up
 	$(BIN)/pytest -n 2 --dist loadfile -m 'not slow' tests
 

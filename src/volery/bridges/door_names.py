@@ -84,10 +84,11 @@ def _ros_tcp_connector(address: Address, _terms: Terms) -> Door:
     return RosTcpConnector(*address)
 
 
-def _ros1(_address: Address, _terms: Terms) -> Door:
+def _ros1(address: Address, terms: Terms) -> Door:
     from volery.bridges.ros1 import Ros1Door
 
-    return Ros1Door()
+    uri = f"http://{address.host}:{address.port}" if address.port else None
+    return Ros1Door(uri, anywhere=terms.anywhere)
 
 
 def _sensor_link(address: Address, terms: Terms) -> Door:

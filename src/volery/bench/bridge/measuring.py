@@ -14,8 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from volery.bench.bridge.native_ros1 import one_way_figures
+from volery.bench.registry import Measured
 from volery.bridges.doors import Doors
 from volery.bridges.ros_tcp_endpoint import RosTcpEndpoint
+from volery.bridges.rosbridge_server import RosbridgeServer
+from volery.core.errors import VoleryError
 from volery.graph.messages import Header, Time, message_type
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario, parse_scenario
@@ -35,9 +39,10 @@ _IMAGE = "sensor_msgs/msg/Image"
 _TRIGGER = "std_srvs/srv/Trigger"
 
 
-def measure() -> dict[str, float]:
+def measure() -> Measured:
     """Figures of the bench `bridge`."""
     figures: dict[str, float] = {}
+    failures: dict[str, str] = {}
     with running(load_scenario("hover")) as world:
         alpha, beta = fit_line(image_latencies(world))
         figures["ros_tcp_alpha_s_per_mb"], figures["ros_tcp_beta_s"] = alpha, beta
@@ -53,8 +58,12 @@ def measure() -> dict[str, float]:
         figures["rosbridge_round_trip_ms"] = float(trips.mean())
         figures["rosbridge_round_trip_p99_ms"] = float(np.percentile(trips, 99))
         figures["stop_wall_p95_ms"] = 1e3 * float(np.percentile(stop_latencies(world), 95))
+        try:
+            figures.update(one_way_figures(world.simulation, world.doors))
+        except VoleryError as error:
+            failures["ros1_one_way_ratio"] = str(error)
     figures.update(stream_figures())
-    return figures
+    return Measured(figures, failures)
 
 
 class World:
@@ -62,6 +71,7 @@ class World:
 
     def __init__(self, simulation: Simulation, doors: Doors) -> None:
         self.simulation = simulation
+        self.doors = doors
         tcp, web = RosTcpEndpoint(port=0), RosbridgeServer(port=0)
         doors.open(tcp)
         doors.open(web)

@@ -55,7 +55,7 @@ class Client:
         return next(payload for name, payload in self.frames() if name == destination)
 
     def _read(self, count: int) -> bytes:
-        data = self._file.read(count)
+        data: bytes = self._file.read(count)
         if len(data) < count:
             raise ConnectionError("the server has closed the connection")
         return data

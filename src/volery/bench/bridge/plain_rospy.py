@@ -1,20 +1,29 @@
-"""The plain rospy sides of `one_way.py`, run by the system's Python."""
+"""Plain rospy programs, run by the system's Python: nothing of Volery is imported.
+
+    python3 plain_rospy.py publish|subscribe
+
+`publish` sends an image of each size (bytes) that it reads, `subscribe` reports for each line the
+[path, size, ms] of all images received, from the publisher's stamp to the callback.
+"""
 
 import json
 import sys
 import threading
 import time
+from typing import Any
 
 import rospy
 from sensor_msgs.msg import Image
 
 
-def say(value):
+def say(value: Any) -> None:
+    """Print a value as JSON."""
     sys.stdout.write(json.dumps(value) + "\n")
     sys.stdout.flush()
 
 
-def publish():
+def publish() -> None:
+    """Send what is asked for."""
     publisher = rospy.Publisher("/one_way/plain", Image, queue_size=10)
     say("ready")
     for line in sys.stdin:
@@ -25,10 +34,11 @@ def publish():
         publisher.publish(message)
 
 
-def subscribe():
+def subscribe() -> None:
+    """Receive from both."""
     taken = []
 
-    def take(message, path):
+    def take(message: Any, path: str) -> None:
         now = time.time_ns()
         taken.append([path, len(message.data), (now - message.header.stamp.to_nsec()) * 1e-6])
 
@@ -39,8 +49,14 @@ def subscribe():
         say(taken)
 
 
-rospy.init_node(f"one_way_{sys.argv[1]}", argv=["peer"], disable_rostime=True)
-threading.Thread(
-    target={"publish": publish, "subscribe": subscribe}[sys.argv[1]], daemon=True
-).start()
-rospy.spin()
+def main() -> None:
+    """Do what the command line says."""
+    what = sys.argv[1]
+    rospy.init_node(f"one_way_{what}", argv=["peer"], disable_rostime=True)
+    work = {"publish": publish, "subscribe": subscribe}[what]
+    threading.Thread(target=work, daemon=True).start()
+    rospy.spin()
+
+
+if __name__ == "__main__":
+    main()
