@@ -75,6 +75,10 @@ def run(
     token: Annotated[
         str | None, typer.Option(envvar="VOLERY_TOKEN", help="What remote clients must show.")
     ] = None,
+    recordings: Annotated[
+        Path | None,
+        typer.Option(help="Folder in which clients may record: /volery/start_recording."),
+    ] = None,
     digest: Annotated[
         bool, typer.Option("--digest", help="Print the SHA-256 over all states and messages.")
     ] = False,
@@ -99,6 +103,7 @@ def run(
         seed=seed,
         speed=parse_speed(speed or ("1" if door else "max")),
         doors=tuple(door or ()),
+        recordings=recordings,
         allow_remote=allow_remote,
         token=token,
         threads=threads,

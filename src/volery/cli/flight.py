@@ -39,6 +39,7 @@ class RunOptions:
     digest: bool = False
     overwrite: bool = False
     doors: tuple[str, ...] = ()
+    recordings: Path | None = None
     allow_remote: bool = False
     token: str | None = None
 

@@ -60,7 +60,7 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts) -> int:
         check_report(options.report)
     threads = _THREADS if options.threads is None else options.threads
     with FlightProgress(scenario.name, scenario.duration_s) as progress:
-        simulation = Simulation(scenario, threads=threads)
+        simulation = Simulation(scenario, threads=threads, recordings=options.recordings)
         try:
             interrupts.be_gentle()
             with open_doors(simulation, options):

@@ -27,7 +27,10 @@ _TRIGGER = "std_srvs/srv/Trigger"
 
 
 def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> None:
-    """Listen to `cmd_vel`, `goal_pose` and `trajectory` of one UAV, offer its plain services.
+    """Listen to the topics that command one UAV, offer its plain services.
+
+    `cmd_vel`, `goal_pose`, `trajectory` and, for a kinematic UAV that something outside moves,
+    `pose_command`: where it stands from the next step on.
 
     A Twist is taken in the level heading frame, a pose and a trajectory in the map. During take-off
     and on the ground they are ignored, and so are those that are none: a refused command on a topic
@@ -48,6 +51,7 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> None:
         "cmd_vel": (Twist, on_twist),
         "goal_pose": (PoseStamped, lambda pose: go_to_message(uav, pose)),
         "trajectory": (MultiDOFJointTrajectory, lambda message: follow_message(uav, message)),
+        "pose_command": (PoseStamped, lambda pose: stand_at_message(uav, pose)),
     }
     for name, (message_class, take) in topics.items():
         graph.subscribe(f"/{uav.name}/{name}", _careful(uav, take), message_class)
@@ -74,6 +78,14 @@ def go_to_message(uav: Uav, message: Any) -> None:
         raise CommandError("the rotation of a goal must be finite")
     yaw = float(rotations.yaw_of(q)) if float(np.linalg.norm(q)) > 0.5 else None
     uav.go_to([place.x, place.y, place.z], yaw)
+
+
+def stand_at_message(uav: Uav, message: Any) -> None:
+    """Put a kinematic `uav` at a PoseStamped in the map. Raises `CommandError`."""
+    if message.header.frame_id not in ("", "map"):
+        raise CommandError(f"poses are in 'map', not in '{message.header.frame_id}'")
+    place, turn = message.pose.position, message.pose.orientation
+    uav.command_pose([place.x, place.y, place.z], [turn.x, turn.y, turn.z, turn.w])
 
 
 def _careful(uav: Uav, take: Callable[[Any], None]) -> Callable[[Published], None]:

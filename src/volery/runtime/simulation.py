@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from numpy.typing import ArrayLike
 
@@ -45,6 +45,9 @@ from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario
 from volery.world.scene import Scene
 from volery.world.weather import Weather
+
+if TYPE_CHECKING:
+    from volery.bridges.replay import Replay
 
 _CLOCK_PERIOD_S = 0.01
 _DIGEST_PERIOD_S = 0.01
@@ -264,6 +267,11 @@ class Simulation:
         future = self._engine.inbox.post(action)
         self._pacer.wake()
         return future
+
+    def play(self, replay: Replay) -> None:
+        """Let a recorded log speak into the graph, beginning now, in simulated time."""
+        self._check_open()
+        replay.start(self.graph, self._engine, lambda: self.time_ns)
 
     def take_in(self) -> None:
         """Do what other threads have posted, and hand out what that published, without a step.

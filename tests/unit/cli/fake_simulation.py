@@ -22,7 +22,7 @@ class FakeSimulation:
     wall_s_per_step = 0.0
     made: list[FakeSimulation] = []  # noqa: RUF012
 
-    def __init__(self, scenario: Any, threads: int = 1) -> None:
+    def __init__(self, scenario: Any, threads: int = 1, recordings: Any = None) -> None:
         self.scenario = scenario
         self.threads = threads
         self.time_ns = 0

@@ -211,6 +211,30 @@ def test_a_stopped_kinematic_uav_stands_in_the_air(simulate, flat_data):
     assert np.linalg.norm(simulation.uavs["uav1"].position_map - stopped_at) < 0.01
 
 
+def test_something_outside_may_move_a_kinematic_uav(simulate, flat_data):
+    flat_data["types"]["f450"]["plant"] = "kinematic"
+    flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 5.0]
+    simulation = simulate(flat_data)
+    poses = simulation.graph.advertise("/uav1/pose_command", PoseStamped)
+    turn = Quaternion(0.0, 0.0, np.sin(0.5), np.cos(0.5))
+    poses.publish(PoseStamped(header(0, "map"), Pose(Point(1.0, 2.0, 6.0), turn)))
+    poses.publish(PoseStamped(header(0, "uav1/odom"), Pose(Point(9.0, 9.0, 9.0), turn)))
+    simulation.step(2)
+    uav = simulation.uavs["uav1"]
+    np.testing.assert_allclose(uav.position_map, [1.0, 2.0, 6.0], atol=1e-9)
+    np.testing.assert_allclose(uav.attitude, [0.0, 0.0, np.sin(0.5), np.cos(0.5)], atol=1e-9)
+
+
+def test_poses_are_for_kinematic_uavs(pair):
+    before = pair.uavs["uav2"].position_map
+    pose = Pose(Point(1.0, 2.0, 6.0), Quaternion(0.0, 0.0, 0.0, 1.0))
+    pair.graph.advertise("/uav2/pose_command", PoseStamped).publish(
+        PoseStamped(header(0, "map"), pose)
+    )
+    pair.step(2)
+    assert np.linalg.norm(pair.uavs["uav2"].position_map - before) < 0.1
+
+
 def test_applied_commands_are_the_same_in_equal_runs(simulate, flat_data):
     flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 5.0]
 
