@@ -10,9 +10,9 @@ import pytest
 from volery import Simulation
 from volery.autonomy.gap_following import GapFollowing
 from volery.bridges.doors import Doors
-from volery.bridges.node_host import NodeHost
-from volery.bridges.rosbridge_client import RosbridgeClient
-from volery.bridges.rosbridge_server import RosbridgeServer
+from volery.bridges.nodes.host import NodeHost
+from volery.bridges.rosbridge.client import RosbridgeClient
+from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import GraphError
 from volery.scenario.load import parse_scenario
 

@@ -4,7 +4,7 @@ import json
 import sys
 import threading
 
-from volery.bridges.ros1_client import Ros1Client
+from volery.bridges.ros1.client import Ros1Client
 from volery.core.errors import GraphError
 from volery.graph.messages import Header, String, Time, message_type
 from volery.graph.reply import Reply

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import pytest
 
-from volery.bridges.ros1_environment import rospy_is_installed
+from volery.bridges.ros1.environment import rospy_is_installed
 from volery.graph.graph import Graph
 from volery.graph.messages import Clock, time_from_ns
 from volery.graph.session import Gateway

@@ -21,9 +21,9 @@ from ros1_bench import (
 from rosbags.highlevel import AnyReader
 
 from volery.bridges.doors import Doors
-from volery.bridges.ros1 import Ros1Door
-from volery.bridges.ros1_environment import load_rospy
-from volery.bridges.ros1_node import join_ros1
+from volery.bridges.ros1.door import Ros1Door
+from volery.bridges.ros1.environment import load_rospy
+from volery.bridges.ros1.node import join_ros1
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import (
     Header,
@@ -373,7 +373,7 @@ def test_a_master_that_began_anew_is_told_everything(live, master, registered):
 
 def test_no_master_is_a_clear_refusal(tmp_path):
     program = (
-        "from volery.bridges.ros1_node import join_ros1\n"
+        "from volery.bridges.ros1.node import join_ros1\n"
         "from volery.core.errors import BridgeError\n"
         "try: join_ros1('late', master_uri='http://127.0.0.1:9')\n"
         "except BridgeError as error: print(error)\n"

@@ -61,38 +61,38 @@ def _parse(address: str, port: int, text: str) -> Address:
 
 
 def _rosbridge(address: Address, terms: Terms) -> Door:
-    from volery.bridges.rosbridge_server import RosbridgeServer
+    from volery.bridges.rosbridge.server import RosbridgeServer
 
     return RosbridgeServer(*address, token=terms.token, anywhere=terms.anywhere)
 
 
 def _ros_tcp(address: Address, terms: Terms) -> Door:
-    from volery.bridges.ros_tcp_endpoint import RosTcpEndpoint
+    from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 
     return RosTcpEndpoint(*address, anywhere=terms.anywhere)
 
 
 def _ros_tcp_2(address: Address, terms: Terms) -> Door:
-    from volery.bridges.ros_tcp_endpoint import RosTcpEndpoint
+    from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 
     return RosTcpEndpoint(*address, generation="ros2", anywhere=terms.anywhere)
 
 
 def _ros_tcp_connector(address: Address, _terms: Terms) -> Door:
-    from volery.bridges.ros_tcp_connector import RosTcpConnector
+    from volery.bridges.ros_tcp.connector import RosTcpConnector
 
     return RosTcpConnector(*address)
 
 
 def _ros1(address: Address, terms: Terms) -> Door:
-    from volery.bridges.ros1 import Ros1Door
+    from volery.bridges.ros1.door import Ros1Door
 
     uri = f"http://{address.host}:{address.port}" if address.port else None
     return Ros1Door(uri, anywhere=terms.anywhere)
 
 
 def _sensor_link(address: Address, terms: Terms) -> Door:
-    from volery.bridges.sensor_link_server import SensorLink
+    from volery.bridges.sensor_link.server import SensorLink
 
     image_port = address.port + 1 if address.port else 0
     return SensorLink(*address, image_port=image_port, anywhere=terms.anywhere)

@@ -18,7 +18,7 @@ from volery.cli.steering import steer
 from volery.core.errors import RecordingError, VoleryError
 
 if TYPE_CHECKING:
-    from volery.bridges.bag import Log
+    from volery.bridges.logs.bag import Log
     from volery.report.collect import FlightCollector
 
 _CONTACTS_SHOWN = 10
@@ -73,7 +73,7 @@ class Flight:
 
             self._collector = FlightCollector(simulation)
         if options.record is not None:
-            from volery.bridges.bag import open_log
+            from volery.bridges.logs.bag import open_log
 
             self._log = open_log(options.record, overwrite=options.overwrite)
             simulation.graph.subscribe_all(self._log.write)

@@ -18,12 +18,12 @@ def open_link(via: str, name: str) -> Link:
     """Join the graph at `via` under a name. `BridgeError` where nobody answers there."""
     scheme, _, rest = via.partition("://")
     if scheme in ("rosbridge", "ws", "wss"):
-        from volery.bridges.rosbridge_client import RosbridgeClient
+        from volery.bridges.rosbridge.client import RosbridgeClient
 
         url = via if scheme != "rosbridge" else f"ws://{rest}"
         return RosbridgeClient(url, name=name)
     if scheme == "ros1":
-        from volery.bridges.ros1_client import Ros1Client
+        from volery.bridges.ros1.client import Ros1Client
 
         return Ros1Client(f"http://{rest}" if rest else None, _ros1_name(name))
     raise BridgeError(f"'{via}' is no way into a graph; use {_WAYS}")

@@ -16,7 +16,7 @@ _FORMATS = {"mcap": "MCAP", "bag": "ROS 1 bag"}
 
 def show_log(path: Path) -> bool:
     """Print what is in a log; False, after one line on stderr, where it is broken or no log."""
-    from volery.bridges.log_reader import summarize
+    from volery.bridges.logs.reader import summarize
 
     try:
         summary = summarize(path)
@@ -40,8 +40,8 @@ def show_log(path: Path) -> bool:
 
 def recover_log(path: Path, out: Path | None) -> None:
     """Write the readable part of a log as a whole file and say what was saved."""
-    from volery.bridges.log_reader import summarize
-    from volery.bridges.recover import recover
+    from volery.bridges.logs.reader import summarize
+    from volery.bridges.logs.recover import recover
 
     if out is None and not summarize(path).trouble:
         typer.echo(f"{path} is whole: nothing to recover")

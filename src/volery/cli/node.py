@@ -31,8 +31,8 @@ def run_node(options: NodeOptions) -> None:
     """Run a node until Ctrl-C, or until it fails."""
     from pydantic import ValidationError
 
-    from volery.bridges.node_host import NodeHost
-    from volery.bridges.profile import Profile, absolute_names, load_profile
+    from volery.bridges.nodes.host import NodeHost
+    from volery.bridges.nodes.profile import Profile, absolute_names, load_profile
     from volery.runtime.node_loading import start_node
     from volery.scenario.schema import NodeEntry
 

@@ -9,7 +9,7 @@ from volery.core.errors import RecordingError, VoleryError
 
 def check_record(path: Path, *, overwrite: bool) -> None:
     """Refuse a log that could not be begun."""
-    from volery.bridges.bag import check_target
+    from volery.bridges.logs.bag import check_target
 
     check_target(path, overwrite=True)
     if path.exists() and not overwrite:

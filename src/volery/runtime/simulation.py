@@ -47,7 +47,7 @@ from volery.world.scene import Scene
 from volery.world.weather import Weather
 
 if TYPE_CHECKING:
-    from volery.bridges.replay import Replay
+    from volery.bridges.logs.replay import Replay
 
 _CLOCK_PERIOD_S = 0.01
 _DIGEST_PERIOD_S = 0.01

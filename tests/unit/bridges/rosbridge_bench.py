@@ -7,8 +7,8 @@ import queue
 import threading
 from concurrent.futures import Future
 
-from volery.bridges.rosbridge_forms import Forms
-from volery.bridges.rosbridge_protocol import RosbridgePeer, Shared
+from volery.bridges.rosbridge.forms import Forms
+from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
 from volery.graph.graph import Graph
 from volery.graph.messages import message_type
 from volery.graph.session import Gateway

@@ -18,9 +18,9 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from volery.bridges import bag
-from volery.bridges.bag import open_log
-from volery.bridges.log_reader import summarize
+from volery.bridges.logs import bag
+from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.reader import summarize
 from volery.core.errors import RecordingError
 from volery.graph.messages import Published, typestore
 
@@ -272,7 +272,7 @@ KILLED = """
 import sys, time
 sys.path.insert(0, sys.argv[2])
 from conftest import make_flight
-from volery.bridges.bag import open_log
+from volery.bridges.logs.bag import open_log
 log = open_log(sys.argv[1])
 messages = make_flight(20.0)
 for message in messages:

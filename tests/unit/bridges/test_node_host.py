@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from volery.bridges.node_host import NodeHost
+from volery.bridges.nodes.host import NodeHost
 from volery.core.errors import GraphError, NodeError
 from volery.graph.graph import Graph
 from volery.graph.messages import Clock, String, Time, message_type

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ros_tcp_client import Loop
 
-from volery.bridges.bag import open_log
-from volery.bridges.log_reader import summarize
-from volery.bridges.recording import Recorder
+from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.reader import summarize
+from volery.bridges.logs.recording import Recorder
 from volery.bridges.topic_patterns import renamer, topic_filter
 from volery.core.errors import GraphError, RecordingError
 from volery.graph.graph import Graph

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from rosbags.highlevel import AnyReader
 
-from volery.bridges.bag import open_log
-from volery.bridges.log_reader import summarize
-from volery.bridges.recover import recover, recovered_name
+from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.reader import summarize
+from volery.bridges.logs.recover import recover, recovered_name
 from volery.core.errors import RecordingError
 from volery.graph.messages import Published, typestore
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from volery.bridges import ros_tcp
-from volery.bridges.ros_tcp import Frame, FrameParser
+from volery.bridges.ros_tcp import wire as ros_tcp
+from volery.bridges.ros_tcp.wire import Frame, FrameParser
 from volery.core.errors import BridgeError
 
 

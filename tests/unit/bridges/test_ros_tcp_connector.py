@@ -13,8 +13,8 @@ import pytest
 from ros_tcp_client import Loop, cdr_string, frame, ros1_string, until
 
 from volery.bridges.doors import Doors
-from volery.bridges.ros_tcp_connector import RosTcpConnector
-from volery.bridges.ros_tcp_endpoint import RosTcpEndpoint
+from volery.bridges.ros_tcp.connector import RosTcpConnector
+from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.core.errors import BridgeError
 from volery.graph.messages import String, Twist, Vector3, message_type
 from volery.graph.reply import Reply

@@ -13,7 +13,7 @@ import pytest
 from ros_tcp_client import Client, Loop, cdr_string, frame, ros1_string, until
 
 from volery.bridges.doors import Doors
-from volery.bridges.ros_tcp_endpoint import RosTcpEndpoint
+from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import String, message_type
 from volery.graph.reply import Reply

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ros_tcp_client import cdr_string, frame, ros1_string
 
-from volery.bridges.ros_tcp import FrameParser
-from volery.bridges.ros_tcp_payloads import payloads_of
-from volery.bridges.ros_tcp_session import EndpointSession
-from volery.bridges.ros_tcp_unity import Selection, UnitySession
+from volery.bridges.ros_tcp.payloads import payloads_of
+from volery.bridges.ros_tcp.session import EndpointSession
+from volery.bridges.ros_tcp.unity import Selection, UnitySession
+from volery.bridges.ros_tcp.wire import FrameParser
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.graph import Graph
 from volery.graph.messages import Published, String, message_type

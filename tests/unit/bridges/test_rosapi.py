@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from rosbridge_bench import SET_BOOL, STEPS, STRING, TIME_NS, TRIGGER, Bench
 
-from volery.bridges.rosapi import RosApi
+from volery.bridges.rosbridge.rosapi import RosApi
 
 
 class Asked:

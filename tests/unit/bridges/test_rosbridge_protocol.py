@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbridge_bench import SET_BOOL, STEPS, STRING, TIME_NS, TRIGGER, Bench, trigger_response
 
-from volery.bridges.cbor_form import encode_cbor
-from volery.bridges.rosbridge_fragments import split
-from volery.bridges.rosbridge_protocol import MOST_WAITING_BYTES
-from volery.bridges.rosbridge_wire import encode_png
+from volery.bridges.rosbridge.cbor_form import encode_cbor
+from volery.bridges.rosbridge.fragments import split
+from volery.bridges.rosbridge.protocol import MOST_WAITING_BYTES
+from volery.bridges.rosbridge.wire import encode_png
 from volery.graph.messages import String, Twist, message_type
 
 

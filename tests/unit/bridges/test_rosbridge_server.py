@@ -19,8 +19,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from volery.bridges.doors import Doors
-from volery.bridges.rosbridge_client import RosbridgeClient
-from volery.bridges.rosbridge_server import RosbridgeServer
+from volery.bridges.rosbridge.client import RosbridgeClient
+from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import BridgeError, GraphError
 from volery.graph import messages as m
 from volery.graph.reply import Reply

@@ -16,10 +16,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from volery.bridges.cbor_form import decode_cbor, encode_cbor
-from volery.bridges.rosbridge_forms import Forms
-from volery.bridges.rosbridge_fragments import MOST_FRAGMENTS, MOST_OPEN, Assembly, split
-from volery.bridges.rosbridge_wire import decode_frame, decode_png, encode_json, encode_png
+from volery.bridges.rosbridge.cbor_form import decode_cbor, encode_cbor
+from volery.bridges.rosbridge.forms import Forms
+from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, MOST_OPEN, Assembly, split
+from volery.bridges.rosbridge.wire import decode_frame, decode_png, encode_json, encode_png
 from volery.core.errors import BridgeError
 from volery.graph import messages as m
 from volery.graph.ros1 import ros1_codec

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from volery.bridges.sensor_link import (
+from volery.bridges.sensor_link.wire import (
     HEAD_BYTES,
     OTHER_LIMIT_BYTES,
     SYNC,

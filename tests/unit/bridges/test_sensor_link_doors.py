@@ -10,14 +10,14 @@ import pytest
 from ros_tcp_client import Loop, until
 
 from volery.bridges.doors import Doors
-from volery.bridges.sensor_link import FrameParser, Kind, encode_frame
-from volery.bridges.sensor_link_client import SensorLinkClient
-from volery.bridges.sensor_link_payloads import (
+from volery.bridges.sensor_link.client import SensorLinkClient
+from volery.bridges.sensor_link.payloads import (
     decode_notice,
     decode_payload,
     encode_payload,
 )
-from volery.bridges.sensor_link_server import SensorLink
+from volery.bridges.sensor_link.server import SensorLink
+from volery.bridges.sensor_link.wire import FrameParser, Kind, encode_frame
 from volery.core.errors import BridgeError
 from volery.graph import messages as m
 from volery.graph.cdr import encode_cdr

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volery.bridges.sensor_link import Kind
-from volery.bridges.sensor_link_payloads import (
+from volery.bridges.sensor_link.payloads import (
     PAYLOADS,
     decode_notice,
     decode_payload,
@@ -18,6 +17,7 @@ from volery.bridges.sensor_link_payloads import (
     encode_payload,
     stamp_of,
 )
+from volery.bridges.sensor_link.wire import Kind
 from volery.core.errors import BridgeError
 from volery.graph import messages as m
 from volery.graph.cdr import encode_cdr

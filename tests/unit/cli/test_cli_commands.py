@@ -14,7 +14,7 @@ from volery.bench import registry
 from volery.bench.document import read_results, render
 from volery.bench.machine import describe_machine, describe_versions
 from volery.bench.registry import Result
-from volery.bridges.bag import open_log
+from volery.bridges.logs.bag import open_log
 from volery.cli import doctor
 from volery.cli.app import app
 from volery.core.errors import VoleryError

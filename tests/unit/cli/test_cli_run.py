@@ -15,7 +15,7 @@ from fake_simulation import FakeSimulation
 from typer.testing import CliRunner, Result
 
 import volery
-from volery.bridges.log_reader import summarize
+from volery.bridges.logs.reader import summarize
 from volery.cli.app import app
 
 Invoke = Callable[..., Result]

@@ -5,7 +5,7 @@ import json
 import pytest
 from asking import ask
 
-from volery.bridges.log_reader import summarize
+from volery.bridges.logs.reader import summarize
 from volery.core.errors import RecordingError
 
 
@@ -112,7 +112,7 @@ def test_a_disk_that_fills_up_ends_the_recording_alone(simulate, flat_data, tmp_
     def fail(_log, _published):
         raise RecordingError("the disk is full")
 
-    monkeypatch.setattr("volery.bridges.bag.McapLog.write", fail)
+    monkeypatch.setattr("volery.bridges.logs.bag.McapLog.write", fail)
     simulation.run(0.1)
     assert simulation.time_s == pytest.approx(0.1)
     refused(ask(simulation, "/volery/stop_recording"), "full")

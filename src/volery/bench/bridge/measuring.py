@@ -17,8 +17,8 @@ import numpy as np
 from volery.bench.bridge.native_ros1 import one_way_figures
 from volery.bench.registry import Measured
 from volery.bridges.doors import Doors
-from volery.bridges.ros_tcp_endpoint import RosTcpEndpoint
-from volery.bridges.rosbridge_server import RosbridgeServer
+from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
+from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import VoleryError
 from volery.graph.messages import Header, Time, message_type
 from volery.runtime import Simulation

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from volery.bridges.bag import Log, open_log
+from volery.bridges.logs.bag import Log, open_log
 from volery.core.errors import RecordingError
 from volery.graph.graph import Graph, Subscription
 from volery.graph.messages import Published

@@ -1,0 +1,1 @@
+"""Logs of a run: written, read, mended, recorded by pattern, replayed."""

@@ -1,0 +1,92 @@
+"""Messages of the graph from the records of a log, whichever ROS wrote it."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from volery.bridges.logs.records import LogRecord, LogTopic
+from volery.core.errors import GraphError
+from volery.graph.cdr import decode_cdr
+from volery.graph.messages import add_definitions, typestore
+from volery.graph.ros1 import ros1_codec, ros2_name
+
+_SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
+_NESTED = re.compile(r"\s*MSG:\s*(\S+)[^\n]*\n?")
+_TYPE = re.compile(r"([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)
+_DEFINITION_FORMS = {"ros1msg", "ros2msg"}
+
+
+class Decoded(NamedTuple):
+    """A message and its type."""
+
+    msgtype: str
+    message: Any
+
+
+class LogDecoder:
+    """Decodes records. Types that nobody knows are learned from the definitions in the log."""
+
+    def __init__(self) -> None:
+        self._types: dict[LogTopic, str | GraphError] = {}
+
+    def decode(self, record: LogRecord) -> Decoded:
+        """Message of a record; its arrays are read-only.
+
+        Raises
+        ------
+        GraphError
+            The type is unknown or not the one of that name here, or the bytes do not fit it.
+
+        """
+        found = self._types.get(record.topic)
+        if found is None:
+            found = self._types[record.topic] = _type_of(record.topic)
+        if isinstance(found, GraphError):
+            raise found
+        if record.topic.encoding == "ros1":
+            return Decoded(found, ros1_codec().decode(record.data, found))
+        return Decoded(found, decode_cdr(record.data, found))
+
+
+def _type_of(topic: LogTopic) -> str | GraphError:
+    """Type of a topic's messages, known by now; or why they cannot be read."""
+    try:
+        if topic.encoding not in ("ros1", "cdr"):
+            raise GraphError(f"messages encoded as '{topic.encoding}' cannot be read")
+        name = ros2_name(topic.msgtype) if topic.encoding == "ros1" else topic.msgtype
+        if name not in typestore().types:
+            _learn(name, topic)
+        if topic.encoding == "ros1" and topic.digest:
+            ours = ros1_codec().md5(name)
+            if ours != topic.digest:
+                raise GraphError(
+                    f"the log has another {name} than is known here: md5 {topic.digest}, not {ours}"
+                )
+    except GraphError as error:
+        return error
+    return name
+
+
+def _learn(name: str, topic: LogTopic) -> None:
+    """Register a type, and what it nests, from the log's text."""
+    if topic.schema_encoding not in _DEFINITION_FORMS or not topic.definition.strip():
+        raise GraphError(f"type {name} is not known, and the log does not define it")
+    first, *others = _SEPARATOR.split(topic.definition)
+    texts = {name: first}
+    for other in others:
+        head = _NESTED.match(other)
+        if head is not None:
+            texts[head[1]] = other[head.end() :]
+    with tempfile.TemporaryDirectory(prefix="volery-types-") as folder:
+        for long_name, text in texts.items():
+            parts = _TYPE.fullmatch(long_name)
+            if parts is None:
+                raise GraphError(f"the log has a type with the name '{long_name}'")
+            if f"{parts[1]}/msg/{parts[2]}" not in typestore().types:
+                path = Path(folder, parts[1], "msg", f"{parts[2]}.msg")
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text, encoding="utf-8")
+        add_definitions(folder)

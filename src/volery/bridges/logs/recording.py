@@ -1,0 +1,110 @@
+"""Recording what goes over the graph, by patterns of topics, begun and ended while it runs.
+
+    recorder = Recorder(graph, open_log("scans.mcap"), topics=("/uav*/laser/**",))
+    gateway.post(recorder.start).result()
+    ...
+    gateway.post(recorder.stop).result()
+
+Latched messages that were published before come first, with the time of the start. A log that
+cannot be written any further ends its recording, never the simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from volery.bridges.logs.bag import Log
+from volery.bridges.topic_patterns import topic_filter
+from volery.core.errors import RecordingError
+from volery.graph.graph import Graph, Subscription
+from volery.graph.messages import Published
+
+EVERYTHING = ("/**",)
+
+
+@dataclass(frozen=True)
+class RecordingInfo:
+    """How a recording fares."""
+
+    path: str
+    running: bool
+    messages: int
+    """Messages taken; after a failure the log says how many can be read."""
+    failure: str
+    """Why it ended by itself; empty if it did not."""
+
+
+class Recorder:
+    """One recording. Methods belong to the simulation's thread; others use `Gateway.post`.
+
+    Parameters
+    ----------
+    graph
+        What is recorded.
+    log
+        Where to; `stop` closes it.
+    topics, exclude
+        Patterns of topics that are recorded, and of those of them that are not; see
+        `topic_patterns`. `GraphError` for what is no pattern.
+
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        log: Log,
+        topics: Iterable[str] = EVERYTHING,
+        exclude: Iterable[str] = (),
+    ) -> None:
+        self._graph = graph
+        self._log = log
+        self._wants = topic_filter(topics, exclude)
+        self._subscription: Subscription | None = None
+        self._ended = False
+        self._messages = 0
+        self._failure: RecordingError | None = None
+
+    @property
+    def info(self) -> RecordingInfo:
+        """Counts so far; any thread may ask."""
+        failure = "" if self._failure is None else str(self._failure)
+        running = self._subscription is not None
+        return RecordingInfo(str(self._log.path), running, self._messages, failure)
+
+    def start(self) -> None:
+        """Begin. `RecordingError` for a recorder that was started before."""
+        if self._ended or self._subscription is not None:
+            raise RecordingError(f"{self._log.path}: this recording was started before")
+        self._subscription = self._graph.subscribe_all(self._take)
+
+    def stop(self) -> None:
+        """Write the rest and close the log; a second time nothing happens.
+
+        RecordingError where the log could not be written, then or earlier.
+        """
+        if self._ended:
+            return
+        self._end()
+        self._log.close()
+        if self._failure is not None:
+            raise self._failure
+
+    def _take(self, published: Published) -> None:
+        if not self._ended and self._failure is None and self._wants(published.topic):
+            try:
+                self._log.write(published)
+            except RecordingError as error:
+                self._failure = error
+                self._unsubscribe()
+                return
+            self._messages += 1
+
+    def _end(self) -> None:
+        self._ended = True
+        self._unsubscribe()
+
+    def _unsubscribe(self) -> None:
+        if self._subscription is not None:
+            self._subscription.cancel()
+            self._subscription = None

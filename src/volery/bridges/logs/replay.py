@@ -1,0 +1,225 @@
+"""Playing a log into a graph, in simulated time.
+
+    replay = Replay("flight.mcap", topics=("/uav1/**",), remap={"/uav1/**": "/ghost/**"})
+    replay.start(graph, timers, now_ns)
+
+Every message is published when it is due: at the present time plus its distance from the log's
+first message. The log is read as it is needed, a chunk at a time. Messages are in the order of the
+log; one with an earlier time than the one before it comes with that one. The headers' stamps stay
+as they were recorded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+from volery.bridges.logs.decoding import LogDecoder
+from volery.bridges.logs.records import LogRecord
+from volery.bridges.logs.stream import LogStream
+from volery.bridges.topic_patterns import renamer, topic_filter
+from volery.core.clock import NS_PER_S, ns_from_s
+from volery.core.errors import GraphError, RecordingError
+from volery.graph.graph import Graph, Publisher
+from volery.graph.thinking import Deferring
+
+EVERYTHING = ("/**",)
+CLOCK = ("/clock",)
+LATCHED = ("/tf_static",)
+
+_SHORTEST_LAP_NS = 1_000_000
+
+
+@dataclass(frozen=True)
+class ReplayInfo:
+    """How a replay fares."""
+
+    path: str
+    running: bool
+    published: int
+    skipped: int
+    """Messages that could not be published."""
+    laps: int
+    """How often the log was played to its end."""
+    trouble: str
+    """What was wrong with the file, as far as it was read: cut off, damaged chunks."""
+    refused: Mapping[str, str]
+    """Topics of which messages were skipped, each with the first reason."""
+
+
+class _Place(NamedTuple):
+    """Where a replay is: when its lap began, and the number of the log's next record."""
+
+    lap_ns: int
+    record: int
+
+
+class Replay:
+    """One replay. Methods but `info` belong to the simulation's thread; others use `Gateway.post`.
+
+    Parameters
+    ----------
+    path
+        A .mcap or .bag file, whole or cut off.
+    topics, exclude
+        Patterns of topics (as in the log) that are played, and of those of them that are not; see
+        `topic_patterns`. A graph has a clock of its own, so `/clock` is left out by default.
+    remap
+        New names of topics, or of whole branches: `{"/uav1/**": "/uav2/**"}`.
+    rate
+        Seconds of the log a simulated second.
+    offset_s
+        Simulated seconds between the start and the log's first message.
+    begin_s
+        Seconds of the log that are left out at its beginning; of them what is latched comes at
+        once.
+    loop
+        Begin again at the end.
+    latched
+        Patterns of topics whose last message awaits those who subscribe later.
+
+    Raises
+    ------
+    RecordingError
+        There is no such file, it is no log, or a number is out of range.
+    GraphError
+        A pattern or a new name is none.
+
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        topics: Iterable[str] = EVERYTHING,
+        exclude: Iterable[str] = CLOCK,
+        remap: Mapping[str, str] | None = None,
+        rate: float = 1.0,
+        offset_s: float = 0.0,
+        begin_s: float = 0.0,
+        loop: bool = False,
+        latched: Iterable[str] = LATCHED,
+    ) -> None:
+        _check(rate, offset_s, begin_s)
+        self._stream = LogStream(Path(path), topic_filter(topics, exclude))
+        self._rename = renamer(remap or {})
+        self._is_latched = topic_filter(latched)
+        self._rate = rate
+        self._offset_ns = ns_from_s(offset_s)
+        self._begin_ns = ns_from_s(begin_s)
+        self._loop = loop
+        self._decoder = LogDecoder()
+        self._publishers: dict[str, Publisher] = {}
+        self._graph: Graph
+        self._timers: Deferring
+        self._now_ns: Callable[[], int]
+        self._started = self._stopped = False
+        self._running = False
+        self._published = self._skipped = self._laps = 0
+        self._refused: dict[str, str] = {}
+
+    @property
+    def info(self) -> ReplayInfo:
+        """Counts so far; any thread may ask."""
+        return ReplayInfo(
+            str(self._stream.path),
+            self._running,
+            self._published,
+            self._skipped,
+            self._laps,
+            self._stream.trouble,
+            dict(self._refused),
+        )
+
+    def start(self, graph: Graph, timers: Deferring, now_ns: Callable[[], int]) -> None:
+        """Begin at the present time, which `now_ns` tells. `RecordingError` the second time.
+
+        timers: the engine, or whoever else calls back at times of the same clock.
+        """
+        if self._started:
+            raise RecordingError(f"{self._stream.path}: this replay was started before")
+        self._started = self._running = True
+        self._graph, self._timers, self._now_ns = graph, timers, now_ns
+        self._go_on(_Place(now_ns() + self._offset_ns, 0))
+
+    def stop(self) -> None:
+        """Publish no more; what was latched is forgotten. A second time nothing happens."""
+        self._started = self._stopped = True
+        self._running = False
+        self._stream.close()
+        for publisher in self._publishers.values():
+            publisher.cancel()
+        self._publishers.clear()
+
+    # A restored snapshot brings back an earlier deadline: its place says where to read on.
+
+    def _go_on(self, place: _Place) -> None:
+        """Publish what is due from `place` on, then wait for the next."""
+        self._stream.seek(place.record)
+        while (record := self._stream.peek()) is not None:
+            due_ns = self._due_ns(place.lap_ns, record)
+            if due_ns is not None and due_ns > self._now_ns():
+                self._wait(due_ns, _Place(place.lap_ns, self._stream.index))
+                return
+            self._stream.advance()
+            if due_ns is not None:
+                self._publish(record)
+        self._end_lap(place)
+
+    def _wait(self, due_ns: int, place: _Place) -> None:
+        self._timers.at(due_ns, partial(self._wake, place))
+
+    def _wake(self, place: _Place) -> None:
+        if not self._stopped:
+            self._running = True
+            self._go_on(place)
+
+    def _due_ns(self, lap_ns: int, record: LogRecord) -> int | None:
+        """Simulated time at which a record is to be published; None for never."""
+        after_ns = record.time_ns - self._stream.first_ns - self._begin_ns
+        if after_ns < 0:
+            comes = not self._begin_ns or self._is_latched(record.topic.topic)
+            return lap_ns if comes else None
+        return lap_ns + (after_ns if self._rate == 1.0 else round(after_ns / self._rate))
+
+    def _publish(self, record: LogRecord) -> None:
+        topic = record.topic.topic
+        try:
+            msgtype, message = self._decoder.decode(record)
+            publisher = self._publishers.get(topic)
+            if publisher is None or publisher.msgtype != msgtype:
+                publisher = self._graph.advertise(
+                    self._rename(topic), msgtype, latched=self._is_latched(topic)
+                )
+                self._publishers[topic] = publisher
+            publisher.publish(message)
+        except GraphError as error:
+            self._skipped += 1
+            self._refused.setdefault(topic, str(error))
+            return
+        self._published += 1
+
+    def _end_lap(self, place: _Place) -> None:
+        self._laps += 1
+        span_ns = self._stream.last_ns - self._stream.first_ns - self._begin_ns
+        if not self._loop or self._stream.selected == 0 or span_ns < 0:
+            self._running = False
+            self._stream.close()
+            return
+        # The gap between two laps is the mean one between two messages.
+        gap_ns = span_ns / (self._stream.selected - 1) if self._stream.selected > 1 else 0.0
+        lap_ns = max(round((span_ns + gap_ns) / self._rate), _SHORTEST_LAP_NS)
+        next_lap = place.lap_ns + lap_ns
+        self._wait(next_lap, _Place(next_lap, 0))
+
+
+def _check(rate: float, offset_s: float, begin_s: float) -> None:
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise RecordingError(f"the rate of a replay must be above 0, not {rate}")
+    for name, value in (("offset_s", offset_s), ("begin_s", begin_s)):
+        if not 0.0 <= value <= (1 << 62) / NS_PER_S:
+            raise RecordingError(f"{name} of a replay must be at least 0 s, not {value}")

@@ -1,0 +1,81 @@
+"""The chosen messages of a log one by one, with a way back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from volery.bridges.logs.records import LogRecord, LogWalk, log_format
+from volery.core.errors import RecordingError
+
+
+class LogStream:
+    """Reads a log forward, a chunk in memory at a time; `seek` backwards begins anew.
+
+    Raises `RecordingError` where there is no log; a damaged one is read as far as it can be, and
+    `trouble` says what was wrong.
+    """
+
+    def __init__(self, path: Path, wants: Callable[[str], bool]) -> None:
+        log_format(path)
+        self.path = path
+        self.trouble = ""
+        self.index = 0
+        """Number of the record that `peek` shows, those that are not wanted counted too."""
+        self.first_ns = 0
+        """Time of the log's first record, wanted or not; known after the first `peek`."""
+        self.last_ns = 0
+        """Latest time of the wanted records shown so far."""
+        self.selected = 0
+        """Wanted records shown so far."""
+        self._wants = wants
+        self._walk: LogWalk | None = None
+        self._records: Iterator[LogRecord] = iter(())
+        self._next: LogRecord | None = None
+
+    def peek(self) -> LogRecord | None:
+        """The next wanted record; None at the end."""
+        if self._walk is None:
+            self._open()
+        while self._next is not None and not self._wants(self._next.topic.topic):
+            self._read(self.index + 1)
+        return self._next
+
+    def advance(self) -> None:
+        """Go on behind the record that `peek` shows."""
+        if self._next is not None:
+            self.selected += 1
+            self.last_ns = max(self.last_ns, self._next.time_ns)
+            self._read(self.index + 1)
+
+    def seek(self, index: int) -> None:
+        """Go to the record with this number, or to the next wanted one after it."""
+        if self._walk is None or index < self.index:
+            self._open()
+        while self.index < index and self.peek() is not None and self.index < index:
+            self.advance()
+
+    def close(self) -> None:
+        """Close the file; `peek` would begin anew."""
+        self._walk = None
+        self._next = None
+        self._records = iter(())
+
+    def _open(self) -> None:
+        self.close()
+        self._walk = LogWalk(self.path)
+        self._records = iter(self._walk)
+        self.selected = self.last_ns = 0
+        self._read(0)
+        self.first_ns = self._next.time_ns if self._next is not None else 0
+
+    def _read(self, index: int) -> None:
+        self.index = index
+        try:
+            self._next = next(self._records, None)
+        except (OSError, RecordingError) as error:  # the file has gone meanwhile
+            self._next = None
+            self.trouble = f"cannot be read any more: {error}"
+            return
+        if self._next is None and self._walk is not None:
+            self.trouble = self._walk.trouble

@@ -1,0 +1,1 @@
+"""Nodes of this project in processes of their own."""

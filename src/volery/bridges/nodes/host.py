@@ -1,0 +1,161 @@
+"""Runs nodes in a process of their own, on a link to the graph of a simulation or a real vehicle.
+
+    host = NodeHost(link, clock="auto")
+    node = GapFollowing(context=host.context(), namespace="/uav1")
+    host.spin()
+
+The node cannot tell: its clock is the graph's `/clock` where there is one, else the computer's, and
+its timers go by that clock.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from volery.bridges.nodes.mirrored_graph import MirroredGraph
+from volery.core.clock import NS_PER_S, ns_from_s
+from volery.core.errors import GraphError
+from volery.graph.graph import Subscription
+from volery.graph.link import Link
+from volery.graph.messages import Clock, Published, Time, message_type
+from volery.graph.node import Context
+
+ClockKind = Literal["auto", "simulated", "wall"]
+_LONGEST_WAIT_S = 0.2
+_CLOCKS_KEPT = 1000
+"""A node that is busy for a while still lets its timers ring at each tick."""
+
+
+@dataclass(order=True)
+class _Alarm:
+    """Something that is due at a time, and again each period where that is not 0."""
+
+    due_ns: int
+    number: int
+    period_ns: int = field(compare=False)
+    action: Callable[[], Any] = field(compare=False)
+
+
+class NodeHost:
+    """One thread's worth of nodes. All methods but `stop` belong to the thread that spins.
+
+    clock: `simulated` follows `/clock`, and nothing is due before its first message; `wall` is the
+    computer's clock (ns since 1970); `auto` is `wall` until a `/clock` is heard.
+    """
+
+    def __init__(self, link: Link, *, clock: ClockKind = "auto") -> None:
+        self._link = link
+        self._kind = clock
+        self._woken = threading.Event()
+        self._stopped = False
+        self._simulated_ns: int | None = None
+        self._alarms: list[_Alarm] = []
+        self._numbers = itertools.count()
+        self.graph = MirroredGraph(link, self.now_ns, self._woken.set)
+        self._clock: Subscription | None = None
+        if clock != "wall":
+            self._clock = self.graph.subscribe("/clock", self._on_clock, Clock, depth=_CLOCKS_KEPT)
+
+    def context(self, remap: Mapping[str, str] | None = None) -> Context:
+        """What a node stands on; `remap` gives topics and services other names."""
+        return Context(self.graph, self, self.now_ns, remap=dict(remap or {}))
+
+    def now_ns(self) -> int:
+        """Simulated time, or the computer's."""
+        if self._simulated_ns is not None:
+            return self._simulated_ns
+        return 0 if self._kind == "simulated" else time.time_ns()
+
+    # ------------------------------------------------------------------------------------ timers
+
+    def every(self, period_s: float, callback: Callable[[], None]) -> None:
+        """Call `callback` each period; after a standstill once, not for each one missed."""
+        period_ns = ns_from_s(period_s)
+        self._set(_Alarm(self.now_ns() + period_ns, next(self._numbers), period_ns, callback))
+
+    def at(self, time_ns: int, action: Callable[[], Any]) -> None:
+        """Call `action` once, at `time_ns` or as soon as possible."""
+        self._set(_Alarm(time_ns, next(self._numbers), 0, action))
+
+    def _set(self, alarm: _Alarm) -> None:
+        heapq.heappush(self._alarms, alarm)
+
+    def _on_clock(self, published: Published) -> None:
+        self._set_clock(published.message.clock)
+        self._ring_due()
+
+    def _set_clock(self, stamp: Time) -> None:
+        before_ns, now_ns = self.now_ns(), stamp.sec * NS_PER_S + stamp.nanosec
+        if self._simulated_ns is None or now_ns < before_ns:
+            # Another clock from here on, or a simulation that was reset: what was left stays left.
+            for alarm in self._alarms:
+                alarm.due_ns += now_ns - before_ns
+        self._simulated_ns = now_ns
+
+    def _ring_due(self) -> None:
+        now_ns = self.now_ns()
+        while self._alarms and self._alarms[0].due_ns <= now_ns:
+            alarm = heapq.heappop(self._alarms)
+            if alarm.period_ns:
+                alarm.due_ns += (1 + (now_ns - alarm.due_ns) // alarm.period_ns) * alarm.period_ns
+                self._set(alarm)
+            alarm.action()
+
+    # --------------------------------------------------------------------------------- lock step
+
+    def join_lock_step(self, name: str, period_s: float, timeout_s: float = 10.0) -> None:
+        """Have the simulation wait for the nodes each `period_s`; before `spin`.
+
+        At each meeting, what the simulation published until then has been handed out and due timers
+        have rung before it goes on: with its physics step as the period the nodes answer as they
+        do inside. `GraphError` where it does not want to wait.
+        """
+        go, done = (f"/volery/lock_step/{name}/{word}" for word in ("go", "done"))
+        self._link.advertise(done, "rosgraph_msgs/msg/Clock")
+
+        def meet(published: Published) -> None:
+            self._ring_due()
+            self._link.publish(done, published.message)
+
+        if self._clock is not None:
+            self._clock.cancel()  # the meetings tell the time
+        self.graph.subscribe(go, meet, Clock)
+        self.graph.hold_back(go, lambda published: self._set_clock(published.message.clock))
+        srvtype = "volery_interfaces/srv/JoinLockStep"
+        request = message_type(f"{srvtype}_Request")(name, period_s, timeout_s)
+        answer = self.graph.call("/volery/join_lock_step", request)
+        if not answer.success:
+            raise GraphError(f"no lock step: {answer.message}")
+        self._set_clock(answer.now)
+
+    # --------------------------------------------------------------------------------------- run
+
+    def spin(self, until: Callable[[], bool] | None = None) -> None:
+        """Serve the nodes until `stop`, or until `until()` is true; errors of nodes end it."""
+        while not self._stopped and not (until is not None and until()):
+            self.spin_once(_LONGEST_WAIT_S)
+
+    def spin_once(self, timeout_s: float) -> None:
+        """Wait for something to do, at most `timeout_s`, and do it."""
+        self._woken.wait(self._pause_s(timeout_s))
+        self._woken.clear()
+        while self.graph.hand_out():
+            pass
+        if self._simulated_ns is None and self._kind != "simulated":
+            self._ring_due()
+
+    def stop(self) -> None:
+        """End `spin` soon; from any thread."""
+        self._stopped = True
+        self._woken.set()
+
+    def _pause_s(self, most_s: float) -> float:
+        if self._simulated_ns is not None or self._kind == "simulated" or not self._alarms:
+            return most_s
+        return min(max((self._alarms[0].due_ns - self.now_ns()) / NS_PER_S, 0.0), most_s)

@@ -1,0 +1,1 @@
+"""Native ROS 1 through rospy: the whole graph, or one node, in a real roscore."""

@@ -1,0 +1,253 @@
+"""A program's part in a ROS 1 graph, with the methods of `graph.session.Session`.
+
+Its methods:
+
+    link = Ros1Client(node_name="gap_following")
+    mailbox = link.subscribe("/uav1/laser/horizontal/scan", wake=woken.set)
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeout
+from typing import Any
+
+from volery.bridges.ros1.node import join_ros1
+from volery.bridges.ros1.raw import raw_message_class
+from volery.core.errors import BridgeError, GraphError
+from volery.graph.messages import Published, message_type, type_name
+from volery.graph.reply import Reply
+from volery.graph.ros1 import ros1_codec
+from volery.graph.session import (
+    DEFAULT_DEPTH,
+    MOST_DEPTH,
+    Handler,
+    Mailbox,
+    SessionInfo,
+    Wake,
+)
+
+_MASTER_EACH_S = 1.0
+_SERVICE_TIMEOUT_S = 30.0
+
+_log = logging.getLogger(__name__)
+
+
+class Ros1Client:
+    """One ROS 1 node as a `graph.link.Link`; wakes and requests come in threads of rospy's.
+
+    Parameters are those of `ros1_node.join_ros1`, which tells what `BridgeError` it raises.
+    """
+
+    def __init__(
+        self,
+        master_uri: str | None = None,
+        node_name: str = "volery_node",
+        *,
+        host: str | None = None,
+        anywhere: bool = False,
+    ) -> None:
+        self._node = join_ros1(node_name, master_uri=master_uri, host=host, anywhere=anywhere)
+        self.name = f"ROS 1 node {self._node.name}"
+        self._codec = ros1_codec()
+        self._lock = threading.RLock()
+        self._publishers: dict[str, _Publisher] = {}
+        self._mailboxes: dict[Mailbox, Any] = {}
+        self._offers: dict[str, Any] = {}
+        self._closed = threading.Event()
+        threading.Thread(target=self._watch, name="volery-ros1-master", daemon=True).start()
+
+    # ------------------------------------------------------------------------------------ topics
+
+    def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
+        """Announce that messages will be published on `topic`. `GraphError` for a wrong type."""
+        with self._lock:
+            self._check_open()
+            old = self._publishers.get(topic)
+            if old is not None and (old.msgtype, old.latched) == (msgtype, latched):
+                return
+            self._codec.learn(msgtype)
+            if old is not None:
+                old.handle.unregister()
+            self._publishers[topic] = _Publisher(
+                self._node.publisher(topic, msgtype, latched=latched), msgtype, latched
+            )
+
+    def unadvertise(self, topic: str) -> None:
+        """Publish on `topic` no more. `GraphError` if it was not announced."""
+        with self._lock:
+            publisher = self._publishers.pop(topic, None)
+        if publisher is None:
+            raise GraphError(f"{self.name} does not publish '{topic}'")
+        publisher.handle.unregister()
+
+    def published_type(self, topic: str) -> str | None:
+        """Type that was announced for `topic`; None if none was."""
+        publisher = self._publishers.get(topic)
+        return None if publisher is None else publisher.msgtype
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Publish a message of the announced type; nothing is done while nobody subscribes."""
+        publisher = self._publishers.get(topic)
+        if publisher is None:
+            raise GraphError(f"{self.name} has not advertised '{topic}'")
+        if type_name(type(message)) != publisher.msgtype:
+            raise GraphError(f"topic '{topic}' carries {publisher.msgtype}")
+        publisher.publish(message)
+
+    def subscribe(
+        self,
+        topic: str,
+        msgtype: str | None = None,
+        *,
+        depth: int = DEFAULT_DEPTH,
+        wake: Wake,
+    ) -> Mailbox:
+        """Begin to receive `topic`, which must be published somewhere or be given a type.
+
+        The time of a message is that of its arrival, by the computer's clock.
+        """
+        if not 1 <= depth <= MOST_DEPTH:
+            raise GraphError(f"queue depth must be 1 to {MOST_DEPTH}, not {depth}")
+        found = msgtype or self._node.topic_type(topic)
+        if found is None:
+            raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
+        self._codec.learn(found)
+        mailbox = Mailbox(topic, depth, wake)
+        with self._lock:
+            self._check_open()
+            receive = self._receiver(topic, found, mailbox)
+            self._mailboxes[mailbox] = self._node.subscriber(topic, found, receive)
+        return mailbox
+
+    def unsubscribe(self, mailbox: Mailbox) -> None:
+        """Receive no more; what waits can still be taken."""
+        with self._lock:
+            subscriber = self._mailboxes.pop(mailbox, None)
+        if subscriber is not None:
+            subscriber.unregister()
+
+    def _receiver(self, topic: str, msgtype: str, mailbox: Mailbox) -> Callable[[bytes, str], None]:
+        def receive(data: bytes, sender: str) -> None:
+            try:
+                message = self._codec.decode(data, msgtype)
+            except GraphError as error:
+                _log.warning("ROS 1 topic %s, from %s: %s", topic, sender, error)
+                return
+            mailbox.put(Published(topic, msgtype, time.time_ns(), message))
+
+        return receive
+
+    # ---------------------------------------------------------------------------------- services
+
+    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+        """Call a service; `reply` gets the response or a `GraphError`, in another thread."""
+
+        def ask() -> None:
+            try:
+                srvtype = self._node.service_type(service)
+                wanted = f"{srvtype}_Request"
+                question = message_type(wanted)() if request is None else request
+                if type_name(type(question)) != wanted:
+                    raise GraphError(f"service '{service}' takes {wanted}")
+                reply.answer(self._node.call(service, srvtype, question))
+            except GraphError as error:
+                reply.fail(error)
+            except Exception as error:  # whoever asked must hear of it
+                reply.fail(GraphError(f"service '{service}': {type(error).__name__}: {error}"))
+
+        threading.Thread(target=ask, name=f"volery-ros1 {service}", daemon=True).start()
+
+    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+        """Offer a service; `handler(request, reply)` is called in a thread of the request's own."""
+
+        def handle(request: Any) -> Any:
+            come: Future[Any] = Future()
+            handler(request, Reply(come.set_result, come.set_exception))
+            try:
+                return come.result(_SERVICE_TIMEOUT_S)
+            except FutureTimeout:
+                raise GraphError(f"{self.name} did not answer") from None
+
+        with self._lock:
+            self._check_open()
+            if service in self._offers:
+                raise GraphError(f"{self.name} offers service '{service}' already")
+            self._offers[service] = self._node.service(service, srvtype, handle)
+
+    def withdraw(self, service: str) -> None:
+        """Offer a service no more. `GraphError` if it was not offered."""
+        with self._lock:
+            offered = self._offers.pop(service, None)
+        if offered is None:
+            raise GraphError(f"{self.name} does not offer service '{service}'")
+        offered.shutdown()
+
+    # --------------------------------------------------------------------------------------- end
+
+    def close(self) -> None:
+        """Take back everything; the node itself ends with the process."""
+        self._closed.set()
+        with self._lock:
+            topics, mailboxes = tuple(self._publishers), tuple(self._mailboxes)
+            services = tuple(self._offers)
+        for topic in topics:
+            self.unadvertise(topic)
+        for mailbox in mailboxes:
+            self.unsubscribe(mailbox)
+        for service in services:
+            self.withdraw(service)
+
+    @property
+    def info(self) -> SessionInfo:
+        """What the client does at present."""
+        with self._lock:
+            return SessionInfo(
+                self.name,
+                tuple(self._publishers),
+                tuple(mailbox.info for mailbox in self._mailboxes),
+                tuple(self._offers),
+            )
+
+    def _check_open(self) -> None:
+        if self._closed.is_set():
+            raise GraphError(f"{self.name} has left")
+        if not self._node.alive:
+            raise GraphError(f"{self.name} was ended by another node of its name")
+
+    def _watch(self) -> None:
+        """Register again with a master that began anew."""
+        while not self._closed.wait(_MASTER_EACH_S) and self._node.alive:
+            if not threading.main_thread().is_alive():
+                self.close()  # else rospy's threads would keep the process from ending
+                return
+            try:
+                self._node.register_again()
+            except (OSError, BridgeError):  # it is away
+                continue
+
+
+class _Publisher:
+    """A publisher and its count of messages."""
+
+    def __init__(self, handle: Any, msgtype: str, latched: bool) -> None:
+        self.handle = handle
+        self.msgtype = msgtype
+        self.latched = latched
+        self._raw = raw_message_class(msgtype)
+        self._encode = ros1_codec().encode
+        self._lock = threading.Lock()
+        self._sequence = 0
+
+    def publish(self, message: Any) -> None:
+        """Send a message; what is latched also to those to come."""
+        if not (self.latched or self.handle.get_num_connections()):
+            return
+        with self._lock:
+            data = self._encode(message, self.msgtype, self._sequence)
+            self._sequence += 1
+            self.handle.publish(self._raw(data))

@@ -1,0 +1,80 @@
+"""Calls of services of the graph that come over a ROS-TCP connection, either end of it.
+
+A call that fails is answered with a `__response` of zero bytes: the protocol knows no failure, and
+both Unity's Connector and Unity's endpoint would wait for ever. Zero bytes make the deserializer
+throw into the code that awaits the response (read in `ROSConnection.cs`, `MessageDeserializer.cs`
+and `tcp_sender.py`, v0.7.0; a response type without fields arrives as if nothing had failed).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from volery.bridges.ros_tcp import wire as ros_tcp
+from volery.bridges.ros_tcp.outbox import Outbox
+from volery.bridges.ros_tcp.payloads import absolute
+from volery.bridges.ros_tcp.wire import Frame
+from volery.core.errors import BridgeError, GraphError
+from volery.graph.reply import Reply
+from volery.graph.session import Session
+
+MOST_CALLS = 1000
+"""Calls of one peer that may be open at once."""
+
+
+class Calls:
+    """Calls services for one peer; `complain` is told, by any thread, which ones failed."""
+
+    def __init__(self, session: Session, outbox: Outbox, complain: Callable[[str], None]) -> None:
+        self._session = session
+        self._outbox = outbox
+        self._complain = complain
+        self._open: set[Reply] = set()
+
+    def call(self, number: int, frame: Frame, expected: str | None = None) -> None:
+        """Call the service that `frame` names, with its payload, as the peer's request `number`.
+
+        expected: type that the peer takes the service for.
+        """
+        name = frame.destination
+        payloads = self._outbox.payloads
+
+        def fail(error: Exception) -> None:
+            self._complain(f"service '{name}': {error}")
+            self.respond(number, name, b"")
+
+        try:
+            srvtype = self._type(absolute(name), expected)
+            request = payloads.decode(frame.payload, f"{srvtype}_Request")
+            if len(self._open) >= MOST_CALLS:
+                raise BridgeError(f"over {MOST_CALLS} calls at once")
+        except (BridgeError, GraphError) as error:
+            fail(error)
+            return
+
+        def respond(response: Any) -> None:
+            try:
+                body = payloads.encode(response, f"{srvtype}_Response")
+            except GraphError as error:
+                fail(error)
+            else:
+                self.respond(number, name, body)
+
+        reply = Reply(respond, fail)
+        self._open.add(reply)
+        reply.when_done(lambda: self._open.discard(reply))
+        self._session.call(absolute(name), request, reply)
+
+    def respond(self, number: int, name: str, body: ros_tcp.Bytes) -> None:
+        """Answer request `number`; `name` must not be empty, or the peer sees a keepalive."""
+        header = ros_tcp.command("response", nul=self._outbox.ends_in_nul, srv_id=number)
+        self._outbox.put(header + ros_tcp.frame(name, body))
+
+    def _type(self, service: str, expected: str | None) -> str:
+        offered = self._session.graph.services().get(service)
+        if offered is None:
+            raise GraphError("nobody offers it")
+        if expected is not None and expected != offered:
+            raise GraphError(f"its type is {offered}, not {expected}")
+        return offered

@@ -1,0 +1,199 @@
+"""Connects the simulation to a ROS-TCP-Endpoint, in the place of a Unity project.
+
+    doors.open(RosTcpConnector("127.0.0.1", 10000))
+
+It need not be there yet: the door connects when it can, and again when the connection is lost.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections import deque
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from volery.bridges.doors import wake_of
+from volery.bridges.ros_tcp import wire as ros_tcp
+from volery.bridges.ros_tcp.pipe import Pipe
+from volery.bridges.ros_tcp.unity import Selection, UnitySession
+from volery.bridges.ros_tcp.wire import FrameParser
+from volery.core.errors import BridgeError
+from volery.graph.session import DEFAULT_DEPTH, Gateway, Wake
+
+KEEPALIVE_S = 1.0
+"""Seconds without a frame after which Unity's Connector sends a keepalive."""
+_REFRESH_S = 0.5
+_FIRST_PAUSE_S = 0.2
+_LONGEST_PAUSE_S = 5.0
+_CONNECT_S = 5.0
+_UNANSWERED_MS = 15_000
+"""So long may sent bytes stay unread before the endpoint counts as gone."""
+_NOTES = 100
+
+
+class RosTcpConnector:
+    """A door that is a client of somebody else's endpoint.
+
+    Parameters
+    ----------
+    host, port
+        Where the endpoint listens.
+    publish, subscribe, services
+        Patterns of what takes part; see `Selection`.
+    depth
+        Messages of one topic that wait while the endpoint does not keep up; the newest are kept.
+    handshake_s
+        Endpoints before 0.7 send no handshake: after so long this one counts as one of ROS 1.
+
+    """
+
+    def __init__(
+        self,
+        host: str = "127.0.0.1",
+        port: int = 10000,
+        *,
+        publish: Sequence[str] = Selection.publish,
+        subscribe: Sequence[str] = Selection.subscribe,
+        services: Sequence[str] = Selection.services,
+        depth: int = DEFAULT_DEPTH,
+        handshake_s: float = 2.0,
+    ) -> None:
+        if not 1 <= port <= 65535:
+            raise BridgeError(f"ROS-TCP: port must be 1 to 65535, not {port}")
+        self._address = (host, port)
+        self._selection = Selection(tuple(publish), tuple(subscribe), tuple(services))
+        self._depth = depth
+        self._handshake_s = handshake_s
+        self._task: asyncio.Task[None] | None = None
+        self._session: UnitySession | None = None
+        self._notes: deque[str] = deque(maxlen=_NOTES)
+
+    @property
+    def name(self) -> str:
+        """What it is, where to, and how that goes."""
+        host, port = self._address
+        return f"ROS-TCP to {host}:{port} ({self.state})"
+
+    @property
+    def state(self) -> str:
+        """`not connected`, `awaiting the handshake`, `ros1` or `ros2`."""
+        session = self._session
+        if session is None:
+            return "not connected"
+        return session.generation or "awaiting the handshake"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the endpoint said, and why connections ended: the newest hundred lines."""
+        return tuple(self._notes)
+
+    async def start(self, gateway: Gateway) -> None:
+        """Begin to connect; returns at once."""
+        self._task = asyncio.get_running_loop().create_task(self._stay_connected(gateway))
+
+    async def stop(self) -> None:
+        """Disconnect."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+            self._task = None
+
+    async def _stay_connected(self, gateway: Gateway) -> None:
+        pause_s = _FIRST_PAUSE_S
+        while True:
+            try:
+                sock = await _connect(*self._address)
+            except (OSError, TimeoutError) as error:
+                self._note(f"cannot connect: {error or 'no answer'}")
+            else:
+                if await self._serve(gateway, sock):
+                    pause_s = _FIRST_PAUSE_S
+            await asyncio.sleep(pause_s)
+            pause_s = min(2.0 * pause_s, _LONGEST_PAUSE_S)
+
+    async def _serve(self, gateway: Gateway, sock: socket.socket) -> bool:
+        """Play Unity's part until the connection ends; whether it ever began in earnest."""
+        host, port = self._address
+        note = self._note
+        open_session = partial(
+            UnitySession, gateway, f"ros-tcp to {host}:{port}", self._selection, self._depth, note
+        )
+        try:
+            connection = _Connection(sock, open_session, note)
+        except OSError as error:
+            note(f"the connection has ended: {error.strerror}")
+            return False
+        self._session = connection.session
+        try:
+            await connection.attend(self._handshake_s)
+        finally:
+            self._session = None
+            connection.pipe.close("the door was closed")
+        note(f"the connection has ended: {connection.ended.result()}")
+        return connection.session.generation is not None
+
+    def _note(self, text: str) -> None:
+        if not self._notes or self._notes[-1] != text:
+            self._notes.append(text)
+
+
+class _Connection:
+    """A connected socket and its session."""
+
+    def __init__(
+        self,
+        sock: socket.socket,
+        open_session: Callable[[Wake], UnitySession],
+        note: Callable[[str], None],
+    ) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._note = note
+        self.ended: asyncio.Future[str] = self._loop.create_future()
+        """Holds the reason, once there is one."""
+        self.session = session = open_session(wake_of(self._loop, self._flush))
+        try:
+            if hasattr(socket, "TCP_USER_TIMEOUT"):
+                sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNANSWERED_MS)
+            self.pipe = Pipe(sock, FrameParser(), session.outbox, session.take, note, self._closed)
+        except OSError:
+            session.close()
+            sock.close()
+            raise
+
+    async def attend(self, handshake_s: float) -> None:
+        """Register what is new and show that we live, until the connection ends."""
+        latest_s = self._loop.time() + handshake_s
+        self.pipe.flush()
+        while not self.ended.done():
+            await asyncio.wait([self.ended], timeout=min(_REFRESH_S, handshake_s))
+            now_s = self._loop.time()
+            if self.session.generation is not None:
+                self.session.refresh()
+            elif now_s >= latest_s:
+                self._note("no handshake: taken for an endpoint of ROS 1 before version 0.7")
+                self.session.begin("ros1")
+            if now_s >= self.pipe.last_sent_s + KEEPALIVE_S and not self.session.outbox.crowded:
+                self.session.outbox.put(ros_tcp.KEEPALIVE)
+
+    def _flush(self) -> None:
+        self.pipe.flush()
+
+    def _closed(self, reason: str) -> None:
+        self.session.close()
+        if not self.ended.done():
+            self.ended.set_result(reason)
+
+
+async def _connect(host: str, port: int) -> socket.socket:
+    """A connected socket; `OSError` or `TimeoutError` if nobody answers."""
+    loop = asyncio.get_running_loop()
+    (family, *_, address), *_ = await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    sock = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        sock.setblocking(False)
+        await asyncio.wait_for(loop.sock_connect(sock, address), _CONNECT_S)
+    except BaseException:
+        sock.close()
+        raise
+    return sock

@@ -1,0 +1,186 @@
+"""A ROS-TCP endpoint: the server that Unity's ROS-TCP-Connector connects to.
+
+    doors.open(RosTcpEndpoint(port=10000))                      # messages of ROS 1
+    doors.open(RosTcpEndpoint(port=10001, generation="ros2"))
+
+Any number of clients, each with a session of its own in the graph.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import socket
+from collections.abc import Callable
+from functools import partial
+
+from volery.bridges.doors import check_address, wake_of
+from volery.bridges.ros_tcp import wire as ros_tcp
+from volery.bridges.ros_tcp.payloads import payloads_of
+from volery.bridges.ros_tcp.pipe import Pipe
+from volery.bridges.ros_tcp.session import EndpointSession
+from volery.bridges.ros_tcp.wire import MOST_PAYLOAD_BYTES, FrameParser, Generation
+from volery.core.errors import BridgeError
+from volery.graph.session import DEFAULT_DEPTH, Gateway, Wake
+
+SILENCE_S = 15.0
+"""Fifteen keepalives of Unity's Connector."""
+_CHECKS_A_SILENCE = 4
+_OUT_OF_FILES_S = 0.1
+_BACKLOG = 64
+
+
+class RosTcpEndpoint:
+    """A door that serves ROS-TCP clients.
+
+    Parameters
+    ----------
+    host, port
+        Where to listen; port 0 takes a free one, and `port` tells which.
+    generation
+        What payloads are: "ros1" or "ros2". The handshake tells the clients.
+    anywhere
+        Consent to a `host` beyond loopback: the protocol carries no password.
+    most_payload_bytes
+        A client that announces a longer payload is let go.
+    depth
+        Messages of one topic that wait for a client who does not keep up; the newest are kept.
+    silence_s
+        A client that has ever sent a keepalive, and then nothing for so long, counts as gone.
+    most_clients
+        Clients at once.
+
+    """
+
+    def __init__(
+        self,
+        host: str = "127.0.0.1",
+        port: int = 10000,
+        *,
+        generation: Generation = "ros1",
+        anywhere: bool = False,
+        most_payload_bytes: int = MOST_PAYLOAD_BYTES,
+        depth: int = DEFAULT_DEPTH,
+        silence_s: float = SILENCE_S,
+        most_clients: int = 256,
+    ) -> None:
+        check_address(host, anywhere=anywhere, flag="anywhere=True or --anywhere")
+        payloads_of(generation)
+        self.port = port
+        self._host = host
+        self._generation: Generation = generation
+        self._most_payload_bytes = most_payload_bytes
+        self._depth = depth
+        self._silence_s = silence_s
+        self._most_clients = most_clients
+        self._listener: socket.socket | None = None
+        self._tasks: list[asyncio.Task[None]] = []
+        self._clients: set[_Client] = set()
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        return f"ROS-TCP {self._host}:{self.port} ({self._generation})"
+
+    async def start(self, gateway: Gateway) -> None:
+        """Listen. `BridgeError` where the port is in use or the host is not ours."""
+        loop = asyncio.get_running_loop()
+        self._listener = await _listen(self._host, self.port)
+        self.port = self._listener.getsockname()[1]
+        self._tasks = [
+            loop.create_task(self._accept(gateway, self._listener)),
+            loop.create_task(self._watch()),
+        ]
+
+    async def stop(self) -> None:
+        """Let all clients go."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._tasks = []
+        if self._listener is not None:
+            self._listener.close()
+            self._listener = None
+        for client in tuple(self._clients):
+            client.pipe.close("the door was closed")
+
+    async def _accept(self, gateway: Gateway, listener: socket.socket) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            try:
+                sock, address = await loop.sock_accept(listener)
+            except OSError:  # out of files, or the client is gone already
+                await asyncio.sleep(_OUT_OF_FILES_S)
+                continue
+            if len(self._clients) >= self._most_clients:
+                with contextlib.suppress(OSError), sock:
+                    sock.send(ros_tcp.command("error", text="too many clients"))
+                continue
+            name = f"ros-tcp {address[0]}:{address[1]}"
+            open_session = partial(EndpointSession, gateway, name, self._generation, self._depth)
+            with contextlib.suppress(OSError):  # gone already
+                parser = FrameParser(self._most_payload_bytes)
+                _Client(sock, parser, open_session, self._clients)
+
+    async def _watch(self) -> None:
+        """Let those go who fell silent."""
+        loop = asyncio.get_running_loop()
+        while True:
+            await asyncio.sleep(self._silence_s / _CHECKS_A_SILENCE)
+            latest = loop.time() - self._silence_s
+            for client in tuple(self._clients):
+                if client.pipe.parser.keepalives and client.pipe.last_received_s < latest:
+                    client.pipe.close("it fell silent")
+
+
+class _Client:
+    """A connection and its session."""
+
+    def __init__(
+        self,
+        sock: socket.socket,
+        parser: FrameParser,
+        open_session: Callable[[Wake], EndpointSession],
+        everyone: set[_Client],
+    ) -> None:
+        self._everyone = everyone
+        self._session = session = open_session(wake_of(asyncio.get_running_loop(), self._flush))
+        try:
+            self.pipe = Pipe(
+                sock, parser, session.outbox, session.take, session.complain, self._closed
+            )
+        except OSError:
+            session.close()
+            sock.close()
+            raise
+        everyone.add(self)
+
+    def _flush(self) -> None:
+        self.pipe.flush()
+
+    def _closed(self, _reason: str) -> None:
+        self._everyone.discard(self)
+        self._session.close()
+
+
+async def _listen(host: str, port: int) -> socket.socket:
+    loop = asyncio.get_running_loop()
+    listener: socket.socket | None = None
+    try:
+        (family, *_, address), *_ = await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+        listener = socket.socket(family, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(_BACKLOG)
+        listener.setblocking(False)
+    except (OSError, OverflowError) as error:
+        if listener is not None:
+            listener.close()
+        if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
+            raise BridgeError(
+                f"ROS-TCP: port {port} on {host} is in use: end the program that listens there "
+                f"(`ss -ltnp 'sport = :{port}'` names it) or choose another port"
+            ) from None
+        raise BridgeError(f"ROS-TCP: cannot listen on {host}:{port}: {error}") from None
+    return listener

@@ -1,0 +1,148 @@
+"""What waits to be sent to one peer: commands first, then messages of all topics in turn.
+
+Messages stay in their bounded mailboxes until the socket takes them, so that a peer who does not
+read loses messages and costs no memory.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+
+from volery.bridges.ros_tcp import wire as ros_tcp
+from volery.bridges.ros_tcp.payloads import Payloads
+from volery.bridges.ros_tcp.wire import Bytes
+from volery.core.errors import GraphError
+from volery.graph.session import DEFAULT_DEPTH, Mailbox, Session, Wake
+
+_BATCH_BYTES = 64 << 10
+_BATCH_PARTS = 128
+"""At most so many parts a system call; Linux takes 1024."""
+_MOST_WAITING_BYTES = 1 << 20
+
+
+class _Stream:
+    """Messages of one topic for the peer."""
+
+    def __init__(self, destination: str) -> None:
+        self.destination = destination
+        self.mailbox: Mailbox | None = None
+
+
+class Outbox:
+    """Frames for one peer. `put` and mailboxes may be filled by any thread.
+
+    wake: called, by any thread, when there is something to gather after there was nothing.
+    """
+
+    def __init__(
+        self, session: Session, payloads: Payloads, wake: Wake, on_error: Callable[[str], None]
+    ) -> None:
+        self._session = session
+        self.payloads = payloads
+        """How messages become bytes; an endpoint's handshake may change it."""
+        self.ends_in_nul = False
+        """Whether the peer expects its commands to end in a NUL."""
+        self._wake = wake
+        self._on_error = on_error
+        self._commands: deque[bytes] = deque()
+        self._command_bytes = 0
+        self._streams: dict[str, _Stream] = {}
+        self._ready: deque[_Stream] = deque()
+        self._lock = threading.Lock()
+        self._woken = False
+
+    def put(self, frame: bytes) -> None:
+        """Add a command, with its body if it has one; it goes before all messages."""
+        with self._lock:
+            self._commands.append(frame)
+            self._command_bytes += len(frame)
+        self._stir()
+
+    @property
+    def crowded(self) -> bool:
+        """Whether so many commands wait that nothing should be done to cause more."""
+        return self._command_bytes > _MOST_WAITING_BYTES
+
+    def stream(
+        self, destination: str, topic: str, msgtype: str, depth: int = DEFAULT_DEPTH
+    ) -> None:
+        """Send messages of `topic` as frames to `destination` from now on.
+
+        A second time it begins anew: latched messages come again, as ROS-TCP-Endpoint does it.
+        `GraphError` for a wrong name or type.
+        """
+        stream = _Stream(destination)
+
+        def stir() -> None:
+            self._ready.append(stream)
+            self._stir()
+
+        self.payloads.learn(msgtype)
+        mailbox = self._session.subscribe(topic, msgtype, depth=depth, wake=stir)
+        self.end_stream(destination)
+        stream.mailbox = mailbox
+        self._streams[destination] = stream
+        stir()  # what was latched came before the mailbox was known
+
+    def end_stream(self, destination: str) -> bool:
+        """Send no more of it; whether it was sent."""
+        stream = self._streams.pop(destination, None)
+        if stream is None or stream.mailbox is None:
+            return False
+        self._session.unsubscribe(stream.mailbox)
+        stream.mailbox = None
+        return True
+
+    @property
+    def streams(self) -> int:
+        """How many topics are sent."""
+        return len(self._streams)
+
+    def gather(self) -> list[Bytes]:
+        """Parts of whole frames to send next, a bounded number; none if nothing waits."""
+        self._woken = False
+        parts: list[Bytes] = []
+        size = 0
+        while size < _BATCH_BYTES and len(parts) < _BATCH_PARTS:
+            frame = self._next_command()
+            if frame is not None:
+                parts.append(frame)
+                size += len(frame)
+                continue
+            if not self._ready:
+                break
+            size += self._add_message(parts)
+        return parts
+
+    def _next_command(self) -> bytes | None:
+        with self._lock:
+            if not self._commands:
+                return None
+            frame = self._commands.popleft()
+            self._command_bytes -= len(frame)
+            return frame
+
+    def _add_message(self, parts: list[Bytes]) -> int:
+        """Add a message of the topic whose turn it is; returns its bytes."""
+        stream = self._ready.popleft()
+        taken = [] if stream.mailbox is None else stream.mailbox.take(1)
+        if not taken:
+            return 0
+        self._ready.append(stream)
+        try:
+            payload = self.payloads.published(taken[0])
+            size = sum(len(part) for part in payload)
+        except GraphError as error:
+            self.end_stream(stream.destination)
+            self._on_error(f"'{stream.destination}' cannot be sent: {error}")
+            return 0
+        head = ros_tcp.head(stream.destination, size)
+        parts += (head, *payload)
+        return len(head) + size
+
+    def _stir(self) -> None:
+        if not self._woken:
+            self._woken = True
+            self._wake()

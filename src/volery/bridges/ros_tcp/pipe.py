@@ -1,0 +1,164 @@
+"""A connected socket between a frame parser and an outbox, in one event loop.
+
+Bytes are received where they stay and sent from where they are: asyncio's own transports would copy
+each message twice.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Callable
+
+from volery.bridges.ros_tcp.outbox import Outbox
+from volery.bridges.ros_tcp.wire import Bytes, Frame, FrameParser
+from volery.core.errors import BridgeError
+
+_BATCHES_A_TURN = 16
+"""After so many others have their turn."""
+_FRAMES_A_TURN = 32
+"""Who sends more at once is read from in small bites, so that a flood delays nobody else."""
+_BITE_BYTES = 2048
+_LARGEST_BITE_BYTES = 16 << 20
+_FAREWELL_S = 1.0
+_PROBES = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
+"""The kernel asks a peer who is silent for 5 s, every 5 s, at most 3 times, whether it lives."""
+
+
+class Pipe:
+    """Reads frames, hands them to `take`, and sends what the outbox gathers.
+
+    broken: told why nothing that follows can be read; what it puts into the outbox is still sent.
+    closed: told once why the connection has ended.
+    """
+
+    def __init__(
+        self,
+        sock: socket.socket,
+        parser: FrameParser,
+        outbox: Outbox,
+        take: Callable[[Frame], None],
+        broken: Callable[[str], None],
+        closed: Callable[[str], None],
+    ) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._sock = sock
+        self.parser = parser
+        self._outbox = outbox
+        self._take = take
+        self._broken = broken
+        self._closed = closed
+        self._unsent: list[Bytes] = []
+        self._blocked = False
+        self._bite = _BITE_BYTES
+        self._reading = True
+        self._ending = False
+        self._open = True
+        self.last_received_s = self.last_sent_s = self._loop.time()
+        """Instants of the loop's clock."""
+        sock.setblocking(False)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for option, value in _PROBES.items():
+            if hasattr(socket, option):
+                sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+        self._loop.add_reader(sock, self._readable)
+
+    def flush(self) -> None:
+        """Send what waits as far as the peer takes it."""
+        if self._open and not self._blocked:
+            self._write()
+
+    def finish(self) -> None:
+        """Hear no more, send what waits, then close."""
+        if self._open and not self._ending:
+            self._ending = True
+            self._loop.call_later(_FAREWELL_S, self.close, "it broke the protocol")
+            self.flush()
+
+    def close(self, reason: str) -> None:
+        """End the connection now; a second time nothing happens."""
+        if not self._open:
+            return
+        self._open = False
+        self._loop.remove_reader(self._sock)
+        self._loop.remove_writer(self._sock)
+        self._sock.close()
+        self._unsent.clear()
+        self._closed(reason)
+
+    def _readable(self) -> None:
+        try:
+            count = self._sock.recv_into(self.parser.space()[: self._bite])
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError as error:
+            self.close(str(error.strerror))
+            return
+        if not count:
+            self.close("it has left")
+            return
+        self.last_received_s = self._loop.time()
+        if self._ending:  # what is not read would make the kernel withdraw our last words
+            return
+        try:
+            frames = self.parser.written(count)
+            flood = len(frames) > _FRAMES_A_TURN
+            self._bite = _BITE_BYTES if flood else min(2 * self._bite, _LARGEST_BITE_BYTES)
+            for frame in frames:
+                self._take(frame)
+        except BridgeError as error:
+            self._broken(str(error))
+            self.finish()
+        if self._outbox.crowded and self._open and not self._ending:
+            self._reading = False  # who does not read our answers is not asked for more
+            self._loop.remove_reader(self._sock)
+
+    def _write(self) -> None:
+        try:
+            for _ in range(_BATCHES_A_TURN):
+                if not self._unsent:
+                    self._unsent = self._outbox.gather()
+                    if not self._unsent:
+                        self._idle()
+                        return
+                self._forget(self._sock.sendmsg(self._unsent))
+                self.last_sent_s = self._loop.time()
+                self._read_again()
+        except (BlockingIOError, InterruptedError):
+            pass
+        except OSError as error:
+            self.close(str(error.strerror))
+            return
+        self._block(True)
+
+    def _read_again(self) -> None:
+        if not self._reading and not self._outbox.crowded:
+            self._reading = True
+            self._loop.add_reader(self._sock, self._readable)
+
+    def _idle(self) -> None:
+        """All is sent."""
+        self._block(False)
+        if self._ending:
+            with contextlib.suppress(OSError):
+                self._sock.shutdown(socket.SHUT_WR)
+
+    def _block(self, blocked: bool) -> None:
+        if blocked and not self._blocked:
+            self._loop.add_writer(self._sock, self._write)
+        elif self._blocked and not blocked:
+            self._loop.remove_writer(self._sock)
+        self._blocked = blocked
+
+    def _forget(self, sent: int) -> None:
+        """Drop what was sent from the front."""
+        parts = self._unsent
+        gone = 0
+        while gone < len(parts) and sent >= len(parts[gone]):
+            sent -= len(parts[gone])
+            gone += 1
+        del parts[:gone]
+        if sent:
+            parts[0] = memoryview(parts[0])[sent:]

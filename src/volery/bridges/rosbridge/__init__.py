@@ -1,0 +1,1 @@
+"""rosbridge v2 over WebSocket: server, rosapi, client."""

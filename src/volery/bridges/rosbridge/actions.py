@@ -1,0 +1,245 @@
+"""Actions of one rosbridge client: goals it sends, and actions it offers.
+
+Goals, feedback and results travel through `graph.actions` as messages of types that the graph
+knows, so a client may send goals to the simulation, to other clients, and they to it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from volery.bridges.rosbridge.fields import (
+    Id,
+    absolute,
+    read_choice,
+    read_id,
+    read_number,
+    read_text,
+    with_id,
+)
+from volery.bridges.rosbridge.forms import Forms
+from volery.bridges.rosbridge.services import Post, Send
+from volery.bridges.rosbridge.wire import Operation
+from volery.core.errors import BridgeError, GraphError
+from volery.graph.actions import Goal, GoalStatus
+from volery.graph.graph import Graph
+from volery.graph.json_decoding import decode_plain
+from volery.graph.ros1_names import ros2_name
+from volery.graph.zero import zero_message
+
+MOST_GOALS = 1000
+"""Open goals of one client, and open goals for it."""
+
+_UNKNOWN = 0
+"""action_msgs/msg/GoalStatus of a goal that never began."""
+
+
+@dataclass
+class _Asked:
+    """A goal that the client has sent."""
+
+    action: str
+    """As the client calls it."""
+    action_type: str
+    tell: Callable[[str, dict[str, Any]], None]
+    feedback: bool
+    goal: Goal | None = None
+    """Known once the simulation's thread has begun with it."""
+
+
+@dataclass(frozen=True)
+class _Acting:
+    """A goal that the client has been given."""
+
+    action: str
+    action_type: str
+    goal: Goal
+
+
+class Actions:
+    """The actions of one client. Its methods belong to the client's thread."""
+
+    def __init__(self, graph: Graph, forms: Forms, send: Send, post: Post) -> None:
+        self._graph = graph
+        self._forms = forms
+        self._send = send
+        self._post = post
+        self._asked: dict[Id, _Asked] = {}
+        self._offers: dict[str, tuple[str, str]] = {}
+        self._acting: dict[str, _Acting] = {}
+        self._numbers = itertools.count(1)
+        self._closed = False
+
+    # ------------------------------------------------------------------------------------ asking
+
+    def send_goal(self, operation: Operation) -> None:
+        """Pass a goal of the client's on."""
+        action, key = read_text(operation, "action"), read_id(operation)
+        size = int(read_number(operation, "fragment_size", 0, 0, 1e9)) or None
+        compression = read_choice(operation, "compression", ("none", "png", "cbor"))
+
+        def tell(op: str, more: dict[str, Any]) -> None:
+            self._send(with_id({"op": op, "action": action, **more}, key), size, compression)
+
+        try:
+            action_type = self._check(operation, action, key)
+            args = operation.get("args")
+            request = decode_plain(args or {}, f"{action_type}_Goal")
+        except (GraphError, BridgeError) as error:
+            tell("action_result", {"values": str(error), "status": _UNKNOWN, "result": False})
+            return
+        asked = _Asked(action, action_type, tell, operation.get("feedback") is True)
+        self._asked[key] = asked
+        self._graph.post(lambda: self._begin(key, asked, request))
+
+    def _check(self, operation: Operation, action: str, key: Id) -> str:
+        name = absolute(action)
+        action_type = self._graph.actions.types().get(name)
+        if action_type is None:
+            raise BridgeError(f"nobody offers action '{name}'")
+        given = operation.get("action_type")
+        if isinstance(given, str) and given and ros2_name(given, "action") != action_type:
+            raise BridgeError(f"action '{name}' is a {action_type}, not {given}")
+        if key in self._asked:
+            raise BridgeError("send_action_goal: a goal with this 'id' is open")
+        if len(self._asked) >= MOST_GOALS:
+            raise BridgeError(f"send_action_goal: more than {MOST_GOALS} goals are open")
+        return action_type
+
+    def _begin(self, key: Id, asked: _Asked, request: Any) -> None:
+        """Send the goal, in the simulation's thread."""
+
+        def on_feedback(message: Any) -> None:
+            if asked.feedback:
+                self._post(lambda: self._tell_feedback(asked, message))
+
+        def on_result(status: GoalStatus, result: Any) -> None:
+            self._post(lambda: self._tell_result(key, asked, status, result))
+
+        name = absolute(asked.action)
+        try:
+            asked.goal = self._graph.actions.send(name, request, on_feedback, on_result)
+        except Exception as error:  # whoever takes goals may break; this client shall know
+            text = str(error)
+            self._post(lambda: self._tell_failure(key, asked, text))
+
+    def _tell_feedback(self, asked: _Asked, message: Any) -> None:
+        plain = self._forms.plain(message, f"{asked.action_type}_Feedback")
+        asked.tell("action_feedback", {"values": plain})
+
+    def _tell_result(self, key: Id, asked: _Asked, status: GoalStatus, result: Any) -> None:
+        self._asked.pop(key, None)
+        plain = {} if result is None else self._forms.plain(result, f"{asked.action_type}_Result")
+        # rosbridge means by "result" that there is one; how it went is the status
+        asked.tell("action_result", {"values": plain, "status": int(status), "result": True})
+
+    def _tell_failure(self, key: Id, asked: _Asked, text: str) -> None:
+        self._asked.pop(key, None)
+        asked.tell("action_result", {"values": text, "status": _UNKNOWN, "result": False})
+
+    def cancel_goal(self, operation: Operation) -> None:
+        """Ask that a goal be given up."""
+        asked = self._asked.get(read_id(operation))
+        if asked is None:
+            raise BridgeError("cancel_action_goal: no open goal has this 'id'")
+        self._graph.post(lambda: _cancel(asked))
+
+    # ------------------------------------------------------------------------------------ acting
+
+    def advertise(self, operation: Operation) -> None:
+        """Offer an action of the client's."""
+        action = read_text(operation, "action")
+        action_type = ros2_name(read_text(operation, "type"), "action")
+        name = absolute(action)
+
+        def take(goal: Goal) -> None:
+            self._post(lambda: self._take(action, action_type, goal))
+
+        self._graph.actions.offer(name, action_type, take)
+        self._offers[name] = (action, action_type)
+
+    def unadvertise(self, operation: Operation) -> None:
+        """Offer an action no more; its open goals are aborted."""
+        name = absolute(read_text(operation, "action"))
+        if self._offers.pop(name, None) is None:
+            raise BridgeError(f"unadvertise_action: '{name}' is not offered by this client")
+        self._graph.actions.withdraw(name)
+        for number in [n for n, a in self._acting.items() if absolute(a.action) == name]:
+            _abort(self._acting.pop(number))
+
+    def _take(self, action: str, action_type: str, goal: Goal) -> None:
+        """Hand a goal to the client."""
+        acting = _Acting(action, action_type, goal)
+        if self._closed or len(self._acting) >= MOST_GOALS:
+            _abort(acting)
+            return
+        number = f"goal:{action}:{next(self._numbers)}"
+        named = {"id": number, "action": action}
+
+        def on_cancel() -> None:
+            cancel = {"op": "cancel_action_goal", **named}
+            self._post(lambda: self._send(cancel, None, "none"))
+
+        self._acting[number] = acting
+        goal.when_cancelled(on_cancel)
+        try:
+            args = self._forms.plain(goal.request, f"{action_type}_Goal")
+            more = {"action_type": action_type, "args": args, "feedback": True}
+            self._send({"op": "send_action_goal", **named, **more}, None, "none")
+        except (GraphError, BridgeError):
+            _abort(self._acting.pop(number))
+            raise
+
+    def take_feedback(self, operation: Operation) -> None:
+        """Pass the client's feedback on."""
+        acting = self._find(operation)
+        values = operation.get("values")
+        acting.goal.feedback(decode_plain(values or {}, f"{acting.action_type}_Feedback"))
+
+    def take_result(self, operation: Operation) -> None:
+        """Pass the client's result on; a failure without values ends in a result of zeros."""
+        acting = self._find(operation)
+        success = operation.get("result", True) is True
+        default = GoalStatus.SUCCEEDED if success else GoalStatus.ABORTED
+        status = read_number(operation, "status", default, 0, 6)
+        values = operation.get("values")
+        plain = values if isinstance(values, dict) or success else {}
+        result = decode_plain(plain or {}, f"{acting.action_type}_Result")
+        del self._acting[str(read_id(operation))]
+        if status == GoalStatus.CANCELED:
+            acting.goal.canceled(result)
+        elif success and status == GoalStatus.SUCCEEDED:
+            acting.goal.succeed(result)
+        else:
+            acting.goal.abort(result)
+
+    def _find(self, operation: Operation) -> _Acting:
+        acting = self._acting.get(str(read_id(operation)))
+        if acting is None:
+            raise BridgeError(f"{operation['op']}: no open goal has this 'id'")
+        return acting
+
+    def close(self) -> None:
+        """The client has left: what it asked for is cancelled, what it acts on is aborted."""
+        self._closed = True
+        for name in self._offers:
+            self._graph.actions.withdraw(name)
+        for acting in tuple(self._acting.values()):
+            _abort(acting)
+        for asked in tuple(self._asked.values()):
+            self._graph.post(lambda left=asked: _cancel(left))  # type: ignore[misc]
+        self._offers.clear()
+        self._acting.clear()
+        self._asked.clear()
+
+
+def _cancel(asked: _Asked) -> None:
+    if asked.goal is not None:
+        asked.goal.cancel()
+
+
+def _abort(acting: _Acting) -> None:
+    acting.goal.abort(zero_message(f"{acting.action_type}_Result"))

@@ -1,0 +1,411 @@
+"""rosbridge v2 from the client's side: frames in, frames out, no sockets.
+
+What was announced, subscribed to and offered is remembered, and sent again by `begin` after every
+connection. Methods may be called by any thread unless they say otherwise.
+"""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from typing import Any
+
+from volery.bridges.rosbridge.cbor_form import encode_cbor
+from volery.bridges.rosbridge.forms import Generation
+from volery.bridges.rosbridge.fragments import Assembly
+from volery.bridges.rosbridge.wire import (
+    MOST_MESSAGE_BYTES,
+    Frame,
+    Operation,
+    decode_frame,
+    decode_png,
+    encode_json,
+)
+from volery.core.errors import GraphError, VoleryError
+from volery.graph.json_decoding import decode_plain
+from volery.graph.json_form import JsonForm
+from volery.graph.messages import Published, typestore
+from volery.graph.reply import Reply
+from volery.graph.ros1_names import ros1_name, ros2_name
+from volery.graph.session import MOST_DEPTH, Handler, Mailbox, SessionInfo, Wake
+
+MOST_WAITING = 1000
+"""Publications that may wait for the network."""
+MOST_WAITING_BYTES = 64 * 1024 * 1024
+MOST_COMPLAINTS = 100
+
+_NS = 1_000_000_000
+
+
+@dataclass
+class _Topic:
+    msgtype: str
+    mailboxes: list[Mailbox] = field(default_factory=list)
+    depth: int = 1
+
+
+@dataclass(frozen=True)
+class _Offer:
+    srvtype: str
+    handler: Handler
+    pending: set[Reply] = field(default_factory=set)
+
+
+@dataclass(frozen=True)
+class _Call:
+    reply: Reply
+    take: Callable[[Any], Any]
+    """Makes the response of its plain form."""
+
+
+class ClientState:
+    """What a client wants of the server, and what is on its way.
+
+    Parameters
+    ----------
+    token
+        Shown first on every connection.
+    wake
+        Told that `frames` has something to give.
+
+    """
+
+    def __init__(self, token: str | None, wake: Wake, generation: Generation = "ros2") -> None:
+        self.complaints: deque[str] = deque(maxlen=MOST_COMPLAINTS)
+        self.dropped = 0
+        self._token = token
+        self._wake = wake
+        self._lock = threading.RLock()
+        self._connected = False
+        self._cbor = False
+        self._ros1 = generation == "ros1"
+        self._plain = JsonForm(ros1_names=self._ros1)
+        self._typed = JsonForm(
+            non_finite_as_null=False, ros1_names=self._ros1, arrays=lambda values, _type: values
+        )
+        self._announced: dict[str, tuple[str, bool]] = {}
+        self._topics: dict[str, _Topic] = {}
+        self._offers: dict[str, _Offer] = {}
+        self._calls: dict[str, _Call] = {}
+        self._orders: deque[Frame] = deque()
+        self._publications: deque[Frame] = deque()
+        self._publication_bytes = 0
+        self._numbers = itertools.count(1)
+        self._assembly = Assembly(MOST_MESSAGE_BYTES)
+
+    # --------------------------------------------------------------------------------- connection
+
+    def begin(self, *, cbor: bool) -> None:
+        """A connection stands: ask for everything anew. cbor: whether the server takes CBOR."""
+        with self._lock:
+            self._connected, self._cbor = True, cbor
+            self._orders.clear()
+            self._assembly = Assembly(MOST_MESSAGE_BYTES)
+            if self._token is not None:
+                self._order({"op": "auth", "token": self._token})
+            for topic, (msgtype, latched) in self._announced.items():
+                self._order(self._advertisement(topic, msgtype, latched))
+            for name, topic_ in self._topics.items():
+                self._order(self._subscription(name, topic_))
+            for service, offer in self._offers.items():
+                self._order(
+                    {
+                        "op": "advertise_service",
+                        "service": service,
+                        "type": self._spelled(offer.srvtype),
+                    }
+                )
+
+    def lose(self, why: str) -> None:
+        """The connection is gone: open calls fail, publications are dropped."""
+        with self._lock:
+            self._connected = False
+            self.dropped += len(self._publications)
+            self._publications.clear()
+            self._publication_bytes = 0
+            self._orders.clear()
+            calls, self._calls = list(self._calls.values()), {}
+        for call in calls:
+            call.reply.fail(GraphError(why))
+
+    def frames(self) -> Iterator[Frame]:
+        """Whatever is to be sent: orders and answers first, then publications."""
+        while True:
+            with self._lock:
+                if self._orders:
+                    frame = self._orders.popleft()
+                elif self._publications:
+                    frame = self._publications.popleft()
+                    self._publication_bytes -= len(frame)
+                else:
+                    return
+            yield frame
+
+    def info(self, name: str) -> SessionInfo:
+        """What the client does at present."""
+        with self._lock:
+            mailboxes = [m.info for topic in self._topics.values() for m in topic.mailboxes]
+            return SessionInfo(name, tuple(self._announced), tuple(mailboxes), tuple(self._offers))
+
+    def _order(self, operation: Operation) -> None:
+        """Queue an operation if there is a connection; `begin` repeats what lasts."""
+        if self._connected:
+            self._orders.append(encode_json(operation))
+            self._wake()
+
+    # ------------------------------------------------------------------------------------ topics
+
+    def advertise(self, topic: str, msgtype: str, latched: bool) -> None:
+        """Announce a topic."""
+        _check_type(msgtype)
+        with self._lock:
+            if self._announced.get(topic) != (msgtype, latched):
+                self._announced[topic] = (msgtype, latched)
+                self._order(self._advertisement(topic, msgtype, latched))
+
+    def unadvertise(self, topic: str, who: str) -> None:
+        """Take an announcement back."""
+        with self._lock:
+            if self._announced.pop(topic, None) is None:
+                raise GraphError(f"{who} does not publish '{topic}'")
+            self._order({"op": "unadvertise", "topic": topic})
+
+    def published_type(self, topic: str) -> str | None:
+        """Announced type of a topic."""
+        found = self._announced.get(topic)
+        return None if found is None else found[0]
+
+    def publish(self, topic: str, message: Any, who: str) -> None:
+        """Queue a publication."""
+        found = self._announced.get(topic)
+        if found is None:
+            raise GraphError(f"{who} has not advertised '{topic}'")
+        name = getattr(message, "__msgtype__", None)
+        if name != found[0]:
+            raise GraphError(f"topic '{topic}' carries {found[0]}, not {name}")
+        if not self._connected:
+            self.dropped += 1
+            return
+        form = self._typed if self._cbor else self._plain
+        operation = {"op": "publish", "topic": topic, "msg": form.encode(message, found[0])}
+        frame = encode_cbor(operation) if self._cbor else encode_json(operation)
+        with self._lock:
+            self._publications.append(frame)
+            self._publication_bytes += len(frame)
+            while (
+                len(self._publications) > MOST_WAITING
+                or self._publication_bytes > MOST_WAITING_BYTES
+            ):
+                self._publication_bytes -= len(self._publications.popleft())
+                self.dropped += 1
+        self._wake()
+
+    def subscribe(self, topic: str, msgtype: str, depth: int, wake: Wake) -> Mailbox:
+        """Begin to receive a topic."""
+        _check_type(msgtype)
+        if not 1 <= depth <= MOST_DEPTH:
+            raise GraphError(f"queue depth must be 1 to {MOST_DEPTH}, not {depth}")
+        mailbox = Mailbox(topic, depth, wake)
+        with self._lock:
+            found = self._topics.setdefault(topic, _Topic(msgtype))
+            if found.msgtype != msgtype:
+                raise GraphError(f"topic '{topic}' carries {found.msgtype}, not {msgtype}")
+            found.mailboxes.append(mailbox)
+            found.depth = max(found.depth, depth)
+            self._order(self._subscription(topic, found))
+        return mailbox
+
+    def unsubscribe(self, mailbox: Mailbox) -> None:
+        """Receive no more."""
+        with self._lock:
+            found = self._topics.get(mailbox.topic)
+            if found is None or mailbox not in found.mailboxes:
+                return
+            found.mailboxes.remove(mailbox)
+            if not found.mailboxes:
+                del self._topics[mailbox.topic]
+                self._order({"op": "unsubscribe", "topic": mailbox.topic})
+
+    # ---------------------------------------------------------------------------------- services
+
+    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+        """Call a service; without a request rosapi is asked for its type first."""
+        if request is not None:
+            srvtype = request.__msgtype__.removesuffix("_Request")
+            args = self._plain.encode(request, request.__msgtype__)
+            self._call(service, args, reply, lambda v: decode_plain(v, f"{srvtype}_Response"))
+            return
+
+        def ask(response: Any) -> None:
+            if not response:
+                reply.fail(GraphError(f"nobody offers service '{service}'"))
+                return
+            answer = f"{ros2_name(response, 'srv')}_Response"
+            self._call(service, {}, reply, lambda values: decode_plain(values, answer))
+
+        asking = Reply(ask, reply.fail)
+        self._call("/rosapi/service_type", {"service": service}, asking, lambda v: v.get("type"))
+
+    def ask_rosapi(self, service: str, args: dict[str, Any], found: Future[str]) -> None:
+        """Ask rosapi for the type of something."""
+
+        def take(name: Any) -> None:
+            found.set_result(ros2_name(name) if name else "")
+
+        self._call(f"/rosapi/{service}", args, Reply(take, found.set_exception), _type_of)
+
+    def _call(
+        self, service: str, args: dict[str, Any], reply: Reply, take: Callable[[Any], Any]
+    ) -> None:
+        with self._lock:
+            if self._connected:
+                number = f"call_service:{service}:{next(self._numbers)}"
+                self._calls[number] = _Call(reply, take)
+                reply.when_done(lambda: self._forget_call(number))
+                self._order({"op": "call_service", "id": number, "service": service, "args": args})
+                return
+        reply.fail(GraphError(f"service '{service}': there is no connection"))
+
+    def _forget_call(self, number: str) -> None:
+        with self._lock:
+            self._calls.pop(number, None)
+
+    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+        """Offer a service."""
+        _check_type(f"{srvtype}_Request")
+        with self._lock:
+            if service in self._offers:
+                raise GraphError(f"service '{service}' is offered already")
+            self._offers[service] = _Offer(srvtype, handler)
+            self._order(
+                {"op": "advertise_service", "service": service, "type": self._spelled(srvtype)}
+            )
+
+    def withdraw(self, service: str, who: str) -> None:
+        """Offer a service no more; its open requests fail."""
+        with self._lock:
+            offer = self._offers.pop(service, None)
+            if offer is None:
+                raise GraphError(f"{who} does not offer service '{service}'")
+            self._order({"op": "unadvertise_service", "service": service})
+        for reply in tuple(offer.pending):
+            reply.fail(GraphError(f"service '{service}': {who} has left"))
+
+    # ------------------------------------------------------------------------------------- words
+
+    def _spelled(self, name: str) -> str:
+        return ros1_name(name) if self._ros1 else name
+
+    def _advertisement(self, topic: str, msgtype: str, latched: bool) -> Operation:
+        spelled = self._spelled(msgtype)
+        return {"op": "advertise", "topic": topic, "type": spelled, "latch": latched}
+
+    def _offering(self, service: str, srvtype: str) -> Operation:
+        return {"op": "advertise_service", "service": service, "type": self._spelled(srvtype)}
+
+    def _subscription(self, name: str, topic: _Topic) -> Operation:
+        return {
+            "op": "subscribe",
+            "topic": name,
+            "type": self._spelled(topic.msgtype),
+            "queue_length": topic.depth,
+            "compression": "cbor",
+        }
+
+    # ------------------------------------------------------------------------------------- input
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame from the server, in the client's thread; what is wrong is a complaint."""
+        try:
+            self._handle(decode_frame(frame), now_s)
+        except VoleryError as error:
+            self.complaints.append(str(error))
+
+    def _handle(self, operation: Operation, now_s: float) -> None:
+        op = operation["op"]
+        if op == "publish":
+            self._deliver(operation)
+        elif op == "service_response":
+            self._take_response(operation)
+        elif op == "call_service":
+            self._take_request(operation)
+        elif op == "fragment":
+            whole = self._assembly.add(operation, now_s)
+            if whole is not None:
+                self._handle(decode_frame(whole), now_s)
+        elif op == "png":
+            self._handle(decode_png(operation, MOST_MESSAGE_BYTES), now_s)
+        elif op == "status":
+            self.complaints.append(str(operation.get("msg")))
+
+    def _deliver(self, operation: Operation) -> None:
+        with self._lock:
+            found = self._topics.get(str(operation.get("topic")))
+            mailboxes = tuple(found.mailboxes) if found else ()
+        if found is None:
+            return
+        message = decode_plain(operation.get("msg"), found.msgtype)
+        published = Published(str(operation["topic"]), found.msgtype, _time_of(message), message)
+        for mailbox in mailboxes:
+            mailbox.put(published)
+
+    def _take_response(self, operation: Operation) -> None:
+        with self._lock:
+            call = self._calls.pop(str(operation.get("id")), None)
+        if call is None:
+            return
+        values = operation.get("values")
+        if operation.get("result", True) is not True:
+            call.reply.fail(GraphError(str(values)))
+            return
+        try:
+            response = call.take({} if values is None else values)
+        except GraphError as error:
+            call.reply.fail(error)
+            return
+        call.reply.answer(response)
+
+    def _take_request(self, operation: Operation) -> None:
+        service, key = str(operation.get("service")), operation.get("id")
+        response: Operation = {"op": "service_response", "service": service, "id": key}
+
+        def respond(values: Any, success: bool) -> None:
+            with self._lock:
+                self._order(response | {"values": values, "result": success})
+
+        offer = self._offers.get(service)
+        if offer is None:
+            respond(f"service '{service}' is not offered here", False)
+            return
+        answer = f"{offer.srvtype}_Response"
+        reply = Reply(
+            lambda message: respond(self._plain.encode(message, answer), True),
+            lambda error: respond(str(error), False),
+        )
+        try:
+            request = decode_plain(operation.get("args") or {}, f"{offer.srvtype}_Request")
+            offer.pending.add(reply)
+            reply.when_done(lambda: offer.pending.discard(reply))
+            offer.handler(request, reply)
+        except Exception as error:  # a handler's mistake is the caller's answer
+            reply.fail(GraphError(f"{type(error).__name__}: {error}"))
+
+
+def _type_of(values: Any) -> str:
+    found = values.get("type") if isinstance(values, dict) else None
+    return found if isinstance(found, str) else ""
+
+
+def _check_type(msgtype: str) -> None:
+    if msgtype not in typestore().types:
+        raise GraphError(f"unknown message type '{msgtype}'")
+
+
+def _time_of(message: Any) -> int:
+    """Stamp of a message, ns; 0 where it has none."""
+    stamp = getattr(getattr(message, "header", None), "stamp", None)
+    return 0 if stamp is None else int(stamp.sec * _NS + stamp.nanosec)

@@ -1,0 +1,114 @@
+"""Operations in fragments, both ways."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from volery.bridges.rosbridge.wire import Operation, encode_json
+from volery.core.errors import BridgeError
+
+MOST_OPEN = 32
+"""Messages of one client that may be under way at once."""
+MOST_FRAGMENTS = 100_000
+"""Fragments of one message."""
+MOST_SECONDS = 30.0
+"""Time from the first to the last fragment of a message."""
+
+_OVERHEAD_BYTES = 64
+"""What keeping a fragment costs beside its text, so that empty ones count too."""
+
+
+def split(text: str, size: int, name: str) -> Iterator[str]:
+    """Fragments of JSON text with at most `size` characters of it each, in order.
+
+    name: the id they share.
+    """
+    total = -(-len(text) // size)
+    for number in range(total):
+        data = text[number * size : (number + 1) * size]
+        yield encode_json(
+            {"op": "fragment", "id": name, "data": data, "num": number, "total": total}
+        )
+
+
+@dataclass
+class _Open:
+    total: int
+    began_s: float
+    parts: dict[int, str] = field(default_factory=dict)
+    size: int = 0
+
+
+class Assembly:
+    """Puts fragments together. What never becomes whole goes after a while."""
+
+    def __init__(self, most_bytes: int) -> None:
+        self._most_bytes = most_bytes
+        self._open: dict[str, _Open] = {}
+        self._size = 0
+
+    @property
+    def waiting(self) -> int:
+        """How many messages are incomplete."""
+        return len(self._open)
+
+    def add(self, operation: Operation, now_s: float) -> str | None:
+        """Take a fragment in; returns the whole text with the last one.
+
+        A fragment that comes again changes nothing.
+
+        Raises
+        ------
+        BridgeError
+            It is malformed, contradicts the others, or there would be too much; the message that
+            it belongs to is given up.
+
+        """
+        self.drop_old(now_s)
+        name, data = operation.get("id"), operation.get("data")
+        number, total = operation.get("num"), operation.get("total")
+        if not isinstance(name, (str, int)) or not isinstance(data, str):
+            raise BridgeError("fragment: 'id' and 'data' must be text")
+        key = repr(name)
+        if isinstance(total, float) and total.is_integer():
+            total = int(total)
+        if type(number) is not int or type(total) is not int or not 0 <= number < total:
+            self._forget(key)
+            raise BridgeError("fragment: 'num' must be 0 to 'total' - 1")
+        message = self._message(key, total, now_s)
+        if number not in message.parts:
+            cost = len(data) + _OVERHEAD_BYTES
+            if self._size + cost > self._most_bytes:
+                self._forget(key)
+                raise BridgeError(f"fragment: more than {self._most_bytes} bytes are under way")
+            message.parts[number] = data
+            message.size += cost
+            self._size += cost
+        if len(message.parts) < total:
+            return None
+        self._forget(key)
+        return "".join(message.parts[k] for k in range(total))
+
+    def drop_old(self, now_s: float) -> None:
+        """Give up what has been under way for too long."""
+        for key in [k for k, m in self._open.items() if now_s - m.began_s > MOST_SECONDS]:
+            self._forget(key)
+
+    def _message(self, key: str, total: int, now_s: float) -> _Open:
+        message = self._open.get(key)
+        if message is None:
+            if total > MOST_FRAGMENTS:
+                raise BridgeError(f"fragment: more than {MOST_FRAGMENTS} of one message")
+            if len(self._open) >= MOST_OPEN:
+                raise BridgeError(f"fragment: more than {MOST_OPEN} messages are under way")
+            message = self._open[key] = _Open(total, now_s)
+        if message.total != total:
+            self._forget(key)
+            raise BridgeError("fragment: 'total' differs from that of the other fragments")
+        return message
+
+    def _forget(self, key: str) -> None:
+        message = self._open.pop(key, None)
+        if message is not None:
+            self._size -= message.size

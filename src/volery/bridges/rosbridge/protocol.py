@@ -1,0 +1,300 @@
+"""rosbridge v2 as one client sees it: frames in, frames out, no sockets.
+
+    peer = RosbridgePeer(session, shared, wake=wake, post=post)
+    peer.receive('{"op": "subscribe", "topic": "/uav1/odom"}')
+    for frame in peer.frames(now_s):
+        send(frame)
+
+Whatever is wrong with an operation is told to the client as a `status` that carries the operation's
+id; nothing that a client sends raises. All methods belong to one thread; `wake` and `post` are
+called by others too.
+"""
+
+from __future__ import annotations
+
+import hmac
+import itertools
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from volery.bridges.rosbridge.actions import Actions
+from volery.bridges.rosbridge.cbor_form import encode_cbor
+from volery.bridges.rosbridge.fields import read_choice, read_id, with_id
+from volery.bridges.rosbridge.forms import Forms
+from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, Assembly, split
+from volery.bridges.rosbridge.services import Post, Services
+from volery.bridges.rosbridge.topics import Topics
+from volery.bridges.rosbridge.wire import (
+    MOST_MESSAGE_BYTES,
+    Frame,
+    Operation,
+    decode_frame,
+    decode_png,
+    encode_json,
+    encode_png,
+)
+from volery.core.errors import BridgeError, VoleryError
+from volery.graph.session import Session
+
+LEVELS = ("error", "none", "warning", "info")
+"""Words of `set_level`; the first is the default."""
+_LOUDNESS = {"none": 0, "error": 1, "warning": 2, "info": 3}
+
+MOST_WAITING_BYTES = 8 * 1024 * 1024
+"""Answers that may wait for a client; beyond, no more is read of it until it reads."""
+MOST_WRAPS = 3
+"""An operation may lie in a picture in fragments, not deeper."""
+
+
+@dataclass(frozen=True)
+class Shared:
+    """What all clients of a server have in common."""
+
+    forms: Forms = field(default_factory=Forms)
+    now_ns: Callable[[], int] = lambda: 0
+    """Simulated time."""
+    token: str | None = None
+    """What a client must show before anything else; None: nothing."""
+    most_bytes: int = MOST_MESSAGE_BYTES
+    """Largest message, also once put together from fragments or a picture."""
+
+
+class RosbridgePeer:
+    """One client.
+
+    Parameters
+    ----------
+    session
+        Its part in the graph; closed by `close`.
+    shared
+        What it has in common with others.
+    wake
+        Told, from any thread, that `frames` has something to give.
+    post
+        Has a function called in the thread of this peer.
+    authorized
+        Whether it has shown the token already.
+
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        shared: Shared,
+        *,
+        wake: Callable[[], None],
+        post: Post,
+        authorized: bool = False,
+    ) -> None:
+        self.authorized = authorized or shared.token is None
+        self.refused: str | None = None
+        """Why the connection must end, once it must."""
+        self._session = session
+        self._shared = shared
+        self._wake = wake
+        self._level = LEVELS[0]
+        self._outbox: deque[tuple[int, Iterator[Frame]]] = deque()
+        self._waiting_bytes = 0
+        self._assembly = Assembly(shared.most_bytes)
+        self._numbers = itertools.count()
+        self._closed = False
+        self._now_s = 0.0
+        self._topics = Topics(session, wake, shared.now_ns)
+        guarded = self._poster(post)
+        self._services = Services(session, shared.forms, self.send, guarded)
+        self._actions = Actions(session.graph, shared.forms, self.send, guarded)
+        self._handlers: dict[str, Callable[[Operation], None]] = {
+            "advertise": self._topics.advertise,
+            "unadvertise": self._topics.unadvertise,
+            "publish": self._topics.publish,
+            "subscribe": self._topics.subscribe,
+            "unsubscribe": self._topics.unsubscribe,
+            "call_service": lambda operation: self._services.call(operation, self._now_s),
+            "service_response": self._services.respond,
+            "advertise_service": self._services.advertise,
+            "unadvertise_service": self._services.unadvertise,
+            "send_action_goal": self._actions.send_goal,
+            "cancel_action_goal": self._actions.cancel_goal,
+            "advertise_action": self._actions.advertise,
+            "unadvertise_action": self._actions.unadvertise,
+            "action_feedback": self._actions.take_feedback,
+            "action_result": self._actions.take_result,
+            "set_level": self._set_level,
+            "status": lambda _: None,
+            "auth": self._authorize,
+        }
+
+    # ---------------------------------------------------------------------------------------- in
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame from the client. now_s: of a clock that never goes back."""
+        if self._closed or self.refused:
+            return
+        self._now_s = now_s
+        if len(frame) > self._shared.most_bytes:
+            self._status("error", f"a message of more than {self._shared.most_bytes} bytes", {})
+            return
+        operation: Operation = {}
+        try:
+            operation = decode_frame(frame)
+            self._handle(operation, now_s, 0)
+        except VoleryError as error:
+            self._status("error", str(error), operation)
+        except Exception as error:
+            # A mistake of ours in serving one client must not end the service of others.
+            self._status("error", f"internal error: {type(error).__name__}: {error}", operation)
+
+    def _handle(self, operation: Operation, now_s: float, depth: int) -> None:
+        op = operation["op"]
+        if depth > MOST_WRAPS:
+            raise BridgeError("an operation is wrapped too often")
+        if not self.authorized and op != "auth":
+            self.refused = "not authorized: send {'op': 'auth', 'token': ...} first"
+            raise BridgeError(self.refused)
+        if op == "fragment":
+            whole = self._assembly.add(operation, now_s)
+            if whole is not None:
+                self._handle_inner(decode_frame(whole), now_s, depth)
+        elif op == "png":
+            self._handle_inner(decode_png(operation, self._shared.most_bytes), now_s, depth)
+        else:
+            handler = self._handlers.get(op)
+            if handler is None:
+                known = ", ".join(sorted((*self._handlers, "fragment", "png")))
+                raise BridgeError(f"unknown operation '{op[:40]}'; there are {known}")
+            handler(operation)
+            if self._level == "info":
+                self._status("info", f"{op}: done", operation)
+
+    def _handle_inner(self, operation: Operation, now_s: float, depth: int) -> None:
+        """An unwrapped operation; its errors carry its own id."""
+        try:
+            self._handle(operation, now_s, depth + 1)
+        except VoleryError as error:
+            self._status("error", str(error), operation)
+
+    def _set_level(self, operation: Operation) -> None:
+        self._level = read_choice(operation, "level", LEVELS)
+
+    def _authorize(self, operation: Operation) -> None:
+        # roslib's `authenticate` sends what it is given as "mac"
+        given = operation.get("token", operation.get("mac"))
+        if not self.authorized and not shows_token(given, self._shared.token):
+            self.refused = "not authorized: wrong token"
+            raise BridgeError(self.refused)
+        self.authorized = True
+
+    # --------------------------------------------------------------------------------------- out
+
+    @property
+    def congested(self) -> bool:
+        """Whether so much waits for the client that no more should be read of it."""
+        return self._waiting_bytes > MOST_WAITING_BYTES
+
+    def send(self, operation: Operation, fragment_size: int | None, compression: str) -> None:
+        """Queue an operation for the client.
+
+        Raises
+        ------
+        BridgeError
+            It cannot be written, or it comes from others and the client does not read.
+
+        """
+        if self._closed:
+            return
+        op = operation["op"]
+        if self.congested and op in ("action_feedback", "call_service", "send_action_goal"):
+            if op == "action_feedback":
+                return
+            raise BridgeError(f"{self._session.name} does not read")
+        if compression == "cbor":
+            self._queue(encode_cbor(operation), None)
+            return
+        text = encode_json(operation)
+        self._queue(encode_png(text) if compression == "png" else text, fragment_size)
+
+    def frames(self, now_s: float) -> Iterator[Frame]:
+        """Whatever is to be sent now: answers first, then messages of all topics in turn."""
+        self._now_s = now_s
+        self._services.expire(now_s)
+        self._assembly.drop_old(now_s)
+        yield from self._answers()
+        for stream, published in self._topics.take(now_s):
+            try:
+                frame = self._shared.forms.frame(published, stream.wishes.compression, stream.name)
+            except VoleryError as error:
+                self._status("error", f"topic '{stream.name}': {error}", {})
+                continue
+            if isinstance(frame, str):
+                yield from self._pieces(frame, stream.wishes.fragment_size)
+            else:
+                yield frame
+            yield from self._answers()
+
+    def due_s(self, now_s: float) -> float | None:
+        """When to call `frames` again though nobody woke; None: not before `wake`."""
+        times = (self._topics.due_s(now_s), self._services.due_s())
+        return min((time for time in times if time is not None), default=None)
+
+    def _answers(self) -> Iterator[Frame]:
+        while self._outbox:
+            size, frames = self._outbox.popleft()
+            yield from frames
+            self._waiting_bytes -= size
+
+    def _queue(self, frame: Frame, fragment_size: int | None) -> None:
+        frames = iter((frame,)) if isinstance(frame, bytes) else self._pieces(frame, fragment_size)
+        self._outbox.append((len(frame), frames))
+        self._waiting_bytes += len(frame)
+        self._wake()
+
+    def _pieces(self, text: str, size: int | None) -> Iterator[Frame]:
+        if size is None or len(text) <= size:
+            return iter((text,))
+        least = -(-len(text) // MOST_FRAGMENTS)
+        return split(text, max(size, least), f"fragments:{next(self._numbers)}")
+
+    def _status(self, level: str, text: str, operation: Operation) -> None:
+        if _LOUDNESS[level] > _LOUDNESS[self._level]:
+            return
+        message: dict[str, Any] = {"op": "status", "level": level, "msg": text}
+        with suppress(BridgeError):  # an id that cannot be echoed
+            with_id(message, read_id(operation) if operation else None)
+        self.send(message, None, "none")
+
+    # --------------------------------------------------------------------------------------- end
+
+    def close(self) -> None:
+        """The client has gone: take back everything; a second time nothing happens."""
+        if self._closed:
+            return
+        self._closed = True
+        self._actions.close()
+        self._session.close()
+        self._outbox.clear()
+
+    def _poster(self, post: Post) -> Post:
+        """`post`, whose errors become statuses."""
+
+        def guarded(action: Callable[[], None]) -> None:
+            def act() -> None:
+                try:
+                    action()
+                except VoleryError as error:
+                    self._status("error", str(error), {})
+
+            post(act)
+
+        return guarded
+
+
+def shows_token(given: Any, token: str | None) -> bool:
+    """Whether what was given is the token, told in the same time for every wrong one."""
+    if token is None:
+        return True
+    return isinstance(given, str) and hmac.compare_digest(
+        given.encode(errors="replace"), token.encode(errors="replace")
+    )

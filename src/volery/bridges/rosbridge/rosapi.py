@@ -1,0 +1,328 @@
+"""The rosapi services: what clients of rosbridge ask about the graph.
+
+They are ordinary services of the graph under `/rosapi/`, so that clients of every door may ask.
+Every session is a node there, and the simulation itself is the node `/volery`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from typing import Any
+
+from volery.bridges.rosbridge.fields import absolute
+from volery.bridges.rosbridge.forms import Generation
+from volery.bridges.rosbridge.rosapi_types import display_name, full_text, type_definitions
+from volery.core.clock import stamp_from_ns
+from volery.core.errors import GraphError
+from volery.graph.graph import TopicInfo
+from volery.graph.json_form import JsonForm
+from volery.graph.reply import Reply
+from volery.graph.ros1_names import ros2_name
+from volery.graph.session import Gateway, Session, SessionInfo
+
+SIMULATION_NODE = "/volery"
+PREFIX = "/rosapi/"
+MOST_PARAMETERS = 10_000
+MOST_VALUE = 1_000_000
+"""Characters of the JSON text of one parameter."""
+
+Answer = Callable[[Any], dict[str, Any]]
+
+
+class Parameters:
+    """Parameters by name, each the JSON text of its value."""
+
+    def __init__(self) -> None:
+        self._values: dict[str, str] = {"/use_sim_time": "true"}
+
+    def names(self) -> list[str]:
+        """All names, sorted."""
+        return sorted(self._values)
+
+    def get(self, name: str) -> str | None:
+        """Value, or None."""
+        return self._values.get(absolute(name))
+
+    def set(self, name: str, value: str) -> None:
+        """Set a value. `GraphError` where it is no JSON or there would be too much."""
+        try:
+            json.loads(value)
+        except (ValueError, RecursionError):
+            raise GraphError(f"parameter '{name}': the value must be JSON text") from None
+        if len(value) > MOST_VALUE or len(self._values) >= MOST_PARAMETERS:
+            raise GraphError(f"parameter '{name}': too large, or too many parameters")
+        self._values[absolute(name)] = value
+
+    def delete(self, name: str) -> None:
+        """Remove a parameter. `GraphError` if there is none."""
+        if self._values.pop(absolute(name), None) is None:
+            raise GraphError(f"no parameter '{name}'")
+
+
+class RosApi:
+    """The services, once `start`ed.
+
+    Parameters
+    ----------
+    gateway
+        Of the graph.
+    generation
+        How types are spelled in answers.
+    now_ns
+        Simulated time.
+    parameters
+        Shared by all who start the services one after the other.
+
+    """
+
+    def __init__(
+        self,
+        gateway: Gateway,
+        generation: Generation,
+        now_ns: Callable[[], int],
+        parameters: Parameters | None = None,
+    ) -> None:
+        self._gateway = gateway
+        self._graph = gateway.graph
+        self._ros1 = generation == "ros1"
+        self._now_ns = now_ns
+        self._actions = gateway.graph.actions.types
+        self._parameters = parameters or Parameters()
+        self._plain = JsonForm()
+        self._session: Session | None = None
+
+    def start(self) -> None:
+        """Offer the services; those that somebody offers already stay his."""
+        session = self._session = self._gateway.open("rosapi")
+        for name, (base, answer) in self._table().items():
+            if not self._graph.has_service(PREFIX + name):
+                srvtype = f"rosapi_msgs/srv/{base}"
+                session.offer(PREFIX + name, srvtype, self._handler(srvtype, answer))
+
+    def stop(self) -> None:
+        """Take them back."""
+        if self._session is not None:
+            self._session.close()
+            self._session = None
+
+    def _handler(self, srvtype: str, answer: Answer) -> Callable[[Any, Reply], None]:
+        def handle(request: Any, reply: Reply) -> None:
+            try:
+                plain = answer(request)
+                reply.answer(self._plain.decode(plain, f"{srvtype}_Response"))
+            except GraphError as error:
+                reply.fail(error)
+
+        return handle
+
+    def _table(self) -> dict[str, tuple[str, Answer]]:
+        """Services by name: their type and what answers."""
+        return {
+            "topics": ("Topics", self._topics),
+            "topics_for_type": ("TopicsForType", self._topics_for_type),
+            "topic_type": ("TopicType", self._topic_type),
+            "topics_and_raw_types": ("TopicsAndRawTypes", self._topics_and_raw_types),
+            "services": ("Services", lambda _: {"services": list(self._graph.services())}),
+            "services_for_type": ("ServicesForType", self._services_for_type),
+            "service_type": ("ServiceType", lambda r: {"type": self._service_type(r.service)}),
+            "service_providers": ("ServiceProviders", self._service_providers),
+            "service_node": ("ServiceNode", lambda r: {"node": self._service_node(r.service)}),
+            "nodes": ("Nodes", lambda _: {"nodes": [SIMULATION_NODE, *self._sessions()]}),
+            "node_details": ("NodeDetails", self._node_details),
+            "publishers": ("Publishers", self._publishers),
+            "subscribers": ("Subscribers", self._subscribers),
+            "message_details": ("MessageDetails", lambda r: self._details(r.type, "msg", "")),
+            "service_request_details": (
+                "ServiceRequestDetails",
+                lambda r: self._details(r.type, "srv", "_Request"),
+            ),
+            "service_response_details": (
+                "ServiceResponseDetails",
+                lambda r: self._details(r.type, "srv", "_Response"),
+            ),
+            "get_param": ("GetParam", self._get_param),
+            "set_param": ("SetParam", self._set_param),
+            "has_param": ("HasParam", self._has_param),
+            "delete_param": ("DeleteParam", self._delete_param),
+            "get_param_names": ("GetParamNames", lambda _: {"names": self._parameters.names()}),
+            "search_param": ("SearchParam", self._search_param),
+            "get_time": ("GetTime", self._time),
+            "get_ros_version": ("GetROSVersion", self._version),
+            "action_servers": ("GetActionServers", self._action_servers),
+            "action_type": ("ActionType", lambda r: {"type": self._action_type(r.action)}),
+            "interfaces": ("Interfaces", self._interfaces),
+        }
+
+    def _name(self, msgtype: str) -> str:
+        return display_name(msgtype, ros1=self._ros1)
+
+    # ------------------------------------------------------------------------------------ topics
+
+    def _topics(self, _: Any) -> dict[str, Any]:
+        topics = self._graph.topics()
+        return {
+            "topics": [t.name for t in topics],
+            "types": [self._name(t.msgtype) for t in topics],
+        }
+
+    def _topics_for_type(self, request: Any) -> dict[str, Any]:
+        wanted = ros2_name(request.type)
+        return {"topics": [t.name for t in self._graph.topics() if t.msgtype == wanted]}
+
+    def _topic_type(self, request: Any) -> dict[str, Any]:
+        msgtype = self._graph.topic_type(absolute(request.topic))
+        return {"type": self._name(msgtype) if msgtype else ""}
+
+    def _topics_and_raw_types(self, _: Any) -> dict[str, Any]:
+        topics = self._graph.topics()
+        texts = {t.msgtype: "" for t in topics}
+        for msgtype in texts:
+            texts[msgtype] = full_text(msgtype, ros1=self._ros1)
+        return self._topics(None) | {"typedefs_full_text": [texts[t.msgtype] for t in topics]}
+
+    def _publishers(self, request: Any) -> dict[str, Any]:
+        topic = absolute(request.topic)
+        nodes = [node for node, info in self._sessions().items() if topic in info.publishes]
+        found = self._topic(topic)
+        own = [SIMULATION_NODE] if found and found.publishers > len(nodes) else []
+        return {"publishers": own + nodes}
+
+    def _subscribers(self, request: Any) -> dict[str, Any]:
+        topic = absolute(request.topic)
+        sessions = self._sessions().items()
+        nodes = [node for node, info in sessions if topic in _topics_of(info)]
+        found = self._topic(topic)
+        own = [SIMULATION_NODE] if found and found.subscribers > len(nodes) else []
+        return {"subscribers": own + nodes}
+
+    def _topic(self, topic: str) -> TopicInfo | None:
+        return next((t for t in self._graph.topics() if t.name == topic), None)
+
+    # ---------------------------------------------------------------------- services and actions
+
+    def _services_for_type(self, request: Any) -> dict[str, Any]:
+        wanted = ros2_name(request.type, "srv")
+        services = self._graph.services().items()
+        return {"services": [name for name, srvtype in services if srvtype == wanted]}
+
+    def _service_type(self, service: str) -> str:
+        srvtype = self._graph.services().get(absolute(service))
+        return self._name(srvtype) if srvtype else ""
+
+    def _service_node(self, service: str) -> str:
+        name = absolute(service)
+        if not self._graph.has_service(name):
+            return ""
+        sessions = self._sessions().items()
+        return next((node for node, info in sessions if name in info.offers), SIMULATION_NODE)
+
+    def _service_providers(self, request: Any) -> dict[str, Any]:
+        node = self._service_node(request.service)
+        return {"providers": [node] if node else []}
+
+    def _action_servers(self, _: Any) -> dict[str, Any]:
+        return {"action_servers": list(self._actions())}
+
+    def _action_type(self, action: str) -> str:
+        action_type = self._actions().get(absolute(action))
+        return self._name(action_type) if action_type else ""
+
+    # ------------------------------------------------------------------------------------- nodes
+
+    def _sessions(self) -> dict[str, SessionInfo]:
+        """Sessions by the name that each has as a node."""
+        found: dict[str, SessionInfo] = {}
+        for info in self._gateway.sessions():
+            base = "/" + re.sub(r"\W+", "_", info.name, flags=re.ASCII).strip("_")
+            name, number = base, 2
+            while name in found:
+                name, number = f"{base}_{number}", number + 1
+            found[name] = info
+        return found
+
+    def _node_details(self, request: Any) -> dict[str, Any]:
+        node = absolute(request.node)
+        info = self._sessions().get(node)
+        if info is not None:
+            return {
+                "subscribing": sorted(_topics_of(info)),
+                "publishing": list(info.publishes),
+                "services": list(info.offers),
+            }
+        if node != SIMULATION_NODE:
+            return {}
+        sessions = list(self._sessions().values())
+        offered = {name for info in sessions for name in info.offers}
+        subscribing, publishing = [], []
+        for topic in self._graph.topics():
+            if topic.publishers > sum(topic.name in info.publishes for info in sessions):
+                publishing.append(topic.name)
+            if topic.subscribers > sum(topic.name in _topics_of(info) for info in sessions):
+                subscribing.append(topic.name)
+        services = [name for name in self._graph.services() if name not in offered]
+        return {"subscribing": subscribing, "publishing": publishing, "services": services}
+
+    # --------------------------------------------------------------------------- types, time
+
+    def _details(self, name: str, kind: Any, part: str) -> dict[str, Any]:
+        msgtype = ros2_name(name, kind) + part
+        typedefs = type_definitions(msgtype, ros1=self._ros1)
+        if not part:
+            typedefs[0]["type"] = name
+        return {"typedefs": typedefs}
+
+    def _interfaces(self, _: Any) -> dict[str, Any]:
+        topics = {t.msgtype for t in self._graph.topics()}
+        used = topics | set(self._graph.services().values()) | set(self._actions().values())
+        return {"interfaces": sorted(self._name(name) for name in used)}
+
+    def _time(self, _: Any) -> dict[str, Any]:
+        sec, nanosec = stamp_from_ns(self._now_ns())
+        return {"time": {"sec": sec, "nanosec": nanosec}}
+
+    def _version(self, _: Any) -> dict[str, Any]:
+        return (
+            {"version": 1, "distro": "noetic"}
+            if self._ros1
+            else {
+                "version": 2,
+                "distro": "jazzy",
+            }
+        )
+
+    # -------------------------------------------------------------------------------- parameters
+
+    def _get_param(self, request: Any) -> dict[str, Any]:
+        value = self._parameters.get(request.name)
+        if value is None and not request.default_value:
+            why = f"no parameter '{request.name}'"
+            return {"value": "null", "successful": False, "reason": why}
+        return {"value": request.default_value if value is None else value, "successful": True}
+
+    def _set_param(self, request: Any) -> dict[str, Any]:
+        return _tried(lambda: self._parameters.set(request.name, request.value))
+
+    def _delete_param(self, request: Any) -> dict[str, Any]:
+        return _tried(lambda: self._parameters.delete(request.name))
+
+    def _has_param(self, request: Any) -> dict[str, Any]:
+        return {"exists": self._parameters.get(request.name) is not None}
+
+    def _search_param(self, request: Any) -> dict[str, Any]:
+        found = self._parameters.get(request.name) is not None
+        return {"global_name": absolute(request.name) if found else ""}
+
+
+def _topics_of(info: SessionInfo) -> set[str]:
+    return {mailbox.topic for mailbox in info.mailboxes}
+
+
+def _tried(action: Callable[[], None]) -> dict[str, Any]:
+    """How an action went, as rosapi tells it."""
+    try:
+        action()
+    except GraphError as error:
+        return {"successful": False, "reason": str(error)}
+    return {"successful": True}

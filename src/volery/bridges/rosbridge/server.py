@@ -1,0 +1,307 @@
+"""rosbridge v2 server: a door for roslib, roslibpy, Foxglove, ROS# and web pages."""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import itertools
+import logging
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from http import HTTPStatus
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+from weakref import WeakSet
+
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from volery.bridges.doors import check_address, wake_of
+from volery.bridges.rosbridge.forms import Forms, Generation
+from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared, shows_token
+from volery.bridges.rosbridge.rosapi import Parameters, RosApi
+from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES
+from volery.core.errors import BridgeError
+from volery.graph.session import Gateway
+
+_log = logging.getLogger(__name__)
+
+LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
+DEFAULT_PORT = 9090
+MOST_CLIENTS = 1000
+
+_LONGEST_SILENCE_S = 10.0
+"""Time a client has to show its token."""
+_FRAMES_A_TURN = 32
+"""Frames sent before other clients get their turn, though the network takes more."""
+
+
+class RosbridgeServer:
+    """Serves clients of the graph over WebSocket.
+
+    Whoever reaches the port commands the UAVs. So it listens on loopback unless `anywhere` is set,
+    and then asks for a token: as `{"op": "auth", "token": ...}` (also what roslib's `authenticate`
+    sends as `mac`), as `?token=` in the URL, or in the header `Authorization: Bearer`.
+
+    A web page of a stranger, open in a browser on this machine, reaches loopback too. Browsers tell
+    whose page it is, and only pages from localhost, from the very address that is connected to, and
+    from `origins` are let in. Programs tell no origin and are let in.
+
+    A client that does not read loses messages of its own; it delays nobody and is dismissed when it
+    answers no pings.
+
+    Parameters
+    ----------
+    host, port
+        Where to listen; port 0 takes a free one, see `port`.
+    path
+        The only path served, such as `/rosbridge`; None: every path.
+    token
+        What clients must show; needed beyond loopback.
+    anywhere
+        Consent to listening beyond loopback.
+    max_message_bytes
+        Largest message taken from a client.
+    generation
+        Spelling and serialization that clients are given: `ros1` has `secs` and `nsecs`, types as
+        `std_msgs/String` and ROS 1 bytes in CBOR-RAW, `ros2` has `sec` and `nanosec`,
+        `std_msgs/msg/String` and CDR. Both are always understood.
+    origins
+        Further web origins to let in, such as `https://studio.example.org`.
+    keepalive_s
+        Time between two pings, and how long an answer may take; None: no pings.
+
+    """
+
+    def __init__(
+        self,
+        host: str = "127.0.0.1",
+        port: int = DEFAULT_PORT,
+        path: str | None = None,
+        token: str | None = None,
+        anywhere: bool = False,
+        max_message_bytes: int = MOST_MESSAGE_BYTES,
+        generation: Generation = "ros2",
+        origins: Sequence[str] = (),
+        keepalive_s: float | None = 20.0,
+        parameters: Parameters | None = None,
+    ) -> None:
+        self.host = host
+        self.port = port
+        self._path = path
+        self._token = token or None
+        self._anywhere = anywhere
+        self._most_bytes = max_message_bytes
+        self._generation: Generation = generation
+        self._origins = frozenset(origins)
+        self._keepalive_s = keepalive_s
+        self._parameters = parameters
+        self._server: Server | None = None
+        self._rosapi: RosApi | None = None
+        self._clients: set[ServerConnection] = set()
+        self._shown: WeakSet[ServerConnection] = WeakSet()
+        """Clients whose request for a connection carried the token."""
+        self._gateway: Gateway | None = None
+        self._shared = Shared()
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"rosbridge ws://{host}:{self.port}{self._path or ''}"
+
+    @property
+    def clients(self) -> int:
+        """How many are connected."""
+        return len(self._clients)
+
+    async def start(self, gateway: Gateway) -> None:
+        """Begin to serve.
+
+        Raises
+        ------
+        BridgeError
+            The address is taken, not this machine's, or beyond loopback without consent and token.
+
+        """
+        check_address(self.host, anywhere=self._anywhere, flag="--allow-remote and --token")
+        if self.host not in LOOPBACK and self._token is None:
+            raise BridgeError(f"{self.host} can be reached from other machines: set a --token")
+        graph = gateway.graph
+        self._gateway = gateway
+        self._shared = Shared(Forms(self._generation), graph._now_ns, self._token, self._most_bytes)
+        try:
+            self._server = await serve(
+                self._serve,
+                self.host,
+                self.port,
+                process_request=self._check_request,
+                select_subprotocol=_select_subprotocol,
+                compression=None,  # deflating would cost more time than loopback and LANs do
+                max_size=self._most_bytes,
+                ping_interval=self._keepalive_s,
+                ping_timeout=self._keepalive_s,
+                close_timeout=1.0,
+            )
+        except OSError as error:
+            raise BridgeError(
+                f"rosbridge cannot listen on {self.host}:{self.port}: {error.strerror or error}; "
+                f"end the program that has the port, or choose another: --door rosbridge=PORT"
+            ) from None
+        self.port = next(iter(self._server.sockets)).getsockname()[1]
+        self._rosapi = RosApi(gateway, self._generation, graph._now_ns, self._parameters)
+        self._rosapi.start()
+
+    async def stop(self) -> None:
+        """Let everybody go."""
+        if self._rosapi is not None:
+            self._rosapi.stop()
+            self._rosapi = None
+        if self._server is not None:
+            self._server.close()
+            await self._server.wait_closed()
+            self._server = None
+
+    # ------------------------------------------------------------------------------- who may come
+
+    def _check_request(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Refuse strangers before they are connected."""
+        url = urlsplit(request.path)
+        if self._path is not None and url.path.rstrip("/") != self._path.rstrip("/"):
+            return connection.respond(HTTPStatus.NOT_FOUND, f"rosbridge is at {self._path}\n")
+        origin = request.headers.get("Origin")
+        if origin is not None and not self._knows(origin, request.headers.get("Host", "")):
+            return connection.respond(
+                HTTPStatus.FORBIDDEN, f"pages of {origin} are not let in; list it in `origins`\n"
+            )
+        given = parse_qs(url.query).get("token", [None])[0]
+        scheme, _, bearer = request.headers.get("Authorization", "").partition(" ")
+        if given is None and scheme.lower() == "bearer":
+            given = bearer.strip()
+        if given is not None and not shows_token(given, self._token):
+            return connection.respond(HTTPStatus.UNAUTHORIZED, "wrong token\n")
+        if len(self._clients) >= MOST_CLIENTS:
+            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "too many clients\n")
+        if given is not None:
+            self._shown.add(connection)
+        return None
+
+    def _knows(self, origin: str, host: str) -> bool:
+        """Whether pages of an origin are let in."""
+        if origin in self._origins:
+            return True
+        page = urlsplit(origin).hostname
+        if page is None:  # "null": a file, or a page that hides where it is from
+            return False
+        if page in LOOPBACK:
+            return True
+        # A name may be made to point here by whoever owns it, so only an address proves the page
+        # to be from where it connects to; where a token is asked for, a name will do.
+        same = page == urlsplit(f"//{host}").hostname
+        return same and (_is_address(page) or self._token is not None)
+
+    # -------------------------------------------------------------------------------- one client
+
+    async def _serve(self, connection: ServerConnection) -> None:
+        assert self._gateway is not None
+        loop = asyncio.get_running_loop()
+        address = connection.remote_address or ("?", 0)
+        session = self._gateway.open(f"rosbridge {address[0]}:{address[1]}")
+        bell = _Bell(loop)
+
+        def post(action: Any) -> None:
+            wake_of(loop, action)()
+
+        peer = RosbridgePeer(
+            session,
+            self._shared,
+            wake=bell.ring,
+            post=post,
+            authorized=connection in self._shown,
+        )
+        self._clients.add(connection)
+        read = asyncio.Event()
+        tasks = [
+            asyncio.create_task(_read(connection, peer, read)),
+            asyncio.create_task(_write(connection, peer, bell, read)),
+        ]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._clients.discard(connection)
+            peer.close()
+            for task in tasks:
+                task.cancel()
+            for outcome in await asyncio.gather(*tasks, return_exceptions=True):
+                if isinstance(outcome, Exception) and not isinstance(outcome, ConnectionClosed):
+                    _log.error("serving %s failed", session.name, exc_info=outcome)
+
+
+class _Bell:
+    """Wakes a writer from any thread; rung often before it is heard, it costs the ringer once."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self.heard = asyncio.Event()
+        self._wake = wake_of(loop, self.heard.set)
+        self._rung = False
+
+    def ring(self) -> None:
+        if not self._rung:
+            self._rung = True
+            self._wake()
+
+    def silence(self) -> None:
+        """Called before looking at what there is: who rings afterwards is heard again."""
+        self.heard.clear()
+        self._rung = False
+
+
+async def _read(connection: ServerConnection, peer: RosbridgePeer, read: asyncio.Event) -> None:
+    """Hand the client's frames to its peer until it leaves or must go."""
+    while peer.refused is None:
+        silence_s = None if peer.authorized else _LONGEST_SILENCE_S
+        try:
+            frame = await asyncio.wait_for(connection.recv(), silence_s)
+        except TimeoutError:
+            await connection.close(1008, "no token was shown")
+            return
+        peer.receive(frame, time.monotonic())
+        while peer.congested:  # it asks for more than it reads
+            read.clear()
+            await read.wait()
+    for answer in peer.frames(time.monotonic()):
+        await connection.send(answer)
+    await connection.close(1008, peer.refused[:100])
+
+
+async def _write(
+    connection: ServerConnection, peer: RosbridgePeer, bell: _Bell, read: asyncio.Event
+) -> None:
+    """Send what the peer has to say, as fast as the client reads."""
+    turns = itertools.count(1)
+    while True:
+        bell.silence()
+        for frame in peer.frames(time.monotonic()):
+            await connection.send(frame)
+            read.set()
+            if next(turns) % _FRAMES_A_TURN == 0:
+                await asyncio.sleep(0)
+        read.set()
+        now_s = time.monotonic()
+        due_s = peer.due_s(now_s)
+        with suppress(TimeoutError):
+            await asyncio.wait_for(bell.heard.wait(), None if due_s is None else due_s - now_s)
+
+
+def _select_subprotocol(_connection: ServerConnection, offered: Sequence[Any]) -> Any:
+    return CBOR_PROTOCOL if CBOR_PROTOCOL in offered else None
+
+
+def _is_address(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,203 @@
+"""Services of one rosbridge client: those it calls, and those it offers."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+from volery.bridges.rosbridge.fields import (
+    Id,
+    absolute,
+    read_choice,
+    read_id,
+    read_number,
+    read_text,
+    with_id,
+)
+from volery.bridges.rosbridge.forms import Forms
+from volery.bridges.rosbridge.wire import Operation
+from volery.core.errors import BridgeError, GraphError
+from volery.graph.definition_store import EMPTY_MEMBER
+from volery.graph.json_decoding import decode_plain
+from volery.graph.messages import typestore
+from volery.graph.reply import Reply
+from volery.graph.ros1_names import ros2_name
+from volery.graph.session import Session
+
+MOST_CALLS = 1000
+"""Open calls of one client, and open requests to it."""
+
+Send = Callable[[Operation, int | None, str], None]
+"""Sends an operation, with a fragment size and a compression."""
+Post = Callable[[Callable[[], None]], None]
+"""Has a function called in the client's thread, from any other."""
+
+
+class Services:
+    """The services of one client. Its methods belong to the client's thread."""
+
+    def __init__(self, session: Session, forms: Forms, send: Send, post: Post) -> None:
+        self._session = session
+        self._forms = forms
+        self._send = send
+        self._post = post
+        self._calls: dict[int, tuple[float, Reply]] = {}
+        self._call_numbers = itertools.count()
+        self._offers: dict[str, tuple[str, str]] = {}
+        self._requests: dict[str, tuple[str, str, Reply]] = {}
+        self._request_numbers = itertools.count(1)
+
+    # ------------------------------------------------------------------------------------- calls
+
+    def call(self, operation: Operation, now_s: float) -> None:
+        """Call a service for the client."""
+        name, key = read_text(operation, "service"), read_id(operation)
+        fragment_size = int(read_number(operation, "fragment_size", 0, 0, 1e9)) or None
+        compression = read_choice(operation, "compression", ("none", "png", "cbor", "cbor-raw"))
+        compression = "cbor" if compression == "cbor-raw" else compression
+        timeout_s = read_number(operation, "timeout", 0, 0, 1e9)
+
+        def respond(values: Any, success: bool) -> None:
+            response = {"op": "service_response", "service": name, "values": values}
+            self._send(with_id(response | {"result": success}, key), fragment_size, compression)
+
+        try:
+            service, srvtype = self._find(name)
+            request = decode_plain(
+                _arguments(operation, f"{srvtype}_Request"), f"{srvtype}_Request"
+            )
+        except (GraphError, BridgeError) as error:
+            respond(str(error), False)
+            return
+        self._ask(service, srvtype, request, respond, now_s + timeout_s if timeout_s else None)
+
+    def _ask(
+        self,
+        service: str,
+        srvtype: str,
+        request: Any,
+        respond: Callable[[Any, bool], None],
+        deadline_s: float | None,
+    ) -> None:
+        if len(self._calls) >= MOST_CALLS:
+            respond(f"more than {MOST_CALLS} calls are open", False)
+            return
+        number = next(self._call_numbers)
+
+        def answer(response: Any) -> None:
+            if self._calls.pop(number, None) is None:
+                return
+            try:
+                respond(self._forms.plain(response, f"{srvtype}_Response"), True)
+            except GraphError as error:
+                respond(str(error), False)
+
+        def fail(error: GraphError) -> None:
+            if self._calls.pop(number, None) is not None:
+                respond(str(error), False)
+
+        reply = Reply(
+            lambda response: self._post(lambda: answer(response)),
+            lambda error: self._post(lambda: fail(error)),
+        )
+        self._calls[number] = (float("inf") if deadline_s is None else deadline_s, reply)
+        self._session.call(service, request, reply)
+
+    def _find(self, name: str) -> tuple[str, str]:
+        """Name in the graph, and type, of what a client calls `/add` or, long ago, `/add#3`."""
+        service = absolute(name.partition("#")[0])
+        srvtype = self._session.graph.services().get(service)
+        if srvtype is None:
+            raise GraphError(f"nobody offers service '{service}'")
+        return service, srvtype
+
+    def expire(self, now_s: float) -> None:
+        """Fail calls whose time is over."""
+        late = [reply for deadline_s, reply in self._calls.values() if deadline_s <= now_s]
+        for reply in late:
+            reply.fail(GraphError("no answer in time"))
+
+    def due_s(self) -> float | None:
+        """When the next call's time is over; None if there is no such."""
+        deadline_s = min((deadline_s for deadline_s, _ in self._calls.values()), default=None)
+        return None if deadline_s == float("inf") else deadline_s
+
+    # ------------------------------------------------------------------------------------ offers
+
+    def advertise(self, operation: Operation) -> None:
+        """Offer a service of the client's; a second time of the same type nothing changes."""
+        name = read_text(operation, "service")
+        srvtype = ros2_name(read_text(operation, "type"), "srv")
+        if f"{srvtype}_Request" not in typestore().types:
+            raise GraphError(f"service type '{srvtype}' is not known")
+        service = absolute(name)
+        if service in self._offers:
+            if self._offers[service] == (name, srvtype):
+                return
+            self._session.withdraw(service)
+
+        def handle(request: Any, reply: Reply) -> None:
+            self._post(lambda: self._request(name, srvtype, request, reply))
+
+        self._offers.pop(service, None)
+        self._session.offer(service, srvtype, handle)
+        self._offers[service] = (name, srvtype)
+
+    def unadvertise(self, operation: Operation) -> None:
+        """Offer a service no more; open requests fail."""
+        service = absolute(read_text(operation, "service"))
+        self._session.withdraw(service)
+        self._offers.pop(service, None)
+
+    def _request(self, name: str, srvtype: str, request: Any, reply: Reply) -> None:
+        """Hand a request to the client."""
+        if len(self._requests) >= MOST_CALLS:
+            reply.fail(GraphError(f"service '{name}': its server is busy"))
+            return
+        number = f"call_service:{name}:{next(self._request_numbers)}"
+        try:
+            args = self._forms.plain(request, f"{srvtype}_Request")
+            self._requests[number] = (absolute(name), srvtype, reply)
+            reply.when_done(lambda: self._post(lambda: self._forget(number)))
+            operation = {"op": "call_service", "id": number, "service": name, "args": args}
+            self._send(operation, None, "none")
+        except (GraphError, BridgeError) as error:
+            reply.fail(GraphError(str(error)))
+
+    def _forget(self, number: str) -> None:
+        self._requests.pop(number, None)
+
+    def respond(self, operation: Operation) -> None:
+        """Take the client's response to a request."""
+        number: Id = read_id(operation)
+        found = self._requests.pop(number, None) if isinstance(number, str) else None
+        if found is None:
+            raise BridgeError("service_response: no open request has this 'id'")
+        service, srvtype, reply = found
+        values = operation.get("values", {})
+        if operation.get("result", True) is not True:
+            why = values if isinstance(values, str) else "its server says that it failed"
+            reply.fail(GraphError(f"service '{service}': {why}"))
+            return
+        try:
+            response = decode_plain({} if values is None else values, f"{srvtype}_Response")
+        except GraphError as error:
+            reply.fail(GraphError(f"service '{service}' answered wrongly: {error}"))
+            raise
+        reply.answer(response)
+
+
+def _arguments(operation: Operation, msgtype: str) -> Any:
+    """Arguments as an object, also where they came as a list in the order of the fields."""
+    args = operation.get("args")
+    if args is None:
+        return {}
+    if not isinstance(args, list):
+        return args
+    names = [name for name, _ in typestore().fielddefs[msgtype][1] if name != EMPTY_MEMBER]
+    if len(args) == 1 and isinstance(args[0], dict) and not set(args[0]) - set(names):
+        return args[0]
+    if len(args) > len(names):
+        raise BridgeError(f"call_service: {len(args)} arguments for {len(names)} fields")
+    return dict(zip(names, args, strict=False))

@@ -1,0 +1,270 @@
+"""Topics of one rosbridge client: what it publishes, and streams of what it subscribed to."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from volery.bridges.rosbridge.fields import (
+    Id,
+    absolute,
+    read_choice,
+    read_id,
+    read_number,
+    read_optional_text,
+    read_text,
+)
+from volery.bridges.rosbridge.forms import COMPRESSIONS
+from volery.bridges.rosbridge.wire import Operation
+from volery.core.clock import stamp_from_ns
+from volery.core.errors import BridgeError, GraphError
+from volery.graph.json_decoding import decode_plain
+from volery.graph.messages import Published, typestore
+from volery.graph.ros1_names import ros2_name
+from volery.graph.session import DEFAULT_DEPTH, MOST_DEPTH, Mailbox, Session
+
+MOST_STREAMS = 10_000
+"""Topics that a client may subscribe to, and publish on."""
+MOST_REQUESTS = 1000
+"""Subscriptions of one topic by one client."""
+
+_HEADER = "std_msgs/msg/Header"
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """How one subscription wants its messages."""
+
+    throttle_s: float = 0.0
+    """Least time between two messages."""
+    queue_length: int = 0
+    """Messages that wait at most; 0: one if throttled, else the usual depth."""
+    fragment_size: int | None = None
+    """Characters a fragment."""
+    compression: str = "none"
+
+    @property
+    def depth(self) -> int:
+        """Length of the mailbox."""
+        if self.queue_length:
+            return self.queue_length
+        return 1 if self.throttle_s else DEFAULT_DEPTH
+
+
+def read_wishes(operation: Operation) -> Wishes:
+    """Wishes of a `subscribe` operation. `BridgeError` for values that cannot be."""
+    size = read_number(operation, "fragment_size", 0, 0, 1e9)
+    return Wishes(
+        read_number(operation, "throttle_rate", 0, 0, 1e9) / 1000.0,
+        int(read_number(operation, "queue_length", 0, 0, MOST_DEPTH)),
+        int(size) or None,
+        read_choice(operation, "compression", COMPRESSIONS),
+    )
+
+
+def combine(wishes: list[Wishes]) -> Wishes:
+    """What satisfies all: lowest throttle, longest queue, smallest fragments, most compact form."""
+    sizes = [w.fragment_size for w in wishes if w.fragment_size]
+    return Wishes(
+        min(w.throttle_s for w in wishes),
+        max(w.queue_length for w in wishes),
+        min(sizes) if sizes else None,
+        max((w.compression for w in wishes), key=COMPRESSIONS.index),
+    )
+
+
+class Stream:
+    """One topic on its way to one client."""
+
+    def __init__(self, name: str, msgtype: str | None) -> None:
+        self.name = name
+        """As the client calls the topic."""
+        self.msgtype = msgtype
+        self.requests: dict[Id, Wishes] = {}
+        self.wishes = Wishes()
+        self.mailbox: Mailbox | None = None
+        self._depth = 0
+        self._left: deque[Published] = deque()
+        """What waited in a mailbox that another one has replaced."""
+        self._next_s = float("-inf")
+
+    def tune(self, session: Session, wake: Callable[[], None], *, anew: bool) -> None:
+        """Fit the mailbox to the requests.
+
+        anew: somebody joined, who shall get what is latched though it was sent before.
+        """
+        self.wishes = combine(list(self.requests.values()))
+        depth = self.wishes.depth
+        latched = anew and self.mailbox is not None and bool(_latched(session, self.name))
+        if depth == self._depth and not latched:
+            return
+        topic = absolute(self.name)
+        mailbox = session.subscribe(topic, self.msgtype, depth=depth, wake=wake)
+        waiting: list[Published] = []
+        if self.mailbox is not None:
+            session.unsubscribe(self.mailbox)
+            waiting = self.mailbox.take()
+        # both mailboxes were open for a moment: what came meanwhile lies in both
+        seen = {id(published) for published in (*self._left, *waiting)}
+        new = [published for published in mailbox.take() if id(published) not in seen]
+        self._left = deque((*self._left, *waiting, *new), maxlen=depth)
+        self.mailbox, self._depth = mailbox, depth
+
+    def take(self, now_s: float) -> Published | None:
+        """The next message, if there is one and its time has come."""
+        if now_s < self._next_s or self.mailbox is None:
+            return None
+        if self._left:
+            found = self._left.popleft()
+        else:
+            taken = self.mailbox.take(1)
+            if not taken:
+                return None
+            found = taken[0]
+        if self.wishes.throttle_s:
+            self._next_s = now_s + self.wishes.throttle_s
+        return found
+
+    def due_s(self, now_s: float) -> float | None:
+        """When to look again; None until the mailbox wakes."""
+        if self.mailbox is None or not (self._left or self.mailbox.info.waiting):
+            return None
+        return max(now_s, self._next_s)
+
+
+def _latched(session: Session, name: str) -> bool:
+    topic = absolute(name)
+    return any(info.name == topic and info.latched for info in session.graph.topics())
+
+
+class Topics:
+    """The topics of one client."""
+
+    def __init__(
+        self, session: Session, wake: Callable[[], None], now_ns: Callable[[], int]
+    ) -> None:
+        self._session = session
+        self._wake = wake
+        self._now_ns = now_ns
+        self._streams: dict[str, Stream] = {}
+        self._published: dict[str, str] = {}
+        self._ready: deque[Stream] = deque()
+        """Streams whose mailboxes have woken; the simulation's thread appends."""
+        self._held: list[Stream] = []
+        """Streams with messages whose time has not come."""
+
+    def advertise(self, operation: Operation) -> None:
+        """Announce a topic that the client will publish on."""
+        topic = absolute(read_text(operation, "topic"))
+        msgtype = ros2_name(read_text(operation, "type"))
+        if topic not in self._published and len(self._published) >= MOST_STREAMS:
+            raise BridgeError(f"advertise: more than {MOST_STREAMS} topics")
+        self._session.advertise(topic, msgtype, latched=operation.get("latch") is True)
+        self._published[topic] = msgtype
+
+    def unadvertise(self, operation: Operation) -> None:
+        """Take an announcement back."""
+        topic = absolute(read_text(operation, "topic"))
+        self._session.unadvertise(topic)
+        self._published.pop(topic, None)
+
+    def publish(self, operation: Operation) -> None:
+        """Publish a message; a topic that exists need not be announced."""
+        topic = absolute(read_text(operation, "topic"))
+        msgtype = self._published.get(topic)
+        if msgtype is None:
+            known = self._session.graph.topic_type(topic)
+            if known is None:
+                raise BridgeError(f"publish: no topic '{topic}'; advertise it first")
+            self.advertise({"op": "publish", "topic": topic, "type": known})
+            msgtype = known
+        plain = operation.get("msg", {})
+        message = decode_plain(plain, msgtype)
+        if isinstance(plain, dict):
+            self._stamp(message, plain, msgtype)
+        self._session.publish(topic, message)
+
+    def _stamp(self, message: Any, plain: dict[str, Any], msgtype: str) -> None:
+        """Give a header that came without a stamp the present time, as rosbridge does."""
+        fields = typestore().fielddefs[msgtype][1]
+        if not fields or fields[0][0] != "header" or fields[0][1][1] != _HEADER:
+            return
+        given = plain.get("header")
+        if not given or "stamp" not in given:
+            stamp = message.header.stamp
+            stamp.sec, stamp.nanosec = stamp_from_ns(self._now_ns())
+
+    def subscribe(self, operation: Operation) -> None:
+        """Begin to send a topic, or fit its stream to one more request."""
+        name, key = read_text(operation, "topic"), read_id(operation)
+        given = read_optional_text(operation, "type")
+        msgtype = ros2_name(given) if given not in (None, "*") else None
+        wishes = read_wishes(operation)
+        stream = self._streams.get(name)
+        if stream is None:
+            if len(self._streams) >= MOST_STREAMS:
+                raise BridgeError(f"subscribe: more than {MOST_STREAMS} topics")
+            stream = Stream(name, msgtype)
+        elif msgtype and msgtype != self._session.graph.topic_type(absolute(name)):
+            raise GraphError(f"topic '{name}' is subscribed to with another type than {msgtype}")
+        if key not in stream.requests and len(stream.requests) >= MOST_REQUESTS:
+            raise BridgeError(f"subscribe: more than {MOST_REQUESTS} subscriptions of '{name}'")
+        before = stream.requests.get(key)
+        stream.requests[key] = wishes
+        try:
+            self._tune(stream, anew=True)
+        except GraphError:
+            if before is None:
+                del stream.requests[key]
+            raise
+        self._streams[name] = stream
+
+    def unsubscribe(self, operation: Operation) -> None:
+        """End one subscription of a topic, or all of them where none is named."""
+        name, key = read_text(operation, "topic"), read_id(operation)
+        stream = self._streams.get(name)
+        if stream is None or (key is not None and key not in stream.requests):
+            raise BridgeError(f"unsubscribe: no such subscription of '{name}'")
+        if key is None:
+            stream.requests.clear()
+        else:
+            del stream.requests[key]
+        if stream.requests:
+            self._tune(stream, anew=False)
+            return
+        del self._streams[name]
+        if stream.mailbox is not None:
+            self._session.unsubscribe(stream.mailbox)
+
+    def take(self, now_s: float) -> Iterator[tuple[Stream, Published]]:
+        """Messages whose time has come, in turn one of every stream."""
+        ready = [self._ready.popleft() for _ in range(len(self._ready))]
+        busy = list(dict.fromkeys((*self._held, *ready)))
+        self._held = []
+        while busy:
+            still = []
+            for stream in busy:
+                if not stream.requests:  # left while others were being sent
+                    continue
+                published = stream.take(now_s)
+                if published is not None:
+                    yield stream, published
+                    still.append(stream)
+                elif stream.due_s(now_s) is not None:
+                    self._held.append(stream)
+            busy = still
+
+    def due_s(self, now_s: float) -> float | None:
+        """When to `take` again without being woken; None if there is nothing to wait for."""
+        times = [stream.due_s(now_s) for stream in self._held if stream.requests]
+        return min((time for time in times if time is not None), default=None)
+
+    def _tune(self, stream: Stream, *, anew: bool) -> None:
+        def wake() -> None:
+            self._ready.append(stream)
+            self._wake()
+
+        stream.tune(self._session, wake, anew=anew)
+        wake()  # what is latched, or waited in the mailbox before this one, is there already

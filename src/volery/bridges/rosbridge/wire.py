@@ -1,0 +1,146 @@
+"""Frames of rosbridge v2: operations as JSON text, as CBOR, inside PNG pictures.
+
+An operation is a dict with the key `op`. A text frame holds JSON, a binary frame CBOR. Large ones
+may travel as a PNG picture or in fragments (`bridges.rosbridge.fragments`).
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import math
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from volery.bridges.rosbridge.cbor_form import MOST_DEPTH, decode_cbor
+from volery.core.errors import BridgeError
+
+Frame = str | bytes
+"""What one WebSocket message carries."""
+Operation = dict[str, Any]
+
+CBOR_PROTOCOL = "rosbridge-cbor"
+"""WebSocket subprotocol by which a client learns that it may send CBOR."""
+MOST_MESSAGE_BYTES = 64 * 1024 * 1024
+"""Largest message a server takes unless told otherwise; a 4k rgb8 image has 25 MB."""
+
+_PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+
+
+def decode_frame(frame: Frame) -> Operation:
+    """Operation that a frame holds.
+
+    Raises
+    ------
+    BridgeError
+        It holds none.
+
+    """
+    found = decode_cbor(frame) if isinstance(frame, bytes) else _decode_json(frame)
+    if not isinstance(found, dict) or not isinstance(found.get("op"), str):
+        raise BridgeError("a message must be an object with the key 'op'")
+    return found
+
+
+def encode_json(operation: Operation) -> str:
+    """JSON text, pure ASCII. Arrays become lists, bytes base64, numbers that are not finite null.
+
+    Raises
+    ------
+    BridgeError
+        It holds what JSON cannot say.
+
+    """
+    try:
+        return _dump(operation)
+    except ValueError:
+        pass  # a number that is not finite, which is rare
+    except (TypeError, RecursionError) as error:
+        raise BridgeError(f"not writable as JSON: {error}") from None
+    try:
+        return _dump(_with_nulls(operation, 0))
+    except (ValueError, TypeError, RecursionError) as error:
+        raise BridgeError(f"not writable as JSON: {error}") from None
+
+
+def encode_png(text: str) -> str:
+    """Operation that carries JSON text as a picture: RGB, nearly square, padded with newlines."""
+    from PIL import Image
+
+    data = text.encode()
+    width = max(1, math.isqrt(len(data) // 3))
+    height = math.ceil(len(data) / (3 * width))
+    image = Image.frombytes("RGB", (width, height), data.ljust(3 * width * height, b"\n"))
+    file = BytesIO()
+    image.save(file, "png", compress_level=1)
+    return encode_json({"op": "png", "data": base64.b64encode(file.getvalue()).decode("ascii")})
+
+
+def decode_png(operation: Operation, most_bytes: int) -> Operation:
+    """Operation inside a picture whose pixels hold at most `most_bytes`.
+
+    Raises
+    ------
+    BridgeError
+        There is no picture, it is too large, or it holds no operation.
+
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    text = operation.get("data")
+    if not isinstance(text, str):
+        raise BridgeError("png: 'data' must be base64 text")
+    try:
+        data = base64.b64decode(text, validate=True)
+        if not data.startswith(_PNG_MAGIC):
+            raise BridgeError("png: 'data' is no PNG picture")
+        with Image.open(BytesIO(data), formats=("PNG",)) as image:
+            if 3 * image.width * image.height > most_bytes:
+                raise BridgeError(f"png: more than {most_bytes} bytes of pixels")
+            pixels = image.convert("RGB").tobytes()
+        inside = pixels.decode().rstrip("\n")
+    except (binascii.Error, UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+        raise BridgeError(f"png: not readable: {error}") from None
+    found = decode_frame(inside)
+    if found["op"] == "png":
+        raise BridgeError("png: a picture inside a picture")
+    return found
+
+
+def _decode_json(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise BridgeError(f"not readable as JSON: {error}") from None
+
+
+def _dump(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), allow_nan=False, default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    """What arrives as CBOR and leaves as JSON."""
+    if isinstance(value, np.ndarray):
+        if value.dtype == np.uint8:
+            return base64.b64encode(value.tobytes()).decode("ascii")
+        return value.tolist()
+    if isinstance(value, (bytes, bytearray)):
+        return base64.b64encode(value).decode("ascii")
+    raise TypeError(f"a {type(value).__name__}")
+
+
+def _with_nulls(value: Any, depth: int) -> Any:
+    if depth > 2 * MOST_DEPTH:
+        raise ValueError("nested too deeply")
+    if isinstance(value, dict):
+        return {key: _with_nulls(inner, depth + 1) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_with_nulls(inner, depth + 1) for inner in value]
+    if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+        return _with_nulls(value.tolist(), depth + 1)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

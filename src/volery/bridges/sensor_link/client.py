@@ -1,0 +1,192 @@
+"""The ROS side of the sensor link: it connects, and fills a graph of its own with what it gets.
+
+    with Doors(gateway) as doors:
+        doors.open(SensorLinkClient("127.0.0.1", 10100, image_port=10101))
+
+Everything that the environment measures appears under its topic (`/uav1/laser/horizontal/scan`);
+poses published on `/uavN/pose_command` and `/uavN/goal_pose` go to the environment. When the
+connection breaks it is made again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import deque
+
+from volery.bridges.doors import wake_of
+from volery.bridges.ros_tcp.inlet import Inlet
+from volery.bridges.sensor_link.commands import COMMAND_TOPICS
+from volery.bridges.sensor_link.payloads import (
+    PAYLOADS,
+    decode_notice,
+    decode_payload,
+    encode_payload,
+    stamp_of,
+)
+from volery.bridges.sensor_link.server import IMAGE_PORT, PORT
+from volery.bridges.sensor_link.wire import Frame, FrameParser, Kind, encode_frame
+from volery.core.errors import BridgeError, GraphError
+from volery.graph.session import Gateway, Mailbox, Session
+
+_READ_BYTES = 256 << 10
+_DEPTH = 20
+_AGAIN_S = (0.1, 0.2, 0.5, 1.0, 2.0)
+_MOST_UNSENT_BYTES = 64 << 10
+_NOTICES_KEPT = 100
+
+
+class SensorLinkClient:
+    """A door to an environment that speaks the sensor link.
+
+    image_port: None leaves images alone. Counters are for reading only.
+    """
+
+    def __init__(
+        self, host: str = "127.0.0.1", port: int = PORT, image_port: int | None = IMAGE_PORT
+    ) -> None:
+        self._host = host
+        self._port = port
+        self._image_port = image_port
+        self._tasks: list[asyncio.Task[None]] = []
+        self._writer: asyncio.StreamWriter | None = None
+        self._inlets: dict[str, Inlet] = {}
+        self._sequences: dict[tuple[int, str], int] = {}
+        self._commands: dict[tuple[Kind, int], Mailbox] = {}
+        self._sent = 0
+        self.received = 0
+        """Messages received."""
+        self.lost = 0
+        """Messages missing from the sequences."""
+        self.corrupt = 0
+        """Frames that came damaged on connections which have ended."""
+        self.refused = 0
+        """Frames that could not be made into a message of this graph."""
+        self.unsent = 0
+        """Commands that found no connection, or one that did not move."""
+        self.notices: deque[str] = deque(maxlen=_NOTICES_KEPT)
+        """What the environment had to say, newest last."""
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        return f"sensor link to {self._host}:{self._port}"
+
+    async def start(self, gateway: Gateway) -> None:
+        """Connect. `BridgeError` where nobody listens."""
+        self._gateway = gateway
+        self._session: Session = gateway.open(self.name)
+        self._wake = wake_of(asyncio.get_running_loop(), self._send_commands)
+        ports = [self._port] if self._image_port is None else [self._port, self._image_port]
+        for port in ports:
+            streams = await self._connect(port)
+            self._tasks.append(asyncio.create_task(self._stay(port, *streams)))
+
+    async def stop(self) -> None:
+        """Disconnect."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._tasks.clear()
+        if hasattr(self, "_session"):
+            self._session.close()
+
+    async def _connect(self, port: int) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+        try:
+            reader, writer = await asyncio.open_connection(self._host, port, limit=2 * _READ_BYTES)
+        except (OSError, OverflowError) as error:
+            raise BridgeError(
+                f"sensor link: nobody listens on {self._host}:{port} ({error}): "
+                "start the simulation with this door, or name its port"
+            ) from None
+        if port == self._port:
+            self._writer = writer
+        return reader, writer
+
+    async def _stay(
+        self, port: int, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        """Read until the end of the connection, make it again, for ever."""
+        while True:
+            try:
+                await self._read(reader)
+            finally:
+                if self._writer is writer:
+                    self._writer = None
+                writer.close()
+            attempt = 0
+            while True:
+                await asyncio.sleep(_AGAIN_S[min(attempt, len(_AGAIN_S) - 1)])
+                with contextlib.suppress(BridgeError):
+                    reader, writer = await self._connect(port)
+                    break
+                attempt += 1
+
+    async def _read(self, reader: asyncio.StreamReader) -> None:
+        parser = FrameParser()
+        with contextlib.suppress(OSError):
+            while data := await reader.read(_READ_BYTES):
+                for frame in parser.feed(data):
+                    self._take(frame)
+                await asyncio.sleep(0)
+        self.corrupt += parser.corrupt
+
+    def _take(self, frame: Frame) -> None:
+        if frame.kind == Kind.NOTICE:
+            self.notices.append(decode_notice(frame.payload))
+            return
+        try:
+            name, message = decode_payload(frame.kind, frame.payload, frame.stamp_ns)
+            topic = f"/uav{frame.uav}/{name}"
+            self._inlet(topic, PAYLOADS[Kind(frame.kind)].msgtype).put(message)
+            if frame.kind in (Kind.POSE, Kind.LASER_SCAN):
+                self._listen_to(frame.uav)
+        except (BridgeError, GraphError):
+            self.refused += 1
+            return
+        self.received += 1
+        self._count_lost(topic, frame)
+
+    def _inlet(self, topic: str, msgtype: str) -> Inlet:
+        inlet = self._inlets.get(topic)
+        if inlet is None or inlet.msgtype != msgtype:
+            self._session.advertise(topic, msgtype)
+            inlet = Inlet(self._gateway, self._session, topic, msgtype, _DEPTH)
+            self._inlets[topic] = inlet
+        return inlet
+
+    def _count_lost(self, topic: str, frame: Frame) -> None:
+        key = (frame.kind, topic)
+        before = self._sequences.get(key)
+        self._sequences[key] = frame.sequence
+        if before is not None and frame.sequence > before:  # else the environment began anew
+            self.lost += frame.sequence - before - 1
+
+    # ------------------------------------------------------------------------------------ commands
+
+    def _listen_to(self, uav: int) -> None:
+        """Carry the commands for a UAV from now on."""
+        if (Kind.POSE_COMMAND, uav) in self._commands:
+            return
+        for kind, topic in COMMAND_TOPICS.items():
+            self._commands[kind, uav] = self._session.subscribe(
+                f"/uav{uav}/{topic}", PAYLOADS[kind].msgtype, wake=self._wake
+            )
+
+    def _send_commands(self) -> None:
+        for (kind, uav), mailbox in self._commands.items():
+            for published in mailbox.take():
+                try:
+                    payload = encode_payload(kind, published.message)
+                    stamp_ns = stamp_of(published.message)
+                    self._send(encode_frame(kind, uav, self._sent, stamp_ns, payload))
+                except BridgeError:
+                    self.refused += 1
+
+    def _send(self, frame: bytes) -> None:
+        writer = self._writer
+        if writer is None or writer.transport.get_write_buffer_size() > _MOST_UNSENT_BYTES:
+            self.unsent += 1
+            return
+        self._sent += 1
+        writer.write(frame)

@@ -1,0 +1,62 @@
+"""What the ROS side sends over the sensor link, checked and published in the graph."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from volery.bridges.ros_tcp.inlet import Inlet
+from volery.bridges.sensor_link.payloads import PAYLOADS, decode_payload
+from volery.bridges.sensor_link.wire import Frame, Kind
+from volery.core.errors import BridgeError, GraphError
+from volery.graph.session import Gateway, Session
+
+COMMAND_TOPICS = {Kind.POSE_COMMAND: "pose_command", Kind.GOAL_POSE: "goal_pose"}
+"""Topics below the UAV's."""
+
+_DEPTH = 2
+"""A pose makes those before it void: while the simulation is busy few need to wait."""
+_UNIT_TOLERANCE = 0.01
+
+
+class Commands:
+    """Publishes one client's commands through its session."""
+
+    def __init__(self, gateway: Gateway, session: Session) -> None:
+        self._gateway = gateway
+        self._session = session
+        self._inlets: dict[tuple[int, int], Inlet] = {}
+
+    def take(self, frame: Frame) -> None:
+        """Publish the command of a frame; `BridgeError` tells why it cannot be."""
+        topic = COMMAND_TOPICS.get(Kind(frame.kind)) if frame.kind in list(Kind) else None
+        if topic is None:
+            known = ", ".join(f"{kind.name} ({int(kind)})" for kind in COMMAND_TOPICS)
+            raise BridgeError(f"frames of type {frame.kind} are not taken here, only {known}")
+        kind = Kind(frame.kind)
+        _, pose = decode_payload(kind, frame.payload, frame.stamp_ns)
+        _check_pose(pose, may_keep_heading=kind is Kind.GOAL_POSE)
+        inlet = self._inlets.get((kind, frame.uav))
+        if inlet is None:
+            inlet = self._inlets[kind, frame.uav] = self._inlet(kind, frame.uav, topic)
+        inlet.put(pose)
+
+    def _inlet(self, kind: Kind, uav: int, topic: str) -> Inlet:
+        below = f"/uav{uav}/"
+        if not any(found.name.startswith(below) for found in self._session.graph.topics()):
+            raise BridgeError(f"there is no UAV {uav}")
+        name, msgtype = f"{below}{topic}", PAYLOADS[kind].msgtype
+        try:
+            self._session.advertise(name, msgtype)
+        except GraphError as error:
+            raise BridgeError(str(error)) from None
+        return Inlet(self._gateway, self._session, name, msgtype, _DEPTH)
+
+
+def _check_pose(stamped: Any, *, may_keep_heading: bool) -> None:
+    if stamped.header.frame_id not in ("", "map"):
+        raise BridgeError(f"poses are in 'map', not in '{stamped.header.frame_id}'")
+    turn = stamped.pose.orientation
+    length = math.hypot(turn.x, turn.y, turn.z, turn.w)
+    if abs(length - 1.0) > _UNIT_TOLERANCE and not (may_keep_heading and length == 0.0):
+        raise BridgeError(f"a quaternion has length 1, not {length:.3g}")

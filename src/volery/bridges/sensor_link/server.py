@@ -1,0 +1,271 @@
+"""The environment's side of the sensor link: it listens, and tells everyone who connects.
+
+    doors.open(SensorLink(port=10100, image_port=10101))
+
+Every client gets the frames of all sensors of all UAVs, and may send poses. Images go out on a port
+of their own, so that scans wait for none. Form of the frames: `volery.bridges.sensor_link.wire`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+from dataclasses import dataclass
+
+from volery.bridges.doors import check_address
+from volery.bridges.sensor_link.commands import Commands
+from volery.bridges.sensor_link.outbox import Outbox
+from volery.bridges.sensor_link.payloads import encode_notice
+from volery.bridges.sensor_link.streams import IMAGES, SENSORS, Stream, Streams, period_from_hz
+from volery.bridges.sensor_link.wire import VERSION, Frame, FrameParser, Kind, encode_frame
+from volery.core.errors import BridgeError
+from volery.graph.session import Gateway
+
+PORT = 10100
+IMAGE_PORT = 10101
+DEPTH = 20
+"""Frames of one sensor that wait for a client: half a second of a scanner with 40 Hz."""
+IMAGE_DEPTH = 1
+MOST_CLIENTS = 64
+"""On each port."""
+
+_COMMAND_LIMIT_BYTES = 4096
+_WRITE_BUFFER_BYTES = 128 << 10
+
+
+@dataclass(frozen=True)
+class ClientInfo:
+    """How a client fares."""
+
+    name: str
+    received: int
+    """Frames that came from it whole."""
+    corrupt: int
+    """Those that did not."""
+    dropped: int
+    """Frames that it was too slow for."""
+    waiting: int
+
+
+class SensorLink:
+    """A door for programs on the ROS side.
+
+    Parameters
+    ----------
+    host
+        Address to listen on.
+    port, image_port
+        Ports of sensors and of images; 0 takes a free one, and the attribute tells which.
+    anywhere
+        Consent to a `host` beyond loopback: the protocol carries no password.
+    image_rate_hz
+        Images of each camera a simulated second, at most; None: all.
+    depth
+        Frames of each sensor that wait for a client that does not keep up; the newest are kept.
+
+    """
+
+    def __init__(
+        self,
+        host: str = "127.0.0.1",
+        port: int = PORT,
+        *,
+        image_port: int = IMAGE_PORT,
+        anywhere: bool = False,
+        image_rate_hz: float | None = None,
+        depth: int = DEPTH,
+    ) -> None:
+        check_address(host, anywhere=anywhere, flag="anywhere=True or --allow-remote")
+        self._host = host
+        self._sensors = _Port(host, port, SENSORS, "sensor link", depth, 0)
+        period_ns = period_from_hz(image_rate_hz)
+        self._images = _Port(host, image_port, IMAGES, "sensor link images", IMAGE_DEPTH, period_ns)
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        return f"sensor link {self._host}:{self.port}, images {self.image_port}"
+
+    @property
+    def port(self) -> int:
+        """Port of the sensors."""
+        return self._sensors.port
+
+    @property
+    def image_port(self) -> int:
+        """Port of the images."""
+        return self._images.port
+
+    @property
+    def clients(self) -> tuple[ClientInfo, ...]:
+        """Everyone who is connected, those who get images last."""
+        return (*self._sensors.infos(), *self._images.infos())
+
+    async def start(self, gateway: Gateway) -> None:
+        """Listen. `BridgeError` where a port is in use or the host is not ours."""
+        for port in (self._sensors, self._images):
+            await port.open(gateway)
+
+    async def stop(self) -> None:
+        """Let all clients go."""
+        for port in (self._sensors, self._images):
+            await port.close()
+
+
+class _Port:
+    """One listening port and its clients."""
+
+    def __init__(
+        self, host: str, port: int, kinds: tuple[Kind, ...], name: str, depth: int, period_ns: int
+    ) -> None:
+        self.port = port
+        self._host = host
+        self._kinds = kinds
+        self._name = name
+        self._depth = depth
+        self._period_ns = period_ns
+        self._server: asyncio.Server | None = None
+        self._clients: set[_Client] = set()
+        self._streams: Streams
+
+    async def open(self, gateway: Gateway) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            self._server = await loop.create_server(
+                lambda: _Client(self, gateway, self._name), self._host, self.port
+            )
+        except (OSError, OverflowError) as error:
+            raise _cannot_listen(self._host, self.port, error) from None
+        self.port = self._server.sockets[0].getsockname()[1]
+        name = f"{self._name} {self._host}:{self.port}"
+        self._streams = Streams(
+            gateway, name, self._kinds, self._send, depth=self._depth, period_ns=self._period_ns
+        )
+
+    async def close(self) -> None:
+        if self._server is not None:
+            self._server.close()
+            for client in tuple(self._clients):
+                client.end()
+            self._streams.close()
+            self._server = None
+        await asyncio.sleep(0)
+
+    @property
+    def takes_commands(self) -> bool:
+        return self._kinds is SENSORS
+
+    @property
+    def depth(self) -> int:
+        return self._depth
+
+    def admit(self, client: _Client) -> bool:
+        """Whether there is room for one more, who is then a client."""
+        if self._server is None or len(self._clients) >= MOST_CLIENTS:
+            return False
+        self._clients.add(client)
+        self._streams.open()
+        return True
+
+    def forget(self, client: _Client) -> None:
+        self._clients.discard(client)
+        if not self._clients:
+            self._streams.close()
+
+    def infos(self) -> list[ClientInfo]:
+        return sorted((client.info for client in tuple(self._clients)), key=lambda info: info.name)
+
+    def _send(self, stream: Stream, frame: bytes) -> None:
+        for client in tuple(self._clients):
+            client.put(stream, frame)
+
+
+class _Client(asyncio.Protocol):
+    """A connection: frames out as it takes them, commands in."""
+
+    def __init__(self, port: _Port, gateway: Gateway, name: str) -> None:
+        self._port = port
+        self._gateway = gateway
+        self._name = name
+        self._outbox = Outbox(port.depth)
+        self._parser = FrameParser(_COMMAND_LIMIT_BYTES)
+        self._paused = False
+        self._notices = 0
+        self._told_version = False
+        self._transport: asyncio.Transport
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+        address = transport.get_extra_info("peername") or ("?", 0)
+        self._name = f"{self._name} {address[0]}:{address[1]}"
+        transport.set_write_buffer_limits(high=_WRITE_BUFFER_BYTES)
+        if not self._port.admit(self):
+            self._notify(f"there are {MOST_CLIENTS} clients already")
+            transport.close()
+            return
+        self._session = self._gateway.open(self._name)
+        self._commands = Commands(self._gateway, self._session)
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
+        self._port.forget(self)
+        session = getattr(self, "_session", None)
+        if session is not None:
+            session.close()
+
+    def data_received(self, data: bytes) -> None:
+        if self._port.takes_commands and not self._transport.is_closing():
+            for frame in self._parser.feed(data):
+                self._take(frame)
+            if self._parser.other_version is not None and not self._told_version:
+                self._told_version = True
+                self._notify(f"version {VERSION} is spoken here, not {self._parser.other_version}")
+
+    def pause_writing(self) -> None:
+        self._paused = True
+
+    def resume_writing(self) -> None:
+        self._paused = False
+        self._flush()
+
+    def put(self, stream: Stream, frame: bytes) -> None:
+        """Send a frame, or let it wait."""
+        self._outbox.put(stream, frame)
+        self._flush()
+
+    def end(self) -> None:
+        """Let the client go, with whatever it has not taken."""
+        self._transport.abort()
+
+    @property
+    def info(self) -> ClientInfo:
+        parser, outbox = self._parser, self._outbox
+        return ClientInfo(self._name, parser.frames, parser.corrupt, outbox.dropped, len(outbox))
+
+    def _take(self, frame: Frame) -> None:
+        try:
+            self._commands.take(frame)
+        except BridgeError as error:
+            self._notify(f"frame {frame.sequence} of UAV {frame.uav} is refused: {error}")
+
+    def _notify(self, text: str) -> None:
+        frame = encode_frame(Kind.NOTICE, 0, self._notices, 0, encode_notice(text))
+        self._notices += 1
+        self._outbox.put(Kind.NOTICE, frame)
+        self._flush()
+
+    def _flush(self) -> None:
+        while not self._paused and not self._transport.is_closing():
+            frame = self._outbox.take()
+            if frame is None:
+                return
+            self._transport.write(frame)
+
+
+def _cannot_listen(host: str, port: int, error: Exception) -> BridgeError:
+    if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
+        return BridgeError(
+            f"sensor link: port {port} on {host} is in use: end the program that listens there "
+            f"(`ss -ltnp 'sport = :{port}'` names it) or choose another port"
+        )
+    return BridgeError(f"sensor link: cannot listen on {host}:{port}: {error}")

@@ -1,0 +1,199 @@
+"""From the graph's sensor topics to frames of the sensor link, encoded once for all clients."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from binascii import crc_hqx
+from collections import deque
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+from volery.bridges.doors import wake_of
+from volery.bridges.sensor_link.payloads import PAYLOADS, encode_payload, stamp_of
+from volery.bridges.sensor_link.wire import (
+    Kind,
+    crc_of_head,
+    encode_frame,
+    encode_head,
+    encode_tail,
+)
+from volery.core.clock import NS_PER_S
+from volery.core.errors import BridgeError, GraphError
+from volery.graph.messages import Published
+from volery.graph.session import Gateway, Mailbox, Session
+
+SENSORS = (Kind.LASER_SCAN, Kind.POSE, Kind.IMU, Kind.SONAR)
+IMAGES = (Kind.IMAGE,)
+
+_UAV_TOPIC = re.compile(r"/uav([1-9]\d{0,4})/(.+)")
+_MOST_UAVS = 0xFFFF
+_NEW_TOPICS_PERIOD_S = 0.5
+_CRC_STEP_BYTES = 64 << 10
+"""A fifth of a millisecond: so long others wait for an image's CRC."""
+
+Send = Callable[["Stream", bytes], None]
+"""Takes a sensor's frame for all clients."""
+
+
+class Stream:
+    """One sensor's messages on their way to clients."""
+
+    def __init__(self, kind: Kind, uav: int, name: str) -> None:
+        self.kind = kind
+        self.uav = uav
+        self.name = name
+        self.mailbox: Mailbox | None = None
+        self.sequence = 0
+        self.last_ns = 0
+        self.next_ns = 0
+        """What is published before is not sent, unless time went back."""
+
+
+class Due(NamedTuple):
+    """A message to be sent, and its number among those of its sensor."""
+
+    stream: Stream
+    published: Published
+    sequence: int
+
+
+class Streams:
+    """The sensors of some kinds. All methods belong to the event loop's thread.
+
+    While nobody is connected nothing is subscribed. depth: messages a sensor that may wait here.
+    period_ns: simulated time between two messages of a sensor that are sent, 0: all are.
+    """
+
+    def __init__(
+        self,
+        gateway: Gateway,
+        name: str,
+        kinds: Iterable[Kind],
+        send: Send,
+        *,
+        depth: int,
+        period_ns: int = 0,
+    ) -> None:
+        self._gateway = gateway
+        self._name = name
+        self._kinds = {PAYLOADS[kind].msgtype: kind for kind in kinds}
+        self._send = send
+        self._depth = depth
+        self._period_ns = period_ns
+        self._session: Session | None = None
+        self._streams: dict[str, Stream] = {}
+        self._ready: deque[Stream] = deque()
+        self._come = asyncio.Event()
+        self._woken = False
+        self._tasks: list[asyncio.Task[None]] = []
+
+    def open(self) -> None:
+        """Begin to receive, and send; a second time nothing happens."""
+        if self._session is None:
+            self._session = self._gateway.open(self._name)
+            self._wake = wake_of(asyncio.get_running_loop(), self._come.set)
+            self._tasks = [
+                asyncio.create_task(self._watch_topics()),
+                asyncio.create_task(self._send_all()),
+            ]
+
+    def close(self) -> None:
+        """Receive no more; sequences go on where they are if it is opened again."""
+        if self._session is not None:
+            for task in self._tasks:
+                task.cancel()
+            self._session.close()
+            self._session = None
+            for stream in self._streams.values():
+                stream.mailbox = None
+            self._ready.clear()
+
+    async def _watch_topics(self) -> None:
+        while True:
+            for topic in self._gateway.graph.topics():
+                kind, found = self._kinds.get(topic.msgtype), _UAV_TOPIC.fullmatch(topic.name)
+                if kind is not None and found is not None and int(found[1]) <= _MOST_UAVS:
+                    stream = self._streams.get(topic.name)
+                    if stream is None:
+                        stream = Stream(kind, int(found[1]), found[2])
+                        self._streams[topic.name] = stream
+                    if stream.mailbox is None:
+                        self._subscribe(topic.name, topic.msgtype, stream)
+            await asyncio.sleep(_NEW_TOPICS_PERIOD_S)
+
+    def _subscribe(self, topic: str, msgtype: str, stream: Stream) -> None:
+        assert self._session is not None
+
+        def stir() -> None:
+            self._ready.append(stream)
+            if not self._woken:
+                self._woken = True
+                self._wake()
+
+        try:
+            stream.mailbox = self._session.subscribe(topic, msgtype, depth=self._depth, wake=stir)
+        except GraphError:  # the topic has just got another type
+            return
+        stir()
+
+    async def _send_all(self) -> None:
+        while True:
+            await self._come.wait()
+            self._come.clear()
+            self._woken = False
+            while self._ready:
+                for due in self._take(self._ready.popleft()):
+                    await self._send_one(due)
+
+    def _take(self, stream: Stream) -> list[Due]:
+        taken = [] if stream.mailbox is None else stream.mailbox.take()
+        due = []
+        for published in taken:
+            if self._is_due(stream, published.time_ns):
+                due.append(Due(stream, published, stream.sequence))
+                stream.sequence += 1
+        return due
+
+    def _is_due(self, stream: Stream, time_ns: int) -> bool:
+        """Whether the stream's rate lets a message of this time through."""
+        period, went_back = self._period_ns, time_ns < stream.last_ns
+        stream.last_ns = time_ns
+        early_ns = period // 100  # a camera of just this rate may round its instants
+        if period and time_ns + early_ns < stream.next_ns and not went_back:
+            return False
+        late = went_back or time_ns >= stream.next_ns + period
+        stream.next_ns = (time_ns if late else stream.next_ns) + period
+        return True
+
+    async def _send_one(self, due: Due) -> None:
+        stream = due.stream
+        try:
+            payload = encode_payload(stream.kind, due.published.message, stream.name)
+            stamp_ns = stamp_of(due.published.message)
+            if len(payload) <= _CRC_STEP_BYTES:
+                frame = encode_frame(stream.kind, stream.uav, due.sequence, stamp_ns, payload)
+            else:
+                head = encode_head(stream.kind, stream.uav, due.sequence, stamp_ns, len(payload))
+                check = await _crc_in_steps(payload, crc_of_head(head))
+                frame = b"".join((head, payload, encode_tail(check)))
+        except BridgeError:  # a message without a form on this link: its number is missing
+            return
+        self._send(stream, frame)
+
+
+async def _crc_in_steps(data: bytes, check: int) -> int:
+    view = memoryview(data)
+    for start in range(0, len(view), _CRC_STEP_BYTES):
+        check = crc_hqx(view[start : start + _CRC_STEP_BYTES], check)
+        await asyncio.sleep(0)
+    return check
+
+
+def period_from_hz(rate_hz: float | None) -> int:
+    """Nanoseconds between two images; 0 for None, which sends all. `BridgeError` if not > 0."""
+    if rate_hz is None:
+        return 0
+    if not 0.0 < rate_hz <= 1e6:
+        raise BridgeError(f"the rate of images must be above 0 Hz and at most 1e6, not {rate_hz}")
+    return round(NS_PER_S / rate_hz)
