@@ -144,6 +144,10 @@ class Graph:
         self._members = threading.RLock()
         """Held by whoever changes topics, publishers, subscribers or services."""
 
+    def now_ns(self) -> int:
+        """Simulated time."""
+        return self._now_ns()
+
     def post(self, action: Callable[[], Any]) -> None:
         """Have `action()` called in the simulation's thread; `GraphError` where that has none."""
         if self._post is None:

@@ -131,7 +131,7 @@ class RosbridgeServer:
             raise BridgeError(f"{self.host} can be reached from other machines: set a --token")
         graph = gateway.graph
         self._gateway = gateway
-        self._shared = Shared(Forms(self._generation), graph._now_ns, self._token, self._most_bytes)
+        self._shared = Shared(Forms(self._generation), graph.now_ns, self._token, self._most_bytes)
         try:
             self._server = await serve(
                 self._serve,
@@ -151,7 +151,7 @@ class RosbridgeServer:
                 f"end the program that has the port, or choose another: --door rosbridge=PORT"
             ) from None
         self.port = next(iter(self._server.sockets)).getsockname()[1]
-        self._rosapi = RosApi(gateway, self._generation, graph._now_ns, self._parameters)
+        self._rosapi = RosApi(gateway, self._generation, graph.now_ns, self._parameters)
         self._rosapi.start()
 
     async def stop(self) -> None:
