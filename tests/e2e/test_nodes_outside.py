@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from contextlib import contextmanager
 
 import pytest
@@ -188,5 +189,11 @@ def test_who_does_not_answer_is_left_behind(gone):
         while thread.is_alive():
             simulation.take_in()
         thread.join()
+        before = time.monotonic()
         simulation.run(0.5)
+        waited_s = time.monotonic() - before
         assert simulation.time_s == pytest.approx(0.5)
+        assert waited_s < 5.0
+        if gone == "is silent":
+            assert waited_s >= 0.3
+        simulation.add_partner("lost", period_s=1.0)  # the name is free again

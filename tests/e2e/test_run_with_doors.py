@@ -87,10 +87,14 @@ def test_a_command_is_published_and_flown(run):
     volery(run, "service", "call", "/uav1/hold")
     twist = "{linear: {x: 1.0}}"
     words = ("topic", "pub", "/uav1/cmd_vel", "geometry_msgs/Twist", twist, "-r", "20", "-t", "20")
+    before = x_of_uav1(run)
     volery(run, *words)
+    assert x_of_uav1(run) > before + 0.2
+
+
+def x_of_uav1(run):
     text = volery(run, "topic", "echo", "/uav1/ground_truth/odom", "--once")
-    x = float(re.search(r"x: (\S+)", text)[1])
-    assert x > 0.2
+    return float(re.search(r"position:\s+x: (\S+)", text)[1])
 
 
 def test_services_are_listed_and_called(run):

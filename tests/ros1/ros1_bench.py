@@ -15,16 +15,14 @@ import sys
 import tempfile
 import threading
 import time
-from concurrent.futures import Future
 from functools import cache
 from pathlib import Path
 
 import pytest
+from live_graph import LiveGraph
 
 from volery.bridges.ros1.environment import rospy_is_installed
-from volery.graph.graph import Graph
 from volery.graph.messages import Clock, time_from_ns
-from volery.graph.session import Gateway
 
 HERE = Path(__file__).parent
 CLOCK = "rosgraph_msgs/msg/Clock"
@@ -184,24 +182,11 @@ def ours(script):
     return Program(sys.executable, str(HERE / script))
 
 
-class LiveGraph:
-    """A graph with a thread that does what is posted, as a simulation has one."""
+class WallGraph(LiveGraph):
+    """A graph whose time is the computer's."""
 
     def __init__(self):
-        self.graph = Graph(time.time_ns)
-        self.gateway = Gateway(self.graph, self.post)
-        self._posted = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-
-    def post(self, action):
-        future = Future()
-        self._posted.put((action, future))
-        return future
-
-    def do(self, action):
-        """Have something done in the graph's thread and wait for it."""
-        return self.post(action).result(10.0)
+        super().__init__(time.time_ns)
 
     def publisher(self, topic, msgtype, **options):
         """A function that publishes."""
@@ -230,17 +215,3 @@ class LiveGraph:
         finally:
             stop.set()
             ticking.join()
-
-    def _run(self):
-        while (job := self._posted.get()) is not None:
-            action, future = job
-            try:
-                result = action()
-                self.graph.deliver()
-                future.set_result(result)
-            except Exception as error:
-                future.set_exception(error)
-
-    def close(self):
-        self._posted.put(None)
-        self._thread.join()

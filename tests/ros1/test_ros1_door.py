@@ -10,7 +10,7 @@ import threading
 import numpy as np
 import pytest
 from ros1_bench import (
-    LiveGraph,
+    WallGraph,
     ours,
     peer,
     require_ros1,
@@ -57,7 +57,7 @@ def master():
 
 @pytest.fixture(scope="module")
 def live(master):
-    live = LiveGraph()
+    live = WallGraph()
     with live.clock():
         yield live
     live.close()

@@ -11,6 +11,7 @@ Everything a door does runs in the thread of `Doors`; what it needs of the simul
 from __future__ import annotations
 
 import asyncio
+import logging
 import sys
 import threading
 from collections.abc import Callable, Coroutine
@@ -20,6 +21,7 @@ from volery.core.errors import BridgeError
 from volery.graph.session import Gateway
 
 T = TypeVar("T")
+_log = logging.getLogger(__name__)
 
 _SWITCH_INTERVAL_S = 0.0005
 """Python's own 5 ms would be the latency of every answer while the engine computes."""
@@ -78,7 +80,10 @@ class Doors:
             return
         self._closed = True
         for door in reversed(self._doors):
-            self.call(door.stop(), _LONGEST_START_S)
+            try:
+                self.call(door.stop(), _LONGEST_START_S)
+            except Exception:
+                _log.exception("%s did not close in good order", door.name)
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()

@@ -2,38 +2,19 @@
 
 from __future__ import annotations
 
-import threading
 from typing import Any
 
-from volery.core.errors import BridgeError, GraphError
-from volery.graph.link import Link
+from volery.core.errors import BridgeError
+from volery.graph.link import Link, call_and_wait
 from volery.graph.messages import message_type
-from volery.graph.reply import Reply
 
 TIMEOUT_S = 10.0
-
-
-def ask(link: Link, service: str, request: Any | None, timeout_s: float = TIMEOUT_S) -> Any:
-    """Call a service and wait for its response. `GraphError` with the reason where none comes."""
-    come = threading.Event()
-    outcome: list[Any] = []
-
-    def take(what: Any) -> None:
-        outcome.append(what)
-        come.set()
-
-    link.call(service, request, Reply(take, take))
-    if not come.wait(timeout_s):
-        raise GraphError(f"service '{service}' did not answer within {timeout_s:g} s")
-    if isinstance(outcome[0], GraphError):
-        raise outcome[0]
-    return outcome[0]
 
 
 def ask_rosapi(link: Link, question: str, **fields: Any) -> Any:
     """Ask a `/rosapi` service, `question` being its type: `TopicType`."""
     request = message_type(f"rosapi_msgs/srv/{question}_Request")(**fields)
-    return ask(link, "/rosapi/" + _snake(question), request)
+    return call_and_wait(link, "/rosapi/" + _snake(question), request, TIMEOUT_S)
 
 
 def topic_types(link: Link) -> dict[str, str]:

@@ -6,11 +6,11 @@ from contextlib import closing
 
 import typer
 
-from volery.cli.asking import ask, ask_rosapi
+from volery.cli.asking import ask_rosapi
 from volery.cli.links import open_link
 from volery.cli.yaml_form import read_message, to_yaml
 from volery.core.errors import BridgeError
-from volery.graph.link import Link
+from volery.graph.link import Link, call_and_wait
 
 
 def list_services(via: str, *, types: bool) -> None:
@@ -31,7 +31,7 @@ def call(via: str, service: str, values: str | None, *, timeout_s: float) -> Non
     with closing(open_link(via, "volery_service_call")) as link:
         srvtype = _type_of(link, service)
         request = read_message(values or "{}", f"{srvtype}_Request")
-        response = ask(link, service, request, timeout_s)
+        response = call_and_wait(link, service, request, timeout_s)
         typer.echo(to_yaml(response, whole=True) or "(an empty response)")
 
 

@@ -37,23 +37,14 @@ def show_type(via: str, topic: str) -> None:
 def echo(via: str, topic: str, *, count: int | None, whole: bool) -> None:
     """Print messages as YAML, each followed by a line of dashes."""
     left = math.inf if count is None else count
-    for published in messages(via, topic, "volery_topic_echo"):
+    for published in _messages(via, topic, "volery_topic_echo"):
+        if published is None:
+            continue
         typer.echo(to_yaml(published.message, whole=whole))
         typer.echo("---")
         left -= 1
         if left <= 0:
             return
-
-
-def messages(via: str, topic: str, name: str) -> Iterator[Published]:
-    """Messages of a topic as they come, without an end."""
-    with closing(open_link(via, name)) as link:
-        come = threading.Event()
-        mailbox = link.subscribe(topic, type_of_topic(link, topic), depth=_DEPTH, wake=come.set)
-        while True:
-            come.wait(0.2)
-            come.clear()
-            yield from mailbox.take()
 
 
 @dataclass
@@ -100,7 +91,7 @@ def measure(via: str, topic: str, *, window: int, line: Callable[[Window], str])
     seen = Window(window)
     told = time.monotonic()
     sizes = line is Window.bandwidth_line
-    for published in _with_pauses(via, topic):
+    for published in _messages(via, topic, "volery_topic_measure"):
         now = time.monotonic()
         if published is not None:
             seen.add(now, len(published.cdr) if sizes else 0)
@@ -132,9 +123,9 @@ def _repeat(link: Link, topic: str, message: object, period_s: float, times: int
             time.sleep(max(due - time.monotonic(), 0.0))
 
 
-def _with_pauses(via: str, topic: str) -> Iterator[Published | None]:
-    """Messages, and None at least five times a second."""
-    with closing(open_link(via, "volery_topic_measure")) as link:
+def _messages(via: str, topic: str, name: str) -> Iterator[Published | None]:
+    """Messages of a topic without an end, and None at least five times a second."""
+    with closing(open_link(via, name)) as link:
         come = threading.Event()
         mailbox = link.subscribe(topic, type_of_topic(link, topic), depth=_DEPTH, wake=come.set)
         while True:

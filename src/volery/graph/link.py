@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any, Protocol
 
+from volery.core.errors import GraphError
 from volery.graph.reply import Reply
 from volery.graph.session import Handler, Mailbox, Wake
 
@@ -22,6 +24,9 @@ class Link(Protocol):
     def publish(self, topic: str, message: Any) -> None:
         """Publish a message of the announced type."""
 
+    def unadvertise(self, topic: str) -> None:
+        """Publish on `topic` no more."""
+
     def subscribe(
         self, topic: str, msgtype: str | None = None, *, depth: int = ..., wake: Wake
     ) -> Mailbox:
@@ -38,3 +43,24 @@ class Link(Protocol):
 
     def close(self) -> None:
         """Take back everything."""
+
+
+def call_and_wait(link: Link, service: str, request: Any | None, timeout_s: float) -> Any:
+    """Call a service and wait for its response, at most `timeout_s` of wall time.
+
+    Not for the thread from which the link's replies come. `GraphError` with the reason where there
+    is no response.
+    """
+    come = threading.Event()
+    outcome: list[Any] = []
+
+    def take(what: Any) -> None:
+        outcome.append(what)
+        come.set()
+
+    link.call(service, request, Reply(take, take))
+    if not come.wait(timeout_s):
+        raise GraphError(f"service '{service}' did not answer within {timeout_s:g} s")
+    if isinstance(outcome[0], GraphError):
+        raise outcome[0]
+    return outcome[0]

@@ -52,11 +52,22 @@ class _Meetings:
             timeout_s=timeout_s,
             on_timeout="leave",
             on_meeting=self._begin,
-            is_there=lambda: graph.publishers(self._done) > 0,
+            is_there=self._is_there,
         )
         self._go = graph.advertise(f"/volery/lock_step/{name}/go", Clock)
         self._subscription = graph.subscribe(self._done, self._end, Clock)
         self._meeting_ns = -1
+
+    def _is_there(self) -> bool:
+        """Whether the client can still answer; what it left behind is cleared away."""
+        there = self._graph.publishers(self._done) > 0
+        if not there:
+            self._clear_away()
+        return there
+
+    def _clear_away(self) -> None:
+        self._go.cancel()
+        self._subscription.cancel()
 
     def _begin(self, time_ns: int) -> None:
         self._meeting_ns = time_ns
@@ -65,7 +76,7 @@ class _Meetings:
 
     def _end(self, published: Published) -> None:
         if self._partner.has_left:
-            self._subscription.cancel()
+            self._clear_away()
             return
         stamp = published.message.clock
         if stamp.sec * NS_PER_S + stamp.nanosec == self._meeting_ns:

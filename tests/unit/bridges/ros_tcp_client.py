@@ -9,11 +9,8 @@ import socket
 import struct
 import threading
 import time
-from collections import deque
-from concurrent.futures import Future
 
-from volery.graph.graph import Graph
-from volery.graph.session import Gateway
+from live_graph import LiveGraph
 
 
 def until(what, timeout_s=10.0):
@@ -42,53 +39,11 @@ def cdr_string(text):
     return b"\0\1\0\0" + struct.pack("<I", len(data)) + data
 
 
-class Loop:
+class Loop(LiveGraph):
     """A graph and the thread that works off what is posted."""
-
-    def __init__(self):
-        self.graph = Graph(lambda: 5)
-        self._posted = deque()
-        self._something = threading.Event()
-        self._running = True
-        self.held = threading.Event()
-        self.gateway = Gateway(self.graph, self.post)
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-
-    def post(self, action):
-        future = Future()
-        self._posted.append((action, future))
-        self._something.set()
-        return future
-
-    def do(self, action):
-        return self.post(action).result(10.0)
 
     def publish(self, publisher, message):
         self.do(lambda: publisher.publish(message))
-
-    def waiting(self):
-        return len(self._posted)
-
-    def close(self):
-        self._running = False
-        self.held.clear()
-        self._something.set()
-        self._thread.join()
-
-    def _run(self):
-        while self._running:
-            self._something.wait()
-            self._something.clear()
-            while self.held.is_set():
-                time.sleep(0.001)
-            while self._posted:
-                action, future = self._posted.popleft()
-                try:
-                    future.set_result(action())
-                except Exception as error:
-                    future.set_exception(error)
-            self.graph.deliver()
 
 
 class Client:

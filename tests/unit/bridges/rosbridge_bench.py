@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-import queue
-import threading
 from concurrent.futures import Future
+
+from live_graph import LiveGraph
 
 from volery.bridges.rosbridge.forms import Forms
 from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
@@ -20,41 +20,16 @@ STEPS = "simulation_interfaces/action/SimulateSteps"
 TIME_NS = 5_000_000_007
 
 
-class FakeSimulation:
+class FakeSimulation(LiveGraph):
     """Does what is posted, in a thread of its own, and delivers."""
 
     def __init__(self) -> None:
-        self._queue: queue.Queue = queue.Queue()
-        self.graph = Graph(lambda: TIME_NS, self.post)
-        self.gateway = Gateway(self.graph, self.post)
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-
-    def post(self, action) -> Future:
-        future: Future = Future()
-        self._queue.put((action, future))
-        return future
-
-    def do(self, action):
-        return self.post(action).result(10)
+        super().__init__(lambda: TIME_NS)
 
     def publish(self, topic, message, *, latched=False):
         publisher = self.graph.advertise(topic, message.__msgtype__, latched=latched)
         self.do(lambda: publisher.publish(message))
         return publisher
-
-    def close(self) -> None:
-        self._queue.put(None)
-        self._thread.join()
-
-    def _run(self) -> None:
-        while (work := self._queue.get()) is not None:
-            action, future = work
-            try:
-                future.set_result(action())
-            except Exception as error:
-                future.set_exception(error)
-            self.graph.deliver()
 
 
 class Bench:

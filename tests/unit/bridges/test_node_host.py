@@ -2,53 +2,32 @@
 
 from __future__ import annotations
 
-import threading
 import time
 
 import pytest
+from live_graph import LiveGraph
 
 from volery.bridges.nodes.host import NodeHost
 from volery.core.errors import GraphError, NodeError
-from volery.graph.graph import Graph
 from volery.graph.messages import Clock, String, Time, message_type
 from volery.graph.node import Node
-from volery.graph.session import Gateway
 
 TRIGGER = "std_srvs/srv/Trigger"
 Response = message_type(f"{TRIGGER}_Response")
 
 
-class World:
-    """A graph with a thread of its own, as a running simulation is."""
+class World(LiveGraph):
+    """A graph with a clock."""
 
     def __init__(self):
-        from volery.engine.commands import Inbox
-
-        self.inbox = Inbox()
         self.now_ns = 0
-        self.graph = Graph(lambda: self.now_ns, self.inbox.post)
-        self.gateway = Gateway(self.graph, self.inbox.post)
+        super().__init__(lambda: self.now_ns)
         self.clock = self.graph.advertise("/clock", Clock)
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._run)
-        self._thread.start()
-
-    def _run(self):
-        while not self._over.wait(0.001):
-            self.inbox.work_off()
-            self.graph.deliver()
 
     def tick(self, time_ns):
         self.now_ns = time_ns
         stamp = Time(time_ns // 10**9, time_ns % 10**9)
-        self.inbox.post(lambda: self.clock.publish(Clock(stamp))).result(5.0)
-
-    def do(self, action):
-        return self.inbox.post(action).result(5.0)
-
-    def close(self):
-        self._over.set()
-        self._thread.join()
+        self.do(lambda: self.clock.publish(Clock(stamp)))
 
 
 @pytest.fixture

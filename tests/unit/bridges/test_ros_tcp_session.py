@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from live_graph import HandGraph
 from ros_tcp_client import cdr_string, frame, ros1_string
 
 from volery.bridges.ros_tcp.payloads import payloads_of
@@ -16,43 +17,23 @@ from volery.bridges.ros_tcp.session import EndpointSession
 from volery.bridges.ros_tcp.unity import Selection, UnitySession
 from volery.bridges.ros_tcp.wire import FrameParser
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.graph import Graph
 from volery.graph.messages import Published, String, message_type
 from volery.graph.reply import Reply
-from volery.graph.session import Gateway
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
 Response = message_type(f"{TRIGGER}_Response")
 
 
-class Bench:
+class Bench(HandGraph):
     """A graph in this thread, with something on it."""
 
     def __init__(self):
-        self.graph = Graph(lambda: 5)
-        self.gateway = Gateway(self.graph, self._post)
-        self.posted = []
+        super().__init__()
         self.publisher = self.graph.advertise("/out", STRING, latched=True)
         self.graph.subscribe("/uav1/cmd_vel", lambda _: None, "geometry_msgs/msg/Twist")
         self.graph.offer("/do", TRIGGER, lambda _request: Response(True, "done"))
         self.before = self.counts()
-
-    def _post(self, action):
-        from concurrent.futures import Future
-
-        future = Future()
-        self.posted.append((action, future))
-        return future
-
-    def work_off(self):
-        while self.posted:
-            action, future = self.posted.pop(0)
-            try:
-                future.set_result(action())
-            except Exception as error:
-                future.set_exception(error)
-        self.graph.deliver()
 
     def counts(self):
         topics = {

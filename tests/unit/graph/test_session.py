@@ -3,47 +3,22 @@
 from __future__ import annotations
 
 import threading
-from concurrent.futures import Future
 
 import pytest
+from live_graph import HandGraph
 
 from volery.core.errors import GraphError
-from volery.graph.graph import Graph
 from volery.graph.messages import String, message_type
 from volery.graph.reply import Reply
-from volery.graph.session import Gateway
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
 Response = message_type(f"{TRIGGER}_Response")
 
 
-class Bench:
-    """A graph whose posts are done when `work_off` says so."""
-
-    def __init__(self):
-        self.graph = Graph(lambda: 5)
-        self.posted = []
-        self.gateway = Gateway(self.graph, self._post)
-
-    def _post(self, action):
-        future = Future()
-        self.posted.append((action, future))
-        return future
-
-    def work_off(self):
-        while self.posted:
-            action, future = self.posted.pop(0)
-            try:
-                future.set_result(action())
-            except Exception as error:
-                future.set_exception(error)
-        self.graph.deliver()
-
-
 @pytest.fixture
 def bench():
-    return Bench()
+    return HandGraph()
 
 
 def quiet():

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
 from volery.core.errors import GraphError
 from volery.graph.graph import AsyncHandler, Callback, Graph, Publisher, Subscription
-from volery.graph.link import Link
+from volery.graph.link import Link, call_and_wait
 from volery.graph.messages import Published, type_name
 from volery.graph.reply import Reply
 from volery.graph.session import DEFAULT_DEPTH, Mailbox
@@ -60,7 +59,12 @@ class MirroredGraph(Graph):
             self._mailboxes[topic] = self._link.subscribe(topic, name, depth=depth, wake=self._wake)
         readers = self._readers.setdefault(topic, [])
         readers.append(callback)
-        return Subscription(readers, callback)
+        return _RemoteSubscription(readers, callback, lambda: self._leave(topic))
+
+    def _leave(self, topic: str) -> None:
+        """End a subscription over there that nobody reads here."""
+        if topic in self._mailboxes and not self._readers[topic]:
+            self._link.unsubscribe(self._mailboxes.pop(topic))
 
     def hold_back(self, barrier: str, begin: Callable[[Published], None]) -> None:
         """Hand messages out only when one on `barrier` has come after them.
@@ -121,17 +125,7 @@ class MirroredGraph(Graph):
 
     def call(self, service: str, request: Any | None = None) -> Any:
         """Call and wait for the response; `GraphError` where none comes in time."""
-        come, answers, failures = threading.Event(), [], []  # type: ignore[var-annotated]
-        reply = Reply(answers.append, failures.append)
-        reply.when_done(come.set)
-        self._link.call(service, request, reply)
-        if not come.wait(_CALL_TIMEOUT_S):
-            raise GraphError(f"service '{service}' did not answer within {_CALL_TIMEOUT_S:.0f} s")
-        while not answers and not failures:  # told just before the answer is handed over
-            threading.Event().wait(0.001)
-        if failures:
-            raise failures[0]
-        return answers[0]
+        return call_and_wait(self._link, service, request, _CALL_TIMEOUT_S)
 
     def call_async(self, service: str, request: Any | None, reply: Reply) -> None:
         """Call; the answer comes from the link's thread."""
@@ -140,6 +134,21 @@ class MirroredGraph(Graph):
     def _keep(self, action: Callable[[], Any]) -> None:
         self._posted.append(action)
         self._wake()
+
+
+class _RemoteSubscription(Subscription):
+    """One callback of a mirrored topic."""
+
+    def __init__(
+        self, readers: list[Callback], callback: Callback, leave: Callable[[], None]
+    ) -> None:
+        super().__init__(readers, callback)
+        self._leave = leave
+
+    def cancel(self) -> None:
+        """Stop receiving; the last one ends the stream."""
+        super().cancel()
+        self._leave()
 
 
 class _RemotePublisher(Publisher):
@@ -173,8 +182,9 @@ class _RemotePublisher(Publisher):
         self._link.publish(self.topic, message)
 
     def cancel(self) -> None:
-        """Publish no more."""
+        """Publish no more, here and there."""
         self._local.cancel()
+        self._link.unadvertise(self.topic)
 
 
 def _number(entry: tuple[int, str, Published]) -> int:
