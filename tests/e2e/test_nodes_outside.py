@@ -197,3 +197,6 @@ def test_who_does_not_answer_is_left_behind(gone):
         if gone == "is silent":
             assert waited_s >= 0.3
         simulation.add_partner("lost", period_s=1.0)  # the name is free again
+        if gone == "closes":
+            topics = {t.name: t for t in simulation.graph.topics()}
+            assert topics["/volery/lock_step/lost/go"].publishers == 0

@@ -169,3 +169,19 @@ def test_the_order_of_arrival_is_kept_across_topics(world):
     world.do(speak)
     spin_until(host, lambda: len(node.seen) == 5)
     assert node.seen == list("01234")
+
+
+def test_what_nobody_reads_or_publishes_any_more_ends_over_there(world):
+    host = NodeHost(world.gateway.open("node"), clock="wall")
+    first, second = (host.graph.subscribe("/a", print, String) for _ in range(2))
+    publisher = host.graph.advertise("/b", String)
+
+    def counts():
+        return {t.name: (t.publishers, t.subscribers) for t in world.graph.topics()}
+
+    assert (counts()["/a"], counts()["/b"]) == ((0, 1), (1, 0))
+    first.cancel()
+    assert counts()["/a"] == (0, 1)
+    second.cancel()
+    publisher.cancel()
+    assert (counts()["/a"], counts()["/b"]) == ((0, 0), (0, 0))
