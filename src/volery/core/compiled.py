@@ -111,7 +111,7 @@ def inner_kernel(function: F, **options: Any) -> F:
     compiles in a fraction of the time. Numbers that a caller writes out count as any others: numba
     would compile the part anew for each of them.
     """
-    part: Any = _decorate(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
+    part: Any = _decorate(function, no_cpython_wrapper=True, **options)
 
     def refuse(*_arguments: Any, **_keywords: Any) -> None:
         raise TypeError(f"{function.__name__} is a part of a kernel; only kernels can call it")
@@ -134,10 +134,12 @@ def _ignore(*_arguments: Any, **_keywords: Any) -> None:
 
 
 def _decorate(function: F, **options: Any) -> F:
+    # Nobody hands kernels to C code: entries for it would be a tenth of the time that compiling takes.
+    choices: dict[str, Any] = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
     saved = _CONFIG.CACHE_DIR
     _CONFIG.CACHE_DIR = str(cache_dir())
     try:
-        compiled: F = numba.njit(cache=True, error_model="numpy", nogil=True, **options)(function)
+        compiled: F = numba.njit(cache=True, **choices, **options)(function)
     finally:
         _CONFIG.CACHE_DIR = saved
     return compiled

@@ -1,4 +1,4 @@
-"""Compiles all kernels at the first start: dynamics here, the sensors' in a helper process.
+"""Compiles all kernels at the first start: dynamics here, most sensors' in a helper process.
 
 On two cores the wait is halved: numba compiles one function at a time in a process. What the helper
 compiles reaches this process through the cache on disk; a marker there tells later starts that
@@ -20,11 +20,15 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from volery.autonomy.ground_plane import GroundPlane
+from volery.autonomy.obstacle_memory import ObstacleMemory
+from volery.autonomy.scan_points import Pose, ScanProjector
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.clock import Schedule
 from volery.core.compiled import cache_dir
 from volery.core.geodesy import LocalFrame
+from volery.graph.zero import zero_message
 from volery.sensors.gnss import GnssBank, load_gnss_model
 from volery.sensors.imu import ImuBank, load_imu_model
 from volery.sensors.joints import JointBank
@@ -63,6 +67,7 @@ def compile_kernels() -> None:
     )
     try:
         compile_dynamics()
+        compile_guidance()
         # A helper that failed costs time, nothing else: the kernels compile when they are called.
         if helper.wait() == 0:
             (cache_dir() / "complete").touch()
@@ -75,6 +80,19 @@ def compile_dynamics() -> None:
     """Compile the fused step, for rigid bodies alone."""
     with _no_garbage_collection():
         _fleet().advance(0, Terrain.flat(extent_m=10.0).grid)
+
+
+def compile_guidance() -> None:
+    """Compile what places UAVs on the ground and lets them follow gaps."""
+    origin, level = np.zeros(3), np.array(rotations.IDENTITY)
+    pose = Pose(0, origin, level, origin, origin)
+    with _no_garbage_collection():
+        Terrain.flat(extent_m=10.0).height([0.0], [0.0])
+        points = ScanProjector([0.0, 0.0, 0.0]).points(zero_message("sensor_msgs/msg/LaserScan"), pose)
+        GroundPlane().add(points, 0)
+        obstacles = ObstacleMemory()
+        obstacles.add(points, 0)
+        obstacles.around(origin, 0, 1.0)
 
 
 @contextmanager
