@@ -134,7 +134,7 @@ def _ignore(*_arguments: Any, **_keywords: Any) -> None:
 
 
 def _decorate(function: F, **options: Any) -> F:
-    # Nobody hands kernels to C code: entries for it would be a tenth of the time that compiling takes.
+    # Nobody hands kernels to C code: entries for it would take a tenth of the time to compile.
     choices: dict[str, Any] = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
     saved = _CONFIG.CACHE_DIR
     _CONFIG.CACHE_DIR = str(cache_dir())

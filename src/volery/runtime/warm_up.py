@@ -86,9 +86,10 @@ def compile_guidance() -> None:
     """Compile what places UAVs on the ground and lets them follow gaps."""
     origin, level = np.zeros(3), np.array(rotations.IDENTITY)
     pose = Pose(0, origin, level, origin, origin)
+    scan = zero_message("sensor_msgs/msg/LaserScan")
     with _no_garbage_collection():
         Terrain.flat(extent_m=10.0).height([0.0], [0.0])
-        points = ScanProjector([0.0, 0.0, 0.0]).points(zero_message("sensor_msgs/msg/LaserScan"), pose)
+        points = ScanProjector([0.0, 0.0, 0.0]).points(scan, pose)
         GroundPlane().add(points, 0)
         obstacles = ObstacleMemory()
         obstacles.add(points, 0)
