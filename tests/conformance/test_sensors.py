@@ -109,12 +109,12 @@ class Measuring:
     def __init__(self, simulate, data):
         self.simulation = simulate(data)
         self.simulation.step(300)  # the history of poses is full
-        (self.bank,) = self.simulation._banks
+        (self.bank,) = self.simulation._engine.banks
 
     def __call__(self, k):
         """Measurement k, as if made at the same age of the simulation each time."""
         time_ns = self.simulation.time_ns - self.bank.lag_ns
-        return self.bank.sample(k, time_ns, self.simulation._fleet)
+        return self.bank.sample(k, time_ns, self.simulation._engine.fleet)
 
 
 def test_every_kind_of_the_scenario_is_listed():
@@ -276,7 +276,7 @@ def test_faults(simulate, kind):
 @every_kind
 def test_a_dropped_sensor_is_silent_on_the_graph(simulate, kind):
     simulation = simulate(scenario(kind, uavs=2))
-    (bank,) = simulation._banks
+    (bank,) = simulation._engine.banks
     bank.faults.set(0, "dropped")
     silent = record(simulation, kind)
     assert not silent

@@ -50,7 +50,7 @@ def alone(simulate, data, seed, seconds, velocity):
     for uav in simulation.uavs.values():
         uav.command_velocity(velocity)
     simulation.run(seconds)
-    found = simulation._fleet.state
+    found = simulation._engine.fleet.state
     return {name: np.array(getattr(found, name)) for name in STATES}, last
 
 

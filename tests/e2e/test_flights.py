@@ -69,7 +69,7 @@ def test_flying_into_a_tree_at_speed(simulate, wood_data, on_contact):
     wood_data["types"]["surveyor"] = {"sensors": []}
     simulation = simulate(wood_data)
     uav = simulation.uavs["uav1"]
-    state = simulation._fleet.state
+    state = simulation._engine.fleet.state
     # Straight at the thickest trunk, 25 m/s, from 10 m away.
     forest = simulation.forest
     trunk = forest.position_map[np.argmax(forest.dbh_m)]
@@ -97,7 +97,7 @@ def test_two_uavs_that_meet_crash_into_each_other(simulate, flat_data):
         {"type": "f450", "position_m": [6.0, 0.0, 20.0]},
     ]
     simulation = simulate(flat_data)
-    state = simulation._fleet.state
+    state = simulation._engine.fleet.state
     state.velocity_map[:, 0] = [25.0, -25.0]
     for uav in simulation.uavs.values():
         uav.command_rotor_speeds(np.full(4, 770.0))

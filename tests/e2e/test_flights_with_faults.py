@@ -22,7 +22,7 @@ def test_lost_motor_at_its_time_brings_a_quadrotor_down(simulate, airborne):
     airborne["faults"] = [{"kind": "motor", "uav": "uav1", "rotor": 0, "at_s": 1.0}]
     simulation = simulate(airborne)
     simulation.run(1.0)
-    health = simulation._fleet.state.rotor_health[0]
+    health = simulation._engine.fleet.state.rotor_health[0]
     assert simulation.uavs["uav1"].position_map[2] == pytest.approx(20.0, abs=0.02)
     simulation.run(3.0)
     assert health[0] == 0.0
@@ -35,9 +35,9 @@ def test_weak_motor_for_a_while(simulate, airborne):
         {"kind": "motor", "uav": "uav1", "rotor": 2, "thrust_factor": 0.7, "until_s": 1.0}
     )
     simulation.run(0.5)
-    assert simulation._fleet.state.rotor_health[0, 2] == 0.7
+    assert simulation._engine.fleet.state.rotor_health[0, 2] == 0.7
     simulation.run(4.0)
-    assert simulation._fleet.state.rotor_health[0, 2] == 1.0
+    assert simulation._engine.fleet.state.rotor_health[0, 2] == 1.0
     np.testing.assert_allclose(simulation.uavs["uav1"].position_map, [0, 0, 20], atol=0.2)
 
 
@@ -149,7 +149,7 @@ def test_the_worst_of_overlapping_faults_decides(simulate, airborne):
         for f, a, b in ((0.9, 0.1, 0.3), (0.8, 0.2, 0.4))
     ]
     simulation = simulate(airborne)
-    health = simulation._fleet.state.rotor_health
+    health = simulation._engine.fleet.state.rotor_health
     found = []
     for _ in range(5):
         simulation.run(0.1)

@@ -20,7 +20,12 @@ from volery.control.estimator.errors import EstimationError
 from volery.control.fleet_events import FleetEvent, event_of
 from volery.control.flight_modes import FlightMode
 from volery.control.gains import STANDARD_RATES, ControlRates
-from volery.control.model_table import checked_wear, model_table, new_references
+from volery.control.model_table import (
+    checked_wear,
+    copy_references,
+    model_table,
+    new_references,
+)
 from volery.control.setpoints import (
     MAX_COORDINATE,
     PILOT,
@@ -366,13 +371,21 @@ class Fleet(FleetCommands):
         """Give the UAVs `rows` the turbulence of UAVs called `names` in a run of `seed`."""
         self._uavs["turbulence"]["key"][rows] = new_turbulence(seed, names)["key"]
 
-    def restart(self, start: dict[str, Any], rows: NDArray[np.int64]) -> None:
+    def restart(
+        self,
+        start: dict[str, Any],
+        rows: NDArray[np.int64],
+        start_rows: NDArray[np.int64] | None = None,
+    ) -> None:
         """Put the UAVs `rows` back to what they were in `start`, a state at step 0, as of now.
 
         A UAV's own time, which wind and time-outs go by, begins anew; it keeps its turbulence's
-        random stream.
+        random stream. start_rows: theirs in `start`, None for the same. Models may be numbered
+        otherwise there.
         """
-        fresh = start["uavs"][rows].copy()
+        start_rows = rows if start_rows is None else start_rows
+        fresh = start["uavs"][start_rows].copy()
+        fresh["model"] = self._uavs["model"][rows]
         fresh["turbulence"]["key"] = self._uavs["turbulence"]["key"][rows]
         fresh["turbulence"]["first_tick"] = self.step // self._periods[2]
         for part, name in (("pilot", "deadline_step"), ("pilot", "start_step")):
@@ -380,10 +393,30 @@ class Fleet(FleetCommands):
         touched = fresh["body"]["last_contact_step"] > NEVER
         fresh["body"]["last_contact_step"][touched] += self.step
         self._uavs[rows] = fresh
-        self.history.position[:, rows] = start["position"][0, rows]
-        self.history.attitude[:, rows] = start["attitude"][0, rows]
+        self.history.position[:, rows] = start["position"][0, start_rows]
+        self.history.attitude[:, rows] = start["attitude"][0, start_rows]
         if len(self._references) == len(self):
-            self._references[rows] = start["references"][rows]
+            self._references[rows, :] = start["references"][start_rows, :1]
+
+    def continue_from(self, other: Fleet, kept: Sequence[tuple[int, int]]) -> None:
+        """Go on where another fleet is, with UAVs of it and new ones; this one has not moved yet.
+
+        kept: own row and the other's of each UAV that goes on; all others begin now.
+        """
+        start = self.get_state()
+        self.step = other.step
+        self.set_weather(other.weather)
+        own, theirs = np.array(kept, np.int64).reshape(-1, 2).T
+        self.restart(start, np.setdiff1d(np.arange(len(self)), own))
+        going_on = other._uavs[theirs].copy()
+        going_on["model"] = self._uavs["model"][own]
+        self._uavs[own] = going_on
+        self._bodies["downwash_budget"] = 0.0  # who may be over whom is looked up anew
+        self.history.position[:, own] = other.history.position[:, theirs]
+        self.history.attitude[:, own] = other.history.attitude[:, theirs]
+        self._paths.continue_from(other._paths, kept)
+        if len(self._references) == len(self) and len(other._references) == len(other):
+            copy_references(other._references[theirs], self._references, own, self.step)
 
     # -------------------------------------------------------------------------------- inside
 

@@ -85,3 +85,14 @@ def new_references(models: NDArray[np.void], attitude: Array, thrust: Array) -> 
     references[:, :, :4] = attitude[:, None]
     references[:, :, 4] = thrust[:, None]
     return references
+
+
+def copy_references(past: Array, references: Array, rows: NDArray[np.int64], step: int) -> None:
+    """Write commands (K, L, 6) of UAVs up to `step` into `rows` (K,) of another ring's (N, M, 6).
+
+    What the other ring could hold but `past` did not is the oldest that is known.
+    """
+    length, room = past.shape[1], references.shape[1]
+    for ago in range(room):
+        known = (step - min(ago, length - 1)) % length
+        references[rows, (step - ago) % room] = past[:, known]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,19 @@ class SegmentStore:
         self.rows[first : self._used] = segments
         pilot["path_first"] = pilot["path_row"] = first
         pilot["path_last"] = self._used - 1
+
+    def continue_from(self, other: SegmentStore, kept: Sequence[tuple[int, int]]) -> None:
+        """Store what pilots of another store fly: for each pair, own row and the other's.
+
+        The pilots' records have been copied already.
+        """
+        for own, _ in kept:
+            self._pilots["path_last"][own] = -1
+        for own, row in kept:
+            pilot: Any = other._pilots[row]
+            if pilot["mode"] == FlightMode.TRAJECTORY and pilot["path_last"] >= 0:
+                self.put(own, other.rows[pilot["path_first"] : pilot["path_last"] + 1])
+                self._pilots["path_row"][own] += pilot["path_row"] - pilot["path_first"]
 
     def get_state(self) -> Array:
         """What a snapshot keeps."""

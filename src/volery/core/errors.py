@@ -1,5 +1,9 @@
 """The error tree. Whatever a user can cause is a `VoleryError` with one clear sentence."""
 
+from __future__ import annotations
+
+from enum import Enum
+
 
 class VoleryError(Exception):
     """Base of all errors that Volery raises on purpose."""
@@ -11,6 +15,22 @@ class ScenarioError(VoleryError):
 
 class DataFileError(VoleryError):
     """A data file (inventory, elevation grid, airframe, sensor) is missing or broken."""
+
+
+class SpawnFault(Enum):
+    """Which of a new UAV's terms is at fault."""
+
+    NAME = "name"
+    NAME_TAKEN = "name taken"
+    TYPE = "type"
+
+
+class SpawnError(VoleryError):
+    """A UAV cannot come into being; `fault` says why not."""
+
+    def __init__(self, fault: SpawnFault, message: str) -> None:
+        super().__init__(message)
+        self.fault = fault
 
 
 class PlacementError(ScenarioError):

@@ -57,7 +57,8 @@ class Agenda(Generic[What]):
         Firings at or before `after_step` are skipped, and so are those at which `wanted()` is
         false: for them no tick needs to end.
         """
-        entry = _Entry(0, self._added, 0, schedule, lag_ns, what, wanted)
+        first = _first_near(schedule, after_step * self._dt_ns - lag_ns)
+        entry = _Entry(0, self._added, first, schedule, lag_ns, what, wanted)
         entry.due_step = self._step_of(entry)
         while entry.due_step <= after_step:
             entry.k += 1
@@ -111,3 +112,8 @@ class Agenda(Generic[What]):
 
     def _step_at(self, entry: _Entry[What], k: int) -> int:
         return -(-(entry.schedule.instant_ns(k) + entry.lag_ns) // self._dt_ns)
+
+
+def _first_near(schedule: Schedule, time_ns: int) -> int:
+    """Number of a firing shortly before `time_ns`, 0 where there is none."""
+    return max(0, (time_ns - schedule.phase_ns) // schedule.period_ns - 2)

@@ -10,7 +10,7 @@ both budgets, so no two can touch before one of them asks.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -96,6 +96,15 @@ class Collisions:
             self._touching_uav[crew, row - crew.start] = False
         self._fleet.state.contact_budget[rows] = 0.0
         self._fleet.state.separation_budget[rows] = 0.0
+
+    def continue_from(self, other: Collisions, kept: Sequence[tuple[int, int]]) -> None:
+        """Know who touches what of another fleet's UAVs: own row and the other's, for each pair.
+
+        Both are single copies of a scenario.
+        """
+        own, theirs = np.array(kept, np.int64).reshape(-1, 2).T
+        self._touched_solid[own] = other._touched_solid[theirs]
+        self._touching_uav[np.ix_(own, own)] = other._touching_uav[np.ix_(theirs, theirs)]
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""

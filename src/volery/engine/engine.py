@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -20,6 +20,7 @@ from volery.engine.commands import Inbox
 from volery.engine.deadlines import Deadlines
 from volery.engine.events import Event, EventKind
 from volery.engine.partners import Partner
+from volery.engine.regrouping import common_rows, continue_bank
 from volery.engine.restart import Keys, restart_sensors
 from volery.engine.stages import STAGES, Tick, take_commands
 from volery.sensors.bank import Bank
@@ -90,17 +91,14 @@ class Engine:
         """Whether nothing is half done: states may be kept and taken back."""
         self.dt_ns = fleet.dt_ns
         self._new_events: list[Event] = []
-        self._names = names
-        response = CRASH if crash_on_contact else BOUNCE
-        self.collisions = Collisions(
-            fleet, scene, names, response, self._new_events.append, copies=copies
-        )
+        self.names = names
+        """Of the UAVs, in fleet order."""
+        self._response = CRASH if crash_on_contact else BOUNCE
+        self.collisions = self._new_collisions(copies)
         self.banks = tuple(banks)
         self.estimation = estimation
         """Estimators that listen to the sensors, where there are any."""
-        self.sensor_agenda: Agenda[SensorBank] = Agenda(self.dt_ns)
-        for bank in banks:
-            self.sensor_agenda.add(bank, bank.schedule, lag_ns=bank.lag_ns)
+        self.sensor_agenda = self._new_agenda(after_step=-1)
         self.timer_agenda: Agenda[Callable[[], Any]] = Agenda(self.dt_ns)
         self.partner_agenda: Agenda[Partner] = Agenda(self.dt_ns)
         self.deadlines = Deadlines(self.dt_ns)
@@ -182,12 +180,12 @@ class Engine:
         """Let something that happens to a UAV now be an event."""
         x, y, z = self.fleet.state.position_map[uav].tolist()
         self._new_events.append(
-            Event(self.time_ns, self._names[uav], kind, (x, y, z), 0.0, detail=detail)
+            Event(self.time_ns, self.names[uav], kind, (x, y, z), 0.0, detail=detail)
         )
 
     def collect_events(self) -> list[Event]:
         """Events since the last call, oldest first."""
-        self._new_events += flight_log.drain(self.fleet, self._names)
+        self._new_events += flight_log.drain(self.fleet, self.names)
         events = sorted(self._new_events, key=lambda event: event.time_ns)
         self._new_events.clear()
         return events
@@ -204,6 +202,36 @@ class Engine:
                 {uav: key for (uav, name), key in keys.items() if name == "odom"}
             )
         return restart_sensors(self.sensor_agenda, self.banks, self.fleet, uavs, keys)
+
+    def regroup(
+        self,
+        fleet: Fleet,
+        banks: Sequence[SensorBank],
+        names: tuple[str, ...],
+        estimation: Estimation | None,
+        going_on: Collection[str],
+    ) -> None:
+        """Go on with a fleet that has more UAVs or fewer; between ticks.
+
+        All parts are new, as at a start. The UAVs `going_on` are as they were, and so are their
+        sensors and estimates; the others, and theirs, begin now.
+        """
+        self._new_events += flight_log.drain(self.fleet, self.names)
+        kept = common_rows(names, self.names, going_on)
+        fleet.continue_from(self.fleet, kept)
+        collisions, old_banks = self.collisions, self.banks
+        step = self.fleet.step
+        measured = (self.sensor_agenda.next_step() or step) > step if step else False
+        self.fleet, self.names = fleet, names
+        self.collisions = self._new_collisions(copies=1)
+        self.collisions.continue_from(collisions, kept)
+        self.banks = tuple(banks)
+        self.sensor_agenda = self._new_agenda(after_step=step if measured else step - 1)
+        for bank in banks:
+            continue_bank(bank, old_banks, going_on)
+        if estimation is not None and self.estimation is not None:
+            estimation.continue_from(self.estimation, kept)
+        self.estimation = estimation
 
     # ------------------------------------------------------------------------------ snapshot
 
@@ -238,6 +266,16 @@ class Engine:
 
     def _from_now(self, period_s: float) -> Schedule:
         return Schedule(Fraction(NS_PER_S, ns_from_s(period_s)), self.time_ns)
+
+    def _new_collisions(self, copies: int) -> Collisions:
+        emit = self._new_events.append
+        return Collisions(self.fleet, self.scene, self.names, self._response, emit, copies=copies)
+
+    def _new_agenda(self, *, after_step: int) -> Agenda[SensorBank]:
+        agenda: Agenda[SensorBank] = Agenda(self.dt_ns)
+        for bank in self.banks:
+            agenda.add(bank, bank.schedule, lag_ns=bank.lag_ns, after_step=after_step)
+        return agenda
 
     def _due_step(self) -> int:
         steps = (part.next_step() for part in self._due)

@@ -126,7 +126,18 @@ class Estimation:
             attitude=attitude,
             stamp_ns=before_the_first_reading,
         )
-        self._tell_fleet()
+        self._tell_fleet(rows)
+
+    def continue_from(self, other: Estimation, kept: Sequence[tuple[int, int]]) -> None:
+        """Go on with another's estimates: own row of the fleet and the other's, for each pair."""
+        theirs = {int(uav): e for e, uav in enumerate(other.setup.uavs)}
+        was = dict(kept)
+        pairs = [
+            (e, theirs[was[int(uav)]])
+            for e, uav in enumerate(self.setup.uavs)
+            if was.get(int(uav)) in theirs
+        ]
+        self.estimator.continue_from(other.estimator, pairs)
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
@@ -155,9 +166,10 @@ class Estimation:
         variance = np.maximum(slope**2 * samples.pressure_variance, _LEAST_VARIANCE)
         self.estimator.fuse_pressure_height(rows, samples.stamp_ns, height, variance)
 
-    def _tell_fleet(self) -> None:
-        """Tell the controllers how far what they fly on is from the truth."""
-        flying = np.flatnonzero(self.setup.flies)
+    def _tell_fleet(self, rows: Rows | None = None) -> None:
+        """Tell the controllers how far what they fly on is from the truth; `rows` (E,), or all."""
+        flies = self.setup.flies
+        flying = np.flatnonzero(flies) if rows is None else rows[flies[rows]]
         if not len(flying):
             return
         uavs = self.setup.uavs[flying]

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.clock import ns_from_s, s_from_ns
@@ -23,17 +26,29 @@ from volery.sensors.gnss import GnssBank
 from volery.vehicle.plants import RigidBody
 from volery.world.weather import Gust
 
+Array = NDArray[np.float64]
+
 
 class FaultPlan:
-    """Plans faults of the UAVs `names` of an engine; planned ones are part of its state."""
+    """Plans faults of an engine's UAVs; planned ones are part of its state.
 
-    def __init__(self, engine: Engine, names: tuple[str, ...]) -> None:
+    UAVs go by their names: rows may change before a fault's time comes, and one that has been
+    deleted meanwhile fails no more.
+    """
+
+    def __init__(self, engine: Engine) -> None:
         self._engine = engine
-        self._names = names
-        self._sound = engine.fleet.state.rotor_health.copy()
-        """(N, rotors) health without faults: what wear has left."""
-        self._weak: dict[tuple[int, int], list[float]] = {}
+        self._sound: dict[str, Array] = {}
+        """(rotors,) health without faults, by UAV: what wear has left."""
+        self._weak: dict[tuple[str, int], list[float]] = {}
         """Shares of thrust that the present faults leave, by UAV and rotor."""
+        self.enlist(engine.names)
+
+    def enlist(self, uavs: Collection[str]) -> None:
+        """Take UAVs as they are now for sound ones."""
+        for name in uavs:
+            self._sound[name] = self._fleet.state.rotor_health[self._row(name)].copy()
+            self.mend(name)
 
     def add(self, fault: Fault) -> None:
         """Let a fault happen when its time comes, or at the next tick if that has passed.
@@ -58,15 +73,15 @@ class FaultPlan:
         if until_s is not None:
             self._at(until_s, end or _nothing, uav, f"fault over: {fault.kind}")
 
-    def mend(self, uav: int) -> None:
+    def mend(self, uav: str) -> None:
         """Forget what weakens the rotors of a UAV that begins anew."""
         self._weak = {key: shares for key, shares in self._weak.items() if key[0] != uav}
 
-    def get_state(self) -> dict[tuple[int, int], list[float]]:
+    def get_state(self) -> dict[tuple[str, int], list[float]]:
         """What a snapshot keeps beside what is planned and what fleet and sensors hold."""
         return {key: list(shares) for key, shares in self._weak.items()}
 
-    def set_state(self, state: dict[tuple[int, int], list[float]]) -> None:
+    def set_state(self, state: dict[tuple[str, int], list[float]]) -> None:
         """Go back to a kept state."""
         self._weak = {key: list(shares) for key, shares in state.items()}
 
@@ -76,6 +91,8 @@ class FaultPlan:
 
     def _at(self, time_s: float, action: Callable[[], Any], uav: str | None, what: str) -> None:
         def act() -> None:
+            if uav is not None and uav not in self._engine.names:
+                return
             action()
             if uav is not None:
                 self._engine.note(self._row(uav), EventKind.FAULT, what)
@@ -89,7 +106,7 @@ class FaultPlan:
             raise CommandError(f"{fault.uav} has no rotor {fault.rotor}; 0 to {rotors - 1} exist")
         if not isinstance(self._fleet.plants[i], RigidBody):
             raise CommandError(f"{fault.uav} has no motors to fail: its plant is no rigid body")
-        key = i, fault.rotor
+        key = fault.uav, fault.rotor
 
         def weaken() -> None:
             self._weak.setdefault(key, []).append(fault.thrust_factor)
@@ -102,10 +119,11 @@ class FaultPlan:
 
         return weaken, mend
 
-    def _set_health(self, key: tuple[int, int]) -> None:
+    def _set_health(self, key: tuple[str, int]) -> None:
         """The worst of the present faults decides."""
-        share = min(self._weak.get(key, ()), default=1.0)
-        self._fleet.set_rotor_health(*key, share * float(self._sound[key]))
+        (uav, rotor), share = key, min(self._weak.get(key, ()), default=1.0)
+        sound = float(self._sound[uav][rotor])
+        self._fleet.set_rotor_health(self._row(uav), rotor, share * sound)
 
     def _sensor(self, fault: SensorFault) -> tuple[Callable[[], Any], Callable[[], Any]]:
         bank, row = self._find(fault.uav, fault.sensor)
@@ -114,29 +132,34 @@ class FaultPlan:
             bank.faults.set(row, fault.effect, fault.bias)  # a bias that does not fit is told now
         finally:
             bank.faults.set_state(before)
-        return (
-            lambda: bank.faults.set(row, fault.effect, fault.bias),
-            lambda: bank.faults.clear(row),
-        )
+
+        def fail() -> None:
+            bank, row = self._find(fault.uav, fault.sensor)
+            bank.faults.set(row, fault.effect, fault.bias)
+
+        def mend() -> None:
+            bank, row = self._find(fault.uav, fault.sensor)
+            bank.faults.clear(row)
+
+        return fail, mend
 
     def _gnss(self, fault: GnssFault) -> Callable[[], Any]:
-        i = self._row(fault.uav)
-        inner = [b.bank for b in self._engine.banks if isinstance(b, FaultableBank)]
-        receivers = [
-            bank
-            for bank in inner
-            if isinstance(bank, GnssBank) and any(s.uav == i for s in bank.sensors)
-        ]
-        if not receivers:
+        if not self._receivers(self._row(fault.uav)):
             raise CommandError(f"{fault.uav} has no GNSS receiver to lose its fix")
         since = ns_from_s(fault.at_s)
         until = {} if fault.until_s is None else {"until_ns": ns_from_s(fault.until_s)}
 
         def deny() -> None:
-            for receiver in receivers:
-                receiver.deny(i, max(since, self._engine.time_ns), **until)
+            row = self._row(fault.uav)
+            for receiver in self._receivers(row):
+                receiver.deny(row, max(since, self._engine.time_ns), **until)
 
         return deny
+
+    def _receivers(self, row: int) -> list[GnssBank]:
+        inner = [b.bank for b in self._engine.banks if isinstance(b, FaultableBank)]
+        gnss = [bank for bank in inner if isinstance(bank, GnssBank)]
+        return [bank for bank in gnss if any(s.uav == row for s in bank.sensors)]
 
     def _gust(self, fault: GustFault) -> Callable[[], Any]:
         def blow() -> None:
@@ -147,9 +170,10 @@ class FaultPlan:
         return blow
 
     def _displacement(self, fault: DisplacementFault) -> Callable[[], Any]:
-        i = self._row(fault.uav)
+        self._row(fault.uav)
 
         def displace() -> None:
+            i = self._row(fault.uav)
             there = self._fleet.state.position_map[i] + fault.offset_m
             x0, y0, x1, y1 = self._engine.ground.bounds
             if not (x0 <= there[0] <= x1 and y0 <= there[1] <= y1):
@@ -162,9 +186,9 @@ class FaultPlan:
 
     def _row(self, uav: str) -> int:
         try:
-            return self._names.index(uav)
+            return self._engine.names.index(uav)
         except ValueError:
-            known = ", ".join(self._names)
+            known = ", ".join(self._engine.names)
             raise CommandError(f"there is no UAV '{uav}'; known: {known}") from None
 
     def _find(self, uav: str, sensor: str) -> tuple[SensorBank, int]:

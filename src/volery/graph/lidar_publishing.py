@@ -59,19 +59,25 @@ class LidarPublisher:
 
     def __init__(self, graph: Graph) -> None:
         self._graph = graph
-        self._scans: dict[SensorId, Publisher] = {}
-        self._echoes: dict[SensorId, Publisher] = {}
-        self._clouds: dict[SensorId, Publisher] = {}
+        self._scans: dict[str, Publisher] = {}
+        self._echoes: dict[str, Publisher] = {}
+        self._clouds: dict[str, Publisher] = {}
 
     def announce(self, sensor: SensorId, model: LidarModel, topic: str) -> None:
         """Advertise what a LIDAR publishes; all echoes go to `echoes` beside a scan's topic."""
         if not isinstance(model.scan, PlanarScan):
-            self._clouds[sensor] = self._graph.advertise(topic, PointCloud2)
+            self._clouds[sensor.path] = self._graph.advertise(topic, PointCloud2)
             return
-        self._scans[sensor] = self._graph.advertise(topic, LaserScan)
+        self._scans[sensor.path] = self._graph.advertise(topic, LaserScan)
         if model.echoes > 1:
             beside = f"{topic.rsplit('/', 1)[0]}/echoes"
-            self._echoes[sensor] = self._graph.advertise(beside, MultiEchoLaserScan)
+            self._echoes[sensor.path] = self._graph.advertise(beside, MultiEchoLaserScan)
+
+    def retire(self, uav_name: str) -> None:
+        """Publish no more for the LIDARs of a UAV."""
+        for publishers in (self._scans, self._echoes, self._clouds):
+            for path in [path for path in publishers if path.startswith(f"{uav_name}/")]:
+                publishers.pop(path).cancel()
 
     def publish(self, scans: LidarScans) -> None:
         """Queue the messages of one sweep of a bank, where somebody receives them."""
@@ -79,17 +85,17 @@ class LidarPublisher:
             self._publish_clouds(scans)
             return
         for row, sensor in enumerate(scans.sensors):
-            publisher = self._scans[sensor]
+            publisher = self._scans[sensor.path]
             if publisher.wanted:
                 publisher.publish(_scan_message(scans, scans.model.scan, row))
-            several = self._echoes.get(sensor)
+            several = self._echoes.get(sensor.path)
             if several is not None and several.wanted:
                 several.publish(_echo_message(scans, scans.model.scan, row))
 
     def _publish_clouds(self, scans: LidarScans) -> None:
         maker: PointMaker | None = None
         for row, sensor in enumerate(scans.sensors):
-            publisher = self._clouds[sensor]
+            publisher = self._clouds[sensor.path]
             if not publisher.wanted:
                 continue
             maker = maker or PointMaker(scans)

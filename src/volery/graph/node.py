@@ -29,8 +29,14 @@ from volery.graph.thinking import Deferring, DelayedPublisher, Thinker
 class Timers(Deferring, Protocol):
     """Whoever can call back at simulated times."""
 
-    def every(self, period_s: float, callback: Callable[[], None]) -> None:
-        """Call `callback` each period, first after one period."""
+    def every(
+        self,
+        period_s: float,
+        callback: Callable[[], None],
+        *,
+        wanted: Callable[[], bool] | None = None,
+    ) -> None:
+        """Call `callback` each period, first after one period; not where `wanted()` is false."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +90,9 @@ class Node:
         self._context = context
         self._overrides = dict(parameter_overrides or {})
         self._parameters: dict[str, Parameter] = {}
+        self._held: list[Callable[[], None]] = []
+        """What gives back a publisher, a subscription, a service."""
+        self._destroyed = False
         self._thinker = (
             Thinker(node_name, context.latency_ns, context.timers, context.now_ns)
             if context.latency_ns
@@ -114,6 +123,7 @@ class Node:
         """
         _check_depth(qos)
         publisher = self._context.graph.advertise(self.resolve(topic), msg_type, latched=latched)
+        self._held.append(publisher.cancel)
         return publisher if self._thinker is None else DelayedPublisher(publisher, self._thinker)
 
     def create_subscription(
@@ -125,12 +135,18 @@ class Node:
         def receive(published: Published) -> None:
             self._run(lambda: callback(published.message), f"message on {published.topic}")
 
-        return self._context.graph.subscribe(self.resolve(topic), receive, msg_type, depth=qos)
+        subscription = self._context.graph.subscribe(
+            self.resolve(topic), receive, msg_type, depth=qos
+        )
+        self._held.append(subscription.cancel)
+        return subscription
 
     def create_timer(self, period_s: float, callback: Callable[[], None]) -> None:
         """Call `callback` each `period_s` of simulated time."""
         check_period(period_s)
-        self._context.timers.every(period_s, lambda: self._run(callback, "timer"))
+        self._context.timers.every(
+            period_s, lambda: self._run(callback, "timer"), wanted=lambda: not self._destroyed
+        )
 
     def create_service(
         self, srv_type: str, service: str, callback: Callable[[Any, Any], Any]
@@ -143,7 +159,9 @@ class Node:
                 return callback(request, _blank(response_type))
             return self._thinker.think(lambda: callback(request, _blank(response_type))).result()
 
-        self._context.graph.offer(self.resolve(service), srv_type, handle)
+        name, graph = self.resolve(service), self._context.graph
+        graph.offer(name, srv_type, handle)
+        self._held.append(lambda: graph.withdraw(name))
 
     def create_client(self, srv_type: str, service: str) -> Client:
         """Client of a service of type `srv_type`, e.g. `std_srvs/srv/Trigger`."""
@@ -171,6 +189,9 @@ class Node:
         """Give back what the node holds; nothing of it runs afterwards."""
         if self._thinker is not None:
             self._thinker.close()
+        self._destroyed = True
+        while self._held:
+            self._held.pop()()
 
     # ----------------------------------------------------------------------------------- helpers
 
@@ -183,6 +204,8 @@ class Node:
         return self._context.now_ns() if self._thinker is None else self._thinker.now_ns()
 
     def _run(self, callback: Callable[[], None], occasion: str) -> None:
+        if self._destroyed:
+            return
         if self._thinker is None:
             self._guarded(callback, occasion)
         else:

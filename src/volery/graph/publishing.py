@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -71,7 +71,7 @@ class GraphPublisher:
         self._graph = graph
         self._publishers: dict[str, Publisher] = {}
         self._lidars = LidarPublisher(graph)
-        self._mounts: dict[SensorId, Mount] = {}
+        self._mounts: dict[str, Mount] = {}
         self._clock = graph.advertise("/clock", Clock)
         self._tf = graph.advertise("/tf", TFMessage)
         self._tf_static = graph.advertise("/tf_static", TFMessage, latched=True)
@@ -89,8 +89,9 @@ class GraphPublisher:
         }
 
     def announce(self, sensor: SensorId, kind: type[Any], mount: Mount) -> None:
-        """Advertise a sensor's topic and place its frame, before the run starts."""
-        self._mounts[sensor] = mount
+        """Advertise a sensor's topic and place its frame."""
+        self._static_sent = False
+        self._mounts[sensor.path] = mount
         base = f"{sensor.uav_name}/base_link"
         if kind is JointAngles:
             self._advertise(f"/{sensor.uav_name}/joint_states", JointState)
@@ -110,12 +111,28 @@ class GraphPublisher:
             self._static.append(_mount_transform(base, f"{sensor.uav_name}/{sensor.name}", mount))
 
     def announce_lidar(self, sensor: SensorId, model: LidarModel, topic: str, mount: Mount) -> None:
-        """Advertise what a LIDAR publishes and place its frame, before the run starts."""
-        self._mounts[sensor] = mount
+        """Advertise what a LIDAR publishes and place its frame."""
+        self._static_sent = False
+        self._mounts[sensor.path] = mount
         self._lidars.announce(sensor, model, topic)
         if not mount.nods:
             base = f"{sensor.uav_name}/base_link"
             self._static.append(_mount_transform(base, laser_frame(sensor), mount))
+
+    def arrange(self, uav_names: Sequence[str]) -> None:
+        """Tell of fixed frames in this order of UAVs."""
+        rows = {name: row for row, name in enumerate(uav_names)}
+        self._static.sort(key=lambda t: rows[t.child_frame_id.split("/")[0]])
+
+    def retire(self, uav_name: str) -> None:
+        """Publish no more for the sensors of a UAV, and forget its frames."""
+        below = f"/{uav_name}/"
+        for topic in [topic for topic in self._publishers if topic.startswith(below)]:
+            self._publishers.pop(topic).cancel()
+        self._lidars.retire(uav_name)
+        own = f"{uav_name}/"
+        self._static = [t for t in self._static if not t.child_frame_id.startswith(own)]
+        self._static_sent = False
 
     def publish(self, samples: Samples) -> None:
         """Queue the messages of one batch of samples; before the first, the fixed transforms."""
@@ -227,7 +244,7 @@ class GraphPublisher:
     def _joints(self, joints: JointAngles) -> None:
         transforms = []
         for i, sensor in enumerate(joints.sensors):
-            mount = self._mounts[sensor]
+            mount = self._mounts[sensor.path]
             base = f"{sensor.uav_name}/base_link"
             angle = float(joints.angle[i])
             if self._tf.wanted:

@@ -19,14 +19,14 @@ from volery.graph.messages import (
     TwistStamped,
     header,
 )
-from volery.runtime.services.offering import offer_command
+from volery.runtime.services.offering import Close, offer_command
 from volery.runtime.trajectory_messages import follow_message
 from volery.runtime.uav import Uav
 
 _TRIGGER = "std_srvs/srv/Trigger"
 
 
-def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> None:
+def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Close]:
     """Listen to the topics that command one UAV, offer its plain services.
 
     `cmd_vel`, `goal_pose`, `trajectory` and, for a kinematic UAV that something outside moves,
@@ -36,7 +36,8 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> None:
     and on the ground they are ignored, and so are those that are none: a refused command on a topic
     has nobody to tell. A Twist that is taken comes out again on `cmd_vel/applied`, stamped with the
     simulated time from which it is in force, by which clients measure round trips. The services
-    take_off, hold, land and return_home answer with `success` and a reason.
+    take_off, hold, land and return_home answer with `success` and a reason. What is returned ends
+    all that.
     """
     applied = graph.advertise(f"/{uav.name}/cmd_vel/applied", TwistStamped)
 
@@ -53,8 +54,10 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> None:
         "trajectory": (MultiDOFJointTrajectory, lambda message: follow_message(uav, message)),
         "pose_command": (PoseStamped, lambda pose: stand_at_message(uav, pose)),
     }
+    closes: list[Close] = [applied.cancel]
     for name, (message_class, take) in topics.items():
-        graph.subscribe(f"/{uav.name}/{name}", _careful(uav, take), message_class)
+        topic = f"/{uav.name}/{name}"
+        closes.append(graph.subscribe(topic, _careful(uav, take), message_class).cancel)
     actions: dict[str, Callable[[], None]] = {
         "take_off": uav.take_off,
         "hold": uav.hold,
@@ -62,7 +65,9 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> None:
         "return_home": uav.return_home,
     }
     for name, action in actions.items():
-        offer_command(graph, f"/{uav.name}/{name}", _TRIGGER, _without_request(action))
+        path = f"/{uav.name}/{name}"
+        closes.append(offer_command(graph, path, _TRIGGER, _without_request(action)))
+    return closes
 
 
 def go_to_message(uav: Uav, message: Any) -> None:

@@ -21,9 +21,8 @@ from volery.scenario.schema import Scenario
 from volery.sensors.samples import JointAngles
 
 
-def make_publisher(graph: Graph, fitted: Sequence[Fitted]) -> GraphPublisher:
+def announce_sensors(publisher: GraphPublisher, fitted: Sequence[Fitted]) -> None:
     """Advertise what the sensors publish."""
-    publisher = GraphPublisher(graph)
     for sensor in fitted:
         if sensor.lidar is not None:
             publisher.announce_lidar(sensor.id, sensor.lidar, sensor.topic, sensor.mount)
@@ -31,7 +30,6 @@ def make_publisher(graph: Graph, fitted: Sequence[Fitted]) -> GraphPublisher:
             publisher.announce(sensor.id, RESULT_OF[sensor.spec.kind], sensor.mount)
         if sensor.mount.nods:
             publisher.announce(sensor.id, JointAngles, sensor.mount)
-    return publisher
 
 
 def start_nodes(

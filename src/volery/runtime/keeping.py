@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from volery.control.fleet import Fleet
 from volery.core.errors import SnapshotError
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
@@ -17,10 +16,13 @@ from volery.graph.graph import Graph
 from volery.graph.node import Node
 from volery.graph.publishing import GraphPublisher
 from volery.runtime.building import check_free
+from volery.runtime.crew import Crew
 from volery.runtime.outlet import Outlet
+from volery.runtime.placement import Start
 from volery.runtime.run_loop import RunLoop
 from volery.runtime.sensor_fitting import Fitted, refit
 from volery.runtime.snapshot import (
+    NodeStates,
     Snapshot,
     check_nodes,
     check_partners,
@@ -33,64 +35,85 @@ from volery.runtime.snapshot import (
 class Keeper:
     """Keeps and puts back the parts of one simulation.
 
-    `take_off(names)` has those of the UAVs take off that do so by themselves. Make it when all
-    parts stand at their start: that state is what `reset` goes back to.
+    Make it when all parts stand at their start: that state is what `reset` goes back to.
     """
 
-    fleet: Fleet
     engine: Engine
     graph: Graph
     faults: FaultPlan
     publisher: GraphPublisher
     loop: RunLoop
-    fitted: Sequence[Fitted]
-    nodes: list[Node]
+    crew: Crew
     partners: list[Partner]
     outlet: Outlet
-    take_off: Callable[[Sequence[str]], None]
     _start: dict[str, Any] = field(init=False)
+    _starts: tuple[Start, ...] = field(init=False)
+    _new_nodes: NodeStates = field(init=False)
+    """States of nodes that have done nothing yet."""
 
     def __post_init__(self) -> None:
         self._start = self._state()
+        self._starts = self.crew.starts
+        self._new_nodes = dict(self._start["nodes"])
+
+    @property
+    def spawned(self) -> list[str]:
+        """Names of UAVs that were not there at the start."""
+        return [start.name for start in self.crew.starts if start not in self._starts]
+
+    def enlist(self, name: str) -> None:
+        """Know the nodes of a UAV that has just begun."""
+        self._new_nodes.update(keep_nodes(self._nodes_of(name)))
 
     def snapshot(self) -> Snapshot:
         """The present state."""
-        self._check("a snapshot", self.nodes)
-        return Snapshot(self.engine.time_ns, id(self), self._state())
+        self._check("a snapshot", self.crew.nodes)
+        return Snapshot(self.engine.time_ns, id(self), self.crew.starts, self._state())
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go to a kept state."""
-        self._check("to restore a state", self.nodes)
+        self._check("to restore a state", self.crew.nodes)
         if not isinstance(snapshot, Snapshot):
             raise SnapshotError(f"not a snapshot: {snapshot!r}")
         if snapshot.owner != id(self):
             raise SnapshotError("the snapshot is of another simulation")
+        if snapshot.starts != self.crew.starts:
+            then = ", ".join(start.name for start in snapshot.starts)
+            raise SnapshotError(f"UAVs have come or gone since the snapshot, which holds {then}")
         self._put_back(snapshot.state)
 
     def reset(self, seed: int) -> None:
-        """Go back to the start, with other random streams."""
-        self._check("a reset", self.nodes)
+        """Go back to the start and the UAVs of the start, with other random streams."""
+        self._check("a reset", self.crew.nodes)
+        if self.crew.starts != self._starts:
+            self.crew.end_nodes()  # all of them, so that they are started in the same order
+            self.crew.regroup(self._starts)
         self._put_back(self._start)
-        rows = np.arange(len(self.fleet))
-        self.fleet.seed_turbulence(seed, rows, self.fleet.names)
-        self._restart_sensors(rows, refit(self.fitted, seed))
-        self.take_off(self.fleet.names)
+        self.crew.start_nodes()
+        fleet = self.engine.fleet
+        rows = np.arange(len(fleet))
+        fleet.seed_turbulence(seed, rows, fleet.names)
+        self._restart_sensors(rows, refit(self.crew.fitted, seed))
+        self.crew.take_off(fleet.names)
 
     def reset_uav(self, row: int) -> None:
         """Put one UAV back to its start while the others fly on."""
-        name = self.fleet.names[row]
-        nodes = [k for k, node in enumerate(self.nodes) if node.get_namespace() == f"/{name}"]
-        self._check("a reset", [self.nodes[k] for k in nodes])
-        start = self._start["engine"]["fleet"]
-        check_free(self.fleet, row, start["position"][0, row])
+        fleet = self.engine.fleet
+        name = fleet.names[row]
+        nodes = self._nodes_of(name)
+        self._check("a reset", nodes)
+        begun = self.crew.beginnings[name]
+        check_free(fleet, row, begun.fleet["position"][0, begun.row])
         rows = np.array([row])
-        self.fleet.restart(start, rows)
+        fleet.restart(begun.fleet, rows, np.array([begun.row]))
         self.engine.collisions.forget(rows)
-        self._restart_sensors(rows, [f for f in self.fitted if f.id.uav == row])
-        states = self._start["nodes"]
-        put_back_nodes([self.nodes[k] for k in nodes], [states[k] for k in nodes])
-        self.faults.mend(row)
-        self.take_off([name])
+        self._restart_sensors(rows, [f for f in self.crew.fitted if f.id.uav == row])
+        put_back_nodes(nodes, self._new_nodes)
+        self.faults.mend(name)
+        self.crew.take_off([name])
+
+    def _nodes_of(self, name: str) -> list[Node]:
+        return [node for node in self.crew.nodes if node.get_namespace() == f"/{name}"]
 
     def _restart_sensors(self, rows: Any, fitted: Sequence[Fitted]) -> None:
         self.engine.restart_sensors(rows, {(f.id.uav, f.id.name): f.key for f in fitted})
@@ -108,14 +131,14 @@ class Keeper:
             "graph": self.graph.get_state(),
             "faults": self.faults.get_state(),
             "publisher": self.publisher.get_state(),
-            "nodes": keep_nodes(self.nodes),
+            "nodes": keep_nodes(self.crew.nodes),
             "digest": None if digest is None else digest.get_state(),
             "events": list(self.outlet.events),
             "owed_ns": self.loop.owed_ns,
         }
 
     def _put_back(self, state: dict[str, Any]) -> None:
-        put_back_nodes(self.nodes, state["nodes"])
+        put_back_nodes(self.crew.nodes, state["nodes"])
         self.engine.set_state(state["engine"])
         self.graph.set_state(state["graph"])
         self.faults.set_state(state["faults"])

@@ -16,7 +16,7 @@ class Outlet:
     """The engine's `Sink` in a simulation."""
 
     def __init__(self, fleet: Fleet, graph: Graph, publisher: GraphPublisher) -> None:
-        self._fleet = fleet
+        self.fleet = fleet
         self._graph = graph
         self._publisher = publisher
         self.events: list[Event] = []
@@ -34,12 +34,12 @@ class Outlet:
     def take_fingerprint(self) -> None:
         """Take the present states into the digest, if there is one."""
         if self.digest is not None:
-            self.digest.add_states(self._fleet)
+            self.digest.add_states(self.fleet)
 
     def advanced(self, first_step: int, last_step: int) -> None:
         """Take in computed steps."""
         if self.digest is not None:
-            self.digest.add_steps(self._fleet.history, first_step, last_step)
+            self.digest.add_steps(self.fleet.history, first_step, last_step)
         if self.watch is not None:
             self.watch()
 

@@ -32,13 +32,11 @@ _CLIMB_LOOKS = 4
 """Heights at which `nearest_free` wants room, from the ground to the take-off altitude."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Start:
-    """One UAV before the first step."""
+    """One UAV before the first step; two of them are never the same UAV."""
 
     name: str
-    group: int
-    """Row in the scenario's `uavs`."""
     type_name: str
     airframe: Airframe
     position_map: Array
@@ -70,7 +68,6 @@ def place_uavs(
             starts.append(
                 Start(
                     name,
-                    g,
                     group.type,
                     airframe,
                     place,
@@ -139,6 +136,13 @@ def lifted(place: Array, airframe: Airframe, terrain: Terrain) -> Array:
     """`place` (3,) m, with feet that stick in the ground as deep as those of one that lands out."""
     standing = _standing(place[:2], airframe, terrain)
     return standing if 0.0 < standing[2] - place[2] < _PRESSED_M else place
+
+
+def on_ground(place: Array, airframe: Airframe, terrain: Terrain) -> Array:
+    """`place` (3,) m, or one on its feet above it where that lies between feet and ground."""
+    ground = float(terrain.height(place[0], place[1]))
+    standing = _standing(place[:2], airframe, terrain)
+    return standing if ground - _PRESSED_M <= place[2] < standing[2] else place
 
 
 def check_place(

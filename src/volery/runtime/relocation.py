@@ -11,12 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from volery.core import rotations
 from volery.core.errors import CommandError, PlacementError
 from volery.engine.engine import Engine
+from volery.runtime.crew import Crew
 from volery.runtime.placement import Start, check_place, lifted, stands_on_ground
-from volery.runtime.sensor_fitting import Fitted
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
 Array = NDArray[np.float64]
+
+_REACH_M = 10.0
+"""Larger than any two UAVs."""
 
 
 class Relocator:
@@ -27,14 +30,12 @@ class Relocator:
         engine: Engine,
         scene: Scene,
         terrain: Terrain,
-        starts: Sequence[Start],
-        fitted: Sequence[Fitted],
+        crew: Crew,
     ) -> None:
         self._engine = engine
         self._scene = scene
         self._terrain = terrain
-        self._starts = starts
-        self._streams = {f.id.uav: f.key for f in fitted if f.id.name == "odom"}
+        self._crew = crew
 
     def place(self, row: int, position_map: ArrayLike, attitude: ArrayLike) -> None:
         """Put UAV `row` at (3,) m with (4,) x y z w, map from body; its motion goes on there.
@@ -45,7 +46,7 @@ class Relocator:
         position = np.asarray(position_map, dtype=np.float64)
         if position.shape != (3,) or not np.isfinite(position).all():
             raise PlacementError(f"a position is three finite numbers, not {position_map!r}")
-        fleet, start = self._engine.fleet, self._starts[row]
+        fleet, start = self._engine.fleet, self._crew.starts[row]
         try:
             position = lifted(position, start.airframe, self._terrain)
             self._check(row, position)
@@ -54,8 +55,9 @@ class Relocator:
         except CommandError as error:
             raise PlacementError(str(error)) from None
         self._engine.collisions.forget(np.array([row]))
-        if self._engine.estimation is not None and row in self._streams:
-            self._engine.estimation.restart({row: self._streams[row]})
+        streams = {f.id.uav: f.key for f in self._crew.fitted if f.id.name == "odom"}
+        if self._engine.estimation is not None and row in streams:
+            self._engine.estimation.restart({row: streams[row]})
 
     def move(self, row: int, velocity_map: ArrayLike, omega_map: ArrayLike) -> None:
         """Let UAV `row` move at (3,) m/s and turn at (3,) rad/s, both map, from now on.
@@ -67,11 +69,14 @@ class Relocator:
         self._engine.fleet.push(row, velocity_map, omega_body)
 
     def _check(self, row: int, position: Array) -> None:
+        start = self._crew.starts[row]
         present = self._engine.fleet.state.position_map
-        others = [
-            replace(start, position_map=present[i])
-            for i, start in enumerate(self._starts)
-            if i != row and np.linalg.norm(present[i] - position) < 10.0
-        ]
-        start = self._starts[row]
+        around = near(self._crew.starts, present, position)
+        others = [other for other in around if other.name != start.name]
         check_place(position, start.airframe, self._scene, self._terrain, others, start.name)
+
+
+def near(starts: Sequence[Start], present: Array, position: Array) -> list[Start]:
+    """Those of the UAVs that are within reach of `position` (3,) m, at their `present` (N, 3) m."""
+    rows = np.flatnonzero(np.linalg.norm(present - position, axis=1) < _REACH_M).tolist()
+    return [replace(starts[row], position_map=present[row]) for row in rows]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from pathlib import Path
 from types import MappingProxyType
@@ -21,12 +21,13 @@ from volery.engine.partners import Partner, check_terms
 from volery.engine.stepping import OnSteps, StepRequest
 from volery.graph.graph import Graph
 from volery.graph.node import Node
+from volery.graph.publishing import GraphPublisher
 from volery.graph.session import Gateway
-from volery.runtime.building import add_bodies, build_fleet, place
+from volery.runtime.assembly import assemble
+from volery.runtime.building import place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
-from volery.runtime.command_door import open_commands
-from volery.runtime.estimation_building import build_estimation
-from volery.runtime.graph_building import all_down, make_publisher, plan_faults, start_nodes
+from volery.runtime.crew import Crew
+from volery.runtime.graph_building import all_down, plan_faults
 from volery.runtime.keeping import Keeper
 from volery.runtime.lock_step import open_lock_step
 from volery.runtime.outlet import Outlet
@@ -34,15 +35,16 @@ from volery.runtime.placement import Start
 from volery.runtime.progress import Progress
 from volery.runtime.relocation import Relocator
 from volery.runtime.run_loop import RunLoop
-from volery.runtime.sensor_building import build_banks
-from volery.runtime.sensor_fitting import fit_sensors, lidar_mounts
+from volery.runtime.sensor_fitting import lidar_mounts
 from volery.runtime.services import Services, open_services
 from volery.runtime.snapshot import Snapshot
+from volery.runtime.spawning import Spawner
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
 from volery.runtime.worlds import build_forest, build_terrain
 from volery.scenario.faults import Fault, parse_fault
-from volery.scenario.schema import Scenario
+from volery.scenario.schema import Scenario, UavType
+from volery.sensors.mount import Mount
 from volery.world.scene import Scene
 from volery.world.weather import Weather
 
@@ -82,63 +84,55 @@ class Simulation:
         self._pacer = Pacer()
 
         starts = place(scenario, self.scene, self.terrain)
-        names = tuple(start.name for start in starts)
-        self._fleet = build_fleet(scenario, starts, names)
-        add_bodies(self.scene, starts)
-        fitted = fit_sensors(scenario, starts)
+        parts = assemble(scenario, starts, self.scene)
         self.graph = Graph(lambda: self.time_ns, self.post)
         self.gateway = Gateway(self.graph, self.post)
         """Where clients of other threads join the graph."""
-        self._publisher = make_publisher(self.graph, fitted)
-        self.outlet = Outlet(self._fleet, self.graph, self._publisher)
+        publisher = GraphPublisher(self.graph)
+        self.outlet = Outlet(parts.fleet, self.graph, publisher)
         """Where steps, measurements and events go."""
-        self.mounts = lidar_mounts(fitted, planar=True)
-        self.cloud_mounts = lidar_mounts(fitted, planar=False)
-        estimation = build_estimation(scenario, fitted, self._fleet)
-        self._banks = build_banks(scenario, fitted, self._fleet, self.scene, estimation)
         self._engine = Engine(
-            self._fleet,
+            parts.fleet,
             self.scene,
             self.terrain,
-            self._banks,
-            names,
+            parts.banks,
+            tuple(start.name for start in starts),
             self.outlet,
             crash_on_contact=scenario.physics.on_contact == "crash",
-            estimation=estimation,
+            estimation=parts.estimation,
         )
-        self.uavs: Mapping[str, Uav] = MappingProxyType(
-            {
-                s.name: Uav(
-                    self._fleet, row, s.name, scenario.types[s.type_name].flight, s.type_name
-                )
-                for row, s in enumerate(starts)
-            }
+        self._faults = FaultPlan(self._engine)
+        self._crew = Crew(
+            scenario,
+            self._engine,
+            self.graph,
+            publisher,
+            self.outlet,
+            self._faults,
+            starts,
         )
-        self.nodes: list[Node] = []
+        self.uavs: Mapping[str, Uav] = MappingProxyType(self._crew.uavs)
+        """In fleet order."""
         self._partners: list[Partner] = []
-        self.starts = starts
-        """Where the UAVs begin, in fleet order."""
-        self._open_graph(starts)
-        self._faults = FaultPlan(self._engine, names)
+        self._keep_time(publisher)
+        self._crew.open(parts)
         plan_faults(self._faults, scenario)
         self._loop = RunLoop(self._engine, self._pacer, scenario.duration_s, self._has_ended)
-        self._relocator = Relocator(self._engine, self.scene, self.terrain, starts, fitted)
+        self._relocator = Relocator(self._engine, self.scene, self.terrain, self._crew)
         open_lock_step(self)
         self._services: Services = open_services(self, recordings=recordings, on_load=on_load)
         self._keeper = Keeper(
-            self._fleet,
             self._engine,
             self.graph,
             self._faults,
-            self._publisher,
+            publisher,
             self._loop,
-            fitted,
-            self.nodes,
+            self._crew,
             self._partners,
             self.outlet,
-            self._take_off,
         )
-        self._take_off(names)
+        self._spawner = Spawner(self._crew, self._keeper, self.scene, self.terrain)
+        self._crew.take_off(self.uavs)
 
     # -------------------------------------------------------------------------------------- time
 
@@ -161,7 +155,7 @@ class Simulation:
         """Advance by physics steps (1 ms each unless the scenario says otherwise)."""
         self._check_open()
         check_steps(steps)
-        self._engine.advance_to(self._fleet.step + steps)
+        self._engine.advance_to(self._engine.fleet.step + steps)
 
     def run(
         self,
@@ -245,7 +239,7 @@ class Simulation:
     @property
     def weather(self) -> Weather:
         """The air."""
-        return self._fleet.weather
+        return self._engine.fleet.weather
 
     def set_weather(self, weather: Weather) -> None:
         """Let `weather` blow from the next guidance tick on."""
@@ -307,7 +301,7 @@ class Simulation:
         is not there any more, as `is_there()` says, is waited for no more.
         """
         self._check_open()
-        check_terms(period_s, timeout_s, on_timeout, self._fleet.dt_ns)
+        check_terms(period_s, timeout_s, on_timeout, self._engine.fleet.dt_ns)
         if any(partner.name == name and not partner.has_left for partner in self._partners):
             raise CommandError(f"there is a lock-step partner '{name}' already")
         partner = Partner(name, timeout_s, on_timeout, on_meeting=on_meeting, is_there=is_there)
@@ -323,8 +317,7 @@ class Simulation:
             self._services.close()
             for partner in self._partners:
                 partner.leave()
-            for node in self.nodes:
-                node.destroy_node()
+            self._crew.end_nodes()
             self.scene.close()
 
     def __enter__(self) -> Simulation:
@@ -354,7 +347,8 @@ class Simulation:
         """Go back to the start, with the scenario's seed or another one.
 
         All that follows is what a fresh simulation does, but for the world: terrain and trees stay
-        as they are (a scenario's `world.seed` fixes them apart from all other randomness).
+        as they are (a scenario's `world.seed` fixes them apart from all other randomness). UAVs
+        that were spawned go, those that were deleted come back.
         """
         self._check_open()
         if seed is not None:
@@ -390,7 +384,69 @@ class Simulation:
         self._check_open()
         self._relocator.move(self._row_of(name), velocity_map, omega_map)
 
+    def spawn_uav(
+        self,
+        name: str,
+        kind: str,
+        position_map: ArrayLike,
+        attitude: ArrayLike = (0.0, 0.0, 0.0, 1.0),
+    ) -> Uav:
+        """Put a new UAV at (3,) m with (4,) x y z w, map from body, while the others go on.
+
+        `kind` is one of `spawnable`. It stands or, in the air, holds; its topics, services, sensors
+        and nodes begin now. A place between its feet and the ground is taken to be on the ground.
+        Raises `SpawnError` for a name or type that cannot be, `PlacementError` for such a place.
+        """
+        self._check_open()
+        return self._spawner.spawn(name, kind, position_map, attitude)
+
+    def delete_uav(self, name: str) -> None:
+        """Take a UAV out, with all that is its own, while the others go on; one must stay."""
+        self._check_open()
+        self._row_of(name)
+        self._spawner.delete([name])
+
+    def delete_spawned(self) -> None:
+        """Take all UAVs out that were not there at the start."""
+        self._check_open()
+        self._spawner.delete(self.spawned)
+
+    @property
+    def spawned(self) -> tuple[str, ...]:
+        """Names of the UAVs that were not there at the start."""
+        return tuple(self._keeper.spawned)
+
+    @property
+    def spawnable(self) -> tuple[str, ...]:
+        """What can be spawned: the scenario's types and, with the usual sensors, every airframe."""
+        return self._spawner.kinds
+
+    @property
+    def types(self) -> Mapping[str, UavType]:
+        """The scenario's types and those of UAVs that were spawned."""
+        return self._crew.scenario.types
+
     # -------------------------------------------------------------------------------- what is known
+
+    @property
+    def starts(self) -> tuple[Start, ...]:
+        """Where the UAVs began, in fleet order."""
+        return self._crew.starts
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """The nodes that run inside, in fleet order."""
+        return tuple(self._crew.nodes)
+
+    @property
+    def mounts(self) -> Mapping[str, Mount]:
+        """Topics of LaserScans and how their LIDARs are mounted."""
+        return lidar_mounts(self._crew.fitted, planar=True)
+
+    @property
+    def cloud_mounts(self) -> Mapping[str, Mount]:
+        """Topics of PointCloud2s and how their LIDARs are mounted."""
+        return lidar_mounts(self._crew.fitted, planar=False)
 
     @property
     def uav_names(self) -> tuple[str, ...]:
@@ -419,25 +475,15 @@ class Simulation:
 
     # ----------------------------------------------------------------------------------- building
 
-    def _open_graph(self, starts: tuple[Start, ...]) -> None:
-        publisher, outlet, every = self._publisher, self.outlet, self._engine.every
+    def _keep_time(self, publisher: GraphPublisher) -> None:
+        """Publish the clock, and take fingerprints, while somebody wants them."""
+        outlet, every = self.outlet, self._engine.every
         every(
             _CLOCK_PERIOD_S,
             lambda: publisher.publish_clock(self.time_ns),
             wanted=lambda: publisher.clock_wanted,
         )
         every(_DIGEST_PERIOD_S, outlet.take_fingerprint, wanted=lambda: outlet.digest is not None)
-        for uav in self.uavs.values():
-            open_commands(self.graph, uav, lambda: self.time_ns)
-        self.nodes += start_nodes(
-            self.scenario, starts, self.graph, self._engine, lambda: self.time_ns
-        )
-
-    def _take_off(self, names: Sequence[str]) -> None:
-        """Let those of the UAVs take off that do so by themselves."""
-        for start in self.starts:
-            if start.takes_off and start.name in names:
-                self.uavs[start.name].take_off()
 
     def _check_open(self) -> None:
         if self._closed:

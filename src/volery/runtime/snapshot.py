@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,11 @@ from volery.core.errors import SnapshotError
 from volery.core.kept import KeepsState
 from volery.engine.partners import Partner
 from volery.graph.node import Node
+from volery.runtime.placement import Start
+
+NodeKey = tuple[str, int]
+"""Namespace of a node, and which of those there it is."""
+NodeStates = dict[NodeKey, Any]
 
 
 @dataclass(frozen=True)
@@ -25,6 +31,8 @@ class Snapshot:
 
     time_ns: int
     owner: int
+    starts: tuple[Start, ...]
+    """The UAVs that it is of."""
     state: dict[str, Any]
 
     @property
@@ -33,21 +41,30 @@ class Snapshot:
         return s_from_ns(self.time_ns)
 
 
-def keep_nodes(nodes: Sequence[Node]) -> list[Any]:
-    """States of all nodes; None of one that does not offer it."""
+def keep_nodes(nodes: Sequence[Node]) -> NodeStates:
+    """States of nodes; None of one that does not offer it."""
     for node in nodes:
         node.join()
-    return [
-        copy.deepcopy(node.get_state()) if isinstance(node, KeepsState) else None for node in nodes
-    ]
+    return {
+        key: copy.deepcopy(node.get_state()) if isinstance(node, KeepsState) else None
+        for key, node in _keyed(nodes)
+    }
 
 
-def put_back_nodes(nodes: Sequence[Node], states: Sequence[Any]) -> None:
+def put_back_nodes(nodes: Sequence[Node], states: NodeStates) -> None:
     """Give all nodes back what `keep_nodes` kept."""
-    for node, state in zip(nodes, states, strict=True):
+    for key, node in _keyed(nodes):
         node.join()
         if isinstance(node, KeepsState):
-            node.set_state(copy.deepcopy(state))
+            node.set_state(copy.deepcopy(states[key]))
+
+
+def _keyed(nodes: Sequence[Node]) -> Iterator[tuple[NodeKey, Node]]:
+    seen: Counter[str] = Counter()
+    for node in nodes:
+        namespace = node.get_namespace()
+        yield (namespace, seen[namespace]), node
+        seen[namespace] += 1
 
 
 def check_nodes(nodes: Sequence[Node], what: str) -> None:

@@ -9,6 +9,7 @@ from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.control.setpoints import MAX_COORDINATE, checked
 from volery.control.trajectory import Trajectory
+from volery.core.errors import CommandError
 from volery.scenario.schema import Flight
 from volery.vehicle.airframe import Airframe
 
@@ -21,12 +22,28 @@ class Uav:
     def __init__(
         self, fleet: Fleet, row: int, name: str, flight: Flight, type_name: str = ""
     ) -> None:
-        self._fleet = fleet
-        self._row = row
+        self._place: tuple[Fleet, int] | None = (fleet, row)
         self._flight = flight
         self.name = name
         self.type_name = type_name
         """Its type in the scenario."""
+
+    def move_to(self, place: tuple[Fleet, int] | None) -> None:
+        """Take over where the fleet has changed: fleet and row, or None where it was deleted."""
+        self._place = place
+
+    @property
+    def _fleet(self) -> Fleet:
+        return self._found()[0]
+
+    @property
+    def _row(self) -> int:
+        return self._found()[1]
+
+    def _found(self) -> tuple[Fleet, int]:
+        if self._place is None:
+            raise CommandError(f"{self.name} was deleted")
+        return self._place
 
     @property
     def airframe(self) -> Airframe:

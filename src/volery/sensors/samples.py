@@ -27,6 +27,11 @@ class SensorId:
     uav_name: str
     name: str
 
+    @property
+    def path(self) -> str:
+        """`uav1/imu`: names it also where rows have changed."""
+        return f"{self.uav_name}/{self.name}"
+
 
 @dataclass(frozen=True)
 class LidarScans:

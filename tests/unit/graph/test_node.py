@@ -12,7 +12,7 @@ class FakeTimers:
     def __init__(self):
         self.entries = []
 
-    def every(self, period_s, callback):
+    def every(self, period_s, callback, *, wanted=None):
         self.entries.append((period_s, callback))
 
 

@@ -5,6 +5,8 @@ import pytest
 from asking import ask, code_of
 
 OK, UNSUPPORTED, NOT_FOUND, FAILED, INVALID_POSE = 1, 0, 2, 4, 101
+NAME_NOT_UNIQUE, NAME_INVALID, UNSUPPORTED_FORMAT, NO_RESOURCE = 101, 102, 103, 104
+NAMESPACE_INVALID, SPAWN_POSE_INVALID, SPAWN_FAILED = 105, 109, 150
 UPRIGHT = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 
 
@@ -198,17 +200,87 @@ def test_a_set_state_is_the_same_again(simulate, flat_data):
     assert digest() == digest()
 
 
-def test_spawning_is_honestly_refused(trio):
-    spawnables = ask(trio, "/get_spawnables")
-    assert [s.entity_resource.uri for s in spawnables.spawnables] == ["f450", "scout"]
-    response = ask(trio, "/spawn_entity", name="uav9", entity_resource={"uri": "f450"})
-    assert code_of(response) == UNSUPPORTED
-    assert "scenario" in response.result.error_message
-    several = ask(trio, "/spawn_entities", spawn_requests=[{"name": "a"}, {"name": "b"}])
-    assert code_of(several) == UNSUPPORTED
-    assert [one.result.result for one in several.results] == [UNSUPPORTED] * 2
-    assert code_of(ask(trio, "/delete_entity", entity="uav1")) == UNSUPPORTED
+def spawn(simulation, uri="scout", place=(60.0, 0.0, 0.0), **fields):
+    pose = {"pose": {"position": dict(zip("xyz", place, strict=True))}}
+    return ask(
+        simulation,
+        "/spawn_entity",
+        **{"entity_resource": {"uri": uri}, "initial_pose": pose, **fields},
+    )
+
+
+def test_types_and_airframes_can_be_spawned(trio):
+    uris = [s.entity_resource.uri for s in ask(trio, "/get_spawnables").spawnables]
+    assert uris[:2] == ["f450", "scout"]
+    assert "crazyflie" in uris
+    assert len(set(uris)) == len(uris)
+    for number, uri in enumerate(uris):
+        response = spawn(trio, uri, (-10.0 * (number + 1), 0.0, 0.0), name=f"new{number}")
+        assert code_of(response) == OK, response.result.error_message
+        assert response.entity_name == f"new{number}"
+    assert names(trio)[3:] == [f"new{number}" for number in range(len(uris))]
+    info = ask(trio, "/get_entity_info", entity="new2").info
+    assert uris[2] in info.description
+    assert ask(trio, "/new0/take_off_to", altitude=2.0).success
+    trio.run(3.0)
+    assert trio.uavs["new0"].position_map[2] > 1.5
+
+
+def test_names_are_found_where_that_is_allowed(trio):
+    assert spawn(trio, name="uav2", allow_renaming=True).entity_name == "uav2_1"
+    there = (80.0, 0.0, 0.0)
+    assert spawn(trio, place=there, allow_renaming=True).entity_name == "uav4"
+    assert code_of(spawn(trio, name="uav2")) == NAME_NOT_UNIQUE
+    assert code_of(spawn(trio)) == NAME_INVALID
+    assert code_of(spawn(trio, name="No")) == NAME_INVALID
+
+
+@pytest.mark.parametrize(
+    ("fields", "code"),
+    [
+        ({"entity_resource": {"resource_string": "<sdf/>"}}, UNSUPPORTED_FORMAT),
+        ({"uri": ""}, NO_RESOURCE),
+        ({"uri": "zeppelin"}, NOT_FOUND),
+        ({"entity_namespace": "/elsewhere"}, NAMESPACE_INVALID),
+        ({"place": (0.0, 0.0, 0.2)}, SPAWN_POSE_INVALID),
+        ({"place": (60.0, 0.0, -5.0)}, SPAWN_POSE_INVALID),
+        ({"place": (60.0, 0.0, float("nan"))}, SPAWN_POSE_INVALID),
+        ({"initial_pose": {"header": {"frame_id": "odom"}}}, SPAWN_POSE_INVALID),
+    ],
+)
+def test_what_cannot_be_spawned_is_told(trio, fields, code):
+    response = spawn(trio, name="extra", **fields)
+    assert code_of(response) == code
+    assert response.result.error_message
+    assert names(trio) == ["uav1", "uav2", "uav3"]
+    assert spawn(trio, name="extra", entity_namespace="/extra").entity_name == "extra"
+
+
+def test_several_are_spawned_one_by_one(trio):
+    requests = [
+        {
+            "name": name,
+            "entity_resource": {"uri": "f450"},
+            "initial_pose": {"pose": {"position": {"x": x, "y": 0.0, "z": 0.0}}},
+        }
+        for name, x in (("a", 60.0), ("b", 0.0), ("c", 70.0))
+    ]
+    response = ask(trio, "/spawn_entities", spawn_requests=requests)
+    assert code_of(response) == SPAWN_FAILED
+    assert "1 of 3" in response.result.error_message
+    assert [one.result.result for one in response.results] == [OK, SPAWN_POSE_INVALID, OK]
+    assert [one.entity_name for one in response.results] == ["a", "", "c"]
+    assert code_of(ask(trio, "/spawn_entities", spawn_requests=[])) == OK
+
+
+def test_deleting(trio):
     assert code_of(ask(trio, "/delete_entity", entity="nobody")) == NOT_FOUND
+    assert code_of(ask(trio, "/delete_entity", entity="uav1")) == OK
+    assert names(trio) == ["uav2", "uav3"]
+    assert code_of(ask(trio, "/delete_entity", entity="uav3")) == OK
+    response = ask(trio, "/delete_entity", entity="uav2")
+    assert code_of(response) == FAILED
+    assert "at least one" in response.result.error_message
 
 
 def test_starts_are_named_poses(trio):

@@ -30,8 +30,8 @@ def test_features_name_what_works_alone(simulate, flat_data):
         return set(response.features.features.tolist())
 
     plain = features()
-    assert {10, 11, 20, 24, 25, 26, 31, 32, 33, 45} <= plain
-    assert not plain & {0, 1, 7, 9, 13, 40, 41, 43, 50}
+    assert {0, 1, 10, 11, 20, 23, 24, 25, 26, 31, 32, 33, 45, 50} <= plain
+    assert not plain & {7, 9, 13, 40, 41, 43}
     assert features(on_load=print) - plain == {40}
 
 
@@ -81,8 +81,24 @@ def test_reset(simulate, flat_data):
         simulation.run(0.1)
         assert code_of(ask(simulation, "/reset_simulation", scope=scope)) == OK
         assert simulation.time_ns == 0
-    for scope, code in ((1, UNSUPPORTED), (2, UNSUPPORTED), (4, UNSUPPORTED), (64, FAILED)):
+    for scope, code in ((1, UNSUPPORTED), (2, UNSUPPORTED), (64, FAILED)):
         assert code_of(ask(simulation, "/reset_simulation", scope=scope)) == code
+
+
+def test_reset_of_what_was_spawned(simulate, flat_data):
+    simulation = simulate(flat_data)
+    simulation.run(0.1)
+    simulation.spawn_uav("extra", "f450", [20.0, 0.0, 0.0])
+    response = ask(simulation, "/reset_simulation", scope=1 | 2)
+    assert code_of(response) == UNSUPPORTED
+    assert "SCOPE_SPAWNED" in response.result.error_message
+    assert code_of(ask(simulation, "/reset_simulation", scope=4)) == OK
+    assert simulation.uav_names == ("uav1",)
+    assert simulation.time_ns == 100_000_000
+    simulation.spawn_uav("extra", "f450", [20.0, 0.0, 0.0])
+    assert code_of(ask(simulation, "/reset_simulation", scope=1 | 2 | 4)) == OK
+    assert simulation.uav_names == ("uav1",)
+    assert simulation.time_ns == 0
 
 
 def test_a_reset_that_cannot_be_is_told(simulate, flat_data):

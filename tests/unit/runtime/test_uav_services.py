@@ -41,7 +41,7 @@ def test_arming_says_what_it_is(pair):
     flying = ask(pair, "/uav2/arm")
     assert flying.success
     assert "flies" in flying.message
-    pair._fleet.crash(1)
+    pair._engine.fleet.crash(1)
     wrecked = ask(pair, "/uav2/arm")
     assert not wrecked.success
     assert "crashed" in wrecked.message

@@ -65,7 +65,7 @@ def test_a_run_in_turbulence_is_the_same_however_it_is_cut(simulate, flat_data):
         for cut in cuts:
             simulation.run(cut)
         digests.append(simulation.digest())
-        air.append(simulation._fleet.state.air_velocity_map.copy())
+        air.append(simulation._engine.fleet.state.air_velocity_map.copy())
     assert digests[0] == digests[1]
     assert np.abs(air[0] - [3, 0, 0]).max() > 1e-3
 
@@ -78,7 +78,7 @@ def test_weather_changes_while_it_runs(simulate, flat_data):
     simulation.gust_now((4.0, 0.0, 0.0), rise_s=0.2, lasts_s=1.0)
     assert simulation.weather.gusts == (Gust((4, 0, 0), 2.0, 0.2, 3.0),)
     simulation.run(0.5)
-    air = simulation._fleet.state.air_velocity_map
+    air = simulation._engine.fleet.state.air_velocity_map
     np.testing.assert_array_equal(air, [[4, 0, 0]])
     simulation.run(0.6)
     assert not air.any()

@@ -73,10 +73,10 @@ def test_imu_lever_arm_feels_centripetal_acceleration(simulate, flat_data):
         {"kind": "imu", "position_m": [lever, 0.0, 0.0], "noise": False}
     ]
     simulation = simulate(flat_data)
-    simulation._fleet.state.omega_body[0] = [0.0, 0.0, 2.0]
-    simulation._fleet.state.acceleration_map[0] = 0.0
-    (bank,) = simulation._banks
-    force = bank.sample(0, 0, simulation._fleet).specific_force[0]
+    simulation._engine.fleet.state.omega_body[0] = [0.0, 0.0, 2.0]
+    simulation._engine.fleet.state.acceleration_map[0] = 0.0
+    (bank,) = simulation._engine.banks
+    force = bank.sample(0, 0, simulation._engine.fleet).specific_force[0]
     np.testing.assert_allclose(force, [-(2.0**2) * lever, 0.0, G], atol=1e-9)
 
 
@@ -229,11 +229,11 @@ def test_nodding_angle_swings_as_the_scenario_says(simulate, wood_data):
 def test_bank_state_can_be_kept_and_restored(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.run(0.2)
-    for bank in simulation._banks:
+    for bank in simulation._engine.banks:
         kept = bank.get_state()
-        first = bank.sample(99, 0, simulation._fleet)
+        first = bank.sample(99, 0, simulation._engine.fleet)
         bank.set_state(kept)
-        again = bank.sample(99, 0, simulation._fleet)
+        again = bank.sample(99, 0, simulation._engine.fleet)
         for name, value in vars(first).items():
             if isinstance(value, np.ndarray):
                 np.testing.assert_array_equal(value, getattr(again, name))

@@ -74,10 +74,24 @@ class NodeHost:
 
     # ------------------------------------------------------------------------------------ timers
 
-    def every(self, period_s: float, callback: Callable[[], None]) -> None:
-        """Call `callback` each period; after a standstill once, not for each one missed."""
+    def every(
+        self,
+        period_s: float,
+        callback: Callable[[], None],
+        *,
+        wanted: Callable[[], bool] | None = None,
+    ) -> None:
+        """Call `callback` each period; after a standstill once, not for each one missed.
+
+        Not where `wanted()` is false.
+        """
+
+        def ring() -> None:
+            if wanted is None or wanted():
+                callback()
+
         period_ns = ns_from_s(period_s)
-        self._set(_Alarm(self.now_ns() + period_ns, next(self._numbers), period_ns, callback))
+        self._set(_Alarm(self.now_ns() + period_ns, next(self._numbers), period_ns, ring))
 
     def at(self, time_ns: int, action: Callable[[], Any]) -> None:
         """Call `action` once, at `time_ns` or as soon as possible."""

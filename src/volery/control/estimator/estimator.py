@@ -278,6 +278,13 @@ class Estimator:
         """(N,) measurements that came too late, or found no room, to be fused."""
         return np.asarray(self._filters["dropped"])
 
+    def continue_from(self, other: Estimator, kept: Sequence[tuple[int, int]]) -> None:
+        """Go on with filters of another estimator: own row and the other's, for each pair."""
+        for own, row in kept:
+            self._filters[own] = other._filters[row]
+            self._queues[own] = other._queues[row]
+            self._copy_readings(own, other._rings[row])
+
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
         return {
@@ -291,6 +298,14 @@ class Estimator:
         self._filters[:] = state["filters"]
         self._rings[:] = state["rings"]
         self._queues[:] = state["queues"]
+
+    def _copy_readings(self, row: int, ring: NDArray[np.void]) -> None:
+        """Take over the readings that wait in another ring, which may be of another length."""
+        state: Any = self._filters[row]
+        waiting = min(int(state["waiting_readings"]), self._rings.shape[1])
+        slots = (int(state["first_reading"]) + np.arange(waiting)) % len(ring)
+        self._rings[row, :waiting] = ring[slots]
+        state["first_reading"], state["waiting_readings"] = 0, waiting
 
     def _begin(
         self, row: int, position: Array, velocity: Array, attitude: Array, start: StartSigmas

@@ -38,7 +38,6 @@ class Entities:
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._scenario = simulation.scenario
 
     def offer(self) -> None:
         """Offer the services of entities."""
@@ -68,7 +67,7 @@ class Entities:
 
     def _info(self, request: Any) -> Fields:
         uav = self._find(request.entity)
-        kind = self._scenario.types[uav.type_name]
+        kind = self._simulation.types[uav.type_name]
         category = filled(f"{_MSG}/EntityCategory", {"category": int(Category.ROBOT)})
         info = {
             "category": category,

@@ -16,6 +16,8 @@ _SRV = "simulation_interfaces/srv/GetSimulatorFeatures"
 class Feature(IntEnum):
     """`simulation_interfaces/msg/SimulatorFeatures`, those that can be had here."""
 
+    SPAWNING = 0
+    DELETING = 1
     NAMED_POSES = 2
     POSE_BOUNDS = 3
     ENTITY_TAGS = 4
@@ -29,6 +31,7 @@ class Feature(IntEnum):
     SIMULATION_RESET = 20
     SIMULATION_RESET_TIME = 21
     SIMULATION_RESET_STATE = 22
+    SIMULATION_RESET_SPAWNED = 23
     SIMULATION_STATE_GETTING = 24
     SIMULATION_STATE_SETTING = 25
     SIMULATION_STATE_PAUSE = 26
@@ -39,6 +42,7 @@ class Feature(IntEnum):
     WORLD_TAGS = 42
     WORLD_INFO_GETTING = 44
     AVAILABLE_WORLDS = 45
+    SPAWNING_ENTITIES = 50
 
 
 _ON_CONDITION = {Feature.WORLD_LOADING}

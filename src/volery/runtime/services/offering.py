@@ -15,6 +15,8 @@ from volery.graph.zero import zero_message
 Fields = Mapping[str, Any]
 """Fields of a response by name; those that are missing stay zero."""
 Handler = Callable[[Any], "Fields | None"]
+Close = Callable[[], None]
+"""Gives back what was opened."""
 Settle = Callable[["Fields | Exception"], None]
 """Gives the answer: its fields, or what went wrong."""
 
@@ -87,8 +89,11 @@ def offer_result_later(
     graph.offer_async(name, srvtype, handle)
 
 
-def offer_command(graph: Graph, name: str, srvtype: str, handler: Handler) -> None:
-    """Offer a service of ours: `success`, and a `message` that says why not."""
+def offer_command(graph: Graph, name: str, srvtype: str, handler: Handler) -> Close:
+    """Offer a service of ours: `success`, and a `message` that says why not.
+
+    What is returned withdraws it.
+    """
 
     def handle(request: Any) -> Any:
         try:
@@ -98,3 +103,4 @@ def offer_command(graph: Graph, name: str, srvtype: str, handler: Handler) -> No
         return filled(f"{srvtype}_Response", {"success": True, **(fields or {})})
 
     graph.offer(name, srvtype, handle)
+    return lambda: graph.withdraw(name)

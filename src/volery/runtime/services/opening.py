@@ -13,9 +13,8 @@ from volery.runtime.services.kept_states import KeptStates
 from volery.runtime.services.named_poses import offer_named_poses
 from volery.runtime.services.playing import Playing
 from volery.runtime.services.recording import Recording
-from volery.runtime.services.spawning import offer_spawning
+from volery.runtime.services.spawning import Spawning
 from volery.runtime.services.stepping import offer_steps
-from volery.runtime.services.uav_services import offer_uav_services
 from volery.runtime.services.worlds import offer_worlds
 
 if TYPE_CHECKING:
@@ -43,13 +42,11 @@ def open_services(
     graph = simulation.graph
     offer_features(graph, loads_worlds=on_load is not None)
     Entities(simulation).offer()
-    offer_spawning(simulation)
+    Spawning(simulation).offer()
     Playing(simulation).offer()
     offer_steps(simulation)
     offer_worlds(simulation, on_load)
     offer_named_poses(graph, simulation.starts)
-    for uav in simulation.uavs.values():
-        offer_uav_services(graph, uav)
     offer_air_and_faults(simulation)
     KeptStates(simulation).offer()
     recording = Recording(graph, recordings)

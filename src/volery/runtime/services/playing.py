@@ -89,13 +89,17 @@ class Playing:
         self._simulation.pause()
 
     def _reset(self, request: Any) -> None:
-        """Time and state go back together; nothing is ever spawned, so that part is done too."""
+        """Time and state go back together, and take the UAVs with them that were spawned."""
         scope = int(request.scope)
         if scope != _ALL and scope & ~(_TIME | _STATE | _SPAWNED):
             raise RefusedError(Code.OPERATION_FAILED, f"there is no scope {scope}")
         if scope == _SPAWNED:
-            raise RefusedError(Code.FEATURE_UNSUPPORTED, "nothing can be spawned")
+            self._simulation.delete_spawned()
+            return
         if scope not in (0, _ALL) and not (scope & _TIME and scope & _STATE):
             reason = "time and state are reset together: SCOPE_DEFAULT, SCOPE_ALL, or both bits"
+            raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
+        if scope == _TIME | _STATE and self._simulation.spawned:
+            reason = "spawned UAVs go with a reset: add SCOPE_SPAWNED, or delete them first"
             raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
         self._simulation.reset()

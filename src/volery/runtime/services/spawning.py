@@ -1,13 +1,16 @@
-"""Spawning and deleting, which this simulator cannot do while it runs, and what it has instead."""
+"""Spawning and deleting UAVs, by the standard."""
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
+from volery.core.errors import PlacementError, SpawnError, SpawnFault, VoleryError
 from volery.runtime.services.offering import (
     Code,
     Fields,
     RefusedError,
+    failed,
     filled,
     offer_result,
     result,
@@ -17,49 +20,108 @@ if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
 
 _SRV = "simulation_interfaces/srv"
-_WHY = "the fleet is built once, from the scenario's uavs; add them there and load it anew"
+_MSG = "simulation_interfaces/msg"
+_NAME_NOT_UNIQUE = 101
+_NAME_INVALID = 102
+_UNSUPPORTED_FORMAT = 103
+_NO_RESOURCE = 104
+_NAMESPACE_INVALID = 105
+_PARSE_ERROR = 106
+_INVALID_POSE = 109
+_SPAWN_FAILED = 150
+_CODES = {
+    SpawnFault.NAME: _NAME_INVALID,
+    SpawnFault.NAME_TAKEN: _NAME_NOT_UNIQUE,
+    SpawnFault.TYPE: Code.NOT_FOUND,
+}
 
 
-def offer_spawning(simulation: Simulation) -> None:
-    """Offer `/get_spawnables`, and honest refusals of what would change the fleet."""
-    graph, types = simulation.graph, simulation.scenario.types
+class Spawning:
+    """Answers what can be spawned, spawns and deletes."""
 
-    def spawnables(_request: Any) -> Fields:
-        return {
-            "spawnables": [
-                filled(
-                    "simulation_interfaces/msg/Spawnable",
-                    {
-                        "entity_resource": resource(name),
-                        "description": f"UAV: {kind.airframe}, {kind.plant}; for scenarios",
-                    },
-                )
-                for name, kind in types.items()
-            ]
-        }
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
 
-    def refuse(_request: Any) -> Fields:
-        raise RefusedError(Code.FEATURE_UNSUPPORTED, _WHY)
+    def offer(self) -> None:
+        """Offer the services."""
+        graph = self._simulation.graph
+        offer_result(graph, "/get_spawnables", f"{_SRV}/GetSpawnables", self._spawnables)
+        offer_result(graph, "/spawn_entity", f"{_SRV}/SpawnEntity", self._spawn)
+        offer_result(graph, "/spawn_entities", f"{_SRV}/SpawnEntities", self._spawn_each)
+        offer_result(graph, "/delete_entity", f"{_SRV}/DeleteEntity", self._delete)
 
-    def delete(request: Any) -> Fields:
-        if request.entity not in simulation.uavs:
+    def _spawnables(self, _request: Any) -> Fields:
+        types = self._simulation.types
+        told = []
+        for name in self._simulation.spawnable:
+            kind = types.get(name)
+            what = f"{kind.airframe}, {kind.plant}" if kind else "airframe with the usual sensors"
+            fields = {"entity_resource": resource(name), "description": f"UAV: {what}"}
+            told.append(filled(f"{_MSG}/Spawnable", fields))
+        return {"spawnables": told}
+
+    def _spawn(self, request: Any) -> Fields:
+        pose = request.initial_pose
+        if request.entity_resource.resource_string:
+            raise RefusedError(_UNSUPPORTED_FORMAT, "UAVs are spawned by type, not from a string")
+        if not request.entity_resource.uri:
+            raise RefusedError(_NO_RESOURCE, "uri must be one of those of /get_spawnables")
+        if pose.header.frame_id not in ("", "map"):
+            reason = f"poses are in 'map', not in '{pose.header.frame_id}'"
+            raise RefusedError(_INVALID_POSE, reason)
+        name = self._name(request)
+        if request.entity_namespace.strip("/") not in ("", name):
+            reason = f"the namespace of a UAV is its name, /{name}; leave it empty"
+            raise RefusedError(_NAMESPACE_INVALID, reason)
+        try:
+            place, turn = pose.pose.position, pose.pose.orientation
+            attitude = [turn.x, turn.y, turn.z, turn.w]
+            self._simulation.spawn_uav(
+                name,
+                request.entity_resource.uri,
+                [place.x, place.y, place.z],
+                attitude if any(attitude) else [0.0, 0.0, 0.0, 1.0],
+            )
+        except SpawnError as error:
+            raise RefusedError(_CODES[error.fault], str(error)) from None
+        except PlacementError as error:
+            raise RefusedError(_INVALID_POSE, str(error)) from None
+        except VoleryError as error:
+            raise RefusedError(_PARSE_ERROR, str(error)) from None
+        return {"entity_name": name}
+
+    def _spawn_each(self, request: Any) -> Fields:
+        """All that can be; the others are told of one by one."""
+        results = []
+        for each in request.spawn_requests:
+            try:
+                fields = {"result": result(), **self._spawn(each)}
+            except RefusedError as error:
+                fields = {"result": failed(error)}
+            results.append(filled(f"{_MSG}/SpawnResult", fields))
+        missing = sum(each.result.result != Code.OK for each in results)
+        if missing:
+            reason = f"{missing} of {len(results)} were not spawned; see their results"
+            return {"result": result(_SPAWN_FAILED, reason), "results": results}
+        return {"results": results}
+
+    def _delete(self, request: Any) -> None:
+        if request.entity not in self._simulation.uavs:
             raise RefusedError(Code.NOT_FOUND, f"there is no entity '{request.entity}'")
-        return refuse(request)
+        self._simulation.delete_uav(request.entity)
 
-    def refuse_each(request: Any) -> Fields:
-        each = {"result": result(Code.FEATURE_UNSUPPORTED, _WHY)}
-        name = "simulation_interfaces/msg/SpawnResult"
-        return {
-            "result": result(Code.FEATURE_UNSUPPORTED, _WHY),
-            "results": [filled(name, each) for _ in request.spawn_requests],
-        }
-
-    offer_result(graph, "/get_spawnables", f"{_SRV}/GetSpawnables", spawnables)
-    offer_result(graph, "/spawn_entity", f"{_SRV}/SpawnEntity", refuse)
-    offer_result(graph, "/spawn_entities", f"{_SRV}/SpawnEntities", refuse_each)
-    offer_result(graph, "/delete_entity", f"{_SRV}/DeleteEntity", delete)
+    def _name(self, request: Any) -> str:
+        """The wished name, or a free one where that is allowed or none was wished."""
+        wished, taken = str(request.name), self._simulation.uavs
+        if wished and not (wished in taken and request.allow_renaming):
+            return wished
+        if not wished and not request.allow_renaming:
+            raise RefusedError(_NAME_INVALID, "name is empty, and allow_renaming is false")
+        stem = f"{wished}_" if wished else "uav"
+        free = (f"{stem}{number}" for number in itertools.count(1))
+        return next(name for name in free if name not in taken)
 
 
 def resource(uri: str) -> Any:
     """A `Resource` that is found under a name."""
-    return filled("simulation_interfaces/msg/Resource", {"uri": uri})
+    return filled(f"{_MSG}/Resource", {"uri": uri})

@@ -7,15 +7,18 @@ from typing import Any
 from volery.control.flight_modes import FlightMode
 from volery.core.errors import CommandError
 from volery.graph.graph import Graph
-from volery.runtime.services.offering import Fields, Handler, offer_command
+from volery.runtime.services.offering import Close, Fields, Handler, offer_command
 from volery.runtime.uav import Uav
 
 _TRIGGER = "std_srvs/srv/Trigger"
 _OURS = "volery_interfaces/srv"
 
 
-def offer_uav_services(graph: Graph, uav: Uav) -> None:
-    """Offer what `runtime.command_door` does not: the plain commands stand there."""
+def offer_uav_services(graph: Graph, uav: Uav) -> list[Close]:
+    """Offer what `runtime.command_door` does not: the plain commands stand there.
+
+    What is returned withdraws it.
+    """
     services: tuple[tuple[str, str, Handler], ...] = (
         ("arm", _TRIGGER, lambda _request: _arm(uav)),
         ("disarm", _TRIGGER, lambda _request: _disarm(uav)),
@@ -28,8 +31,10 @@ def offer_uav_services(graph: Graph, uav: Uav) -> None:
             lambda request: uav.set_command_timeout(request.seconds),
         ),
     )
-    for name, srvtype, handler in services:
+    return [
         offer_command(graph, f"/{uav.name}/{name}", srvtype, handler)
+        for name, srvtype, handler in services
+    ]
 
 
 def _arm(uav: Uav) -> Fields:

@@ -1,0 +1,43 @@
+"""What goes on when a fleet is replaced by one with more UAVs, or fewer."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from volery.sensors.bank import Bank
+
+Pairs = Sequence[tuple[int, int]]
+"""New row and old row of everything that goes on."""
+
+
+def common_rows(names: Sequence[str], before: Sequence[str], going_on: Collection[str]) -> Pairs:
+    """Rows in `names`, and in `before`, of what is in both and goes on."""
+    rows = {name: row for row, name in enumerate(before) if name in going_on}
+    return [(row, rows[name]) for row, name in enumerate(names) if name in rows]
+
+
+def continue_bank(bank: Bank, others: Sequence[Bank], going_on: Collection[str]) -> None:
+    """Let sensors of `bank` go on that were in one of `others`, those of the UAVs `going_on`."""
+    paths = [sensor.path for sensor in bank.sensors]
+    sensors = {sensor.path for sensor in bank.sensors if sensor.uav_name in going_on}
+    for other in others:
+        kept = common_rows(paths, [sensor.path for sensor in other.sensors], sensors)
+        if kept and other.name == bank.name:
+            sizes = len(paths), len(other.sensors)
+            bank.set_state(_mixed(bank.get_state(), other.get_state(), kept, sizes))
+
+
+def _mixed(fresh: Any, past: Any, kept: Pairs, sizes: tuple[int, int]) -> Any:
+    """State `fresh` with the rows `kept` of every array as in `past`; rows are sensors."""
+    if isinstance(past, Mapping):
+        fresh = fresh or {}
+        return {key: _mixed(fresh.get(key), past[key], kept, sizes) for key in past}
+    if not isinstance(past, np.ndarray):
+        return past
+    mixed = np.zeros((sizes[0], *past.shape[1:]), past.dtype) if fresh is None else fresh.copy()
+    for own, theirs in kept:
+        mixed[own] = past[theirs]
+    return mixed

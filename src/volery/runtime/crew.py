@@ -1,0 +1,153 @@
+"""The UAVs of a running simulation with all that is theirs, and how they come and go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from volery.core.errors import CommandError
+from volery.engine.engine import Engine
+from volery.engine.faults import FaultPlan
+from volery.graph.graph import Graph
+from volery.graph.node import Node
+from volery.graph.publishing import GraphPublisher
+from volery.runtime.assembly import Assembly, assemble
+from volery.runtime.command_door import open_commands
+from volery.runtime.graph_building import announce_sensors, start_nodes
+from volery.runtime.outlet import Outlet
+from volery.runtime.placement import Start
+from volery.runtime.sensor_fitting import Fitted
+from volery.runtime.services.offering import Close
+from volery.runtime.services.uav_services import offer_uav_services
+from volery.runtime.uav import Uav
+from volery.scenario.schema import Scenario
+
+
+@dataclass
+class Beginning:
+    """How a UAV begins: its row in a state of a fleet that has not moved yet."""
+
+    fleet: dict[str, Any]
+    row: int
+
+
+@dataclass
+class Crew:
+    """The UAVs of an engine: starts, sensors, handles, commands on the graph, nodes.
+
+    `open(parts)` makes the first ones; `regroup(starts)` replaces them by others, of whom those
+    that were there already go on undisturbed.
+    """
+
+    scenario: Scenario
+    """With every type that may be flown."""
+    engine: Engine
+    graph: Graph
+    publisher: GraphPublisher
+    outlet: Outlet
+    faults: FaultPlan
+    starts: tuple[Start, ...]
+    """In fleet order."""
+    fitted: list[Fitted] = field(default_factory=list)
+    uavs: dict[str, Uav] = field(default_factory=dict)
+    nodes: list[Node] = field(default_factory=list)
+    """In fleet order."""
+    beginnings: dict[str, Beginning] = field(default_factory=dict)
+    _closes: dict[str, list[Close]] = field(default_factory=dict)
+
+    def open(self, parts: Assembly) -> None:
+        """Let the UAVs that the engine was made with take part in the graph."""
+        self._take_over(parts, self.starts)
+        self.start_nodes()
+
+    def regroup(self, starts: Sequence[Start]) -> None:
+        """Fly with the UAVs `starts` from now on; nodes of new ones wait for `start_nodes`."""
+        if not self.engine.stands:
+            raise CommandError("UAVs come and go between ticks; use post()")
+        if not starts:
+            raise CommandError("a simulation needs at least one UAV")
+        parts = assemble(self.scenario, starts, self.engine.scene)
+        new = [start for start in starts if start not in self.starts]
+        going_on = {start.name for start in starts if start in self.starts}
+        for start in self.starts:
+            if start.name not in going_on:
+                self._dismiss(start.name)
+        self.starts = tuple(starts)
+        self._take_over(parts, new, going_on)
+
+    def start_nodes(self) -> None:
+        """Start the nodes of UAVs that have none yet."""
+        served = {node.get_namespace() for node in self.nodes}
+        alone = [start for start in self.starts if f"/{start.name}" not in served]
+        now_ns = self._now_ns
+        self.nodes += start_nodes(self.scenario, alone, self.graph, self.engine, now_ns)
+        order = {f"/{start.name}": row for row, start in enumerate(self.starts)}
+        self.nodes.sort(key=lambda node: order[node.get_namespace()])
+
+    def take_off(self, names: Iterable[str]) -> None:
+        """Let those of the UAVs take off that do so by themselves."""
+        chosen = set(names)
+        for start in self.starts:
+            if start.takes_off and start.name in chosen:
+                self.uavs[start.name].take_off()
+
+    def end_nodes(self) -> None:
+        """End all nodes."""
+        while self.nodes:
+            self.nodes.pop().destroy_node()
+
+    # -------------------------------------------------------------------------------- inside
+
+    def _take_over(
+        self, parts: Assembly, new: Sequence[Start], going_on: set[str] | None = None
+    ) -> None:
+        names = tuple(start.name for start in self.starts)
+        begun = parts.fleet.get_state()
+        if going_on is not None:
+            self.engine.regroup(parts.fleet, parts.banks, names, parts.estimation, going_on)
+            self.outlet.fleet = parts.fleet
+        self.fitted = parts.fitted
+        fresh = {start.name for start in new}
+        announce_sensors(self.publisher, [f for f in self.fitted if f.id.uav_name in fresh])
+        self.publisher.arrange(names)
+        for row, start in enumerate(self.starts):
+            if start.name in fresh:
+                self.beginnings[start.name] = Beginning(begun, row)
+                self._enlist(start, row)
+            else:
+                self.uavs[start.name].move_to((parts.fleet, row))
+        self.uavs.update({name: self.uavs.pop(name) for name in names})  # in fleet order
+        if going_on is not None:
+            self.faults.enlist(fresh)
+            self._restart_sensors(fresh)
+
+    def _enlist(self, start: Start, row: int) -> None:
+        flight = self.scenario.types[start.type_name].flight
+        uav = Uav(self.engine.fleet, row, start.name, flight, start.type_name)
+        self.uavs[start.name] = uav
+        self._closes[start.name] = [
+            *open_commands(self.graph, uav, self._now_ns),
+            *offer_uav_services(self.graph, uav),
+        ]
+
+    def _dismiss(self, name: str) -> None:
+        own = [node for node in self.nodes if node.get_namespace() == f"/{name}"]
+        for node in own:
+            node.destroy_node()
+            self.nodes.remove(node)
+        for close in self._closes.pop(name):
+            close()
+        self.publisher.retire(name)
+        self.uavs.pop(name).move_to(None)
+        del self.beginnings[name]
+
+    def _restart_sensors(self, fresh: set[str]) -> None:
+        keys = {(f.id.uav, f.id.name): f.key for f in self.fitted if f.id.uav_name in fresh}
+        rows = [row for row, start in enumerate(self.starts) if start.name in fresh]
+        self.engine.restart_sensors(np.array(rows, np.int64), keys)
+
+    def _now_ns(self) -> int:
+        return self.engine.time_ns
