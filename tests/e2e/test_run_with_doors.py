@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import os
 import re
+import socket
 import subprocess
 import sys
 import threading
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+
+from volery.bridges.rosbridge.client import RosbridgeClient
+from volery.cli.run import RunOptions, _Change
+from volery.core.errors import CommandError, GraphError, VoleryError
+from volery.graph.link import call_and_wait
+from volery.graph.zero import zero_message
 
 pytest.importorskip("roslibpy")
 ROOT = Path(__file__).parents[2]
@@ -19,8 +28,8 @@ VOLERY = [sys.executable, "-m", "volery.cli"]
 class Run:
     """A simulation in a process of its own, its doors on free ports."""
 
-    def __init__(self, *doors, scenario="hover", seconds=120):
-        words = [word for door in doors for word in ("--door", f"{door}=0")]
+    def __init__(self, *doors, scenario="hover", seconds=120, port=0):
+        words = [word for door in doors for word in ("--door", f"{door}={port}")]
         self.process = subprocess.Popen(
             [*VOLERY, "run", scenario, "--seconds", str(seconds), *words],
             stdout=subprocess.DEVNULL,
@@ -200,3 +209,59 @@ def test_a_port_in_use_is_told(run):
     assert done.returncode == 2
     assert str(run.ports[0]) in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return server.getsockname()[1]
+
+
+def answer(client, service, **fields):
+    srvtype = "".join(word.capitalize() for word in service.strip("/").split("_"))
+    request = zero_message(f"simulation_interfaces/srv/{srvtype}_Request")
+    for name, value in fields.items():
+        setattr(request, name, value)
+    return call_and_wait(client, service, request, 5.0)
+
+
+def world(uri):
+    resource = zero_message("simulation_interfaces/msg/Resource")
+    resource.uri = uri
+    return resource
+
+
+def test_a_client_loads_another_world():
+    """The answer still comes; the doors open again where they were, and the client comes back."""
+    run = Run("rosbridge", seconds=600, port=free_port())
+    client = RosbridgeClient(f"ws://127.0.0.1:{run.ports[0]}")
+    try:
+        loaded = answer(client, "/load_world", world_resource=world("swarm_100"))
+        assert (loaded.result.result, loaded.world.name) == (1, "swarm_100")
+        until = time.monotonic() + 60.0
+        name = ""
+        while name != "swarm_100":
+            assert run.process.poll() is None
+            assert time.monotonic() < until
+            with suppress(GraphError):
+                name = answer(client, "/get_current_world").world.name
+        unknown = answer(client, "/load_world", world_resource=world("atlantis"))
+        assert unknown.result.result == 2
+    finally:
+        client.close()
+        run.close()
+
+
+def test_files_of_one_flight_stay_of_one_world(tmp_path):
+    change = _Change(RunOptions("hover", record=tmp_path / "a.mcap"))
+    with pytest.raises(CommandError, match="--record"):
+        change.ask("swarm_100")
+    change = _Change(RunOptions("hover", digest=True))
+    with pytest.raises(CommandError, match="--digest"):
+        change.ask("swarm_100")
+    change = _Change(RunOptions("hover", uavs=3))
+    change.quit = lambda: quits.append(change.wanted)
+    quits = []
+    with pytest.raises(VoleryError):
+        change.ask("atlantis")
+    change.ask("longleaf")
+    assert quits == ["longleaf"]

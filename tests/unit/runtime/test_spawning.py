@@ -46,9 +46,11 @@ class Witness:
         self.messages = []
         below = tuple(f"/{name}/" for name in names)
         simulation.graph.subscribe_all(
-            lambda p: self.messages.append((p.time_ns, p.topic, repr(p.message)))
-            if p.topic.startswith(below)
-            else None
+            lambda p: (
+                self.messages.append((p.time_ns, p.topic, repr(p.message)))
+                if p.topic.startswith(below)
+                else None
+            )
         )
 
     def states(self):
@@ -201,7 +203,7 @@ def test_nodes_begin_and_end_with_their_uav(simulate, wood_data):
     nodes = len(simulation.nodes)
     simulation.run(0.2)
     other = simulation.uavs["uav1"]
-    room = other.position_map + [0.0, -2.0, 0.0]
+    room = np.add(other.position_map, [0.0, -2.0, 0.0])
     simulation.spawn_uav("third", other.type_name, room)
     own = [node for node in simulation.nodes if node.get_namespace() == "/third"]
     assert len(own) == nodes // 2
@@ -281,7 +283,7 @@ def test_snapshots_are_of_one_fleet(simulate, flat_data):
     simulation.run(0.2)
     kept = simulation.snapshot()
     simulation.spawn_uav("extra", "f450", [20.0, 0.0, 0.0])
-    with pytest.raises(SnapshotError, match="come or gone.*holds uav1"):
+    with pytest.raises(SnapshotError, match=r"come or gone.*holds uav1"):
         simulation.restore(kept)
     both = simulation.snapshot()
     simulation.run(0.5)
