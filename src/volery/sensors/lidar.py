@@ -28,6 +28,7 @@ __all__ = [
     "LidarBatch",
     "MountTable",
     "make_batch",
+    "move_bodies",
     "sample_echoes",
     "sample_lidars",
     "scan_rays",
@@ -110,7 +111,7 @@ def sample_echoes(
     if not scans:
         return echoes
     start, end = _interval(model, batch, history)
-    bodies = _move_bodies(scene, history, start, end)
+    bodies = move_bodies(scene, history, start, end)
     table = model.scan.table(_sweep_number(model, batch))
     if not scene.compiled:
         surfaces = _surfaces(1, beams)
@@ -174,7 +175,7 @@ def _interval(model: LidarModel, batch: LidarBatch, history: PoseHistory) -> tup
     return int(starts.min()), int(starts.max()) + model.sweep_duration_ns
 
 
-def _move_bodies(scene: Scene, history: PoseHistory, start: int, end: int) -> int:
+def move_bodies(scene: Scene, history: PoseHistory, start: int, end: int) -> int:
     """Let the bodies move through the interval; how many there are."""
     bodies = len(scene.handle.bodies.scene)
     if bodies:

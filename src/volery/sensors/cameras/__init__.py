@@ -1,0 +1,1 @@
+"""Cameras: lenses, shading, and pictures of a scene."""

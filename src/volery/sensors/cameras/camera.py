@@ -1,0 +1,86 @@
+"""Pictures of a scene, taken by several cameras of one model at once."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.workers import Workers, new_counter
+from volery.sensors.aim_kernels import LidarBatch
+from volery.sensors.cameras.camera_kernels import PIECE, Frames, Optics, take_pictures
+from volery.sensors.cameras.light import Light
+from volery.sensors.cameras.model import CameraModel
+from volery.sensors.lidar import move_bodies
+from volery.vehicle.pose_history import PoseHistory
+from volery.world.embree import LANES
+from volery.world.scene import Scene
+from volery.world.scene_kernels import thread_block
+
+Part = Literal["colour", "depth", "labels"]
+EVERY_PART: tuple[Part, ...] = ("colour", "depth", "labels")
+
+
+class Pictures(NamedTuple):
+    """S pictures; what was not wanted is None."""
+
+    colour: NDArray[np.uint8] | None
+    """(S, height, width, 3) sRGB."""
+    depth: NDArray[np.float32] | None
+    """(S, height, width) m along the optical axis; -inf: nearer than the camera sees, inf: farther,
+    NaN: outside of what its lens shows."""
+    instance: NDArray[np.int32] | None
+    """(S, height, width) instance of the scene, -1 for none."""
+    material: NDArray[np.uint8] | None
+    """(S, height, width) `Material`."""
+
+
+def take(
+    scene: Scene,
+    model: CameraModel,
+    light: Light,
+    batch: LidarBatch,
+    history: PoseHistory,
+    *,
+    parts: Collection[Part] = EVERY_PART,
+    workers: Workers | None = None,
+) -> Pictures:
+    """Expose the batch's pictures: `sweep_start_ns` is when their first rows are.
+
+    `history` must reach from the earliest exposure to the end of the latest one's readout. A camera
+    does not see its own UAV. The same picture comes of any number of threads.
+    """
+    if not scene.compiled:
+        raise NotImplementedError("cameras need Embree's library; see `volery doctor`")
+    shots, pixels = len(batch.uav), model.width * model.height
+    colour, depth, labels = (pixels if part in parts else 0 for part in EVERY_PART)
+    frames = Frames(
+        np.empty((shots, colour, 3), np.uint8),
+        np.empty((shots, depth), np.float32),
+        np.empty((shots, labels), np.int32),
+        np.empty((shots, labels), np.uint8),
+    )
+    if shots:
+        start = int(batch.sweep_start_ns.min())
+        end = int(batch.sweep_start_ns.max()) + model.readout_ns
+        bodies = move_bodies(scene, history, start, end)
+        handle, table, counter = scene.handle, model.table, new_counter()
+        reach = model.far_m / float(table.direction[:, 0].min())
+        optics = Optics(model.near_m, model.far_m, reach, model.readout_ns, model.exposure)
+
+        def expose() -> None:
+            block = thread_block(PIECE * LANES, bodies)
+            take_pictures(
+                handle, table, optics, light, batch, history, start, end, counter, block, frames
+            )
+
+        (workers or scene.workers).run(expose)
+    shape = shots, model.height, model.width
+    return Pictures(
+        frames.colour.reshape(*shape, 3) if colour else None,
+        frames.depth.reshape(shape) if depth else None,
+        frames.instance.reshape(shape) if labels else None,
+        frames.material.reshape(shape) if labels else None,
+    )

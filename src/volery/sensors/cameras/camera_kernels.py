@@ -1,0 +1,202 @@
+"""Compiled pictures: rays of pixels are aimed, cast and shaded in pieces that threads share."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.compiled import inner_kernel, kernel
+from volery.core.workers import fetch_add
+from volery.sensors.aim_kernels import LidarBatch, sensor_frame
+from volery.sensors.cameras.light import CODES, Light
+from volery.sensors.cameras.pixel_table import PixelTable
+from volery.sensors.cameras.shade_kernels import SCRATCH_ROWS, find_shadows, note_hits, shade
+from volery.vehicle.pose_history import PoseHistory
+from volery.world.embree import DIRECTION, FAR, LANES, ORIGIN
+from volery.world.scene_kernels import RayBlock, SceneHandle, cast_block, near_bodies
+
+PIECE = 2048 // LANES
+"""Packets of a piece."""
+_SHADOW_MARGIN_M = 5.0
+"""Bodies this far beyond a camera's reach may still throw a shadow into its picture."""
+
+f4 = np.float32
+
+
+class Frames(NamedTuple):
+    """What is wanted of S pictures; arrays without pixels are left alone."""
+
+    colour: NDArray[np.uint8]
+    """(S, height * width, 3) sRGB, or (S, 0, 3)."""
+    depth: NDArray[np.float32]
+    """(S, height * width) m along the optical axis; -inf too near, inf too far; or (S, 0)."""
+    instance: NDArray[np.int32]
+    """(S, height * width) scene instance, -1 for none; or (S, 0)."""
+    material: NDArray[np.uint8]
+    """(S, height * width) `Material`; or (S, 0)."""
+
+
+class Optics(NamedTuple):
+    """Numbers of a camera that kernels need."""
+
+    near_m: float
+    far_m: float
+    reach_m: float
+    """Length of the longest ray: to `far_m` in the picture's corner."""
+    readout_ns: int
+    exposure: float
+
+
+@inner_kernel
+def _aim(
+    table: PixelTable,
+    batch: LidarBatch,
+    shot: int,
+    history: PoseHistory,
+    first: int,
+    count: int,
+    block: RayBlock,
+) -> None:
+    """Fill packets with the rays of a picture's packets from `first` on."""
+    known_ns = np.int64(-1)
+    frame = sensor_frame(batch, shot, history, batch.sweep_start_ns[shot])
+    for p in range(count):
+        after_ns = table.after_ns[first + p]
+        if after_ns != known_ns:
+            known_ns = after_ns
+            frame = sensor_frame(batch, shot, history, batch.sweep_start_ns[shot] + after_ns)
+        rays, aims = block.rays[p], table.direction[first + p]
+        for k in range(LANES):
+            f, s, u = aims[0, k], aims[1, k], aims[2, k]
+            for j in range(3):
+                rays[ORIGIN + j, k] = frame[j]
+                rays[DIRECTION + j, k] = f * frame[3 + j] + s * frame[6 + j] + u * frame[9 + j]
+            block.skip[p, k] = -1
+
+
+@inner_kernel
+def _near(
+    scene: SceneHandle,
+    batch: LidarBatch,
+    shot: int,
+    history: PoseHistory,
+    optics: Optics,
+    near: NDArray[np.int32],
+) -> int:
+    """List the other UAVs that the picture may show; their number."""
+    if scene.bodies.scene.shape[0] == 0:
+        return 0
+    start = batch.sweep_start_ns[shot]
+    a = sensor_frame(batch, shot, history, start)
+    b = sensor_frame(batch, shot, history, start + optics.readout_ns)
+    count: int = near_bodies(
+        scene.bodies,
+        (min(a[0], b[0]), min(a[1], b[1]), min(a[2], b[2])),
+        (max(a[0], b[0]), max(a[1], b[1]), max(a[2], b[2])),
+        optics.reach_m + _SHADOW_MARGIN_M,
+        batch.uav[shot],
+        near,
+    )
+    return count
+
+
+@inner_kernel
+def _write_geometry(
+    table: PixelTable,
+    optics: Optics,
+    block: RayBlock,
+    p: int,
+    packet: int,
+    shot: int,
+    frames: Frames,
+) -> None:
+    """Depth and labels of a packet's pixels, of the first sample of each."""
+    wants_depth, wants_labels = frames.depth.shape[1] > 0, frames.instance.shape[1] > 0
+    for k in range(0, LANES, table.samples):
+        pixel = table.pixel[packet, k]
+        if pixel < 0:
+            continue
+        depth = block.rays[p, FAR, k] * table.direction[packet, 0, k]
+        blind = table.blind[packet, k]
+        seen = block.instance[p, k] >= 0 and depth <= optics.far_m and not blind
+        if wants_depth:
+            if not seen:
+                depth = f4(np.nan) if blind else f4(np.inf)
+            elif depth < optics.near_m:
+                depth = f4(-np.inf)
+            frames.depth[shot, pixel] = depth
+        if wants_labels:
+            frames.instance[shot, pixel] = block.instance[p, k] if seen else -1
+            frames.material[shot, pixel] = block.material[p, k] if seen else 0
+
+
+@inner_kernel
+def _write_colour(
+    table: PixelTable,
+    optics: Optics,
+    light: Light,
+    packet: int,
+    shot: int,
+    colour: NDArray[np.float32],
+    frames: Frames,
+) -> None:
+    """Bytes of a packet's pixels, each the mean of its samples' light."""
+    samples = table.samples
+    scale = f4(optics.exposure * (CODES - 1) / samples)
+    for k in range(0, LANES, samples):
+        pixel = table.pixel[packet, k]
+        if pixel < 0:
+            continue
+        for j in range(3):
+            total = f4(0.0)
+            for n in range(samples):
+                if not table.blind[packet, k + n]:
+                    total += min(max(colour[j, k + n], f4(0.0)), f4(1e4))
+            frames.colour[shot, pixel, j] = light.code[min(int(total * scale), CODES - 1)]
+
+
+@kernel
+def take_pictures(
+    scene: SceneHandle,
+    table: PixelTable,
+    optics: Optics,
+    light: Light,
+    batch: LidarBatch,
+    history: PoseHistory,
+    bodies_start_ns: int,
+    bodies_end_ns: int,
+    counter: NDArray[np.int64],
+    block: RayBlock,
+    frames: Frames,
+) -> None:
+    """Take pieces of pictures, one by one from `counter`."""
+    packets = table.direction.shape[0]
+    pieces = (packets + PIECE - 1) // PIECE
+    interval = max(bodies_end_ns - bodies_start_ns, 1)
+    wants_colour = frames.colour.shape[1] > 0
+    scratch = np.empty((SCRATCH_ROWS, LANES), f4)
+    colour, direction = np.empty((3, LANES), f4), np.empty((3, LANES), f4)
+    distance = np.empty(LANES, f4)
+    while True:
+        number = fetch_add(counter.ctypes.data)
+        shot = number // pieces
+        if shot >= batch.uav.shape[0]:
+            return
+        first = (number % pieces) * PIECE
+        own = min(PIECE, packets - first)
+        near_count = _near(scene, batch, shot, history, optics, block.near)
+        _aim(table, batch, shot, history, first, own, block)
+        for p in range(own):
+            time = batch.sweep_start_ns[shot] + table.after_ns[first + p]
+            fraction = (time - bodies_start_ns) / interval
+            block.fraction[p] = min(max(fraction, 0.0), 1.0)
+        cast_block(scene, block, own * LANES, optics.reach_m, near_count)
+        for p in range(own):
+            _write_geometry(table, optics, block, p, first + p, shot, frames)
+            if wants_colour:
+                note_hits(block, p, scratch)
+                find_shadows(scene, block, p, near_count, light, scratch, distance, direction)
+                shade(block, p, light, scratch, distance, direction, colour)
+                _write_colour(table, optics, light, first + p, shot, colour, frames)

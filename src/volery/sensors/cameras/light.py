@@ -1,0 +1,108 @@
+"""Light and surfaces as cameras see them: sun, sky, haze, and the colours of materials.
+
+Colours are linear (r, g, b) with 1 for a white surface in full sun; the picture is coded by sRGB.
+All numbers here are modelling choices for a clear day, but where a source is named.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.world.materials import Material
+
+CODES = 4096
+"""Steps of the table from linear light to a byte."""
+GRAIN = 64
+"""Side of the table of random greys."""
+
+
+class Light(NamedTuple):
+    """What kernels need to shade; see `make_light`."""
+
+    sun: NDArray[np.float32]
+    """(3,) unit vector towards it, map."""
+    sun_colour: NDArray[np.float32]
+    """(3,) of a white surface that faces it."""
+    zenith: NDArray[np.float32]
+    """(3,) of the sky overhead."""
+    horizon: NDArray[np.float32]
+    """(3,) of the sky at the horizon, and of haze."""
+    bounce: NDArray[np.float32]
+    """(3,) of the light that the ground throws back up."""
+    extinction_per_m: float
+    """Of the air between: what is d m away keeps exp(-extinction d) of its contrast."""
+    surface: NDArray[np.float32]
+    """(materials, 8): colour, second colour, size of the grain 1/m, share of light let through."""
+    grain: NDArray[np.float32]
+    """(GRAIN, GRAIN) random greys from 0 to 1, the same at opposite edges."""
+    code: NDArray[np.uint8]
+    """(CODES,) bytes of linear light from 0 to 1."""
+
+
+_SURFACES = {
+    #                     colour               second colour      1/m  through
+    Material.NONE: ((0.50, 0.50, 0.50), (0.50, 0.50, 0.50), 1.0, 0.0),
+    Material.GROUND: ((0.17, 0.14, 0.08), (0.10, 0.13, 0.04), 1.3, 0.0),
+    Material.WOOD: ((0.19, 0.13, 0.08), (0.09, 0.065, 0.045), 6.0, 0.0),
+    Material.LEAF: ((0.05, 0.14, 0.03), (0.09, 0.20, 0.04), 0.7, 0.4),
+    Material.UAV_BODY: ((0.60, 0.60, 0.62), (0.45, 0.05, 0.04), 9.0, 0.0),
+    Material.ROTOR: ((0.05, 0.05, 0.05), (0.08, 0.08, 0.08), 20.0, 0.5),
+    Material.WALL: ((0.55, 0.51, 0.44), (0.45, 0.41, 0.36), 0.8, 0.0),
+}
+
+
+def make_light(
+    sun_elevation_deg: float = 50.0, sun_azimuth_deg: float = 135.0, visibility_m: float = 20_000.0
+) -> Light:
+    """Light of a day; azimuth clockwise from north.
+
+    visibility_m: where a contrast of 1 has faded to .05, so that extinction is 3 / visibility (the
+    meteorological optical range of the WMO, Guide to Instruments WMO-No. 8, ch. 9).
+    """
+    elevation, azimuth = math.radians(sun_elevation_deg), math.radians(sun_azimuth_deg)
+    level = math.cos(elevation)
+    sun = (level * math.sin(azimuth), level * math.cos(azimuth), math.sin(elevation))
+    height = max(math.sin(elevation), 0.0)
+    strength = min(1.0, 3.0 * height) * 0.9
+    day = min(1.0, 0.05 + 2.0 * max(math.sin(elevation) + 0.1, 0.0))
+    warm = np.array([1.0, 0.75 + 0.25 * min(1.0, 3.0 * height), 0.5 + 0.5 * min(1.0, 2.0 * height)])
+    return Light(
+        sun=_row(sun),
+        sun_colour=_row(strength * warm),
+        zenith=_row(day * np.array([0.13, 0.26, 0.60])),
+        horizon=_row(day * np.array([0.55, 0.66, 0.80])),
+        bounce=_row(day * np.array([0.09, 0.09, 0.06])),
+        extinction_per_m=3.0 / visibility_m,
+        surface=_surface_table(),
+        grain=_grain(),
+        code=_codes(),
+    )
+
+
+def _surface_table() -> NDArray[np.float32]:
+    rows = [[*first, *second, size, through] for first, second, size, through in _SURFACES.values()]
+    return np.array(rows, dtype=np.float32)
+
+
+def _grain() -> NDArray[np.float32]:
+    """Greys whose neighbours resemble each other a little, spread evenly."""
+    greys = np.random.default_rng(20_251_121).random((GRAIN, GRAIN))
+    for axis in (0, 1):
+        greys = 0.5 * greys + 0.25 * (np.roll(greys, 1, axis) + np.roll(greys, -1, axis))
+    ranks = np.argsort(np.argsort(greys.ravel(), kind="stable"), kind="stable")
+    return np.asarray((ranks / (ranks.size - 1)).reshape(greys.shape), dtype=np.float32)
+
+
+def _codes() -> NDArray[np.uint8]:
+    """IEC 61966-2-1 (sRGB)."""
+    linear = np.linspace(0.0, 1.0, CODES)
+    coded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.asarray(np.round(255.0 * coded), dtype=np.uint8)
+
+
+def _row(values: object) -> NDArray[np.float32]:
+    return np.array(values, dtype=np.float32)

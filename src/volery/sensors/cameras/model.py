@@ -1,0 +1,100 @@
+"""What a camera is: its picture's size, its lens, how far it sees, how it exposes."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from volery.sensors.cameras.lens import distort
+from volery.sensors.cameras.pixel_table import PixelTable, make_table
+from volery.sensors.model import SensorModel, load_model
+
+Array = NDArray[np.float64]
+Side = Annotated[int, Field(ge=1, le=8192)]
+
+
+class CameraModel(SensorModel):
+    """Numbers of a camera; see the data files in `models/`.
+
+    Pixel (column u, row v) covers u - .5 to u + .5: its centre has whole coordinates, as OpenCV and
+    ROS count them.
+    """
+
+    name: str = "pinhole"
+    width: Side = 640
+    height: Side = 480
+    horizontal_fov_deg: Annotated[float, Field(gt=0.0, lt=180.0)] = 60.0
+    """Of the ideal picture, before the lens distorts it."""
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    """k1, k2, p1, p2, k3 of `plumb_bob`."""
+    near_m: NonNegativeFloat = 0.05
+    """Depth of what is nearer is told as -inf."""
+    far_m: PositiveFloat = 200.0
+    """What is farther away is sky; its depth is told as inf."""
+    readout_s: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0
+    """From the exposure of the first row to that of the last one; 0: a global shutter."""
+    samples: Literal[1, 4] = 1
+    """Rays a pixel; 4 smooth the edges of the colour picture."""
+    exposure: PositiveFloat = 1.0
+    """Factor of the light."""
+
+    @model_validator(mode="after")
+    def _sees_something(self) -> Self:
+        if self.near_m >= self.far_m:
+            raise ValueError(f"near_m = {self.near_m} must be below far_m = {self.far_m}")
+        return self
+
+    @property
+    def focal_px(self) -> float:
+        """Focal length fx = fy, pixels."""
+        return self.width / (2.0 * math.tan(math.radians(self.horizontal_fov_deg) / 2.0))
+
+    @property
+    def centre_px(self) -> tuple[float, float]:
+        """(cx, cy), pixels: the middle of the picture."""
+        return (self.width - 1) / 2.0, (self.height - 1) / 2.0
+
+    @property
+    def matrix(self) -> Array:
+        """K (3, 3)."""
+        (cx, cy), f = self.centre_px, self.focal_px
+        return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def readout_ns(self) -> int:
+        """From the first row's exposure to the last one's."""
+        return round(self.readout_s * 1e9)
+
+    @cached_property
+    def table(self) -> PixelTable:
+        """The rays of the pixels."""
+        return make_table(
+            self.width,
+            self.height,
+            self.focal_px,
+            self.centre_px,
+            self.distortion,
+            self.samples,
+            self.readout_ns,
+        )
+
+    def project(self, points: ArrayLike) -> Array:
+        """Pixels (..., 2), column and row, of points (..., 3) in the optical frame, m.
+
+        The optical frame has z forward, x right, y down. NaN for points that are not in front.
+        """
+        p = np.asarray(points, dtype=np.float64)
+        ahead = np.where(p[..., 2] > 0.0, p[..., 2], np.nan)
+        pixels = distort(p[..., :2] / ahead[..., None], self.distortion)
+        return np.asarray(pixels * self.focal_px + np.array(self.centre_px))
+
+
+def load_camera(name: str | Path = "pinhole", folder: Path | None = None) -> CameraModel:
+    """Model by shipped name or `.toml` path."""
+    return load_model(CameraModel, "camera", name, folder)

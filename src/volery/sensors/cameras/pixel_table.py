@@ -1,0 +1,72 @@
+"""The rays of a picture, ordered in packets whose pixels lie close together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.sensors.cameras.lens import undistort
+from volery.world.embree import LANES
+
+_OFFSETS = {
+    1: np.array([[0.0, 0.0]]),
+    # A rotated grid: four rows and four columns are met, so that edges of any slope are smoothed.
+    4: np.array([[-0.125, -0.375], [0.375, -0.125], [-0.375, 0.125], [0.125, 0.375]]),
+}
+"""Places of a pixel's samples about its centre, pixels."""
+
+
+class PixelTable(NamedTuple):
+    """P packets of LANES rays: tiles of 4 x 4 pixels, or of 2 x 2 with four samples each.
+
+    Samples of a pixel are neighbouring lanes. Lanes beyond the picture's edge repeat one within.
+    """
+
+    direction: NDArray[np.float32]
+    """(P, 3, LANES) unit vectors in the sensor's axes: x forward, y left, z up."""
+    pixel: NDArray[np.int64]
+    """(P, LANES) row * width + column; -1 where nothing is to be written."""
+    blind: NDArray[np.bool_]
+    """(P, LANES) where the lens shows nothing."""
+    after_ns: NDArray[np.int64]
+    """(P,) when it is exposed, after the first row."""
+    samples: int
+
+
+def make_table(
+    width: int,
+    height: int,
+    focal_px: float,
+    centre_px: tuple[float, float],
+    distortion: Sequence[float],
+    samples: int,
+    readout_ns: int,
+) -> PixelTable:
+    """Rays of a picture; the arguments are those of `CameraModel`."""
+    side = 4 if samples == 1 else 2
+    across, down = -(-width // side), -(-height // side)
+    y, x = np.mgrid[0:side, 0:side].reshape(2, -1)
+    tile_y, tile_x = np.mgrid[0:down, 0:across].reshape(2, -1, 1) * side
+    u, v = tile_x + x, tile_y + y
+    inside = (u < width) & (v < height)
+    u, v = np.minimum(u, width - 1), np.minimum(v, height - 1)
+    pixel = np.where(inside, v * width + u, -1)
+    places = np.stack([u, v], axis=-1)[:, :, None] + _OFFSETS[samples]
+    ideal = undistort((places - np.array(centre_px)) / focal_px, distortion)
+    ideal = ideal.reshape(-1, LANES, 2)
+    blind = np.isnan(ideal[..., 0]) | np.isnan(ideal[..., 1])
+    ideal[blind] = 0.0
+    rays = np.stack([np.ones(blind.shape), -ideal[..., 0], -ideal[..., 1]], axis=1)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    middle = np.minimum(tile_y[:, 0] + (side - 1) / 2.0, height - 1)
+    share = middle / max(height - 1, 1)
+    return PixelTable(
+        np.ascontiguousarray(rays, dtype=np.float32),
+        np.ascontiguousarray(np.repeat(pixel, samples, axis=1), dtype=np.int64),
+        blind,
+        np.round(share * readout_ns).astype(np.int64),
+        samples,
+    )

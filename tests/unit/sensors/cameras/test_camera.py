@@ -1,0 +1,203 @@
+"""Pictures of small scenes whose depth, shadows and labels are known."""
+
+import numpy as np
+import pytest
+
+from volery.core import rotations
+from volery.core.workers import Workers
+from volery.sensors.cameras.camera import take
+from volery.sensors.cameras.lens import undistort
+from volery.sensors.cameras.light import make_light
+from volery.sensors.cameras.model import CameraModel, load_camera
+from volery.sensors.lidar import make_batch, stack_mounts
+from volery.sensors.mount import make_mount
+from volery.vehicle.airframe import load_airframe
+from volery.vehicle.body_shape import body_shape
+from volery.vehicle.pose_history import new_history
+from volery.world.materials import Material
+from volery.world.mesh import Mesh
+from volery.world.scene import Scene, Solid
+from volery.world.terrain import Terrain
+
+NOON = make_light(sun_elevation_deg=90.0)
+SMALL = CameraModel(width=64, height=48, far_m=100.0)
+
+
+def wall(x, y0=-50.0, y1=50.0, z0=0.0, z1=40.0):
+    """A rectangle across the x axis."""
+    corners = np.array([[x, y0, z0], [x, y1, z0], [x, y1, z1], [x, y0, z1]], np.float32)
+    triangles = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    return Solid(Mesh(corners, triangles), Material.WALL, "wall")
+
+
+@pytest.fixture
+def picture():
+    """Take a picture from `position`, looking along x but for `rpy` (rad)."""
+    scenes = []
+
+    def shoot(model, position=(0.0, 0.0, 2.0), rpy=(0, 0, 0), *, solids=(), light=NOON, **options):
+        scene = Scene(Terrain.flat(200.0, origin=(-100.0, -100.0)), None, solids=solids)
+        scenes.append(scene)
+        attitude = rotations.from_rpy(*rpy)
+        history = new_history([position], [attitude], 1_000_000)
+        batch = make_batch([0], [0], [0], [0], [0], stack_mounts([make_mount()]))
+        return take(scene, model, light, batch, history, **options)
+
+    yield shoot
+    for scene in scenes:
+        scene.close()
+
+
+def test_depth_of_a_wall_is_its_distance_along_the_axis(picture):
+    seen = picture(SMALL, (0.0, 0.0, 20.0), solids=[wall(12.0)])
+    np.testing.assert_allclose(seen.depth[0], 12.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("distortion", [(0.0,) * 5, (-0.2, 0.05, 0.003, -0.002, 0.01)])
+def test_depth_of_the_ground_against_analytic_rays(picture, distortion):
+    """Each pixel's depth puts its point on the ground, within a millimetre."""
+    model = CameraModel(width=80, height=60, distortion=distortion)
+    pitch = np.radians(35.0)
+    turn = rotations.from_rpy(0.0, pitch, 0.4)
+    seen = picture(model, (3.0, -2.0, 6.0), (0.0, pitch, 0.4))
+    v, u = np.mgrid[0:60, 0:80]
+    depth = seen.depth[0].astype(np.float64)
+    ideal = undistort((np.stack([u, v], -1) - model.centre_px) / model.focal_px, distortion)
+    optical = np.dstack([ideal * depth[..., None], depth])
+    body = np.stack([optical[..., 2], -optical[..., 0], -optical[..., 1]], -1)
+    points = np.add(rotations.rotate(turn, body), [3.0, -2.0, 6.0])
+    np.testing.assert_allclose(points[..., 2], 0.0, atol=1e-3)
+
+
+def test_where_objects_stand_they_are_seen(picture):
+    """A post right of the axis is right in the picture, at the column of the model's formula."""
+    post = wall(10.0, y0=-3.1, y1=-2.9)
+    seen = picture(SMALL, (0.0, 0.0, 10.0), solids=[post])
+    columns = np.flatnonzero(seen.material[0][24] == Material.WALL)
+    wanted = SMALL.project([3.0, 0.0, 10.0])[0]
+    assert abs(columns.mean() - wanted) <= 0.5
+    assert (seen.instance[0][24, columns] == 1).all()
+    sky = seen.material[0] == Material.NONE
+    assert np.isinf(seen.depth[0][sky]).all()
+    assert (seen.instance[0][sky] == -1).all()
+
+
+def test_too_near_and_too_far(picture):
+    near = CameraModel(width=16, height=16, near_m=3.0, far_m=20.0)
+    assert (picture(near, (0, 0, 20.0), solids=[wall(2.0)]).depth == -np.inf).all()
+    beyond = picture(near, (0.0, 0.0, 20.0), solids=[wall(20.1)])
+    assert (beyond.depth == np.inf).all()
+    assert (beyond.instance == -1).all()
+    at_the_end = picture(near, (0.0, 0.0, 20.0), solids=[wall(19.9)])
+    np.testing.assert_allclose(at_the_end.depth, 19.9, atol=1e-3)  # in the corners too
+
+
+def test_shadows_fall_away_from_the_sun(picture):
+    """A wall between sun and ground darkens the ground behind it, and only there."""
+    down = CameraModel(width=40, height=40, horizontal_fov_deg=40.0)
+    low = make_light(sun_elevation_deg=45.0, sun_azimuth_deg=90.0)  # in the east: +x
+    blind = wall(5.0, z0=0.0, z1=4.0)  # its shadow reaches from x = 5 to x = 1
+    plain = picture(down, (0.0, 0.0, 20.0), (0, np.pi / 2, 0), light=low).colour[0].astype(float)
+    dark = picture(down, (0.0, 0.0, 20.0), (0, np.pi / 2, 0), light=low, solids=[blind])
+    ratio = dark.colour[0].astype(float).sum(-1) / plain.sum(-1)
+    ahead = 20.0 * -(np.arange(40) - 19.5) / down.focal_px  # rows are x, ahead is up
+    shaded, lit = (ahead > 1.3) & (ahead < 4.7), (ahead < 0.7)
+    assert ratio[shaded].max() < 0.85
+    np.testing.assert_array_equal(ratio[lit], 1.0)
+
+
+def test_night_is_dark_and_fog_hides(picture):
+    day = picture(SMALL, solids=[wall(30.0)]).colour.mean()
+    night = make_light(sun_elevation_deg=-20.0)
+    assert picture(SMALL, solids=[wall(30.0)], light=night).colour.mean() < 0.5 * day
+    fog = make_light(visibility_m=30.0)
+    rows = slice(10, 20)
+    clear = picture(SMALL, solids=[wall(30.0)]).colour[0][rows].astype(float)
+    misty = picture(SMALL, solids=[wall(30.0)], light=fog).colour[0][rows].astype(float)
+    horizon = 255.0 * (1.055 * fog.horizon ** (1 / 2.4) - 0.055)
+    assert np.abs(misty - horizon).mean() < 0.3 * np.abs(clear - horizon).mean()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (3, 5), (17, 2), (64, 48)])
+@pytest.mark.parametrize("samples", [1, 4])
+def test_any_size_is_filled(picture, size, samples):
+    model = CameraModel(width=size[0], height=size[1], samples=samples)
+    seen = picture(model, (0.0, 0.0, 20.0), solids=[wall(12.0)])
+    assert seen.colour.shape == (1, size[1], size[0], 3)
+    np.testing.assert_allclose(seen.depth, 12.0, atol=1e-2)
+    assert (seen.material == Material.WALL).all()
+    assert (seen.colour > 0).all()
+
+
+def test_more_samples_smooth_an_edge(picture):
+    """A slanting edge has pixels between wall and sky."""
+
+    def greys(samples):
+        model = CameraModel(width=64, height=64, samples=samples)
+        seen = picture(model, (0, 0, 20.0), (0.3, 0, 0), solids=[wall(10.0, y1=0.0)], light=NOON)
+        colours = seen.colour[0, 32].astype(int)
+        return len(np.unique(colours, axis=0))
+
+    assert greys(4) > greys(1)
+
+
+def test_only_what_is_wanted_is_made(picture):
+    seen = picture(SMALL, parts=("depth",))
+    assert seen.colour is None
+    assert seen.material is None
+    assert seen.depth is not None
+
+
+def test_threads_change_nothing(picture):
+    workers = Workers(3)
+    model = CameraModel(width=320, height=240, samples=4)
+    one = picture(model, solids=[wall(8.0, y1=2.0)])
+    three = picture(model, solids=[wall(8.0, y1=2.0)], workers=workers)
+    workers.close()
+    for a, b in zip(one, three, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.fixture
+def two():
+    """A camera at the origin and another UAV 3 m ahead of it."""
+    scene = Scene(Terrain.flat(200.0, origin=(-100.0, -100.0)), None)
+    scene.set_bodies([body_shape(load_airframe("f450"))], [0, 0])
+    yield scene
+    scene.close()
+
+
+def shoot(scene, history, model, time_ns=0):
+    batch = make_batch([0], [0], [time_ns], [0], [0], stack_mounts([make_mount()]))
+    return take(scene, model, NOON, batch, history)
+
+
+def test_others_are_seen_and_oneself_is_not(two):
+    level = np.tile(rotations.IDENTITY, (2, 1))
+    history = new_history([[0.0, 0.0, 5.0], [3.0, 0.0, 5.0]], level, 1_000_000)
+    seen = shoot(two, history, CameraModel(width=160, height=120))
+    assert (seen.instance[0] == two.moving_offset + 1).sum() > 20
+    assert not (seen.instance[0] == two.moving_offset).any()
+    body = seen.depth[0][seen.instance[0] == two.moving_offset + 1]
+    assert 2.4 < body.min() < 3.0
+
+
+def test_a_rolling_shutter_leans(two):
+    """What passes by while rows are exposed one after the other is seen slanting."""
+    model = CameraModel(width=160, height=160, horizontal_fov_deg=40.0, readout_s=0.06)
+    level = np.tile(rotations.IDENTITY, (2, 1))
+    history = new_history([[0.0, 0.0, 5.0], [3.0, 0.0, 5.0]], level, 1_000_000)
+    for step in range(64):
+        history.position[step, 1] = [3.0, 0.5 - step / 64, 5.0]
+    seen = shoot(two, history, model).instance[0] == two.moving_offset + 1
+    rows = np.flatnonzero(seen.any(axis=1))
+    middles = [np.flatnonzero(seen[row]).mean() for row in (rows[0], rows[-1])]
+    global_shutter = shoot(two, history, model.model_copy(update={"readout_s": 0.0}), 30_000_000)
+    still = global_shutter.instance[0] == two.moving_offset + 1
+    rows = np.flatnonzero(still.any(axis=1))
+    upright = [np.flatnonzero(still[row]).mean() for row in (rows[0], rows[-1])]
+    assert middles[1] - middles[0] > 4.0 + abs(upright[1] - upright[0])
+
+
+def test_the_shipped_camera_loads():
+    assert load_camera() == CameraModel(name="pinhole camera")
