@@ -54,6 +54,9 @@ KINDS = [
          entry={"rate_hz": 20.0}),
     Kind("lidar", ("laser/horizontal/scan",), 40.0, "Hokuyo", "utm_30lx", 18_750_000, True,
          entry=LEANT),
+    Kind("camera", ("camera/depth", "camera/image_raw", "camera/camera_info",
+                    "camera/labels/instance", "camera/labels/material"),
+         10.0, "Camera", "pinhole", entry={**DOWN_AHEAD, "width": 24, "height": 17}),
 ]  # fmt: skip
 
 every_kind = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.kind)

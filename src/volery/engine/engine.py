@@ -48,6 +48,9 @@ class SensorBank(Bank, Protocol):
     def faults(self) -> FaultTable:
         """Faults of the sensors, row by row."""
 
+    def is_wanted(self) -> bool:
+        """Whether the next measurement is worth making."""
+
 
 class Sink(Protocol):
     """Where measurements and events go."""
@@ -274,7 +277,13 @@ class Engine:
     def _new_agenda(self, *, after_step: int) -> Agenda[SensorBank]:
         agenda: Agenda[SensorBank] = Agenda(self.dt_ns)
         for bank in self.banks:
-            agenda.add(bank, bank.schedule, lag_ns=bank.lag_ns, after_step=after_step)
+            agenda.add(
+                bank,
+                bank.schedule,
+                lag_ns=bank.lag_ns,
+                after_step=after_step,
+                wanted=bank.is_wanted,
+            )
         return agenda
 
     def _due_step(self) -> int:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.graph.channels import Channel
 from volery.graph.messages import (
     FluidPressure,
     MagneticField,
@@ -27,19 +27,6 @@ Array = NDArray[np.float64]
 _ZERO_CELSIUS_K = 273.15
 _NOT_MEASURED = -1.0
 """Variance of a quantity that the message holds and the sensor does not know (sensor_msgs/Imu)."""
-
-
-class Channel(NamedTuple):
-    """One of the topics of a sensor: `/UAV/SENSOR` and a suffix."""
-
-    suffix: str
-    message_class: type[Any]
-    message: Callable[[Any, int], Any]
-    """(samples, row) -> message, or None where there is nothing to tell."""
-
-    def topic(self, sensor: SensorId) -> str:
-        """Name of the topic."""
-        return f"/{sensor.uav_name}/{sensor.name}{self.suffix}"
 
 
 def fix(readings: GnssReadings, row: int) -> NavSatFix:
@@ -101,7 +88,7 @@ def magnetic_field(readings: MagneticReadings, row: int) -> MagneticField:
     )
 
 
-CHANNELS: dict[type[Any], tuple[Channel, ...]] = {
+NAVIGATION_CHANNELS: dict[type[Any], tuple[Channel, ...]] = {
     GnssReadings: (
         Channel("", NavSatFix, fix),
         Channel("_velocity", TwistWithCovarianceStamped, fix_velocity),

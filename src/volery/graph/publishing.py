@@ -16,6 +16,13 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.engine.events import Event
+from volery.graph.camera_messages import (
+    CAMERA_CHANNELS,
+    OPTICAL_ATTITUDE,
+    PART_OF_SUFFIX,
+    optical_frame,
+)
+from volery.graph.channels import Channel
 from volery.graph.graph import Graph, Publisher
 from volery.graph.lidar_publishing import LidarPublisher, laser_frame
 from volery.graph.messages import (
@@ -39,11 +46,12 @@ from volery.graph.messages import (
     header,
     time_from_ns,
 )
-from volery.graph.navigation_messages import CHANNELS
+from volery.graph.navigation_messages import NAVIGATION_CHANNELS
 from volery.sensors.lidar_model import LidarModel
-from volery.sensors.mount import Mount
+from volery.sensors.mount import Mount, make_mount
 from volery.sensors.samples import (
     BatteryReadings,
+    CameraFrames,
     ImuReadings,
     JointAngles,
     LidarScans,
@@ -55,6 +63,12 @@ from volery.sensors.samples import (
 from volery.vehicle.battery import BatteryLevel
 
 Array = NDArray[np.float64]
+
+CHANNELS: dict[type[Any], tuple[Channel, ...]] = {
+    **NAVIGATION_CHANNELS,
+    CameraFrames: CAMERA_CHANNELS,
+}
+"""Topics of the kinds of samples that have a channel for each."""
 
 _NO_EFFORT = np.zeros(0)
 _UNKNOWN_ORIENTATION = np.full(9, 0.0)
@@ -108,7 +122,19 @@ class GraphPublisher:
             else:
                 message_class = Imu if kind is ImuReadings else Range
                 self._advertise(f"/{sensor.uav_name}/{sensor.name}", message_class)
-            self._static.append(_mount_transform(base, f"{sensor.uav_name}/{sensor.name}", mount))
+            self._static.append(_mount_transform(base, sensor.path, mount))
+            if kind is CameraFrames:
+                optical = make_mount(attitude_body=OPTICAL_ATTITUDE)
+                self._static.append(_mount_transform(sensor.path, optical_frame(sensor), optical))
+
+    def wanted_parts(self, cameras: Sequence[SensorId]) -> set[str]:
+        """What of the pictures of these cameras somebody would receive."""
+        return {
+            PART_OF_SUFFIX[channel.suffix]
+            for channel in CAMERA_CHANNELS
+            for camera in cameras
+            if self._publishers[channel.topic(camera)].wanted
+        }
 
     def announce_lidar(self, sensor: SensorId, model: LidarModel, topic: str, mount: Mount) -> None:
         """Advertise what a LIDAR publishes and place its frame."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -113,6 +114,10 @@ class Crew:
         fresh = {start.name for start in new}
         announce_sensors(self.publisher, [f for f in self.fitted if f.id.uav_name in fresh])
         self.publisher.arrange(names)
+        for bank in parts.banks:
+            if bank.name == "camera":
+                cameras: Any = bank
+                cameras.bank.wants = partial(self.publisher.wanted_parts, bank.sensors)
         for row, start in enumerate(self.starts):
             if start.name in fresh:
                 self.beginnings[start.name] = Beginning(begun, row)

@@ -14,7 +14,7 @@ from volery.core.clock import Schedule, ns_from_s
 from volery.core.errors import DataFileError
 from volery.engine.engine import SensorBank
 from volery.runtime.navigation import denial, local_frame, magnetic_field_map
-from volery.runtime.sensor_fitting import RESULT_OF, Fitted
+from volery.runtime.sensor_fitting import PICTURE, RESULT_OF, Fitted
 from volery.scenario import schema
 from volery.sensors.bank import Bank
 from volery.sensors.barometer import BarometerBank, load_barometer_model
@@ -80,6 +80,7 @@ class _Builder:
     def build(self, group: list[Fitted]) -> Bank:
         by_kind: dict[str, Callable[[list[Fitted]], Bank]] = {
             "lidar": self._lidar,
+            "camera": self._camera,
             "imu": self._imu,
             "sonar": self._sonar,
             "odometry": self._odometry,
@@ -107,6 +108,23 @@ class _Builder:
             _keys(group),
             self._scene,
             intensities=_wants_intensities(group[0].spec, model),
+        )
+
+    def _camera(self, group: list[Fitted]) -> Bank:
+        from volery.sensors.cameras.bank import CameraBank
+        from volery.sensors.cameras.light import make_light
+        from volery.sensors.cameras.model import load_camera
+
+        spec, light = group[0].spec, self._world.light
+        own = {name: getattr(spec, name) for name in PICTURE if getattr(spec, name) is not None}
+        return CameraBank(
+            load_camera(spec.model, self._folder).model_copy(update=own),
+            _schedule(group),
+            _ids(group),
+            tuple(s.mount for s in group),
+            _keys(group),
+            self._scene,
+            make_light(light.sun_elevation_deg, light.sun_azimuth_deg, light.visibility_m),
         )
 
     def _imu(self, group: list[Fitted]) -> Bank:

@@ -20,6 +20,7 @@ from volery.sensors.lidar_model import LidarModel, load_lidar
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.samples import (
     BatteryReadings,
+    CameraFrames,
     GnssReadings,
     ImuReadings,
     LidarScans,
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 RESULT_OF: dict[str, type[Samples]] = {
     "lidar": LidarScans,
+    "camera": CameraFrames,
     "imu": ImuReadings,
     "sonar": RangeReadings,
     "odometry": OdometryReadings,
@@ -48,6 +50,10 @@ RESULT_OF: dict[str, type[Samples]] = {
     "battery": BatteryReadings,
 }
 """What each kind of sensor measures."""
+
+
+PICTURE = ("width", "height", "horizontal_fov_deg")
+"""What a scenario may change of a camera's model."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +73,8 @@ class Fitted:
         spec = self.spec
         rate, model = getattr(spec, "rate_hz", None), getattr(spec, "model", None)
         noise, intensities = getattr(spec, "noise", None), getattr(spec, "intensities", None)
-        return (spec.kind, model, rate, spec.phase_s, noise, intensities)
+        picture = [getattr(spec, name, None) for name in PICTURE]
+        return (spec.kind, model, rate, spec.phase_s, noise, intensities, *picture)
 
     @property
     def topic(self) -> str:

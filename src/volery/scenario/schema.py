@@ -23,6 +23,7 @@ from volery.scenario.base import (
     Vector2,
     check_rectangle,
 )
+from volery.scenario.camera import CameraSensor, Daylight
 from volery.scenario.faults import Fault
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
 from volery.scenario.wind import Wind
@@ -86,6 +87,7 @@ class World(Data):
     terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
     forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
     wind: Wind = Wind()
+    light: Daylight = Daylight()
     origin: Origin = Origin()
     magnetic_field: MagneticField = MagneticField()
     gnss_denied: bool = False
@@ -179,6 +181,7 @@ Sensor = Annotated[
     | OdometrySensor
     | EstimateSensor
     | GroundTruthSensor
+    | CameraSensor
     | NavigationSensor
     | BatterySensor,
     Field(discriminator="kind"),

@@ -146,7 +146,7 @@ class FaultTable:
         rows = np.flatnonzero((self._kind == FaultKind.STUCK) & self._known)
         changed: Arrays = {}
         for name, array in arrays.items():
-            if len(rows):
+            if len(rows) and self._last[name].shape == array.shape:
                 mixed = array.copy()
                 mixed[rows] = self._last[name][rows]
                 changed[name] = owned(mixed)
@@ -174,6 +174,11 @@ class FaultableBank:
     def lag_ns(self) -> int:
         """How long after its instant a measurement is known."""
         return self.bank.lag_ns
+
+    def is_wanted(self) -> bool:
+        """Whether measurements are worth making; only cameras ask who receives them."""
+        asks = getattr(self.bank, "is_wanted", None)
+        return asks is None or bool(asks())
 
     @property
     def sensors(self) -> tuple[SensorId, ...]:

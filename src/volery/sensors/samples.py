@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.geodesy import LocalFrame
+from volery.sensors.cameras.model import CameraModel
 from volery.sensors.lidar_model import LidarModel
 
 Array = NDArray[np.float64]
@@ -54,6 +55,26 @@ class LidarScans:
     def ranges(self) -> NDArray[np.float32]:
         """(S, beams) of the first echoes, m."""
         return self.echoes[:, 0]
+
+
+@dataclass(frozen=True)
+class CameraFrames:
+    """One picture of each camera of a bank; a part that nobody wanted has no pixels."""
+
+    MEASURED: ClassVar[dict[str, int]] = {"depth": 1}
+
+    sensors: tuple[SensorId, ...]
+    stamp_ns: int
+    """When the first row was exposed."""
+    model: CameraModel
+    colour: NDArray[np.uint8]
+    """(S, height, width, 3) sRGB."""
+    depth: NDArray[np.float32]
+    """(S, height, width) m along the optical axis; -inf too near, inf too far, NaN not seen."""
+    instance: NDArray[np.int32]
+    """(S, height, width) instance of the scene, -1 for none."""
+    material: NDArray[np.uint8]
+    """(S, height, width) `Material`."""
 
 
 @dataclass(frozen=True)
@@ -201,6 +222,7 @@ class BatteryReadings:
 
 Samples: TypeAlias = (
     LidarScans
+    | CameraFrames
     | ImuReadings
     | RangeReadings
     | OdometryReadings

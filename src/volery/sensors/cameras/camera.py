@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import cache
+from statistics import NormalDist
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 
 from volery.core.workers import Workers, new_counter
 from volery.sensors.aim_kernels import LidarBatch
-from volery.sensors.cameras.camera_kernels import PIECE, Frames, Optics, take_pictures
+from volery.sensors.cameras.camera_kernels import NORMALS, PIECE, Frames, Optics, take_pictures
 from volery.sensors.cameras.light import Light
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.lidar import move_bodies
@@ -47,8 +49,9 @@ def take(
     parts: Collection[Part] = EVERY_PART,
     workers: Workers | None = None,
 ) -> Pictures:
-    """Expose the batch's pictures: `sweep_start_ns` is when their first rows are.
+    """Expose the batch's pictures: the first row of each at its `sweep_start_ns`.
 
+    Noise follows from `key` and `scan_number`, the number of a camera's picture.
     `history` must reach from the earliest exposure to the end of the latest one's readout. A camera
     does not see its own UAV. The same picture comes of any number of threads.
     """
@@ -68,7 +71,17 @@ def take(
         bodies = move_bodies(scene, history, start, end)
         handle, table, counter = scene.handle, model.table, new_counter()
         reach = model.far_m / float(table.direction[:, 0].min())
-        optics = Optics(model.near_m, model.far_m, reach, model.readout_ns, model.exposure)
+        optics = Optics(
+            model.near_m,
+            model.far_m,
+            reach,
+            model.readout_ns,
+            model.exposure,
+            model.read_noise,
+            model.shot_noise,
+            model.depth_noise_per_m,
+            _normals(),
+        )
 
         def expose() -> None:
             block = thread_block(PIECE * LANES, bodies)
@@ -84,3 +97,10 @@ def take(
         frames.instance.reshape(shape) if labels else None,
         frames.material.reshape(shape) if labels else None,
     )
+
+
+@cache
+def _normals() -> NDArray[np.float32]:
+    """Quantiles of the normal distribution in the middles of equal shares."""
+    quantile = NormalDist().inv_cdf
+    return np.array([quantile((i + 0.5) / NORMALS) for i in range(NORMALS)], dtype=np.float32)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.compiled import inner_kernel, kernel
+from volery.core.rng import random_bits
 from volery.core.workers import fetch_add
 from volery.sensors.aim_kernels import LidarBatch, sensor_frame
 from volery.sensors.cameras.light import CODES, Light
@@ -19,6 +20,8 @@ from volery.world.scene_kernels import RayBlock, SceneHandle, cast_block, near_b
 
 PIECE = 2048 // LANES
 """Packets of a piece."""
+NORMALS = 4096
+"""Size of the table of normal numbers: its largest is 3.7 standard deviations."""
 _SHADOW_MARGIN_M = 5.0
 """Bodies this far beyond a camera's reach may still throw a shadow into its picture."""
 
@@ -47,6 +50,11 @@ class Optics(NamedTuple):
     """Length of the longest ray: to `far_m` in the picture's corner."""
     readout_ns: int
     exposure: float
+    read_noise: float
+    shot_noise: float
+    depth_noise_per_m: float
+    normals: NDArray[np.float32]
+    """(NORMALS,) normal numbers from which noise is drawn."""
 
 
 @inner_kernel
@@ -103,9 +111,23 @@ def _near(
 
 
 @inner_kernel
+def _bits(table: PixelTable, batch: LidarBatch, shot: int, pixel: int) -> Any:
+    """Random bits of a pixel in a picture: they follow from stream, picture and pixel alone."""
+    pixels = table.direction.shape[0] * LANES
+    return random_bits(batch.key[shot], batch.scan_number[shot] * pixels + pixel)
+
+
+@inner_kernel
+def _draw(optics: Optics, bits: Any, j: int) -> float:
+    """Normal number j (0 to 3) of a pixel whose random bits are `bits`."""
+    return float(optics.normals[(bits >> np.uint64(12 * j)) & np.uint64(NORMALS - 1)])
+
+
+@inner_kernel
 def _write_geometry(
     table: PixelTable,
     optics: Optics,
+    batch: LidarBatch,
     block: RayBlock,
     p: int,
     packet: int,
@@ -126,6 +148,9 @@ def _write_geometry(
                 depth = f4(np.nan) if blind else f4(np.inf)
             elif depth < optics.near_m:
                 depth = f4(-np.inf)
+            elif optics.depth_noise_per_m > 0.0:
+                bits = _bits(table, batch, shot, pixel)
+                depth += f4(optics.depth_noise_per_m * _draw(optics, bits, 3)) * depth * depth
             frames.depth[shot, pixel] = depth
         if wants_labels:
             frames.instance[shot, pixel] = block.instance[p, k] if seen else -1
@@ -137,6 +162,7 @@ def _write_colour(
     table: PixelTable,
     optics: Optics,
     light: Light,
+    batch: LidarBatch,
     packet: int,
     shot: int,
     colour: NDArray[np.float32],
@@ -144,17 +170,26 @@ def _write_colour(
 ) -> None:
     """Bytes of a packet's pixels, each the mean of its samples' light."""
     samples = table.samples
-    scale = f4(optics.exposure * (CODES - 1) / samples)
+    scale = f4(optics.exposure / samples)
+    is_noisy = optics.read_noise > 0.0 or optics.shot_noise > 0.0
+    dark, bright = f4(optics.read_noise**2), f4(optics.shot_noise**2)
+    bits: Any = np.uint64(0)
     for k in range(0, LANES, samples):
         pixel = table.pixel[packet, k]
         if pixel < 0:
             continue
+        if is_noisy:
+            bits = _bits(table, batch, shot, pixel)
         for j in range(3):
             total = f4(0.0)
             for n in range(samples):
                 if not table.blind[packet, k + n]:
                     total += min(max(colour[j, k + n], f4(0.0)), f4(1e4))
-            frames.colour[shot, pixel, j] = light.code[min(int(total * scale), CODES - 1)]
+            lit = total * scale
+            if is_noisy:
+                lit += f4(_draw(optics, bits, j)) * np.sqrt(dark + bright * min(lit, f4(1.0)))
+            code = int(max(lit, f4(0.0)) * f4(CODES - 1) + f4(0.5))
+            frames.colour[shot, pixel, j] = light.code[min(code, CODES - 1)]
 
 
 @kernel
@@ -194,9 +229,9 @@ def take_pictures(
             block.fraction[p] = min(max(fraction, 0.0), 1.0)
         cast_block(scene, block, own * LANES, optics.reach_m, near_count)
         for p in range(own):
-            _write_geometry(table, optics, block, p, first + p, shot, frames)
+            _write_geometry(table, optics, batch, block, p, first + p, shot, frames)
             if wants_colour:
                 note_hits(block, p, scratch)
                 find_shadows(scene, block, p, near_count, light, scratch, distance, direction)
                 shade(block, p, light, scratch, distance, direction, colour)
-                _write_colour(table, optics, light, first + p, shot, colour, frames)
+                _write_colour(table, optics, light, batch, first + p, shot, colour, frames)

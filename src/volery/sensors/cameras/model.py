@@ -43,6 +43,13 @@ class CameraModel(SensorModel):
     """Rays a pixel; 4 smooth the edges of the colour picture."""
     exposure: PositiveFloat = 1.0
     """Factor of the light."""
+    read_noise: NonNegativeFloat = 0.0
+    """Standard deviation of a dark pixel, of the light that saturates it."""
+    shot_noise: NonNegativeFloat = 0.0
+    """Standard deviation that light adds to a pixel which it just saturates; it goes with the
+    square root of the light."""
+    depth_noise_per_m: NonNegativeFloat = 0.0
+    """Standard deviation of the depth at 1 m; it grows with the square, as that of stereo does."""
 
     @model_validator(mode="after")
     def _sees_something(self) -> Self:
@@ -65,6 +72,11 @@ class CameraModel(SensorModel):
         """K (3, 3)."""
         (cx, cy), f = self.centre_px, self.focal_px
         return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
+
+    def without_noise(self) -> CameraModel:
+        """The same camera, exact."""
+        none = {"read_noise": 0.0, "shot_noise": 0.0, "depth_noise_per_m": 0.0}
+        return self.model_copy(update=none)
 
     @property
     def readout_ns(self) -> int:

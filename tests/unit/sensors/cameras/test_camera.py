@@ -130,15 +130,16 @@ def test_any_size_is_filled(picture, size, samples):
 
 
 def test_more_samples_smooth_an_edge(picture):
-    """A slanting edge has pixels between wall and sky."""
+    """Four samples are nearer to the mean of an eight times finer picture than one."""
 
-    def greys(samples):
-        model = CameraModel(width=64, height=64, samples=samples)
-        seen = picture(model, (0, 0, 20.0), (0.3, 0, 0), solids=[wall(10.0, y1=0.0)], light=NOON)
-        colours = seen.colour[0, 32].astype(int)
-        return len(np.unique(colours, axis=0))
+    def shot(size, samples):
+        model = CameraModel(width=size, height=size, samples=samples)
+        seen = picture(model, (0, 0, 20.0), (0.3, 0, 0), solids=[wall(10.0, y1=0.0)])
+        return seen.colour[0].astype(float)
 
-    assert greys(4) > greys(1)
+    fine = shot(512, 4).reshape(64, 8, 64, 8, 3).mean((1, 3))
+    off = {samples: np.abs(shot(64, samples) - fine).mean() for samples in (1, 4)}
+    assert off[4] < 0.6 * off[1]
 
 
 def test_only_what_is_wanted_is_made(picture):
@@ -199,5 +200,23 @@ def test_a_rolling_shutter_leans(two):
     assert middles[1] - middles[0] > 4.0 + abs(upright[1] - upright[0])
 
 
+def test_noise_has_the_stated_size(picture):
+    numbers = {"read_noise": 0.01, "shot_noise": 0.04, "depth_noise_per_m": 0.002}
+    exact = CameraModel(width=128, height=128, horizontal_fov_deg=5.0)
+    noisy = exact.model_copy(update=numbers)
+    place = {"position": (0.0, 0.0, 20.0), "solids": [wall(10.0)]}
+    sound, seen = picture(exact, **place), picture(noisy, **place)
+    off = seen.depth - sound.depth
+    assert off.std() == pytest.approx(0.002 * 10.0**2, rel=0.03)
+    assert abs(off.mean()) < 0.01
+    coded = np.arange(256) / 255.0
+    linear = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+    light = linear[sound.colour]
+    off = linear[seen.colour] - light
+    wanted = np.sqrt(0.01**2 + 0.04**2 * light.mean())
+    assert off.std() == pytest.approx(wanted, rel=0.05)
+    assert abs(off.mean()) < 0.1 * wanted
+
+
 def test_the_shipped_camera_loads():
-    assert load_camera() == CameraModel(name="pinhole camera")
+    assert load_camera().without_noise() == CameraModel(name="pinhole camera")

@@ -1,0 +1,34 @@
+"""Scenario data of cameras and of the light they see by."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from volery.scenario.base import Data, MountedSensor, Name, Rate
+
+Side = Annotated[int, Field(ge=1, le=8192)]
+
+
+class CameraSensor(MountedSensor):
+    """A camera of a named model; x of its frame looks along the optical axis, z is up."""
+
+    kind: Literal["camera"]
+    name: Name = "camera"
+    model: str = "pinhole"
+    rate_hz: Rate = 10.0
+    width: Side | None = None
+    """Pixels, instead of the model's; so are those that follow."""
+    height: Side | None = None
+    horizontal_fov_deg: Annotated[float, Field(gt=0.0, lt=180.0)] | None = None
+
+
+class Daylight(Data):
+    """Sun and clearness of the air."""
+
+    sun_elevation_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 50.0
+    sun_azimuth_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 135.0
+    """Clockwise from north."""
+    visibility_m: Annotated[float, Field(ge=1.0, le=1e6)] = 20_000.0
+    """Meteorological optical range: where the contrast of things has faded to a twentieth."""

@@ -1,0 +1,122 @@
+"""All cameras of one model and phase, exposed together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.fleet import Fleet
+from volery.core.clock import Schedule
+from volery.core.errors import DataFileError
+from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.cameras.camera import EVERY_PART, Part, Pictures, take
+from volery.sensors.cameras.light import Light
+from volery.sensors.cameras.model import CameraModel
+from volery.sensors.lidar import make_batch, stack_mounts
+from volery.sensors.mount import Mount
+from volery.sensors.samples import CameraFrames, SensorId, owned
+from volery.vehicle.pose_history import KEPT_NS
+from volery.world.scene import Scene
+
+_LONGEST_READOUT_NS = KEPT_NS - 10_000_000
+
+
+class CameraBank:
+    """Pictures of all cameras of the bank; `keys` (S,) are their noise streams, or None.
+
+    A picture is known when its last row has been read out. Only what somebody wants is made, as
+    `wants()` says: nobody's later picture depends on it.
+    """
+
+    name = "camera"
+
+    def __init__(
+        self,
+        model: CameraModel,
+        schedule: Schedule,
+        sensors: tuple[SensorId, ...],
+        mounts: tuple[Mount, ...],
+        keys: NDArray[np.uint64] | None,
+        scene: Scene,
+        light: Light,
+    ) -> None:
+        if model.readout_ns > _LONGEST_READOUT_NS:
+            raise DataFileError(
+                f"camera '{model.name}': readout_s = {model.readout_s} is too long; "
+                f"{_LONGEST_READOUT_NS / 1e9} at most"
+            )
+        if not scene.compiled:
+            raise DataFileError("cameras need Embree's library, which `volery doctor` looks for")
+        self.schedule = schedule
+        self.sensors = sensors
+        self.lag_ns = model.readout_ns
+        self.wants: Callable[[], Collection[Part]] = lambda: EVERY_PART
+        """What of the pictures is wanted now."""
+        self._model = model if keys is not None else model.without_noise()
+        self._has_noise = keys is not None
+        self._keys = np.zeros(len(sensors), np.uint64) if keys is None else keys.copy()
+        self._first = np.zeros(len(sensors), np.int64)
+        self._scene = scene
+        self._light = light
+        self._rows = uav_rows(sensors)
+        self._mounts = stack_mounts(mounts)
+
+    def is_wanted(self) -> bool:
+        """Whether anybody would receive a picture."""
+        return bool(self.wants())
+
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> CameraFrames:
+        """Picture number k of all cameras of the bank; `time_ns` is that of the first row."""
+        batch = make_batch(
+            self._rows,
+            np.arange(len(self._rows)),
+            time_ns,
+            self._keys,
+            k - self._first,
+            self._mounts,
+        )
+        parts = self.wants() or EVERY_PART
+        pictures = take(self._scene, self._model, self._light, batch, fleet.history, parts=parts)
+        return CameraFrames(self.sensors, time_ns, self._model, **_arrays(pictures))
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {"keys": self._keys.copy(), "first": self._first.copy()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._keys = np.array(state["keys"])
+        self._first = np.array(state["first"])
+
+    def reset(
+        self,
+        uavs: NDArray[np.int64] | None,
+        keys: NDArray[np.uint64] | None,
+        time_ns: int,  # noqa: ARG002
+        k: int,
+    ) -> None:
+        """Let the cameras of some UAVs begin anew with picture number `k`; see `Bank.reset`."""
+        rows = rows_of(self._rows, uavs)
+        self._first[rows] = k
+        if keys is not None and self._has_noise:
+            self._keys[rows] = keys
+
+
+def _arrays(pictures: Pictures) -> dict[str, Any]:
+    """Arrays of all parts, without pixels where a part was not wanted."""
+    count = next(len(part) for part in pictures if part is not None)
+    return {
+        name: owned(np.zeros((count, 0, 0), _KINDS[name]) if part is None else part)
+        for name, part in pictures._asdict().items()
+    }
+
+
+_KINDS: dict[str, type] = {
+    "colour": np.uint8,
+    "depth": np.float32,
+    "instance": np.int32,
+    "material": np.uint8,
+}
