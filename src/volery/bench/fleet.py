@@ -64,7 +64,9 @@ def largest(factor_of: Callable[[int], float], *, first: int, step: int) -> tupl
 
 def real_time_factor(uavs: int, *, rings: bool = False) -> float:
     """Median real-time factor of a fleet of `uavs`, with two planar LIDARs or one of 64 rings."""
-    scenario = parse_scenario(_scenario(uavs, _RINGS if rings else _PLANAR), where="bench fleet")
+    scenario = parse_scenario(
+        fleet_scenario(uavs, _RINGS if rings else _PLANAR), where="bench fleet"
+    )
     with Simulation(scenario) as simulation:
         received = 0
 
@@ -90,7 +92,8 @@ def real_time_factor(uavs: int, *, rings: bool = False) -> float:
         return statistics.median(factors)
 
 
-def _scenario(uavs: int, lidars: list[dict[str, Any]]) -> dict[str, object]:
+def fleet_scenario(uavs: int, sensors: list[dict[str, Any]]) -> dict[str, object]:
+    """UAVs with `sensors`, besides an IMU, above free places of the forest."""
     rows = min(_ROWS, uavs)
     groups = [
         {
@@ -117,7 +120,7 @@ def _scenario(uavs: int, lidars: list[dict[str, Any]]) -> dict[str, object]:
         },
         "types": {
             "surveyor": {
-                "sensors": [*lidars, {"kind": "imu"}],
+                "sensors": [*sensors, {"kind": "imu"}],
                 "flight": {"take_off_altitude_m": 3.0, "command_timeout_s": 60.0},
             }
         },

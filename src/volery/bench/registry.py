@@ -136,6 +136,17 @@ BENCHES: dict[str, Bench] = {
             {"realtime_uavs": Bound(60.0)},
         ),
         Bench(
+            "camera",
+            "Cameras: 640 x 480 pictures in the forest of the bench `lidar`, with shadows; the "
+            "largest fleet at real-time factor 1 with 320 x 240 colour and depth at 10 Hz",
+            {
+                "rgbd_ms_1_thread": Bound(120.0, at_most=True),
+                "rgbd_ms_2_threads": Bound(65.0, at_most=True),
+                "depth_ms_2_threads": Bound(35.0, at_most=True),
+                "realtime_camera_uavs": Bound(4.0),
+            },
+        ),
+        Bench(
             "dynamics",
             "Dynamics: plant and control, fused substeps; a swarm with contacts and downwash, "
             "500 Hz position control; 1,024 copies under velocity control on two threads",
