@@ -83,6 +83,15 @@ class Publisher:
         if not self._cancelled:
             self._graph.enqueue(self, self._topic, message)
 
+    def publish_posted(self, message: Any) -> None:
+        """Queue a message that was published before `cancel`, even if it gets here after that."""
+        self._graph.enqueue(self, self._topic, message)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether its last message awaits those who subscribe later."""
+        return self.latched and not self._cancelled
+
     def cancel(self) -> None:
         """Publish no more; what it latched is forgotten."""
         if not self._cancelled:
@@ -259,7 +268,7 @@ class Graph:
                     only(published)
                 continue
             with self._members:  # who attaches meanwhile gets it once
-                if sender.latched:
+                if sender.keeps:
                     topic.kept[sender] = published
                 callbacks = (*self._to_all, *topic.callbacks)
             for callback in callbacks:

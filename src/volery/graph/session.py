@@ -187,7 +187,7 @@ class Session:
         publisher = self._publishers.get(topic)
         if publisher is None:
             raise GraphError(f"{self.name} has not advertised '{topic}'")
-        self._gateway.post(lambda: publisher.publish(message))
+        self._gateway.post(lambda: publisher.publish_posted(message))
 
     def subscribe(
         self,
