@@ -148,7 +148,7 @@ class Node:
     def create_client(self, srv_type: str, service: str) -> Client:
         """Client of a service of type `srv_type`, e.g. `std_srvs/srv/Trigger`."""
         message_type(f"{srv_type}_Request")
-        return Client(self._context.graph, self.resolve(service), self._thinker)
+        return Client(self._context.graph, self.resolve(service), srv_type, self._thinker)
 
     def declare_parameter(self, name: str, default: Any) -> Parameter:
         """Declare a parameter; an override given at start wins over the default."""
