@@ -95,11 +95,14 @@ class RosApi:
 
     def start(self) -> None:
         """Offer the services; those that somebody offers already stay his."""
+        table = self._table().items()
+        missing = [(k, v) for k, v in table if not self._graph.has_service(PREFIX + k)]
+        if not missing:
+            return
         session = self._session = self._gateway.open("rosapi")
-        for name, (base, answer) in self._table().items():
-            if not self._graph.has_service(PREFIX + name):
-                srvtype = f"rosapi_msgs/srv/{base}"
-                session.offer(PREFIX + name, srvtype, self._handler(srvtype, answer))
+        for name, (base, answer) in missing:
+            srvtype = f"rosapi_msgs/srv/{base}"
+            session.offer(PREFIX + name, srvtype, self._handler(srvtype, answer))
 
     def stop(self) -> None:
         """Take them back."""
