@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -10,6 +11,7 @@ import threading
 from pathlib import Path
 
 import pytest
+from websockets.sync.client import connect
 
 pytest.importorskip("roslibpy")
 ROOT = Path(__file__).parents[2]
@@ -113,6 +115,19 @@ def test_services_are_listed_and_called(run, via):
     answer = volery(run, "service", "call", "/get_entities", via=via)
     assert "entities: [uav1]" in answer
     assert "success: false" in volery(run, "service", "call", "/uav1/take_off", via=via)
+
+
+def test_a_door_can_be_opened_on_several_ports():
+    run = Run("rosbridge", "rosbridge", seconds=60)
+    try:
+        first, second = run.ports
+        assert first != second
+        for address in (f"127.0.0.1:{first}", f"127.0.0.1:{second}/rosbridge"):
+            with connect(f"ws://{address}") as client:
+                client.send('{"op": "call_service", "service": "/get_entities"}')
+                assert json.loads(client.recv(20))["values"]["entities"] == ["uav1"]
+    finally:
+        run.close()
 
 
 def test_the_services_are_told_without_rosbridge_too():
