@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 from volery.core.errors import GraphError
 from volery.graph.actions import Actions
 from volery.graph.messages import Published, message_type, type_name
+from volery.graph.parameters import Parameters
 from volery.graph.reply import Reply
 
 Callback = Callable[[Published], None]
@@ -148,6 +149,8 @@ class Graph:
         self._services: dict[str, _Service] = {}
         self.actions = Actions()
         """Goals that take their time."""
+        self.parameters = Parameters()
+        """What the nodes have declared."""
         self._to_all: list[Callback] = []
         self._queue: deque[_Letter] = deque()
         self._members = threading.RLock()

@@ -34,20 +34,24 @@ class Snapshot:
 
 
 def keep_nodes(nodes: Sequence[Node]) -> list[Any]:
-    """States of all nodes; None of one that does not offer it."""
+    """States of all nodes, None of one that does not offer it, and values of their parameters."""
     for node in nodes:
         node.join()
     return [
-        copy.deepcopy(node.get_state()) if isinstance(node, KeepsState) else None for node in nodes
+        copy.deepcopy(
+            (node.get_state() if isinstance(node, KeepsState) else None, node.parameter_values())
+        )
+        for node in nodes
     ]
 
 
 def put_back_nodes(nodes: Sequence[Node], states: Sequence[Any]) -> None:
     """Give all nodes back what `keep_nodes` kept."""
-    for node, state in zip(nodes, states, strict=True):
+    for node, (state, values) in zip(nodes, copy.deepcopy(list(states)), strict=True):
         node.join()
+        node.put_back_parameters(values)
         if isinstance(node, KeepsState):
-            node.set_state(copy.deepcopy(state))
+            node.set_state(state)
 
 
 def check_nodes(nodes: Sequence[Node], what: str) -> None:
