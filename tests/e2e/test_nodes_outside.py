@@ -12,6 +12,8 @@ from volery import Simulation
 from volery.autonomy.gap_following import GapFollowing
 from volery.bridges.doors import Doors
 from volery.bridges.nodes.host import NodeHost
+from volery.bridges.ros_tcp.client import RosTcpClient
+from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import GraphError
@@ -94,6 +96,17 @@ def over_rosbridge(simulation):
         yield lambda: RosbridgeClient(f"ws://127.0.0.1:{server.port}", name="gap_following")
 
 
+def over_ros_tcp(generation):
+    @contextmanager
+    def way(simulation):
+        endpoint = RosTcpEndpoint(port=0, generation=generation)
+        with Doors(simulation.gateway) as doors:
+            doors.open(endpoint)
+            yield lambda: RosTcpClient(port=endpoint.port, name="gap_following")
+
+    return way
+
+
 def fly_outside(way):
     with Simulation(scenario(with_node=False)) as simulation, way(simulation) as open_link:
         commands = listen(simulation)
@@ -126,7 +139,15 @@ def fly_outside(way):
         return commands, simulation.uavs["uav1"].position_map
 
 
-@pytest.mark.parametrize("way", [in_memory, over_rosbridge])
+WAYS = {
+    "in memory": in_memory,
+    "rosbridge": over_rosbridge,
+    "ROS-TCP, ROS 1": over_ros_tcp("ros1"),
+    "ROS-TCP, ROS 2": over_ros_tcp("ros2"),
+}
+
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 def test_a_lock_step_partner_outside_flies_what_the_node_inside_flies(way):
     inside, place = fly_inside()
     outside, other_place = fly_outside(way)

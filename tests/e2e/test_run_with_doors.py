@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import socket
@@ -13,6 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from websockets.sync.client import connect
 
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.cli.run import RunOptions, _Change
@@ -61,8 +63,16 @@ def run():
     run.close()
 
 
-def volery(run, *words, timeout_s=40.0, ok=True):
-    environment = {**os.environ, "VOLERY_VIA": f"rosbridge://127.0.0.1:{run.ports[0]}"}
+def via_rosbridge(run):
+    return f"rosbridge://127.0.0.1:{run.ports[0]}"
+
+
+def via_ros_tcp(run):
+    return f"ros-tcp://127.0.0.1:{run.ports[1]}"
+
+
+def volery(run, *words, via=via_rosbridge, timeout_s=40.0, ok=True):
+    environment = {**os.environ, "VOLERY_VIA": via(run)}
     done = subprocess.run(
         [*VOLERY, *words],
         check=False,
@@ -76,17 +86,19 @@ def volery(run, *words, timeout_s=40.0, ok=True):
     return done.stdout if ok else done.stderr
 
 
-def test_topics_are_listed_with_their_types(run):
-    lines = volery(run, "topic", "list", "--types").splitlines()
+@pytest.mark.parametrize("via", [via_rosbridge, via_ros_tcp])
+def test_topics_are_listed_with_their_types(run, via):
+    lines = volery(run, "topic", "list", "--types", via=via).splitlines()
     assert "/uav1/odom [nav_msgs/msg/Odometry]" in lines
     assert "/clock [rosgraph_msgs/msg/Clock]" in lines
-    assert volery(run, "topic", "type", "/uav1/imu").strip() == "sensor_msgs/msg/Imu"
+    assert volery(run, "topic", "type", "/uav1/imu", via=via).strip() == "sensor_msgs/msg/Imu"
 
 
-def test_a_message_is_printed_as_yaml(run):
+@pytest.mark.parametrize("via", [via_rosbridge, via_ros_tcp])
+def test_a_message_is_printed_as_yaml(run, via):
     from ruamel.yaml import YAML
 
-    text = volery(run, "topic", "echo", "/uav1/odom", "--once")
+    text = volery(run, "topic", "echo", "/uav1/odom", "--once", via=via)
     message = YAML(typ="safe", pure=True).load(text.removesuffix("---\n"))
     assert message["child_frame_id"] == "uav1/base_link"
     assert isinstance(message["pose"]["pose"]["position"]["z"], float)
@@ -106,11 +118,38 @@ def x_of_uav1(run):
     return float(re.search(r"position:\s+x: (\S+)", text)[1])
 
 
-def test_services_are_listed_and_called(run):
-    assert "/uav1/take_off [std_srvs/srv/Trigger]" in volery(run, "service", "list", "-t")
-    answer = volery(run, "service", "call", "/get_entities")
+@pytest.mark.parametrize("via", [via_rosbridge, via_ros_tcp])
+def test_services_are_listed_and_called(run, via):
+    assert "/uav1/take_off [std_srvs/srv/Trigger]" in volery(run, "service", "list", "-t", via=via)
+    answer = volery(run, "service", "call", "/get_entities", via=via)
     assert "entities: [uav1]" in answer
-    assert "success: false" in volery(run, "service", "call", "/uav1/take_off")
+    assert "success: false" in volery(run, "service", "call", "/uav1/take_off", via=via)
+
+
+def test_a_door_can_be_opened_on_several_ports():
+    run = Run("rosbridge", "rosbridge", seconds=60)
+    try:
+        first, second = run.ports
+        assert first != second
+        for address in (f"127.0.0.1:{first}", f"127.0.0.1:{second}/rosbridge"):
+            with connect(f"ws://{address}") as client:
+                client.send('{"op": "call_service", "service": "/get_entities"}')
+                assert json.loads(client.recv(20))["values"]["entities"] == ["uav1"]
+    finally:
+        run.close()
+
+
+def test_the_services_are_told_without_rosbridge_too():
+    run = Run("ros-tcp", seconds=60)
+    try:
+        environment = {**os.environ, "VOLERY_VIA": f"ros-tcp://127.0.0.1:{run.ports[0]}"}
+        words = [*VOLERY, "service", "type", "/uav1/take_off"]
+        done = subprocess.run(
+            words, check=True, capture_output=True, text=True, timeout=60, env=environment
+        )
+    finally:
+        run.close()
+    assert done.stdout.strip() == "std_srvs/srv/Trigger"
 
 
 @pytest.mark.parametrize(
@@ -126,13 +165,17 @@ def test_services_are_listed_and_called(run):
         (("node", "no_such_module:Node"), "cannot be imported"),
         (("topic", "list", "--via", "pigeon://post"), "no way into a graph"),
         (("topic", "list", "--via", "rosbridge://127.0.0.1:1"), "nobody speaks rosbridge"),
+        (("topic", "list", "--via", "ros-tcp://127.0.0.1:1"), "nobody speaks ROS-TCP"),
+        (("topic", "list", "--via", "ros-tcp://127.0.0.1:x"), "no way into a graph"),
     ],
 )
 def test_slips_are_told_in_a_line(run, words, reason):
     assert reason in volery(run, *words, ok=False)
 
 
-def test_a_node_runs_beside(run, tmp_path):
+@pytest.mark.parametrize("way", [via_rosbridge, via_ros_tcp])
+def test_a_node_runs_beside(run, tmp_path, way):
+    name = way.__name__
     (tmp_path / "echoing.py").write_text(
         "from volery.graph.messages import String\n"
         "from volery.graph.node import Node\n"
@@ -144,8 +187,8 @@ def test_a_node_runs_beside(run, tmp_path):
         "        self.create_timer(0.1, lambda: out.publish(String(word)))\n"
     )
     profile = tmp_path / "profile.toml"
-    profile.write_text('namespace = "/uav1"\n[remap]\nout = "/renamed"\n')
-    via = f"rosbridge://127.0.0.1:{run.ports[0]}"
+    profile.write_text(f'namespace = "/uav1"\n[remap]\nout = "/{name}"\n')
+    via = way(run)
     node = subprocess.Popen(
         [*VOLERY, "node", "echoing:Echo", "--via", via, "--profile", profile, "-p", "word=hello"],
         stderr=subprocess.PIPE,
@@ -154,9 +197,9 @@ def test_a_node_runs_beside(run, tmp_path):
     try:
         assert "echo runs on" in node.stderr.readline()
         for _ in range(50):
-            if "/renamed" in volery(run, "topic", "list"):
+            if f"/{name}" in volery(run, "topic", "list"):
                 break
-        assert "data: hello" in volery(run, "topic", "echo", "/renamed", "--once")
+        assert "data: hello" in volery(run, "topic", "echo", f"/{name}", "--once")
     finally:
         node.terminate()
         node.wait(20)

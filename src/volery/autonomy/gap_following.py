@@ -74,14 +74,16 @@ class GapFollowing(Node):
     deceleration_m_s2: braking that the speed limit counts on.
     nodding_mount: [x, y, z] of the nodding LIDAR in the body, m; `level_mount` likewise.
 
+    `height_m` and `speed_m_s` may be set in flight.
+
     """
 
     def __init__(self, **options: Any) -> None:
         super().__init__("gap_following", **options)
         route = self.declare_parameter("route", [[50.0, 0.0]]).value
         self._route = [np.array(point, dtype=np.float64) for point in route]
-        self._height = float(self.declare_parameter("height_m", 3.0).value)
-        self._speed = float(self.declare_parameter("speed_m_s", 3.0).value)
+        self._height_m = self.declare_parameter("height_m", 3.0, read_only=False)
+        self._speed_m_s = self.declare_parameter("speed_m_s", 3.0, read_only=False)
         self._safe_radius = float(self.declare_parameter("safe_radius_m", 1.1).value)
         self._deceleration = float(self.declare_parameter("deceleration_m_s2", 2.0).value)
         self._level = ScanProjector(self.declare_parameter("level_mount", [0.0, 0.0, 0.0]).value)
@@ -122,6 +124,10 @@ class GapFollowing(Node):
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
         put_back(self, state)
+
+    @property
+    def _height(self) -> float:
+        return float(self._height_m.value)
 
     # ------------------------------------------------------------------------------ what it sees
 
@@ -236,7 +242,7 @@ class GapFollowing(Node):
 
     def _speed_limit(self, free_m: float, goal_m: float, obstacles: Array) -> float:
         stop_within = max(min(free_m - 0.3, goal_m), 0.05)
-        speed = min(self._speed, math.sqrt(2.0 * self._deceleration * stop_within))
+        speed = min(float(self._speed_m_s.value), math.sqrt(2.0 * self._deceleration * stop_within))
         if len(obstacles):
             nearest = float(np.hypot(obstacles[:, 0], obstacles[:, 1]).min())
             speed = min(speed, max(0.4, 2.0 * (nearest - 0.4)))

@@ -45,7 +45,10 @@ def render(results: Sequence[Result]) -> str:
 def _table(bench: Bench, result: Result) -> str:
     if bench.name == "peers":
         return peers_table(result.figures, result.versions)
-    rows = "".join(_row(bench, name, value) for name, value in result.figures.items())
+    told = {
+        k: v for k, v in result.figures.items() if not (bench.apart and k.startswith(bench.apart))
+    }
+    rows = "".join(_row(bench, name, value) for name, value in told.items())
     return f"| figure | measured | bound |\n|---|---:|---:|\n{rows}"
 
 

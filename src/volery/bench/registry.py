@@ -93,13 +93,15 @@ class Result:
 class Bench:
     """A module to measure with and the bounds of its figures.
 
-    in_all: whether `volery bench all` runs it.
+    in_all: whether `volery bench all` runs it. apart: prefix of figures that a page of their own
+    tells.
     """
 
     name: str
     title: str
     bounds: Mapping[str, Bound] = field(default_factory=dict)
     in_all: bool = True
+    apart: str = ""
 
     def run(self) -> Result:
         """Measure now."""
@@ -174,7 +176,8 @@ BENCHES: dict[str, Bench] = {
         Bench(
             "bridge",
             "Bridges: messages through the doors, clients in processes of their own; the lines are "
-            "L = alpha S + beta through the medians of 100 messages a size, 0 to 2.5 MB",
+            "L = alpha S + beta through the medians of 100 messages a size, 0 to 2.5 MB; sizes and "
+            "end points beside the published ones in [bridge_latency.md](bridge_latency.md)",
             {
                 "ros_tcp_alpha_s_per_mb": Bound(0.0015, at_most=True),
                 "ros_tcp_beta_s": Bound(0.0004, at_most=True),
@@ -187,6 +190,7 @@ BENCHES: dict[str, Bench] = {
                 "stream_lost": Bound(0.0, at_most=True),
                 "stream_real_time_factor": Bound(0.99),
             },
+            apart="latency_",
         ),
         Bench(
             "peers",

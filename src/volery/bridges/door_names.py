@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from volery.bridges.doors import Door
 from volery.core.errors import BridgeError
@@ -67,15 +67,18 @@ def _rosbridge(address: Address, terms: Terms) -> Door:
 
 
 def _ros_tcp(address: Address, terms: Terms) -> Door:
-    from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
-
-    return RosTcpEndpoint(*address, anywhere=terms.anywhere)
+    return _ros_tcp_endpoint(address, terms, "ros1")
 
 
 def _ros_tcp_2(address: Address, terms: Terms) -> Door:
-    from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
+    return _ros_tcp_endpoint(address, terms, "ros2")
 
-    return RosTcpEndpoint(*address, generation="ros2", anywhere=terms.anywhere)
+
+def _ros_tcp_endpoint(address: Address, terms: Terms, generation: Literal["ros1", "ros2"]) -> Door:
+    from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
+    from volery.bridges.rosbridge.beside import WithRosApi
+
+    return WithRosApi(RosTcpEndpoint(*address, generation=generation, anywhere=terms.anywhere))
 
 
 def _ros_tcp_connector(address: Address, _terms: Terms) -> Door:

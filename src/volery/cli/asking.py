@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from volery.core.errors import BridgeError
-from volery.graph.link import Link, call_and_wait
+from volery.graph.link import Link, TellsTopics, call_and_wait
 from volery.graph.messages import message_type
 
 TIMEOUT_S = 10.0
@@ -19,13 +19,18 @@ def ask_rosapi(link: Link, question: str, **fields: Any) -> Any:
 
 def topic_types(link: Link) -> dict[str, str]:
     """Topics of the graph and their types, by name."""
+    if isinstance(link, TellsTopics):
+        return dict(sorted(link.topic_types().items()))
     answer = ask_rosapi(link, "Topics")
     return dict(sorted(zip(answer.topics, answer.types, strict=True)))
 
 
 def type_of_topic(link: Link, topic: str) -> str:
     """Type of a topic. `BridgeError` where there is no such topic."""
-    found: str = ask_rosapi(link, "TopicType", topic=topic).type
+    if isinstance(link, TellsTopics):
+        found = link.topic_types().get(topic, "")
+    else:
+        found = ask_rosapi(link, "TopicType", topic=topic).type
     if not found:
         raise BridgeError(f"there is no topic '{topic}'; see `volery topic list`")
     return found

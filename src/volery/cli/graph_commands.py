@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from volery.cli.guard import guarded
-from volery.cli.links import DEFAULT_VIA
+from volery.cli.links import DEFAULT_VIA, WAYS
 
 _CONTEXT = {"help_option_names": ["-h", "--help"]}
 topic_app = typer.Typer(
@@ -20,7 +20,7 @@ service_app = typer.Typer(
 
 Via = Annotated[
     str,
-    typer.Option(envvar="VOLERY_VIA", help="Way into the graph: rosbridge://HOST:PORT or ros1."),
+    typer.Option(envvar="VOLERY_VIA", help=f"Way into the graph: {WAYS}."),
 ]
 Topic = Annotated[str, typer.Argument(help="Name of a topic.")]
 Service = Annotated[str, typer.Argument(help="Name of a service.")]
@@ -33,7 +33,7 @@ def node(
     via: Annotated[
         str | None,
         typer.Option(
-            envvar="VOLERY_VIA", help="Way into the graph: rosbridge://HOST:PORT (default) or ros1."
+            envvar="VOLERY_VIA", help=f"Way into the graph: {WAYS}; {DEFAULT_VIA} by default."
         ),
     ] = None,
     namespace: Annotated[str | None, typer.Option(help="Such as /uav1.")] = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 from volery.core.errors import BridgeError
 
@@ -11,7 +12,8 @@ if TYPE_CHECKING:
 
 
 DEFAULT_VIA = "rosbridge://127.0.0.1:9090"
-_WAYS = "rosbridge://HOST:PORT or ros1"
+WAYS = "rosbridge://HOST:PORT, ros-tcp://HOST:PORT or ros1"
+_ROS_TCP_PORT = 10000
 
 
 def open_link(via: str, name: str) -> Link:
@@ -22,11 +24,34 @@ def open_link(via: str, name: str) -> Link:
 
         url = via if scheme != "rosbridge" else f"ws://{rest}"
         return RosbridgeClient(url, name=name)
+    if scheme in ("ros-tcp", "ros-tcp-2"):
+        from volery.bridges.ros_tcp.client import RosTcpClient
+
+        host, port = _address(via, _ROS_TCP_PORT)
+        return RosTcpClient(
+            host, port, name=name, generation="ros2" if scheme == "ros-tcp-2" else "ros1"
+        )
     if scheme == "ros1":
         from volery.bridges.ros1.client import Ros1Client
 
         return Ros1Client(f"http://{rest}" if rest else None, _ros1_name(name))
-    raise BridgeError(f"'{via}' is no way into a graph; use {_WAYS}")
+    raise _no_way(via)
+
+
+def _address(via: str, port: int) -> tuple[str, int]:
+    """Host and port of a way into a graph. `BridgeError` for what is none."""
+    try:
+        parts = urlsplit(via)
+        host, given = parts.hostname, parts.port
+    except ValueError:
+        raise _no_way(via) from None
+    if host is None or given == 0 or parts.path.strip("/"):
+        raise _no_way(via)
+    return host, given or port
+
+
+def _no_way(via: str) -> BridgeError:
+    return BridgeError(f"'{via}' is no way into a graph; use {WAYS}")
 
 
 def _ros1_name(name: str) -> str:

@@ -10,6 +10,7 @@ from volery.core.errors import GraphError
 from volery.graph.graph import Graph
 from volery.graph.reply import Reply
 from volery.graph.thinking import Thinker
+from volery.graph.zero import zero_message
 
 
 class Answer:
@@ -61,11 +62,12 @@ class Answer:
 
 
 class Client:
-    """Calls one service."""
+    """Calls one service; without a request with one of zeros and empty texts."""
 
-    def __init__(self, graph: Graph, service: str, thinker: Thinker | None) -> None:
+    def __init__(self, graph: Graph, service: str, srvtype: str, thinker: Thinker | None) -> None:
         self._graph = graph
         self._thinker = thinker
+        self._request_type = f"{srvtype}_Request"
         self.service = service
 
     def service_is_ready(self) -> bool:
@@ -78,7 +80,7 @@ class Client:
             raise GraphError(
                 f"a node with a latency cannot wait for service '{self.service}': use call_async"
             )
-        return self._graph.call(self.service, request)
+        return self._graph.call(self.service, self._filled(request))
 
     def call_async(self, request: Any | None = None) -> Answer:
         """Call; the answer comes at once, or later from a service outside.
@@ -86,6 +88,7 @@ class Client:
         For a node with a latency it is input of a callback of its own.
         """
         answer = Answer()
+        question = self._filled(request)
 
         def settle(how: Callable[[], None]) -> None:
             if self._thinker is None:
@@ -106,8 +109,11 @@ class Client:
                 lambda response: come_back(lambda: answer.answer(response)),
                 lambda error: come_back(lambda: answer.fail(error)),
             )
-            self._graph.call_async(self.service, request, reply)
+            self._graph.call_async(self.service, question, reply)
 
         if self._thinker is None or not self._thinker.hold_back(ask):
             ask()
         return answer
+
+    def _filled(self, request: Any | None) -> Any:
+        return zero_message(self._request_type) if request is None else request

@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 from volery.core.errors import GraphError
 from volery.graph.actions import Actions
 from volery.graph.messages import Published, message_type, type_name
+from volery.graph.parameters import Parameters
 from volery.graph.reply import Reply
 
 Callback = Callable[[Published], None]
@@ -83,6 +84,15 @@ class Publisher:
         if not self._cancelled:
             self._graph.enqueue(self, self._topic, message)
 
+    def publish_posted(self, message: Any) -> None:
+        """Queue a message that was published before `cancel`, even if it gets here after that."""
+        self._graph.enqueue(self, self._topic, message)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether its last message awaits those who subscribe later."""
+        return self.latched and not self._cancelled
+
     def cancel(self) -> None:
         """Publish no more; what it latched is forgotten."""
         if not self._cancelled:
@@ -139,6 +149,8 @@ class Graph:
         self._services: dict[str, _Service] = {}
         self.actions = Actions()
         """Goals that take their time."""
+        self.parameters = Parameters()
+        """What the nodes have declared."""
         self._to_all: list[Callback] = []
         self._queue: deque[_Letter] = deque()
         self._members = threading.RLock()
@@ -259,7 +271,7 @@ class Graph:
                     only(published)
                 continue
             with self._members:  # who attaches meanwhile gets it once
-                if sender.latched:
+                if sender.keeps:
                     topic.kept[sender] = published
                 callbacks = (*self._to_all, *topic.callbacks)
             for callback in callbacks:

@@ -20,6 +20,7 @@ from volery.graph.messages import (
     PointCloud2,
     PointField,
     header,
+    single,
 )
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.point_cloud import POINT, PointMaker
@@ -107,13 +108,13 @@ def _scan_message(scans: LidarScans, pattern: PlanarScan, row: int) -> LaserScan
     intensities = scans.intensities[row]
     return LaserScan(
         header(scans.stamp_ns, laser_frame(scans.sensors[row])),
-        pattern.angle_min_rad,
-        pattern.angle_max_rad,
-        pattern.angle_increment_rad,
-        pattern.time_increment_s,
-        1.0 / pattern.rate_hz,
-        scans.model.range.min_m,
-        scans.model.range.max_m,
+        single(pattern.angle_min_rad),
+        single(pattern.angle_max_rad),
+        single(pattern.angle_increment_rad),
+        single(pattern.time_increment_s),
+        single(1.0 / pattern.rate_hz),
+        single(scans.model.range.min_m),
+        single(scans.model.range.max_m),
         scans.echoes[row, 0],
         intensities[0] if len(intensities) else _NO_INTENSITIES,
     )
@@ -128,13 +129,13 @@ def _echo_message(scans: LidarScans, pattern: PlanarScan, row: int) -> MultiEcho
         array.flags.writeable = False
     return MultiEchoLaserScan(
         header(scans.stamp_ns, laser_frame(scans.sensors[row])),
-        pattern.angle_min_rad,
-        pattern.angle_max_rad,
-        pattern.angle_increment_rad,
-        pattern.time_increment_s,
-        1.0 / pattern.rate_hz,
-        scans.model.range.min_m,
-        scans.model.range.max_m,
+        single(pattern.angle_min_rad),
+        single(pattern.angle_max_rad),
+        single(pattern.angle_increment_rad),
+        single(pattern.time_increment_s),
+        single(1.0 / pattern.rate_hz),
+        single(scans.model.range.min_m),
+        single(scans.model.range.max_m),
         [LaserEcho(beam[:n]) for beam, n in zip(ranges, count, strict=True)],
         [LaserEcho(beam[:n]) for beam, n in zip(intensities, count, strict=True)]
         if intensities.size

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from volery.core.errors import GraphError
 from volery.graph.reply import Reply
@@ -43,6 +43,14 @@ class Link(Protocol):
 
     def close(self) -> None:
         """Take back everything."""
+
+
+@runtime_checkable
+class TellsTopics(Protocol):
+    """A link whose own protocol tells what topics there are."""
+
+    def topic_types(self) -> dict[str, str]:
+        """Topics of the graph and their types, by name. `GraphError` where no answer comes."""
 
 
 def call_and_wait(link: Link, service: str, request: Any | None, timeout_s: float) -> Any:

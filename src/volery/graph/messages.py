@@ -11,10 +11,11 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.stores import ros2_jazzy as _ros2
 
-from volery.core.clock import stamp_from_ns
+from volery.core.clock import NS_PER_S, stamp_from_ns
 from volery.graph.definition_store import DefinitionStore
 
 Time = _ros2.builtin_interfaces__msg__Time
@@ -112,6 +113,17 @@ def time_from_ns(time_ns: int) -> Time:
 def header(time_ns: int, frame_id: str) -> Header:
     """Header stamped with simulated time."""
     return Header(time_from_ns(time_ns), frame_id)
+
+
+def single(value: float) -> float:
+    """The value that a float32 field of a message holds: nodes inside get what goes out."""
+    return float(np.float32(value))
+
+
+def stamp_of(message: Any) -> int:
+    """Stamp in a message's header, ns; 0 where it has none."""
+    stamp = getattr(getattr(message, "header", None), "stamp", None)
+    return 0 if stamp is None else int(stamp.sec * NS_PER_S + stamp.nanosec)
 
 
 @dataclass(frozen=True)

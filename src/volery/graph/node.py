@@ -23,6 +23,7 @@ from volery.core.errors import GraphError, NodeError, VoleryError
 from volery.graph.client import Client
 from volery.graph.graph import Graph, Publisher, Subscription, check_period
 from volery.graph.messages import Published, message_type
+from volery.graph.parameters import Parameter, same_kind
 from volery.graph.thinking import Deferring, DelayedPublisher, Thinker
 
 
@@ -66,14 +67,6 @@ class Clock:
         return self._now_ns()
 
 
-class Parameter:
-    """A declared parameter and its value."""
-
-    def __init__(self, name: str, value: Any) -> None:
-        self.name = name
-        self.value = value
-
-
 class Node:
     """Base of all nodes. Subclasses accept `**options` and pass them on."""
 
@@ -108,6 +101,11 @@ class Node:
     def get_namespace(self) -> str:
         """Namespace, such as `/uav1`."""
         return self._namespace or "/"
+
+    @property
+    def full_name(self) -> str:
+        """Name with namespace, such as `/uav1/gap_following`."""
+        return f"{self._namespace}/{self._name}"
 
     def get_clock(self) -> Clock:
         """The clock that stamps are compared with."""
@@ -166,16 +164,22 @@ class Node:
     def create_client(self, srv_type: str, service: str) -> Client:
         """Client of a service of type `srv_type`, e.g. `std_srvs/srv/Trigger`."""
         message_type(f"{srv_type}_Request")
-        return Client(self._context.graph, self.resolve(service), self._thinker)
+        return Client(self._context.graph, self.resolve(service), srv_type, self._thinker)
 
-    def declare_parameter(self, name: str, default: Any) -> Parameter:
-        """Declare a parameter; an override given at start wins over the default."""
+    def declare_parameter(self, name: str, default: Any, *, read_only: bool = True) -> Parameter:
+        """Declare a parameter; an override given at start wins over the default.
+
+        Unless it is `read_only` it may be set while the node runs, which then reads
+        `Parameter.value` each time anew.
+        """
         value = self._overrides.pop(name, default)
-        if default is not None and not _same_kind(value, default):
+        if not same_kind(value, default):
             raise GraphError(
                 f"node {self._name}: parameter '{name}' must be like {default!r}, not {value!r}"
             )
-        parameter = self._parameters[name] = Parameter(name, value)
+        parameter = Parameter(name, value, like=default, read_only=read_only, before_set=self.join)
+        self._context.graph.parameters.declare(self.full_name, parameter)
+        self._parameters[name] = parameter
         return parameter
 
     def get_parameter(self, name: str) -> Parameter:
@@ -187,6 +191,7 @@ class Node:
 
     def destroy_node(self) -> None:
         """Give back what the node holds; nothing of it runs afterwards."""
+        self._context.graph.parameters.forget(self.full_name)
         if self._thinker is not None:
             self._thinker.close()
         self._destroyed = True
@@ -240,18 +245,19 @@ class Node:
         """Names of all declared parameters."""
         return sorted(self._parameters)
 
+    def parameter_values(self) -> dict[str, Any]:
+        """Values of the parameters that may be set while the node runs, by name."""
+        return {k: p.value for k, p in self._parameters.items() if not p.read_only}
+
+    def put_back_parameters(self, values: Mapping[str, Any]) -> None:
+        """Set what `parameter_values` gave."""
+        for name, value in values.items():
+            self._parameters[name].value = value
+
 
 def _check_depth(qos: int) -> None:
     if qos < 1:
         raise GraphError(f"queue depth must be at least 1, not {qos}")
-
-
-def _same_kind(value: Any, default: Any) -> bool:
-    if isinstance(default, bool) or isinstance(value, bool):
-        return isinstance(default, bool) and isinstance(value, bool)
-    if isinstance(default, float):
-        return isinstance(value, int | float)
-    return isinstance(value, type(default))
 
 
 def _blank(response_type: type[Any]) -> Any:

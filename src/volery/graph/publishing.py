@@ -44,6 +44,7 @@ from volery.graph.messages import (
     TwistWithCovariance,
     Vector3,
     header,
+    single,
     time_from_ns,
 )
 from volery.graph.navigation_messages import NAVIGATION_CHANNELS
@@ -224,10 +225,10 @@ class GraphPublisher:
                 Range(
                     header(readings.stamp_ns, f"{sensor.uav_name}/{sensor.name}"),
                     Range.ULTRASOUND,
-                    readings.field_of_view_rad,
-                    readings.range_min_m,
-                    readings.range_max_m,
-                    float(readings.ranges[i]),
+                    single(readings.field_of_view_rad),
+                    single(readings.range_min_m),
+                    single(readings.range_max_m),
+                    single(readings.ranges[i]),
                     0.0,
                 )
             )
@@ -324,13 +325,13 @@ def _battery_state(readings: BatteryReadings, i: int) -> BatteryState:
     dead = readings.level[i] == BatteryLevel.EMPTY
     return BatteryState(
         header(readings.stamp_ns, f"{readings.sensors[i].uav_name}/base_link"),
-        voltage,
+        single(voltage),
         math.nan,
-        -float(readings.current[i]),
-        share * capacity,
-        capacity,
-        capacity,
-        share,
+        single(-readings.current[i]),
+        single(share * capacity),
+        single(capacity),
+        single(capacity),
+        single(share),
         BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
         BatteryState.POWER_SUPPLY_HEALTH_DEAD if dead else BatteryState.POWER_SUPPLY_HEALTH_GOOD,
         BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO,

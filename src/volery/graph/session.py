@@ -87,6 +87,12 @@ class Mailbox:
             return [self._waiting.popleft() for _ in range(most)]
 
     @property
+    def next_number(self) -> int | None:
+        """Number, as of `take_numbered`, of the message to be taken next; None if none waits."""
+        with self._lock:
+            return self._waiting[0][0] if self._waiting else None
+
+    @property
     def info(self) -> MailboxInfo:
         """Counts so far."""
         with self._lock:
@@ -187,7 +193,7 @@ class Session:
         publisher = self._publishers.get(topic)
         if publisher is None:
             raise GraphError(f"{self.name} has not advertised '{topic}'")
-        self._gateway.post(lambda: publisher.publish(message))
+        self._gateway.post(lambda: publisher.publish_posted(message))
 
     def subscribe(
         self,

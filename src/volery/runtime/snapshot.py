@@ -42,11 +42,13 @@ class Snapshot:
 
 
 def keep_nodes(nodes: Sequence[Node]) -> NodeStates:
-    """States of nodes; None of one that does not offer it."""
+    """States of nodes, None of one that does not offer it, and values of their parameters."""
     for node in nodes:
         node.join()
     return {
-        key: copy.deepcopy(node.get_state()) if isinstance(node, KeepsState) else None
+        key: copy.deepcopy(
+            (node.get_state() if isinstance(node, KeepsState) else None, node.parameter_values())
+        )
         for key, node in _keyed(nodes)
     }
 
@@ -54,9 +56,11 @@ def keep_nodes(nodes: Sequence[Node]) -> NodeStates:
 def put_back_nodes(nodes: Sequence[Node], states: NodeStates) -> None:
     """Give all nodes back what `keep_nodes` kept."""
     for key, node in _keyed(nodes):
+        state, values = copy.deepcopy(states[key])
         node.join()
+        node.put_back_parameters(values)
         if isinstance(node, KeepsState):
-            node.set_state(copy.deepcopy(states[key]))
+            node.set_state(state)
 
 
 def _keyed(nodes: Sequence[Node]) -> Iterator[tuple[NodeKey, Node]]:

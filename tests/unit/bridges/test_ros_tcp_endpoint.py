@@ -80,7 +80,9 @@ def test_the_handshake_says_which_ros(serve, generation):
     name, fields = client.next()
     assert name == "__handshake"
     assert fields["version"] == "v0.7.0"
-    assert json.loads(fields["metadata"]) == {"protocol": generation.upper()}
+    metadata = json.loads(fields["metadata"])
+    assert metadata["protocol"] == generation.upper()
+    assert metadata["features"] == ["queue_size", "remove", "response_error"]
     client.close()
 
 

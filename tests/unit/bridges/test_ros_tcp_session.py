@@ -169,22 +169,55 @@ def test_a_message_that_cannot_be_said_is_told_once():
     assert bench.counts() == bench.before
 
 
-def test_topics_take_turns():
+def subscribe(session, topic, **more):
+    fields = {"topic": topic, "message_name": "std_msgs/String", **more}
+    for one in FrameParser().feed(frame("__subscribe", json.dumps(fields).encode())):
+        session.take(one)
+
+
+def test_messages_keep_their_order_across_topics():
+    """Who waits for a message on one topic has all that was published before on others."""
     bench = Bench()
-    session = EndpointSession(bench.gateway, "c", "ros1", 10, lambda: None)
-    for topic in ("/out", "/in"):
-        fields = json.dumps({"topic": topic, "message_name": "std_msgs/String"}).encode()
-        for one in FrameParser().feed(frame("__subscribe", fields)):
-            session.take(one)
-    other = bench.graph.advertise("/in", STRING)
-    for k in range(3):
-        bench.publisher.publish(String(str(k)))
-    for k in range(3):
-        other.publish(String(str(k)))
+    session = EndpointSession(bench.gateway, "c", "ros1", 3, lambda: None)
+    subscribe(session, "/out")
+    subscribe(session, "/in")
+    publishers = {"/out": bench.publisher, "/in": bench.graph.advertise("/in", STRING)}
+    order = ["/out", "/in", "/in", "/out", "/out", "/in"]
+    for topic in order:
+        publishers[topic].publish(String(topic))
     bench.work_off()
     session.complain("first")
-    found = [f.destination for f in drain(session)]
-    assert found == ["__handshake", "__error", *["/out", "/in"] * 3]
+    assert [f.destination for f in drain(session)] == ["__handshake", "__error", *order]
+
+
+def test_lost_messages_leave_the_others_in_order():
+    bench = Bench()
+    session = EndpointSession(bench.gateway, "c", "ros1", 2, lambda: None)
+    subscribe(session, "/out")
+    subscribe(session, "/in")
+    drain(session)
+    large, other = String("x" * 100_000), bench.graph.advertise("/in", STRING)
+
+    def publish(*what):
+        for publisher, message in what:
+            publisher.publish(message)
+        bench.work_off()
+
+    publish((other, large), (bench.publisher, String("1")))
+    assert len(session.outbox.gather()) == 2  # the large one fills a batch; "1" has its turn next
+    publish((other, String("2")), (bench.publisher, String("3")), (bench.publisher, String("4")))
+    assert [bytes(f.payload)[4:] for f in drain(session)] == [b"2", b"3", b"4"]
+
+
+def test_a_client_says_how_many_messages_may_wait():
+    bench = Bench()
+    session = EndpointSession(bench.gateway, "c", "ros1", 2, lambda: None)
+    subscribe(session, "/out", queue_size=5)
+    drain(session)
+    for k in range(9):
+        bench.publisher.publish(String(str(k)))
+    bench.work_off()
+    assert [bytes(f.payload)[4:] for f in drain(session)] == [b"4", b"5", b"6", b"7", b"8"]
 
 
 def large_messages():

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from rosbridge_bench import SET_BOOL, STEPS, STRING, TIME_NS, TRIGGER, Bench
 
 from volery.bridges.rosbridge.rosapi import RosApi
+from volery.graph.node import Context, Node
 
 
 class Asked:
@@ -30,6 +33,16 @@ class Asked:
         self.client.send("call_service", service=f"/rosapi/{name}", args=args)
         (answer,) = self.client.read()
         return answer["values"]
+
+
+class Flier(Node):
+    """Declares parameters, one of which it reads each time anew."""
+
+    def __init__(self, graph, **options):
+        super().__init__("flier", context=Context(graph, None, lambda: 0), **options)
+        self.declare_parameter("route", [[1.0, 2.0]])
+        self.declare_parameter("far_m", math.inf)
+        self.height = self.declare_parameter("height_m", 3.0, read_only=False)
 
 
 @pytest.fixture
@@ -105,6 +118,54 @@ def test_types(ask, ask_as_ros1):
     old = ask_as_ros1("message_details", type="std_msgs/Header")["typedefs"]
     assert old[0]["fieldtypes"] == ["time", "string"]
     assert old[1]["fieldnames"] == ["secs", "nsecs"]
+
+
+@pytest.mark.parametrize(("generation", "between"), [("ros1", "/"), ("ros2", ":")])
+def test_parameters_of_nodes_are_listed_as_ros_does_and_found_by_either_name(generation, between):
+    ask = Asked(generation)
+    Flier(ask.bench.graph, namespace="/uav1", parameter_overrides={"height_m": 4})
+    names = [f"/uav1/flier{between}{name}" for name in ("far_m", "height_m", "route")]
+    assert ask("get_param_names") == {"names": [*names, "/use_sim_time"]}
+    for name in ("/uav1/flier:route", "/uav1/flier/route", "uav1/flier/route"):
+        assert ask("get_param", name=name)["value"] == "[[1.0, 2.0]]"
+        assert ask("has_param", name=name) == {"exists": True}
+    assert ask("get_param", name="/uav1/flier:far_m")["value"] == "null"
+    for name in ("/uav1/flier:none", "/uav2/flier:route", "/uav1/flier/none"):
+        assert ask("has_param", name=name) == {"exists": False}
+        assert ask("get_param", name=name)["value"] == "null"
+
+
+def test_a_refusal_is_told_in_ros_1_too_whose_response_has_no_word_for_it(ask_as_ros1):
+    Flier(ask_as_ros1.bench.graph, namespace="/uav1")
+    assert ask_as_ros1("set_param", name="/uav1/flier/height_m", value="2") == {}
+    assert "read-only" in ask_as_ros1("set_param", name="/uav1/flier/route", value="[]")
+    assert "declared" in ask_as_ros1("delete_param", name="/uav1/flier/route")
+
+
+def test_parameters_of_nodes_are_set_or_refused(ask):
+    node = Flier(ask.bench.graph, namespace="/uav1")
+    assert ask("set_param", name="/uav1/flier:height_m", value="2")["successful"]
+    assert node.height.value == 2
+    assert ask("get_param", name="/uav1/flier/height_m")["value"] == "2"
+    assert ask("set_param", name="/uav1/flier/height_m", value="2.5")["successful"]
+    refused = {
+        ("/uav1/flier:route", "[]"): "read-only",
+        ("/uav1/flier:height_m", '"high"'): "must be like 3.0",
+        ("/uav1/flier:height_m", "true"): "must be like 3.0",
+        ("/uav1/flier:height_m", "NaN"): "JSON",
+        ("/uav1/flier:hight_m", "2"): "no parameter 'hight_m'; it has far_m, height_m, route",
+        ("/uav1/flier/hight_m", "2"): "no parameter 'hight_m'",
+        ("/uav3/flier:height_m", "2"): "no node '/uav3/flier'",
+    }
+    for (name, value), reason in refused.items():
+        answer = ask("set_param", name=name, value=value)
+        assert not answer["successful"]
+        assert reason in answer["reason"]
+    answer = ask("delete_param", name="/uav1/flier:height_m")
+    assert "declared by its node" in answer["reason"]
+    assert node.height.value == 2.5
+    node.destroy_node()
+    assert ask("get_param_names") == {"names": ["/use_sim_time"]}
 
 
 def test_parameters(ask):

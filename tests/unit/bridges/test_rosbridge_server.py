@@ -55,8 +55,8 @@ def url_of(server):
 class Plain:
     """A client made of nothing but a WebSocket."""
 
-    def __init__(self, server, **options):
-        self._entry = connect(url_of(server), max_size=None, **options)
+    def __init__(self, server, path="", **options):
+        self._entry = connect(url_of(server) + path, max_size=None, **options)
 
     def __enter__(self):
         self.socket = self._entry.__enter__()
@@ -103,6 +103,26 @@ def test_topics_both_ways(simulation, server):
         client.synchronize()
         simulation.publish("/out", m.String("zurück 🛬"))
         assert client.read()["msg"] == {"data": "zurück 🛬"}
+
+
+@pytest.mark.parametrize("path", ["", "/", "/rosbridge", "/some/where/else?x=1"])
+def test_two_doors_serve_one_graph_at_any_path(simulation, doors, server, path):
+    """Standard clients connect to :9090, the ancestors' to :8080/rosbridge."""
+    other = RosbridgeServer(port=0)
+    doors.open(other)
+    seen = []
+    simulation.graph.subscribe("/in", seen.append, STRING)
+    with Plain(server, path=path) as first, Plain(other, path=path) as second:
+        first.send("subscribe", topic="/in", type="std_msgs/String")
+        first.synchronize()
+        second.send("advertise", topic="/in", type="std_msgs/String")
+        second.send("publish", topic="/in", msg={"data": "across"})
+        assert first.read()["msg"] == {"data": "across"}
+        for client in (first, second):
+            client.send("call_service", service="/rosapi/nodes", id="1")
+            nodes = client.read()["values"]["nodes"]
+            assert len([node for node in nodes if "rosapi" in node]) == 1
+    until(lambda: len(seen) == 1)
 
 
 def test_late_joiners_get_what_is_latched(simulation, server):

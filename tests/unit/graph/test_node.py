@@ -80,3 +80,10 @@ def test_timers_and_services(context):
     assert client.call().success
     with pytest.raises(GraphError, match="queue depth"):
         node.create_publisher(String, "t", 0)
+
+
+def test_a_parameter_is_declared_once(context):
+    node = Node("a", context=context)
+    node.declare_parameter("speed", 1.0)
+    with pytest.raises(GraphError, match="already"):
+        node.declare_parameter("speed", 2.0)

@@ -192,3 +192,19 @@ def test_nothing_is_lost_or_doubled_while_clients_come_and_go(bench):
     for thread in threads:
         thread.join()
     assert not trouble
+
+
+def test_last_words_of_who_leaves_are_heard(bench):
+    """`volery topic pub --once` publishes and leaves, faster than a tick."""
+    seen = []
+    bench.graph.subscribe("/in", seen.append, STRING)
+    session = bench.gateway.open("visitor")
+    session.advertise("/in", STRING, latched=True)
+    session.publish("/in", String("farewell"))
+    session.close()
+    bench.work_off()
+    assert [p.message.data for p in seen] == ["farewell"]
+    late = []
+    bench.graph.subscribe("/in", late.append, STRING)
+    bench.graph.deliver()
+    assert not late

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import statistics
 import subprocess
 import sys
 import threading
@@ -14,6 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from volery.bench.bridge.latency_figures import (
+    IMAGE_BYTES,
+    TRIALS,
+    end_point_figures,
+    fit_line,
+    one_way_latencies,
+    size_figures,
+)
 from volery.bench.bridge.native_ros1 import one_way_figures
 from volery.bench.registry import Measured
 from volery.bridges.doors import Doors
@@ -25,11 +32,9 @@ from volery.runtime import Simulation
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import Scenario
 
-_IMAGE_BYTES = (0, 100_000, 250_000, 500_000, 1_000_000, 2_500_000)
 _IMAGES = 100
 _IMAGE_PERIOD_S = 0.02
 _ROUND_TRIPS = 1000
-_ARTICLE_TRIPS = 10
 _STOPS = 100
 _SAFE_HEIGHT_M = 50.0
 """It falls a little at each stop."""
@@ -44,20 +49,20 @@ def measure() -> Measured:
     figures: dict[str, float] = {}
     failures: dict[str, str] = {}
     with running(load_scenario("hover")) as world:
-        alpha, beta = fit_line(image_latencies(world))
+        images = image_latencies(world)
+        alpha, beta = fit_line(images)
         figures["ros_tcp_alpha_s_per_mb"], figures["ros_tcp_beta_s"] = alpha, beta
+        figures.update(size_figures(images))
         trips = 1e3 * np.array(world.ros_tcp("round_trips", "uav1", _ROUND_TRIPS)["took"])
         figures["ros_tcp_round_trip_ms"] = float(trips.mean())
         figures["ros_tcp_round_trip_p99_ms"] = float(np.percentile(trips, 99))
-        means = [
-            1e3 * statistics.mean(world.ros_tcp("round_trips", "uav1", _ARTICLE_TRIPS)["took"])
-            for _ in range(_ARTICLE_TRIPS)
-        ]
-        figures["ros_tcp_round_trip_10x10_ms"] = statistics.mean(means)
+        figures.update(command_figures(world))
         trips = 1e3 * np.array(world.rosbridge("round_trips", "uav1", _ROUND_TRIPS)["took"])
         figures["rosbridge_round_trip_ms"] = float(trips.mean())
         figures["rosbridge_round_trip_p99_ms"] = float(np.percentile(trips, 99))
-        figures["stop_wall_p95_ms"] = 1e3 * float(np.percentile(stop_latencies(world), 95))
+        took = stop_latencies(world)
+        figures["stop_wall_p95_ms"] = 1e3 * float(np.percentile(took, 95))
+        figures.update(end_point_figures("stop", np.reshape(took, (TRIALS, -1)).tolist()))
         try:
             figures.update(one_way_figures(world.simulation, world.doors))
         except VoleryError as error:
@@ -133,9 +138,9 @@ def image_latencies(world: World) -> list[tuple[int, float]]:
     gateway, topic = world.simulation.gateway, "/bench/image"
     publisher = gateway.post(lambda: world.simulation.graph.advertise(topic, _IMAGE)).result()
     image = message_type(_IMAGE)
-    finish = world.start("plain_ros_tcp", "sizes", topic, _IMAGES * len(_IMAGE_BYTES))
+    finish = world.start("plain_ros_tcp", "sizes", topic, _IMAGES * len(IMAGE_BYTES))
     _wait_for_subscriber(world.simulation, topic)
-    for size in _IMAGE_BYTES:
+    for size in IMAGE_BYTES:
         pixels = np.zeros(size, np.uint8)
         pixels.flags.writeable = False
 
@@ -150,12 +155,26 @@ def image_latencies(world: World) -> list[tuple[int, float]]:
     return [(size, latency) for size, latency in finish()["latencies"]]
 
 
-def fit_line(latencies: list[tuple[int, float]]) -> tuple[float, float]:
-    """L = alpha S + beta, s/MB and s, through the medians of each size."""
-    sizes = sorted({size for size, _ in latencies})
-    medians = [statistics.median(s for size, s in latencies if size == one) for one in sizes]
-    alpha, beta = np.polyfit(np.array(sizes) / 1e6, medians, 1)
-    return float(alpha), float(beta)
+def command_figures(world: World) -> dict[str, float]:
+    """Ten trials of ten commands: until applied, and until the report of that is back."""
+    applied_ns: dict[float, int] = {}
+
+    def note(published: Any) -> None:
+        applied_ns[published.message.twist.angular.z] = time.monotonic_ns()
+
+    simulation = world.simulation
+    topic = "/uav1/cmd_vel/applied"
+    noting = simulation.post(lambda: simulation.graph.subscribe(topic, note)).result()
+    round_trips, one_way = [], []
+    for _ in range(TRIALS):
+        found = world.ros_tcp("round_trips", "uav1", TRIALS)
+        round_trips.append(found["took"])
+        one_way.append(one_way_latencies(found["sent_ns"], applied_ns))
+    simulation.post(noting.cancel).result()
+    return {
+        **end_point_figures("round_trip", round_trips),
+        **end_point_figures("one_way", one_way),
+    }
 
 
 def stop_latencies(world: World) -> list[float]:

@@ -76,23 +76,27 @@ def receive_images(client: Client, topic: str, count: int) -> dict[str, Any]:
 
 
 def round_trips(client: Client, uav: str, count: int) -> dict[str, Any]:
-    """Seconds from a Twist sent to the report, stamped by the step that applies it, received."""
+    """Seconds from a Twist sent to the report, stamped by the step that applies it, received.
+
+    Also when each was sent, ns of the monotonic clock, after the number that it carries.
+    """
     command, applied = f"/{uav}/cmd_vel", f"/{uav}/cmd_vel/applied"
     client.command("__publish", topic=command, message_name=_TWIST)
     client.command("__subscribe", topic=applied, message_name="geometry_msgs/TwistStamped")
     time.sleep(_SETTLE_S)
-    took, draw = [], random.Random(1)
+    took, sent, draw = [], [], random.Random(1)
     for k in range(count):
         time.sleep(draw.uniform(0.002, 0.006))
         number = 0.1 + 1e-6 * k
         before = time.perf_counter()
+        sent.append((number, time.monotonic_ns()))
         client.send(command, struct.pack("<6d", 0.0, 0.0, 0.0, 0.0, 0.0, number))
         while True:
             report = client.wait_for(applied)
             if struct.unpack("<d", report[-8:])[0] == number:
                 break
         took.append(time.perf_counter() - before)
-    return {"took": took}
+    return {"took": took, "sent_ns": sent}
 
 
 def stops(client: Client, uav: str, count: int) -> dict[str, Any]:

@@ -15,20 +15,14 @@ from functools import partial
 
 from volery.bridges.doors import wake_of
 from volery.bridges.ros_tcp import wire as ros_tcp
+from volery.bridges.ros_tcp.dial import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUSE_S, dial
 from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.unity import Selection, UnitySession
 from volery.bridges.ros_tcp.wire import FrameParser
 from volery.core.errors import BridgeError
 from volery.graph.session import DEFAULT_DEPTH, Gateway, Wake
 
-KEEPALIVE_S = 1.0
-"""Seconds without a frame after which Unity's Connector sends a keepalive."""
 _REFRESH_S = 0.5
-_FIRST_PAUSE_S = 0.2
-_LONGEST_PAUSE_S = 5.0
-_CONNECT_S = 5.0
-_UNANSWERED_MS = 15_000
-"""So long may sent bytes stay unread before the endpoint counts as gone."""
 _NOTES = 100
 
 
@@ -100,17 +94,17 @@ class RosTcpConnector:
             self._task = None
 
     async def _stay_connected(self, gateway: Gateway) -> None:
-        pause_s = _FIRST_PAUSE_S
+        pause_s = FIRST_PAUSE_S
         while True:
             try:
-                sock = await _connect(*self._address)
+                sock = await dial(*self._address)
             except (OSError, TimeoutError) as error:
                 self._note(f"cannot connect: {error or 'no answer'}")
             else:
                 if await self._serve(gateway, sock):
-                    pause_s = _FIRST_PAUSE_S
+                    pause_s = FIRST_PAUSE_S
             await asyncio.sleep(pause_s)
-            pause_s = min(2.0 * pause_s, _LONGEST_PAUSE_S)
+            pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
 
     async def _serve(self, gateway: Gateway, sock: socket.socket) -> bool:
         """Play Unity's part until the connection ends; whether it ever began in earnest."""
@@ -153,8 +147,6 @@ class _Connection:
         """Holds the reason, once there is one."""
         self.session = session = open_session(wake_of(self._loop, self._flush))
         try:
-            if hasattr(socket, "TCP_USER_TIMEOUT"):
-                sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNANSWERED_MS)
             self.pipe = Pipe(sock, FrameParser(), session.outbox, session.take, note, self._closed)
         except OSError:
             session.close()
@@ -183,17 +175,3 @@ class _Connection:
         self.session.close()
         if not self.ended.done():
             self.ended.set_result(reason)
-
-
-async def _connect(host: str, port: int) -> socket.socket:
-    """A connected socket; `OSError` or `TimeoutError` if nobody answers."""
-    loop = asyncio.get_running_loop()
-    (family, *_, address), *_ = await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-    sock = socket.socket(family, socket.SOCK_STREAM)
-    try:
-        sock.setblocking(False)
-        await asyncio.wait_for(loop.sock_connect(sock, address), _CONNECT_S)
-    except BaseException:
-        sock.close()
-        raise
-    return sock

@@ -1,4 +1,4 @@
-"""What waits to be sent to one peer: commands first, then messages of all topics in turn.
+"""What waits to be sent to one peer: commands first, then messages in the order of arrival.
 
 Messages stay in their bounded mailboxes until the socket takes them, so that a peer who does not
 read loses messages and costs no memory.
@@ -6,6 +6,8 @@ read loses messages and costs no memory.
 
 from __future__ import annotations
 
+import heapq
+import itertools
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -28,6 +30,13 @@ class _Stream:
     def __init__(self, destination: str) -> None:
         self.destination = destination
         self.mailbox: Mailbox | None = None
+        self.queued = False
+        """Whether its turn is planned."""
+
+    @property
+    def next_number(self) -> int | None:
+        """Number of its next message in the order of arrival; None if none waits."""
+        return None if self.mailbox is None else self.mailbox.next_number
 
 
 class Outbox:
@@ -50,6 +59,10 @@ class Outbox:
         self._command_bytes = 0
         self._streams: dict[str, _Stream] = {}
         self._ready: deque[_Stream] = deque()
+        """Streams that were empty before; any thread appends."""
+        self._turns: list[tuple[int, int, _Stream]] = []
+        """Heap of streams with messages: number of the next one, a number of their own."""
+        self._numbers = itertools.count()
         self._lock = threading.Lock()
         self._woken = False
 
@@ -111,9 +124,10 @@ class Outbox:
                 parts.append(frame)
                 size += len(frame)
                 continue
-            if not self._ready:
+            stream = self._next_stream()
+            if stream is None:
                 break
-            size += self._add_message(parts)
+            size += self._add_message(stream, parts)
         return parts
 
     def _next_command(self) -> bytes | None:
@@ -124,13 +138,31 @@ class Outbox:
             self._command_bytes -= len(frame)
             return frame
 
-    def _add_message(self, parts: list[Bytes]) -> int:
-        """Add a message of the topic whose turn it is; returns its bytes."""
-        stream = self._ready.popleft()
+    def _next_stream(self) -> _Stream | None:
+        """The topic whose next message came before those of all others."""
+        while self._ready:
+            self._plan(self._ready.popleft())
+        while self._turns:
+            number, _, stream = heapq.heappop(self._turns)
+            stream.queued = False
+            if stream.next_number == number:
+                return stream
+            self._plan(stream)  # its oldest messages had to go
+        return None
+
+    def _plan(self, stream: _Stream) -> None:
+        """Give a topic its turn."""
+        number = stream.next_number
+        if number is not None and not stream.queued:
+            stream.queued = True
+            heapq.heappush(self._turns, (number, next(self._numbers), stream))
+
+    def _add_message(self, stream: _Stream, parts: list[Bytes]) -> int:
+        """Add a topic's next message; returns its bytes."""
         taken = [] if stream.mailbox is None else stream.mailbox.take(1)
+        self._plan(stream)
         if not taken:
             return 0
-        self._ready.append(stream)
         try:
             payload = self.payloads.published(taken[0])
             size = sum(len(part) for part in payload)

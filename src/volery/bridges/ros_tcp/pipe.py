@@ -10,8 +10,8 @@ import asyncio
 import contextlib
 import socket
 from collections.abc import Callable
+from typing import Protocol
 
-from volery.bridges.ros_tcp.outbox import Outbox
 from volery.bridges.ros_tcp.wire import Bytes, Frame, FrameParser
 from volery.core.errors import BridgeError
 
@@ -26,6 +26,17 @@ _PROBES = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
 """The kernel asks a peer who is silent for 5 s, every 5 s, at most 3 times, whether it lives."""
 
 
+class Outgoing(Protocol):
+    """Frames that wait to be sent."""
+
+    @property
+    def crowded(self) -> bool:
+        """Whether so much waits that nothing should be done to cause more."""
+
+    def gather(self) -> list[Bytes]:
+        """Parts of whole frames to send next, a bounded number; none if nothing waits."""
+
+
 class Pipe:
     """Reads frames, hands them to `take`, and sends what the outbox gathers.
 
@@ -37,7 +48,7 @@ class Pipe:
         self,
         sock: socket.socket,
         parser: FrameParser,
-        outbox: Outbox,
+        outbox: Outgoing,
         take: Callable[[Frame], None],
         broken: Callable[[str], None],
         closed: Callable[[str], None],

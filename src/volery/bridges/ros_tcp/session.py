@@ -32,6 +32,8 @@ MOST_REGISTRATIONS = 10_000
 _FIRST_REQUEST = 1001
 """As ROS-TCP-Endpoint counts."""
 
+_FEATURES = (ros_tcp.QUEUE_SIZE, ros_tcp.REMOVE, ros_tcp.RESPONSE_ERROR)
+
 Fields = dict[str, Any]
 Body = Callable[[Frame], None]
 
@@ -71,7 +73,7 @@ class EndpointSession:
             "__remove_ros_service": self._remove_ros_service,
             "__remove_unity_service": self._remove_unity_service,
         }
-        self.outbox.put(ros_tcp.handshake(generation))
+        self.outbox.put(ros_tcp.handshake(generation, _FEATURES))
 
     def take(self, frame: Frame) -> None:
         """Do what a frame asks for."""
@@ -106,13 +108,11 @@ class EndpointSession:
 
     def _publish(self, fields: Fields) -> None:
         name, msgtype = text_field(fields, "topic"), topic_type(text_field(fields, "message_name"))
-        depth = number_field({"queue_size": DEFAULT_DEPTH, **fields}, "queue_size")
+        depth = _depth(fields, DEFAULT_DEPTH)
         topic = absolute(name)
         self._check_room(self._inlets, name)
         self._session.advertise(topic, msgtype, latched=bool(fields.get("latch", False)))
         self._payloads.learn(msgtype)
-        # in ROS a queue of 0 has no end
-        depth = min(max(depth, 1), MOST_DEPTH) if depth else MOST_DEPTH
         self._inlets[name] = Inlet(self._gateway, self._session, topic, msgtype, depth)
 
     def _remove_publisher(self, fields: Fields) -> None:
@@ -132,7 +132,7 @@ class EndpointSession:
         name, msgtype = text_field(fields, "topic"), topic_type(text_field(fields, "message_name"))
         if self.outbox.streams >= MOST_REGISTRATIONS:
             raise BridgeError(f"over {MOST_REGISTRATIONS} topics")
-        self.outbox.stream(name, absolute(name), msgtype, self._depth)
+        self.outbox.stream(name, absolute(name), msgtype, _depth(fields, self._depth))
 
     def _remove_subscriber(self, fields: Fields) -> None:
         if not self.outbox.end_stream(text_field(fields, "topic")):
@@ -203,22 +203,31 @@ class EndpointSession:
         self._session.withdraw(absolute(name))
 
     def _response(self, fields: Fields) -> None:
-        number = number_field(fields, "srv_id")
-        self._body = ("response", number, lambda frame: self._answer(number, frame))
+        number, error = number_field(fields, "srv_id"), fields.get("error")
+        self._body = ("response", number, lambda frame: self._answer(number, frame, error))
 
-    def _answer(self, number: int, frame: Frame) -> None:
+    def _answer(self, number: int, frame: Frame, error: Any) -> None:
         """Hand the client's response to whoever called its service."""
         reply, srvtype = self._requests.pop(number)
+        if error is not None:
+            reply.fail(GraphError(str(error)))
+            return
         try:
             response = self._payloads.decode(frame.payload, f"{srvtype}_Response")
-        except GraphError as error:
-            reply.fail(GraphError(f"the service's answer is broken: {error}"))
+        except GraphError as broken:
+            reply.fail(GraphError(f"the service's answer is broken: {broken}"))
             raise
         reply.answer(response)
 
     def _check_room(self, registered: dict[str, Any] | set[str], name: str) -> None:
         if name not in registered and len(registered) >= MOST_REGISTRATIONS:
             raise BridgeError(f"over {MOST_REGISTRATIONS} registrations")
+
+
+def _depth(fields: Fields, default: int) -> int:
+    """Messages that may wait, by the client's `queue_size`; in ROS a queue of 0 has no end."""
+    depth = number_field({"queue_size": default, **fields}, "queue_size")
+    return min(max(depth, 1), MOST_DEPTH) if depth else MOST_DEPTH
 
 
 class _Requests:

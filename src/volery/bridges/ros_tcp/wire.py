@@ -13,6 +13,7 @@ Source: ROS-TCP-Connector and ROS-TCP-Endpoint v0.7.0, `ROSConnection.cs`, `SysC
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from struct import Struct
 from typing import Any, Literal, NamedTuple
 
@@ -24,6 +25,12 @@ Generation = Literal["ros1", "ros2"]
 Bytes = bytes | bytearray | memoryview
 
 KEEPALIVE = bytes(8)
+QUEUE_SIZE = "queue_size"
+"""Feature: `__subscribe` may have a `queue_size`, the number of messages that may wait."""
+REMOVE = "remove"
+"""Feature: `__remove_subscriber` and its like are understood."""
+RESPONSE_ERROR = "response_error"
+"""Feature: `__response` may have an `error`, the reason why a service failed."""
 MOST_PAYLOAD_BYTES = 64 << 20
 MOST_DESTINATION_BYTES = 4096
 MOST_JSON_BYTES = 1 << 20
@@ -187,10 +194,15 @@ def command(name: str, *, nul: bool = False, **fields: Any) -> bytes:
     return frame(f"__{name}", json.dumps(fields).encode() + b"\0" * nul)
 
 
-def handshake(generation: Generation) -> bytes:
-    """First frame of an endpoint."""
-    metadata = json.dumps({"protocol": generation.upper()})
-    return command("handshake", version=_VERSION, metadata=metadata)
+def handshake(generation: Generation, features: Sequence[str] = ()) -> bytes:
+    """First frame of an endpoint, with what it understands beyond the protocol.
+
+    Unity's Connector reads of the metadata the fields that it knows.
+    """
+    fields: dict[str, Any] = {"protocol": generation.upper()}
+    if features:
+        fields["features"] = list(features)
+    return command("handshake", version=_VERSION, metadata=json.dumps(fields))
 
 
 def read_handshake(fields: dict[str, Any]) -> Generation:
@@ -205,6 +217,17 @@ def read_handshake(fields: dict[str, Any]) -> Generation:
     if protocol == "ros2":
         return "ros2"
     raise BridgeError(f"the endpoint's handshake names neither ROS1 nor ROS2: {fields}")
+
+
+def read_features(fields: dict[str, Any]) -> frozenset[str]:
+    """What an endpoint understands beyond the protocol, by the fields of its handshake."""
+    try:
+        features = json.loads(fields["metadata"])["features"]
+    except (KeyError, TypeError, ValueError):
+        return frozenset()
+    if not isinstance(features, list):
+        return frozenset()
+    return frozenset(feature for feature in features if isinstance(feature, str))
 
 
 def read_fields(payload: Bytes) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from volery.bridges.rosbridge.wire import (
 from volery.core.errors import GraphError, VoleryError
 from volery.graph.json_decoding import decode_plain
 from volery.graph.json_form import JsonForm
-from volery.graph.messages import Published, typestore
+from volery.graph.messages import Published, stamp_of, typestore
 from volery.graph.reply import Reply
 from volery.graph.ros1_names import ros1_name, ros2_name
 from volery.graph.session import MOST_DEPTH, Handler, Mailbox, SessionInfo, Wake
@@ -37,8 +37,6 @@ MOST_WAITING = 1000
 """Publications that may wait for the network."""
 MOST_WAITING_BYTES = 64 * 1024 * 1024
 MOST_COMPLAINTS = 100
-
-_NS = 1_000_000_000
 
 
 @dataclass
@@ -349,7 +347,7 @@ class ClientState:
         if found is None:
             return
         message = decode_plain(operation.get("msg"), found.msgtype)
-        published = Published(str(operation["topic"]), found.msgtype, _time_of(message), message)
+        published = Published(str(operation["topic"]), found.msgtype, stamp_of(message), message)
         for mailbox in mailboxes:
             mailbox.put(published)
 
@@ -403,9 +401,3 @@ def _type_of(values: Any) -> str:
 def _check_type(msgtype: str) -> None:
     if msgtype not in typestore().types:
         raise GraphError(f"unknown message type '{msgtype}'")
-
-
-def _time_of(message: Any) -> int:
-    """Stamp of a message, ns; 0 where it has none."""
-    stamp = getattr(getattr(message, "header", None), "stamp", None)
-    return 0 if stamp is None else int(stamp.sec * _NS + stamp.nanosec)

@@ -6,13 +6,13 @@ Every session is a node there, and the simulation itself is the node `/volery`.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable
 from typing import Any
 
 from volery.bridges.rosbridge.fields import absolute
 from volery.bridges.rosbridge.forms import Generation
+from volery.bridges.rosbridge.rosapi_parameters import NamedParameters, Parameters
 from volery.bridges.rosbridge.rosapi_types import display_name, full_text, type_definitions
 from volery.core.clock import stamp_from_ns
 from volery.core.errors import GraphError
@@ -24,41 +24,8 @@ from volery.graph.session import Gateway, Session, SessionInfo
 
 SIMULATION_NODE = "/volery"
 PREFIX = "/rosapi/"
-MOST_PARAMETERS = 10_000
-MOST_VALUE = 1_000_000
-"""Characters of the JSON text of one parameter."""
 
 Answer = Callable[[Any], dict[str, Any]]
-
-
-class Parameters:
-    """Parameters by name, each the JSON text of its value."""
-
-    def __init__(self) -> None:
-        self._values: dict[str, str] = {"/use_sim_time": "true"}
-
-    def names(self) -> list[str]:
-        """All names, sorted."""
-        return sorted(self._values)
-
-    def get(self, name: str) -> str | None:
-        """Value, or None."""
-        return self._values.get(absolute(name))
-
-    def set(self, name: str, value: str) -> None:
-        """Set a value. `GraphError` where it is no JSON or there would be too much."""
-        try:
-            json.loads(value)
-        except (ValueError, RecursionError):
-            raise GraphError(f"parameter '{name}': the value must be JSON text") from None
-        if len(value) > MOST_VALUE or len(self._values) >= MOST_PARAMETERS:
-            raise GraphError(f"parameter '{name}': too large, or too many parameters")
-        self._values[absolute(name)] = value
-
-    def delete(self, name: str) -> None:
-        """Remove a parameter. `GraphError` if there is none."""
-        if self._values.pop(absolute(name), None) is None:
-            raise GraphError(f"no parameter '{name}'")
 
 
 class RosApi:
@@ -89,17 +56,22 @@ class RosApi:
         self._ros1 = generation == "ros1"
         self._now_ns = now_ns
         self._actions = gateway.graph.actions.types
-        self._parameters = parameters or Parameters()
+        self._parameters = NamedParameters(
+            parameters or Parameters(), gateway.graph.parameters, ros1=self._ros1
+        )
         self._plain = JsonForm()
         self._session: Session | None = None
 
     def start(self) -> None:
         """Offer the services; those that somebody offers already stay his."""
+        table = self._table().items()
+        missing = [(k, v) for k, v in table if not self._graph.has_service(PREFIX + k)]
+        if not missing:
+            return
         session = self._session = self._gateway.open("rosapi")
-        for name, (base, answer) in self._table().items():
-            if not self._graph.has_service(PREFIX + name):
-                srvtype = f"rosapi_msgs/srv/{base}"
-                session.offer(PREFIX + name, srvtype, self._handler(srvtype, answer))
+        for name, (base, answer) in missing:
+            srvtype = f"rosapi_msgs/srv/{base}"
+            session.offer(PREFIX + name, srvtype, self._handler(srvtype, answer))
 
     def stop(self) -> None:
         """Take them back."""
@@ -302,10 +274,20 @@ class RosApi:
         return {"value": request.default_value if value is None else value, "successful": True}
 
     def _set_param(self, request: Any) -> dict[str, Any]:
-        return _tried(lambda: self._parameters.set(request.name, request.value))
+        return self._tried(lambda: self._parameters.set(request.name, request.value))
 
     def _delete_param(self, request: Any) -> dict[str, Any]:
-        return _tried(lambda: self._parameters.delete(request.name))
+        return self._tried(lambda: self._parameters.delete(request.name))
+
+    def _tried(self, action: Callable[[], None]) -> dict[str, Any]:
+        """How an action went, as rosapi tells it; the call fails where that cannot be told."""
+        try:
+            action()
+        except GraphError as error:
+            if self._ros1:
+                raise
+            return {"successful": False, "reason": str(error)}
+        return {"successful": True}
 
     def _has_param(self, request: Any) -> dict[str, Any]:
         return {"exists": self._parameters.get(request.name) is not None}
@@ -317,12 +299,3 @@ class RosApi:
 
 def _topics_of(info: SessionInfo) -> set[str]:
     return {mailbox.topic for mailbox in info.mailboxes}
-
-
-def _tried(action: Callable[[], None]) -> dict[str, Any]:
-    """How an action went, as rosapi tells it."""
-    try:
-        action()
-    except GraphError as error:
-        return {"successful": False, "reason": str(error)}
-    return {"successful": True}

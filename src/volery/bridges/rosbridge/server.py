@@ -21,7 +21,8 @@ from websockets.http11 import Request, Response
 from volery.bridges.doors import check_address, wake_of
 from volery.bridges.rosbridge.forms import Forms, Generation
 from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared, shows_token
-from volery.bridges.rosbridge.rosapi import Parameters, RosApi
+from volery.bridges.rosbridge.rosapi import RosApi
+from volery.bridges.rosbridge.rosapi_parameters import Parameters
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES
 from volery.core.errors import BridgeError
 from volery.graph.session import Gateway

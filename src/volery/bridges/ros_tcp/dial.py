@@ -1,0 +1,31 @@
+"""Connects to ROS-TCP endpoints."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+
+KEEPALIVE_S = 1.0
+"""Seconds without a frame after which Unity's Connector sends a keepalive."""
+FIRST_PAUSE_S = 0.2
+LONGEST_PAUSE_S = 5.0
+"""Pauses between two attempts double up to this."""
+_CONNECT_S = 5.0
+_UNANSWERED_MS = 15_000
+"""So long may sent bytes stay unread before the endpoint counts as gone."""
+
+
+async def dial(host: str, port: int) -> socket.socket:
+    """A connected socket; `OSError` or `TimeoutError` if nobody answers."""
+    loop = asyncio.get_running_loop()
+    (family, *_, address), *_ = await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    sock = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        sock.setblocking(False)
+        await asyncio.wait_for(loop.sock_connect(sock, address), _CONNECT_S)
+        if hasattr(socket, "TCP_USER_TIMEOUT"):
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNANSWERED_MS)
+    except BaseException:
+        sock.close()
+        raise
+    return sock

@@ -1,0 +1,114 @@
+"""Parameters as rosapi's services name them: those that nodes declared, and all others.
+
+In ROS 1 names are paths, `/uav1/gap_following/height_m`; in ROS 2 a node and its parameter,
+`/uav1/gap_following:height_m`. Both are understood. Values are JSON text.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from volery.bridges.rosbridge.fields import absolute
+from volery.core.errors import GraphError
+from volery.graph.parameters import Parameter
+from volery.graph.parameters import Parameters as Declared
+
+MOST_PARAMETERS = 10_000
+MOST_VALUE = 1_000_000
+"""Characters of the JSON text of one parameter."""
+
+
+class Parameters:
+    """Parameters of nobody, by name, each the JSON text of its value."""
+
+    def __init__(self) -> None:
+        self._values: dict[str, str] = {"/use_sim_time": "true"}
+
+    def names(self) -> list[str]:
+        """All names, sorted."""
+        return sorted(self._values)
+
+    def get(self, name: str) -> str | None:
+        """Value, or None."""
+        return self._values.get(absolute(name))
+
+    def set(self, name: str, value: str) -> None:
+        """Set a value. `GraphError` where there would be too much."""
+        if len(value) > MOST_VALUE or len(self._values) >= MOST_PARAMETERS:
+            raise GraphError(f"parameter '{name}': too large, or too many parameters")
+        self._values[absolute(name)] = value
+
+    def delete(self, name: str) -> None:
+        """Remove a parameter. `GraphError` if there is none."""
+        if self._values.pop(absolute(name), None) is None:
+            raise GraphError(f"no parameter '{name}'")
+
+
+class NamedParameters:
+    """Parameters of nodes and of nobody, by one kind of name.
+
+    ros1: whether nodes' parameters are listed as paths.
+    """
+
+    def __init__(self, others: Parameters, declared: Declared, *, ros1: bool) -> None:
+        self._others = others
+        self._declared = declared
+        self._between = "/" if ros1 else ":"
+
+    def names(self) -> list[str]:
+        """All names, sorted."""
+        declared = [f"{node}{self._between}{name}" for node, name in self._declared.names()]
+        return sorted([*self._others.names(), *declared])
+
+    def get(self, name: str) -> str | None:
+        """Value, or None where there is none of that name."""
+        try:
+            parameter = self._find(name)
+        except GraphError:
+            return None
+        return self._others.get(name) if parameter is None else _text(parameter.value)
+
+    def set(self, name: str, value: str) -> None:
+        """Set a value. `GraphError` where it is no JSON, or its node does not take it."""
+        try:
+            plain = json.loads(value, parse_constant=_refuse)
+        except (ValueError, RecursionError):
+            raise GraphError(f"parameter '{name}': the value must be JSON text") from None
+        parameter = self._find(name)
+        if parameter is None:
+            self._others.set(name, value)
+        else:
+            parameter.set(plain)
+
+    def delete(self, name: str) -> None:
+        """Remove a parameter. `GraphError` if there is none, or a node has declared it."""
+        if self._find(name) is not None:
+            raise GraphError(f"parameter '{name}' is declared by its node")
+        self._others.delete(name)
+
+    def _find(self, name: str) -> Parameter | None:
+        """Parameter of a node, None for one of nobody.
+
+        `GraphError` where a node is named that has none of that name: nobody would read it.
+        """
+        full = absolute(name)
+        node, colon, last = full.rpartition(":")
+        if not colon:
+            node, _, last = full.rpartition("/")
+            if not self._declared.has_node(node):
+                return None
+        return self._declared.get(node, last)
+
+
+def _refuse(word: str) -> None:
+    """Python reads NaN and Infinity too."""
+    raise ValueError(word)
+
+
+def _text(value: Any) -> str:
+    """JSON text of a value; numbers that JSON has not are null."""
+    try:
+        return json.dumps(value, allow_nan=False)
+    except (TypeError, ValueError):
+        return json.dumps(None)
