@@ -24,6 +24,7 @@ from volery.core.errors import GraphError
 from volery.graph.actions import Actions
 from volery.graph.messages import Published, message_type, type_name
 from volery.graph.reply import Reply
+from volery.graph.zero import zero_message
 
 Callback = Callable[[Published], None]
 AsyncHandler = Callable[[Any, Reply], None]
@@ -365,9 +366,9 @@ class Graph:
 
 
 def _request(service: _Service, request: Any | None) -> Any:
-    """The request, or a blank one."""
+    """The request, or one of zeros."""
     if request is None:
-        return message_type(f"{service.srvtype}_Request")()
+        return zero_message(f"{service.srvtype}_Request")
     return request
 
 

@@ -163,3 +163,9 @@ def test_laser_scan_bytes_survive_a_round_trip():
     store = typestore()
     again = store.deserialize_cdr(store.serialize_cdr(scan, scan.__msgtype__), scan.__msgtype__)
     np.testing.assert_array_equal(again.ranges, ranges)
+
+
+def test_a_call_without_a_request_is_one_of_zeros(graph):
+    response = message_type("std_srvs/srv/SetBool_Response")
+    graph.offer("/arm", "std_srvs/srv/SetBool", lambda r: response(r.data, f"{r.data}"))
+    assert graph.call("/arm").message == "False"
