@@ -10,6 +10,7 @@ the first tenth. Ends with 1 and the number of the failing check; `--seed S --on
 from __future__ import annotations
 
 import argparse
+import ctypes
 import faulthandler
 import gc
 import random
@@ -42,7 +43,6 @@ def run(name, seconds, seed):
     settled = None
     while (now := time.monotonic()) < begin + seconds:
         if settled is None and now > begin + 0.1 * seconds:
-            gc.collect()
             settled = _resident_mb()
         if number % 100 == 0:
             faulthandler.dump_traceback_later(_HUNG_S, exit=True)
@@ -55,7 +55,6 @@ def run(name, seconds, seed):
         slowest_s = max(slowest_s, time.process_time() - began_s)
         number += 1
     faulthandler.cancel_dump_traceback_later()
-    gc.collect()
     grown = _resident_mb() - (settled or 0.0)
     well = slowest_s < _SLOW_S and grown < _MOST_GROWTH_MB
     return (
@@ -66,6 +65,8 @@ def run(name, seconds, seed):
 
 
 def _resident_mb():
+    gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     return pages * resource.getpagesize() / 1e6
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import itertools
 import resource
@@ -126,6 +127,7 @@ def subscribers(bench):
 
 def resident_bytes():
     gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)  # what earlier tests have left would hide growth
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     return pages * resource.getpagesize()
 
