@@ -25,10 +25,14 @@ from volery.graph.actions import Actions
 from volery.graph.messages import Published, message_type, type_name
 from volery.graph.parameters import Parameters
 from volery.graph.reply import Reply
+from volery.graph.zero import zero_message
 
 Callback = Callable[[Published], None]
 AsyncHandler = Callable[[Any, Reply], None]
 """Takes a request and answers through the reply, at once or later."""
+
+MOST_UNUSED = 1000
+"""Topics that are remembered though nobody takes part in them any more."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,11 @@ class _Topic:
         self.latched = False
         self.kept: dict[Publisher, Published] = {}  # the last delivered one of each latched one
 
+    @property
+    def used(self) -> bool:
+        """Whether anybody takes part."""
+        return bool(self.publishers or self.callbacks)
+
 
 class Publisher:
     """A right to publish one type on one topic."""
@@ -62,7 +71,8 @@ class Publisher:
         self._graph = graph
         self._topic = topic
         self.latched = latched
-        self._cancelled = False
+        self.cancelled = False
+        """Whether it publishes no more."""
 
     @property
     def msgtype(self) -> str:
@@ -81,7 +91,7 @@ class Publisher:
 
     def publish(self, message: Any) -> None:
         """Queue a message for delivery; nothing after `cancel`."""
-        if not self._cancelled:
+        if not self.cancelled:
             self._graph.enqueue(self, self._topic, message)
 
     def publish_posted(self, message: Any) -> None:
@@ -91,26 +101,33 @@ class Publisher:
     @property
     def keeps(self) -> bool:
         """Whether its last message awaits those who subscribe later."""
-        return self.latched and not self._cancelled
+        return self.latched and not self.cancelled
 
     def cancel(self) -> None:
         """Publish no more; what it latched is forgotten."""
-        if not self._cancelled:
-            self._cancelled = True
+        if not self.cancelled:
+            self.cancelled = True
             self._graph.dismiss(self, self._topic)
 
 
 class Subscription:
-    """A running subscription; `cancel` ends it."""
+    """A running subscription; `cancel` ends it, and tells `left` so."""
 
-    def __init__(self, callbacks: list[Callback], callback: Callback) -> None:
+    def __init__(
+        self,
+        callbacks: list[Callback],
+        callback: Callback,
+        left: Callable[[], None] = lambda: None,
+    ) -> None:
         self._callbacks = callbacks
         self._callback = callback
+        self._left = left
 
     def cancel(self) -> None:
         """Stop receiving."""
         if self._callback in self._callbacks:
             self._callbacks.remove(self._callback)
+            self._left()
 
 
 class _Letter(NamedTuple):
@@ -146,6 +163,7 @@ class Graph:
         self._now_ns = now_ns
         self._post = post
         self._topics: dict[str, _Topic] = {}
+        self._unused: dict[str, _Topic] = {}
         self._services: dict[str, _Service] = {}
         self.actions = Actions()
         """Goals that take their time."""
@@ -191,6 +209,7 @@ class Graph:
         with self._members:
             topic.publishers -= 1
             topic.kept.pop(publisher, None)
+            self._drop_unused(topic)
 
     def subscribe(
         self,
@@ -209,7 +228,7 @@ class Graph:
             found = self._known_topic(topic, msgtype)
             found.callbacks.append(callback)
         self._send_kept([found], callback)
-        return Subscription(found.callbacks, callback)
+        return Subscription(found.callbacks, callback, lambda: self._drop_unused(found))
 
     def attach(
         self, topic: str, put: Callback, msgtype: str | type[Any] | None = None
@@ -223,7 +242,7 @@ class Graph:
             for kept in tuple(found.kept.values()):
                 put(kept)
             found.callbacks.append(put)
-        return Subscription(found.callbacks, put)
+        return Subscription(found.callbacks, put, lambda: self._drop_unused(found))
 
     def subscribe_all(self, callback: Callback) -> Subscription:
         """Call `callback` with every message of every topic, before the topic's subscribers.
@@ -279,17 +298,27 @@ class Graph:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps: undelivered and latched messages, how many each topic has seen."""
-        return {
-            "queue": list(self._queue),
-            "topics": {name: (t.messages, dict(t.kept)) for name, t in self._topics.items()},
-        }
+        with self._members:
+            topics = {name: (t.messages, dict(t.kept)) for name, t in self._topics.items()}
+        return {"queue": list(self._queue), "topics": topics}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state; topics, subscribers and services stay as they are."""
         self._queue = deque(state["queue"])
-        for name, topic in self._topics.items():
-            messages, kept = state["topics"].get(name, (0, {}))
-            topic.messages, topic.kept = messages, dict(kept)
+        with self._members:
+            for name, topic in self._topics.items():
+                messages, kept = state["topics"].get(name, (0, {}))
+                topic.messages, topic.kept = messages, dict(kept)
+
+    def _drop_unused(self, topic: _Topic) -> None:
+        """Forget the oldest unused topics where clients have left very many."""
+        with self._members:
+            if not topic.used:
+                self._unused[topic.name] = topic
+            if len(self._unused) > MOST_UNUSED:
+                oldest = self._unused.pop(next(iter(self._unused)))
+                if not oldest.used:
+                    del self._topics[oldest.name]
 
     def _send_kept(self, topics: list[_Topic], callback: Callback) -> None:
         """Put what was kept before everything under way, which is newer."""
@@ -377,9 +406,9 @@ class Graph:
 
 
 def _request(service: _Service, request: Any | None) -> Any:
-    """The request, or a blank one."""
+    """The request, or one of zeros."""
     if request is None:
-        return message_type(f"{service.srvtype}_Request")()
+        return zero_message(f"{service.srvtype}_Request")
     return request
 
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import struct
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,6 +10,7 @@ from rosbags.highlevel import AnyReader
 
 from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.reader import summarize
+from volery.bridges.logs.records import LogWalk
 from volery.bridges.logs.recover import recover, recovered_name
 from volery.core.errors import RecordingError
 from volery.graph.messages import Published, typestore
@@ -27,6 +30,13 @@ def cut(path: Path, messages: list[Published], keep: float) -> int:
     data = path.read_bytes()
     path.write_bytes(data[: int(len(data) * keep)])
     return len(messages)
+
+
+def walked(path: Path) -> LogWalk:
+    walk = LogWalk(path)
+    for _ in walk:
+        pass
+    return walk
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -122,3 +132,16 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
     for path in (tmp_path / "none.mcap", tmp_path):
         with pytest.raises(RecordingError, match="cannot read the log"):
             summarize(path)
+
+
+def test_a_length_that_lies_claims_no_memory(tmp_path: Path, flight: Flight) -> None:
+    path = tmp_path / "flight.bag"
+    cut(path, flight(0.2), 1.0)
+    with path.open("ab") as file:
+        file.write(struct.pack("<I", 0xFFFFFFF0) + b"x")
+    tracemalloc.start()
+    try:
+        assert "cut off" in walked(path).trouble
+        assert tracemalloc.get_traced_memory()[1] < 100e6
+    finally:
+        tracemalloc.stop()

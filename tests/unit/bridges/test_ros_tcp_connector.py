@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import socket
 import struct
@@ -13,7 +14,7 @@ import pytest
 from ros_tcp_client import Loop, cdr_string, frame, ros1_string, until
 
 from volery.bridges.doors import Doors
-from volery.bridges.ros_tcp.connector import RosTcpConnector
+from volery.bridges.ros_tcp.connector import RosTcpConnector, _connect
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.core.errors import BridgeError
 from volery.graph.messages import String, Twist, Vector3, message_type
@@ -328,3 +329,27 @@ def test_a_handshake_without_sense_ends_the_connection(meet, metadata):
 def test_a_port_must_be_one():
     with pytest.raises(BridgeError, match="port"):
         RosTcpConnector(port=0)
+
+
+def test_whenever_it_is_stopped_a_connector_ends():
+    """Also in the moment in which the connection comes about."""
+
+    async def stop_after(turns, port):
+        connecting = asyncio.create_task(_connect("127.0.0.1", port))
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        stopped = connecting.cancel()
+        (outcome,) = await asyncio.gather(connecting, return_exceptions=True)
+        if isinstance(outcome, socket.socket):
+            outcome.close()
+        assert stopped == connecting.cancelled()
+        return stopped
+
+    async def stop_at_every_turn(port):
+        turns = 0
+        while await stop_after(turns, port):
+            turns += 1
+        return turns
+
+    with socket.create_server(("127.0.0.1", 0), backlog=64) as listener:
+        assert asyncio.run(stop_at_every_turn(listener.getsockname()[1])) > 2

@@ -315,6 +315,8 @@ def test_one_clients_service_for_another(loop, serve, connect):
         ("__subscribe", b'{"topic": "/a", "message_name": "nope/Nope"}', "unknown type"),
         ("__subscribe", b'{"topic": "/a", "message_name": "String"}', "name of a ROS type"),
         ("__subscribe", b'{"topic": "/a b", "message_name": "std_msgs/String"}', "valid name"),
+        ("__subscribe", b'{"topic": "__error", "message_name": "std_msgs/String"}', "a command"),
+        ("__unity_service", b'{"topic": "__do", "message_name": "std_srvs/Trigger"}', "a command"),
         ("__publish", b'{"topic": "/taken", "message_name": "std_msgs/Empty"}', "carries"),
         ("__publish", b'{"topic":"/a","message_name":"std_msgs/String","queue_size":"x"}', "queue"),
         ("__unity_service", b'{"topic": "/do", "message_name": "std_srvs/Trigger"}', "already"),

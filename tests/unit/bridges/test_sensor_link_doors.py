@@ -209,6 +209,18 @@ def test_who_speaks_another_version_is_told_once(link, connect):
     assert link.clients[0].waiting == 0
 
 
+def test_who_sends_too_much_is_told_once_and_may_go_on(loop, link, connect):
+    loop.graph.advertise("/uav2/odom", m.Odometry)
+    commands = collect(loop, "/uav2/pose_command")
+    client = connect(link.port)
+    client.socket.sendall(encode_frame(Kind.POSE_COMMAND, 2, 0, 0, bytes(5000)) * 3)
+    notice = decode_notice(client.next().payload)
+    assert notice == "a payload of type 128 with 5000 bytes is over 4096 bytes"
+    client.send(Kind.POSE_COMMAND, 2, pose(4.0))
+    until(lambda: commands)
+    assert link.clients[0].waiting == 0
+
+
 def test_who_does_not_read_loses_his_own_oldest_only(loop, link, connect):
     publisher = loop.graph.advertise("/uav1/laser/horizontal/scan", m.LaserScan)
     slow, quick = connect(link.port, receive_buffer=4096), connect(link.port)

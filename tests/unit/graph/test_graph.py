@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from volery.core.errors import GraphError
-from volery.graph.graph import Graph
+from volery.graph.graph import MOST_UNUSED, Graph
 from volery.graph.messages import LaserScan, String, Twist, header, message_type, typestore
 
 
@@ -163,3 +163,39 @@ def test_laser_scan_bytes_survive_a_round_trip():
     store = typestore()
     again = store.deserialize_cdr(store.serialize_cdr(scan, scan.__msgtype__), scan.__msgtype__)
     np.testing.assert_array_equal(again.ranges, ranges)
+
+
+def test_a_call_without_a_request_is_one_of_zeros(graph):
+    response = message_type("std_srvs/srv/SetBool_Response")
+    graph.offer("/arm", "std_srvs/srv/SetBool", lambda r: response(r.data, f"{r.data}"))
+    assert graph.call("/arm").message == "False"
+
+
+def test_topics_that_come_and_go_do_not_pile_up(graph):
+    stays = graph.advertise("/stays", String)
+    graph.advertise("/idle", String).cancel()
+    for k in range(2 * MOST_UNUSED):
+        graph.advertise(f"/t{k}", String).cancel()
+        graph.subscribe(f"/s{k}", lambda _: None, String).cancel()
+        if k == 3:  # is among those that nobody uses, and is used again
+            back = graph.advertise("/idle", String)
+    names = {t.name for t in graph.topics()}
+    assert {"/stays", "/idle"} <= names
+    assert len(names) == MOST_UNUSED + 2
+    assert graph.topic_type("/t0") is None
+    graph.advertise("/t0", Twist)  # whoever comes next may choose another type
+    for one in (stays, back):
+        one.cancel()
+    assert f"/s{2 * MOST_UNUSED - 1}" in names
+
+
+def test_what_was_latched_on_the_way_goes_with_its_publisher(graph):
+    graph.subscribe("/a", lambda _: None, String)
+    publisher = graph.advertise("/a", String, latched=True)
+    publisher.publish(String("under way"))
+    publisher.cancel()
+    graph.deliver()
+    late = []
+    graph.subscribe("/a", late.append)
+    graph.deliver()
+    assert late == []

@@ -119,7 +119,7 @@ class LogWalk:
         file.seek(len(BAG_MAGIC))
         indexed = False
         while file.tell() < size:
-            record = _bag_record(file)
+            record = _bag_record(file, size)
             if record is None:
                 self.trouble = _PART_CHUNK
                 return
@@ -129,8 +129,8 @@ class LogWalk:
                 indexed = any(head.get(b"index_pos", b""))
             elif kind == b"\x05":
                 try:
-                    inner = io.BytesIO(decompressors[head[b"compression"].decode()](data))
-                    messages = list(self._bag_messages(inner))
+                    chunk = decompressors[head[b"compression"].decode()](data)
+                    messages = list(self._bag_messages(chunk))
                 except Exception:  # whatever a decoder makes of damaged bytes
                     self.damaged_chunks += 1
                     continue
@@ -138,8 +138,9 @@ class LogWalk:
         if not indexed:
             self.trouble = _NO_INDEX
 
-    def _bag_messages(self, chunk: BinaryIO) -> Iterator[LogRecord]:
-        while (record := _bag_record(chunk)) is not None:
+    def _bag_messages(self, chunk: bytes) -> Iterator[LogRecord]:
+        inner = io.BytesIO(chunk)
+        while (record := _bag_record(inner, len(chunk))) is not None:
             head, data = record
             if head[b"op"] == b"\x07":
                 (number,) = struct.unpack("<I", head[b"conn"])
@@ -196,18 +197,20 @@ def _mcap_records(opcode: int, data: bytes) -> list[Any]:
     return [Message.read(stream, len(data))]
 
 
-def _bag_record(file: BinaryIO) -> tuple[dict[bytes, bytes], bytes] | None:
-    """Header fields and data of the next record; None at the end or where it is not whole."""
+def _bag_record(file: BinaryIO, size: int) -> tuple[dict[bytes, bytes], bytes] | None:
+    """Header fields and data of the next record; None at the end or where it is not whole.
+
+    size: bytes of the whole file. A read of more would claim memory for all that a length says.
+    """
     parts = []
     for _ in range(2):
         head = file.read(4)
         if len(head) < 4:
             return None
         (length,) = struct.unpack("<I", head)
-        part = file.read(length)
-        if len(part) < length:
+        if length > size - file.tell():
             return None
-        parts.append(part)
+        parts.append(file.read(length))
     return _bag_fields(parts[0]), parts[1]
 
 

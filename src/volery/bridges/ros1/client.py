@@ -11,12 +11,11 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
 from typing import Any
 
-from volery.bridges.ros1.node import join_ros1
+from volery.bridges.ros1.node import Receive, join_ros1
 from volery.bridges.ros1.raw import raw_message_class
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import Published, message_type, type_name
@@ -131,8 +130,8 @@ class Ros1Client:
         if subscriber is not None:
             subscriber.unregister()
 
-    def _receiver(self, topic: str, msgtype: str, mailbox: Mailbox) -> Callable[[bytes, str], None]:
-        def receive(data: bytes, sender: str) -> None:
+    def _receiver(self, topic: str, msgtype: str, mailbox: Mailbox) -> Receive:
+        def receive(data: bytes, sender: str, _latched: bool) -> None:
             try:
                 message = self._codec.decode(data, msgtype)
             except GraphError as error:

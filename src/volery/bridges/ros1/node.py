@@ -29,6 +29,9 @@ _log = logging.getLogger(__name__)
 _lock = threading.Lock()
 _nodes: list[Ros1Node] = []
 
+Receive = Callable[[bytes, str, bool], None]
+"""Takes a message's bytes, the name of the node that sent it, and whether that one latches it."""
+
 
 class Ros1Node:
     """The node. All methods may be called by any thread; those that ask the master may block."""
@@ -75,11 +78,12 @@ class Ros1Node:
         publisher.impl.set_queue_size(None)  # no thread for each connection
         return publisher
 
-    def subscriber(self, topic: str, msgtype: str, receive: Callable[[bytes, str], None]) -> Any:
-        """A `rospy.Subscriber`; `receive(data, sender)` is called in a thread of its own."""
+    def subscriber(self, topic: str, msgtype: str, receive: Receive) -> Any:
+        """A `rospy.Subscriber`; `receive` is called in a thread of its own."""
 
         def call_back(raw: Any) -> None:
-            receive(raw.data, raw._connection_header.get("callerid", ""))
+            header = raw._connection_header
+            receive(raw.data, header.get("callerid", ""), header.get("latching") == "1")
 
         made = raw_message_class(msgtype)
         return self._rospy.Subscriber(

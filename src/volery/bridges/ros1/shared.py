@@ -118,8 +118,10 @@ class Shared:
     def _receive(self, topic: TopicInfo) -> Any:
         name, msgtype = topic.name, topic.msgtype
         decode = ros1_codec().decode
+        keeps = False
 
-        def receive(data: bytes, sender: str) -> None:
+        def receive(data: bytes, sender: str, latched: bool) -> None:
+            nonlocal keeps
             if sender == self.node.name:
                 return  # what the graph itself publishes
             try:
@@ -127,7 +129,8 @@ class Shared:
                 outlet = self._outlets.get(name)
                 if outlet is not None:
                     outlet.leave_out(message)
-                self._session.advertise(name, msgtype)
+                keeps = keeps or latched  # one publisher stands for all of them here
+                self._session.advertise(name, msgtype, latched=keeps)
                 self._session.publish(name, message)
             except GraphError as error:
                 self._refuse(name, error)

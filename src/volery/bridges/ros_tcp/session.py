@@ -107,7 +107,7 @@ class EndpointSession:
         action(ros_tcp.read_fields(frame.payload))
 
     def _publish(self, fields: Fields) -> None:
-        name, msgtype = text_field(fields, "topic"), topic_type(text_field(fields, "message_name"))
+        name, msgtype = _name_in(fields), topic_type(text_field(fields, "message_name"))
         depth = _depth(fields, DEFAULT_DEPTH)
         topic = absolute(name)
         self._check_room(self._inlets, name)
@@ -129,7 +129,7 @@ class EndpointSession:
         inlet.put(self._payloads.decode(frame.payload, inlet.msgtype))
 
     def _subscribe(self, fields: Fields) -> None:
-        name, msgtype = text_field(fields, "topic"), topic_type(text_field(fields, "message_name"))
+        name, msgtype = _name_in(fields), topic_type(text_field(fields, "message_name"))
         if self.outbox.streams >= MOST_REGISTRATIONS:
             raise BridgeError(f"over {MOST_REGISTRATIONS} topics")
         self.outbox.stream(name, absolute(name), msgtype, _depth(fields, self._depth))
@@ -146,10 +146,7 @@ class EndpointSession:
     # ---------------------------------------------------------- services that the client calls
 
     def _ros_service(self, fields: Fields) -> None:
-        name, srvtype = (
-            text_field(fields, "topic"),
-            service_type(text_field(fields, "message_name")),
-        )
+        name, srvtype = _name_in(fields), service_type(text_field(fields, "message_name"))
         self._check_room(self._called, name)
         self._called[name] = srvtype
 
@@ -173,10 +170,7 @@ class EndpointSession:
     # ---------------------------------------------------------- services that the client offers
 
     def _unity_service(self, fields: Fields) -> None:
-        name, srvtype = (
-            text_field(fields, "topic"),
-            service_type(text_field(fields, "message_name")),
-        )
+        name, srvtype = _name_in(fields), service_type(text_field(fields, "message_name"))
         self._check_room(self._offered, name)
         service = absolute(name)
         if name in self._offered:
@@ -228,6 +222,14 @@ def _depth(fields: Fields, default: int) -> int:
     """Messages that may wait, by the client's `queue_size`; in ROS a queue of 0 has no end."""
     depth = number_field({"queue_size": default, **fields}, "queue_size")
     return min(max(depth, 1), MOST_DEPTH) if depth else MOST_DEPTH
+
+
+def _name_in(fields: Fields) -> str:
+    """Name of the topic or service to register."""
+    name = text_field(fields, "topic")
+    if name.startswith("__"):
+        raise BridgeError(f"'{name[:200]}' would be taken for a command")
+    return name
 
 
 class _Requests:

@@ -238,23 +238,20 @@ class ClientState:
             self._call(service, args, reply, lambda v: decode_plain(v, f"{srvtype}_Response"))
             return
 
-        def ask(response: Any) -> None:
-            if not response:
+        def ask(srvtype: str) -> None:
+            if not srvtype:
                 reply.fail(GraphError(f"nobody offers service '{service}'"))
                 return
-            answer = f"{ros2_name(response, 'srv')}_Response"
+            answer = f"{srvtype}_Response"
             self._call(service, {}, reply, lambda values: decode_plain(values, answer))
 
         asking = Reply(ask, reply.fail)
-        self._call("/rosapi/service_type", {"service": service}, asking, lambda v: v.get("type"))
+        self._call("/rosapi/service_type", {"service": service}, asking, _service_type_of)
 
     def ask_rosapi(self, service: str, args: dict[str, Any], found: Future[str]) -> None:
         """Ask rosapi for the type of something."""
-
-        def take(name: Any) -> None:
-            found.set_result(ros2_name(name) if name else "")
-
-        self._call(f"/rosapi/{service}", args, Reply(take, found.set_exception), _type_of)
+        reply = Reply(found.set_result, found.set_exception)
+        self._call(f"/rosapi/{service}", args, reply, _type_of)
 
     def _call(
         self, service: str, args: dict[str, Any], reply: Reply, take: Callable[[Any], Any]
@@ -394,8 +391,15 @@ class ClientState:
 
 
 def _type_of(values: Any) -> str:
+    """ROS 2 name of the message type in rosapi's answer; empty where there is none."""
     found = values.get("type") if isinstance(values, dict) else None
-    return found if isinstance(found, str) else ""
+    return ros2_name(found) if isinstance(found, str) and found else ""
+
+
+def _service_type_of(values: Any) -> str:
+    """The same of a service."""
+    found = values.get("type") if isinstance(values, dict) else None
+    return ros2_name(found, "srv") if isinstance(found, str) and found else ""
 
 
 def _check_type(msgtype: str) -> None:

@@ -264,7 +264,8 @@ async def _read(connection: ServerConnection, peer: RosbridgePeer, read: asyncio
     while peer.refused is None:
         silence_s = None if peer.authorized else _LONGEST_SILENCE_S
         try:
-            frame = await asyncio.wait_for(connection.recv(), silence_s)
+            async with asyncio.timeout(silence_s):  # unlike wait_for it loses no cancellation
+                frame = await connection.recv()
         except TimeoutError:
             await connection.close(1008, "no token was shown")
             return
@@ -293,7 +294,8 @@ async def _write(
         now_s = time.monotonic()
         due_s = peer.due_s(now_s)
         with suppress(TimeoutError):
-            await asyncio.wait_for(bell.heard.wait(), None if due_s is None else due_s - now_s)
+            async with asyncio.timeout(None if due_s is None else due_s - now_s):
+                await bell.heard.wait()
 
 
 def _select_subprotocol(_connection: ServerConnection, offered: Sequence[Any]) -> Any:

@@ -191,7 +191,7 @@ class _Client(asyncio.Protocol):
         self._parser = FrameParser(_COMMAND_LIMIT_BYTES)
         self._paused = False
         self._notices = 0
-        self._told_version = False
+        self._told_version = self._told_length = False
         self._transport: asyncio.Transport
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -220,6 +220,9 @@ class _Client(asyncio.Protocol):
             if self._parser.other_version is not None and not self._told_version:
                 self._told_version = True
                 self._notify(f"version {VERSION} is spoken here, not {self._parser.other_version}")
+            if self._parser.too_long is not None and not self._told_length:
+                self._told_length = True
+                self._notify(self._parser.too_long)
 
     def pause_writing(self) -> None:
         self._paused = True

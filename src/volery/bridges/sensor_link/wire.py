@@ -142,6 +142,8 @@ class FrameParser:
         """Bytes that belonged to no frame, those of damaged ones included."""
         self.other_version: int | None = None
         """Version of the last frame that was dropped for its version alone."""
+        self.too_long: str | None = None
+        """What was said of the last frame that was dropped for its length alone."""
 
     @property
     def waiting_bytes(self) -> int:
@@ -219,7 +221,9 @@ class FrameParser:
         if version != VERSION:
             self.other_version = version
             return None
-        if length > min(limit_of(kind), self._limit):
+        limit = min(limit_of(kind), self._limit)
+        if length > limit:
+            self.too_long = f"a payload of type {kind} with {length} bytes is over {limit} bytes"
             return None
         return HEAD_BYTES + int(length) + TAIL_BYTES
 

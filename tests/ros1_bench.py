@@ -24,7 +24,7 @@ from live_graph import LiveGraph
 from volery.bridges.ros1.environment import rospy_is_installed
 from volery.graph.messages import Clock, time_from_ns
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parent / "ros1"
 CLOCK = "rosgraph_msgs/msg/Clock"
 SYSTEM_PYTHON = "/usr/bin/python3"
 _TOOLS = ("rosmaster", "rostopic", "rosservice", "rosbag")

@@ -1,0 +1,41 @@
+"""Every door, by name."""
+
+from __future__ import annotations
+
+import pytest
+from door_ros1 import Ros1Bench
+from door_ros_tcp import ConnectorBench, EndpointBench
+from door_rosbridge import ClientBench, ServerBench
+from door_sensor_link import SensorLinkBench
+
+BENCHES = {
+    "ros_tcp": lambda: EndpointBench("ros1"),
+    "ros_tcp_2": lambda: EndpointBench("ros2"),
+    "ros_tcp_connector": ConnectorBench,
+    "rosbridge_json": lambda: ServerBench("none"),
+    "rosbridge_cbor": lambda: ServerBench("cbor"),
+    "rosbridge_raw": lambda: ServerBench("cbor-raw"),
+    "rosbridge_client": ClientBench,
+    "ros1": Ros1Bench,
+    "sensor_link": SensorLinkBench,
+}
+
+
+ROSPY = [  # it uses what is deprecated and forgets to close sockets
+    pytest.mark.filterwarnings("ignore:notifyAll:DeprecationWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+
+@pytest.fixture(
+    params=[pytest.param(name, marks=ROSPY if name == "ros1" else []) for name in BENCHES]
+)
+def bench(request):
+    made = BENCHES[request.param]()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def client(bench):
+    return bench.connect()

@@ -1,0 +1,48 @@
+"""Services over every door."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+from door_bench import Refused
+
+from volery.core.errors import GraphError
+
+
+def test_a_service_of_ours(bench, client):
+    bench.needs("services")
+    bench.ours.offer("/ours", "here, größer")
+    assert client.call("/ours") == "here, größer"
+    assert client.call("/ours") == "here, größer"
+
+
+def test_a_service_that_nobody_offers_is_told(bench, client):
+    bench.needs("services", "advertising")
+    bench.ours.offer("/ours", "x")
+    client.call("/ours")
+    bench.ours.live.graph.withdraw("/ours")
+    with pytest.raises((Refused, AssertionError)):
+        client.call("/ours")
+
+
+def test_a_service_of_the_client(bench, client):
+    bench.needs("services of clients")
+    client.offer(bench.remote_service)
+    bench.ours.wait_for_service(bench.remote_service)
+    for _ in range(2):
+        answer = bench.ours.call(bench.remote_service).get(timeout=10.0)
+        assert answer.message == client.their_answer
+
+
+@pytest.mark.parametrize("how", ["reset", "close"])
+def test_a_service_whose_client_left_fails_at_once(bench, client, how):
+    bench.needs("services of clients")
+    client.their_answer = None
+    client.offer(bench.remote_service)
+    bench.ours.wait_for_service(bench.remote_service)
+    come = bench.ours.call(bench.remote_service)
+    getattr(client, how)()
+    began = time.monotonic()
+    assert isinstance(come.get(timeout=10.0), GraphError)
+    assert time.monotonic() - began < 2.0

@@ -1,0 +1,119 @@
+"""Logs: MCAP files and ROS 1 bags as other programs, damage and crashes leave them."""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+from functools import cache
+from pathlib import Path
+
+from mcap.writer import CompressionType, Writer
+from rosbags.rosbag1 import Writer as BagWriter
+
+from volery.bridges.logs.decoding import LogDecoder
+from volery.bridges.logs.reader import summarize
+from volery.bridges.logs.records import LogWalk
+from volery.bridges.logs.recover import recover
+from volery.core.errors import GraphError, RecordingError
+from volery.graph.cdr import encode_cdr
+from volery.graph.messages import String, Twist, Vector3
+from volery.graph.ros1 import ros1_codec
+
+STRING = "std_msgs/msg/String"
+TWIST = "geometry_msgs/msg/Twist"
+_TWIST = Twist(Vector3(1.0, 2.0, 3.0), Vector3(0.0, 0.0, 0.5))
+_SHORTEST = 14
+"""Bytes of the longer magic: what is in front of the first record."""
+
+
+@cache
+def _folder():
+    """A folder for the process, in memory where there is such a one."""
+    memory = Path("/dev/shm")
+    place = memory if memory.is_dir() else None
+    return tempfile.TemporaryDirectory(prefix="volery-fuzz-", dir=place)
+
+
+def _path(name):
+    return Path(_folder().name, name)
+
+
+@cache
+def _mcaps():
+    """Without checksums, else none but the first change would be seen."""
+    found = []
+    for compression in (CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD):
+        for chunks in (True, False):
+            path = _path("seed.mcap")
+            with path.open("wb") as file:
+                writer = Writer(
+                    file,
+                    chunk_size=300,
+                    compression=compression,
+                    use_chunking=chunks,
+                    enable_crcs=False,
+                )
+                writer.start(profile="ros2", library="fuzz")
+                for name, text, message in (
+                    (STRING, b"string data\n", String("hello")),
+                    (TWIST, b"Vector3 linear\nVector3 angular\n", _TWIST),
+                ):
+                    schema = writer.register_schema(name, "ros2msg", text)
+                    channel = writer.register_channel(f"/{name[-5:]}", "cdr", schema)
+                    data = encode_cdr(message, name)
+                    for k in range(4):
+                        writer.add_message(channel, k, data, k, k)
+                writer.finish()
+            found.append(path.read_bytes())
+    return found
+
+
+@cache
+def _bags():
+    found = []
+    codec = ros1_codec()
+    for compression in (None, BagWriter.CompressionFormat.LZ4, BagWriter.CompressionFormat.BZ2):
+        path = _path("seed.bag")
+        path.unlink(missing_ok=True)
+        writer = BagWriter(path)
+        if compression is not None:
+            writer.set_compression(compression)
+        with writer:
+            for name, message in ((STRING, String("hello")), (TWIST, _TWIST)):
+                text, md5 = codec.definition_text(name), codec.md5(name)
+                place = writer.add_connection(f"/{name[-5:]}", name, msgdef=text, md5sum=md5)
+                for k in range(4):
+                    writer.write(place, k * 10**9, codec.encode(message, name))
+        found.append(path.read_bytes())
+    return found
+
+
+def mcap(mutator):
+    """MCAP files."""
+    return _read(mutator, _mcaps(), "x.mcap")
+
+
+def bag(mutator):
+    """ROS 1 bags."""
+    return _read(mutator, _bags(), "x.bag")
+
+
+def _read(mutator, seeds, name):
+    path = _path(name)
+    data = mutator.bytes(seeds)
+    path.write_bytes(mutator.pick(seeds)[:_SHORTEST] + data[_SHORTEST:])
+    out = path.with_name(f"out-{name}")
+    out.unlink(missing_ok=True)
+    decoder, walk = LogDecoder(), LogWalk(path)
+    with contextlib.suppress(RecordingError):
+        for record in walk:
+            if record.topic.msgtype in (STRING, TWIST):  # others would be learnt for ever
+                with contextlib.suppress(GraphError):
+                    decoder.decode(record)
+    with contextlib.suppress(RecordingError):
+        summary = summarize(path)
+        assert summary.messages >= 0
+    with contextlib.suppress(RecordingError):
+        recovery = recover(path, out)
+        assert summarize(out).messages == recovery.messages
+    return 1

@@ -1,0 +1,95 @@
+"""Millions of frames into every parser, outside of the test run.
+
+    python tests/fuzz/long_run.py --seconds 60
+    python tests/fuzz/long_run.py --seconds 600 --seed 7 cdr ros1
+
+Prints, for each parser, frames, frames a second, the slowest check and how far memory grew after
+the first tenth. Ends with 1 and the number of the failing check; `--seed S --only N` repeats it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import faulthandler
+import gc
+import random
+import resource
+import sys
+import time
+import traceback
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+from mutation import Mutator  # noqa: E402
+from targets import TARGETS  # noqa: E402
+
+_HUNG_S = 120.0
+"""For a hundred checks."""
+_SLOW_S = 2.0
+_MOST_GROWTH_MB = 40.0
+_MOST_MEMORY_BYTES = 3 << 30
+
+
+def random_of(seed, name, number):
+    """The draws of one check."""
+    return random.Random(f"{seed} {name} {number}")
+
+
+def run(name, seconds, seed):
+    """Feed one parser for a while; one line about it, and whether all was well."""
+    check, slowest_s, frames, number = TARGETS[name], 0.0, 0, 0
+    begin = time.monotonic()
+    settled = None
+    while (now := time.monotonic()) < begin + seconds:
+        if settled is None and now > begin + 0.1 * seconds:
+            settled = _resident_mb()
+        if number % 100 == 0:
+            faulthandler.dump_traceback_later(_HUNG_S, exit=True)
+        began_s = time.process_time()  # others may have the processor meanwhile
+        try:
+            frames += check(Mutator(random_of(seed, name, number)))
+        except Exception:
+            traceback.print_exc()
+            return f"{name}: check {number} of seed {seed} FAILED", False
+        slowest_s = max(slowest_s, time.process_time() - began_s)
+        number += 1
+    faulthandler.cancel_dump_traceback_later()
+    grown = _resident_mb() - (settled or 0.0)
+    well = slowest_s < _SLOW_S and grown < _MOST_GROWTH_MB
+    return (
+        f"{name}: {frames} frames, {frames / seconds:.0f}/s, slowest {1000 * slowest_s:.0f} ms, "
+        f"memory {grown:+.1f} MB{'' if well else ' FAILED'}",
+        well,
+    )
+
+
+def _resident_mb():
+    gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * resource.getpagesize() / 1e6
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("targets", nargs="*", default=list(TARGETS), metavar="PARSER")
+    parser.add_argument("--seconds", type=float, default=60.0, help="for each parser")
+    parser.add_argument("--seed", default="0")
+    parser.add_argument("--only", type=int, help="this check alone")
+    options = parser.parse_args()
+    resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY_BYTES, _MOST_MEMORY_BYTES))
+    well = True
+    for name in options.targets:
+        if options.only is not None:
+            TARGETS[name](Mutator(random_of(options.seed, name, options.only)))
+            continue
+        line, good = run(name, options.seconds, options.seed)
+        sys.stdout.write(f"{line}\n")
+        sys.stdout.flush()
+        well = well and good
+    return 0 if well else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

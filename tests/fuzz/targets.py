@@ -1,0 +1,33 @@
+"""Every parser of bytes from outside, by name.
+
+A target takes a `Mutator`, feeds its parser, checks what must hold and returns how many frames that
+were. What it must not let out: any exception but those that its parser documents.
+"""
+
+import log_targets
+import message_targets
+import rosbridge_targets
+import socket_targets
+
+TARGETS = {
+    "ros_tcp_wire": socket_targets.ros_tcp_wire,
+    "ros_tcp_endpoint": socket_targets.ros_tcp_endpoint,
+    "ros_tcp_connector": socket_targets.ros_tcp_connector,
+    "rosbridge_json": rosbridge_targets.json_frames,
+    "rosbridge_cbor": rosbridge_targets.cbor_frames,
+    "rosbridge_png": rosbridge_targets.pictures,
+    "rosbridge_fragments": rosbridge_targets.fragments,
+    "rosbridge_server": rosbridge_targets.server,
+    "rosbridge_client": rosbridge_targets.client,
+    "sensor_link_wire": socket_targets.sensor_link_wire,
+    "sensor_link_payloads": socket_targets.sensor_link_payloads,
+    "sensor_link_commands": socket_targets.sensor_link_commands,
+    "cdr": message_targets.cdr,
+    "ros1": message_targets.ros1,
+    "plain_values": message_targets.plain_values,
+    "definitions": message_targets.definitions,
+    "topic_patterns": message_targets.patterns,
+    "type_names": message_targets.type_names,
+    "mcap": log_targets.mcap,
+    "bag": log_targets.bag,
+}
