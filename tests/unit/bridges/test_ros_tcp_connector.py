@@ -14,7 +14,8 @@ import pytest
 from ros_tcp_client import Loop, cdr_string, frame, ros1_string, until
 
 from volery.bridges.doors import Doors
-from volery.bridges.ros_tcp.connector import RosTcpConnector, _connect
+from volery.bridges.ros_tcp.connector import RosTcpConnector
+from volery.bridges.ros_tcp.dial import dial
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.core.errors import BridgeError
 from volery.graph.messages import String, Twist, Vector3, message_type
@@ -335,7 +336,7 @@ def test_whenever_it_is_stopped_a_connector_ends():
     """Also in the moment in which the connection comes about."""
 
     async def stop_after(turns, port):
-        connecting = asyncio.create_task(_connect("127.0.0.1", port))
+        connecting = asyncio.create_task(dial("127.0.0.1", port))
         for _ in range(turns):
             await asyncio.sleep(0)
         stopped = connecting.cancel()

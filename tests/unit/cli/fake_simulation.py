@@ -22,7 +22,9 @@ class FakeSimulation:
     wall_s_per_step = 0.0
     made: list[FakeSimulation] = []  # noqa: RUF012
 
-    def __init__(self, scenario: Any, threads: int = 1, recordings: Any = None) -> None:
+    def __init__(
+        self, scenario: Any, threads: int = 1, recordings: Any = None, on_load: Any = None
+    ) -> None:
         self.scenario = scenario
         self.threads = threads
         self.time_ns = 0
@@ -41,6 +43,9 @@ class FakeSimulation:
         self._odom = self.graph.advertise("/uav1/ground_truth/odom", m.Odometry)
         self._scan = self.graph.advertise(SCAN, m.LaserScan)
         FakeSimulation.made.append(self)
+
+    def quit(self) -> None:
+        """Nobody loads another world here."""
 
     @property
     def time_s(self) -> float:
