@@ -34,6 +34,7 @@ __all__ = [
     "find_occluded",
     "near_bodies",
     "new_block",
+    "run_together",
     "thread_block",
 ]
 
@@ -72,7 +73,7 @@ def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], reach: flo
 
 
 @inner_kernel
-def _together(rays: NDArray[np.float32], lanes: int) -> bool:
+def run_together(rays: NDArray[np.float32], lanes: int) -> bool:
     """Whether first and last ray of a packet run close together."""
     last = lanes - 1
     apart, along = 0.0, 0.0
@@ -105,7 +106,7 @@ def cast_block(
             valid[k] = 0
         _make_ready(rays[p], words[p], limit)
         if static != 0:
-            arguments = coherent_address if _together(rays[p], lanes) else 0
+            arguments = coherent_address if run_together(rays[p], lanes) else 0
             intersect_packet(
                 valid_address, static, rays_address + p * (PACKET_ROWS * LANES * 4), arguments
             )
@@ -275,7 +276,7 @@ def find_occluded(
             _aim(block, origins, targets, first, p, lanes)
             rays = block.rays[p]
             if scene.static != 0:
-                arguments = block.coherent.ctypes.data if _together(rays, lanes) else 0
+                arguments = block.coherent.ctypes.data if run_together(rays, lanes) else 0
                 occluded_packet(block.valid.ctypes.data, scene.static, rays.ctypes.data, arguments)
             for n in range(near_count):
                 hide_behind_body(scene, block, p, lanes, block.near[n])

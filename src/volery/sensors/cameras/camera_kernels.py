@@ -13,7 +13,13 @@ from volery.core.workers import fetch_add
 from volery.sensors.aim_kernels import LidarBatch, sensor_frame
 from volery.sensors.cameras.light import CODES, Light
 from volery.sensors.cameras.pixel_table import PixelTable
-from volery.sensors.cameras.shade_kernels import SCRATCH_ROWS, find_shadows, note_hits, shade
+from volery.sensors.cameras.shade_kernels import (
+    SCRATCH_ROWS,
+    Scratch,
+    find_shadows,
+    note_hits,
+    shade,
+)
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.embree import DIRECTION, FAR, LANES, ORIGIN
 from volery.world.scene_kernels import RayBlock, SceneHandle, cast_block, near_bodies
@@ -129,32 +135,36 @@ def _write_geometry(
     optics: Optics,
     batch: LidarBatch,
     block: RayBlock,
-    p: int,
-    packet: int,
+    first: int,
+    count: int,
     shot: int,
     frames: Frames,
 ) -> None:
-    """Depth and labels of a packet's pixels, of the first sample of each."""
+    """Depth and labels of pixels, of the first sample of each."""
     wants_depth, wants_labels = frames.depth.shape[1] > 0, frames.instance.shape[1] > 0
-    for k in range(0, LANES, table.samples):
-        pixel = table.pixel[packet, k]
-        if pixel < 0:
-            continue
-        depth = block.rays[p, FAR, k] * table.direction[packet, 0, k]
-        blind = table.blind[packet, k]
-        seen = block.instance[p, k] >= 0 and depth <= optics.far_m and not blind
-        if wants_depth:
-            if not seen:
-                depth = f4(np.nan) if blind else f4(np.inf)
-            elif depth < optics.near_m:
-                depth = f4(-np.inf)
-            elif optics.depth_noise_per_m > 0.0:
-                bits = _bits(table, batch, shot, pixel)
-                depth += f4(optics.depth_noise_per_m * _draw(optics, bits, 3)) * depth * depth
-            frames.depth[shot, pixel] = depth
-        if wants_labels:
-            frames.instance[shot, pixel] = block.instance[p, k] if seen else -1
-            frames.material[shot, pixel] = block.material[p, k] if seen else 0
+    is_noisy = optics.depth_noise_per_m > 0.0
+    near, far = f4(optics.near_m), f4(optics.far_m)
+    for p in range(count):
+        pixels, blinds = table.pixel[first + p], table.blind[first + p]
+        ahead, rays, instance = table.direction[first + p], block.rays[p], block.instance[p]
+        for k in range(0, LANES, table.samples):
+            pixel = pixels[k]
+            if pixel < 0:
+                continue
+            depth = rays[FAR, k] * ahead[0, k]
+            seen = instance[k] >= 0 and depth <= far and not blinds[k]
+            if wants_depth:
+                if not seen:
+                    depth = f4(np.nan) if blinds[k] else f4(np.inf)
+                elif depth < near:
+                    depth = f4(-np.inf)
+                elif is_noisy:
+                    bits = _bits(table, batch, shot, pixel)
+                    depth += f4(optics.depth_noise_per_m * _draw(optics, bits, 3)) * depth * depth
+                frames.depth[shot, pixel] = depth
+            if wants_labels:
+                frames.instance[shot, pixel] = instance[k] if seen else -1
+                frames.material[shot, pixel] = block.material[p, k] if seen else 0
 
 
 @inner_kernel
@@ -163,33 +173,36 @@ def _write_colour(
     optics: Optics,
     light: Light,
     batch: LidarBatch,
-    packet: int,
+    first: int,
+    count: int,
     shot: int,
-    colour: NDArray[np.float32],
+    colours: NDArray[np.float32],
     frames: Frames,
 ) -> None:
-    """Bytes of a packet's pixels, each the mean of its samples' light."""
+    """Bytes of pixels, each the mean of its samples' light."""
     samples = table.samples
     scale = f4(optics.exposure / samples)
     is_noisy = optics.read_noise > 0.0 or optics.shot_noise > 0.0
     dark, bright = f4(optics.read_noise**2), f4(optics.shot_noise**2)
     bits: Any = np.uint64(0)
-    for k in range(0, LANES, samples):
-        pixel = table.pixel[packet, k]
-        if pixel < 0:
-            continue
-        if is_noisy:
-            bits = _bits(table, batch, shot, pixel)
-        for j in range(3):
-            total = f4(0.0)
-            for n in range(samples):
-                if not table.blind[packet, k + n]:
-                    total += min(max(colour[j, k + n], f4(0.0)), f4(1e4))
-            lit = total * scale
+    for p in range(count):
+        colour, pixels, blinds = colours[p], table.pixel[first + p], table.blind[first + p]
+        for k in range(0, LANES, samples):
+            pixel = pixels[k]
+            if pixel < 0:
+                continue
             if is_noisy:
-                lit += f4(_draw(optics, bits, j)) * np.sqrt(dark + bright * min(lit, f4(1.0)))
-            code = int(max(lit, f4(0.0)) * f4(CODES - 1) + f4(0.5))
-            frames.colour[shot, pixel, j] = light.code[min(code, CODES - 1)]
+                bits = _bits(table, batch, shot, pixel)
+            for j in range(3):
+                total = f4(0.0)
+                for n in range(samples):
+                    if not blinds[k + n]:
+                        total += min(max(colour[j, k + n], f4(0.0)), f4(1e4))
+                lit = total * scale
+                if is_noisy:
+                    lit += f4(_draw(optics, bits, j)) * np.sqrt(dark + bright * min(lit, f4(1.0)))
+                code = min(max(lit, f4(0.0)), f4(1.0)) * f4(CODES - 1) + f4(0.5)
+                frames.colour[shot, pixel, j] = light.code[int(code)]
 
 
 @kernel
@@ -211,9 +224,13 @@ def take_pictures(
     pieces = (packets + PIECE - 1) // PIECE
     interval = max(bodies_end_ns - bodies_start_ns, 1)
     wants_colour = frames.colour.shape[1] > 0
-    scratch = np.empty((SCRATCH_ROWS, LANES), f4)
-    colour, direction = np.empty((3, LANES), f4), np.empty((3, LANES), f4)
-    distance = np.empty(LANES, f4)
+    kept = PIECE if wants_colour else 0
+    scratch = Scratch(
+        np.empty((kept, SCRATCH_ROWS, LANES), f4),
+        np.empty((kept, LANES), f4),
+        np.empty((kept, 3, LANES), f4),
+        np.empty((kept, 3, LANES), f4),
+    )
     while True:
         number = fetch_add(counter.ctypes.data)
         shot = number // pieces
@@ -228,10 +245,9 @@ def take_pictures(
             fraction = (time - bodies_start_ns) / interval
             block.fraction[p] = min(max(fraction, 0.0), 1.0)
         cast_block(scene, block, own * LANES, optics.reach_m, near_count)
-        for p in range(own):
-            _write_geometry(table, optics, batch, block, p, first + p, shot, frames)
-            if wants_colour:
-                note_hits(block, p, scratch)
-                find_shadows(scene, block, p, near_count, light, scratch, distance, direction)
-                shade(block, p, light, scratch, distance, direction, colour)
-                _write_colour(table, optics, light, batch, first + p, shot, colour, frames)
+        _write_geometry(table, optics, batch, block, first, own, shot, frames)
+        if wants_colour:
+            note_hits(block, own, scratch)
+            find_shadows(scene, block, own, near_count, light, scratch)
+            shade(block, own, light, scratch)
+            _write_colour(table, optics, light, batch, first, own, shot, scratch.colour, frames)

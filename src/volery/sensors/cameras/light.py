@@ -16,6 +16,9 @@ from volery.world.materials import Material
 
 CODES = 4096
 """Steps of the table from linear light to a byte."""
+CLEAR = 8192
+_LAST_DEPTH = 8.0
+"""Optical depth at which nothing but haze is left: exp(-8) is a tenth of a byte's step."""
 GRAIN = 64
 """Side of the table of random greys."""
 
@@ -33,8 +36,12 @@ class Light(NamedTuple):
     """(3,) of the sky at the horizon, and of haze."""
     bounce: NDArray[np.float32]
     """(3,) of the light that the ground throws back up."""
-    extinction_per_m: float
-    """Of the air between: what is d m away keeps exp(-extinction d) of its contrast."""
+    overhead: NDArray[np.float32]
+    """(3,) of the sky's light on a level surface."""
+    clear: NDArray[np.float32]
+    """(CLEAR,) share of its contrast that a thing keeps, by its distance: exp(-extinction d)."""
+    clear_per_m: float
+    """Entries of `clear` per metre; the last one holds for all that is farther away."""
     surface: NDArray[np.float32]
     """(materials, 8): colour, second colour, size of the grain 1/m, share of light let through."""
     grain: NDArray[np.float32]
@@ -72,11 +79,13 @@ def make_light(
     warm = np.array([1.0, 0.75 + 0.25 * min(1.0, 3.0 * height), 0.5 + 0.5 * min(1.0, 2.0 * height)])
     return Light(
         sun=_row(sun),
-        sun_colour=_row(strength * warm),
+        sun_colour=_row(1.6 * strength * warm),
         zenith=_row(day * np.array([0.13, 0.26, 0.60])),
         horizon=_row(day * np.array([0.55, 0.66, 0.80])),
-        bounce=_row(day * np.array([0.09, 0.09, 0.06])),
-        extinction_per_m=3.0 / visibility_m,
+        bounce=_row(day * np.array([0.14, 0.14, 0.10])),
+        overhead=_row(day * np.array([0.52, 0.79, 1.41])),
+        clear=_row(np.exp(-_LAST_DEPTH * (np.arange(CLEAR) + 0.5) / CLEAR)),
+        clear_per_m=CLEAR * 3.0 / (_LAST_DEPTH * visibility_m),
         surface=_surface_table(),
         grain=_grain(),
         code=_codes(),

@@ -2,98 +2,114 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.compiled import inner_kernel
-from volery.sensors.cameras.light import GRAIN, Light
+from volery.sensors.cameras.light import CLEAR, GRAIN, Light
 from volery.world.body_kernels import hide_behind_body
 from volery.world.embree import DIRECTION, FAR, LANES, NORMAL, ORIGIN, occluded_packet
-from volery.world.scene_kernels import RayBlock, SceneHandle
+from volery.world.scene_kernels import RayBlock, SceneHandle, run_together
 
 SHADOW_REACH_M = 80.0
 """Farther away nothing throws a shadow: trees and houses are lower."""
 _MASK = GRAIN - 1
 # Rows of a packet's scratch memory.
-_HIT, _PLACE_X, _LIT, SCRATCH_ROWS = 0, 1, 4, 8
-_NORMAL_X = 5
+_HIT, _PLACE_X, _LIT, _NORMAL_X, SCRATCH_ROWS = 0, 1, 4, 5, 8
 
 f4 = np.float32
+_FAR_OFF = np.float32(65536.0)
+"""Makes coordinates positive, so that cutting off is rounding down."""
+
+
+class Scratch(NamedTuple):
+    """What shading keeps of P packets; see `new_scratch`."""
+
+    hit: NDArray[np.float32]
+    """(P, SCRATCH_ROWS, LANES): whether anything was hit, where, how the sun falls, the normal."""
+    distance: NDArray[np.float32]
+    """(P, LANES) m."""
+    direction: NDArray[np.float32]
+    """(P, 3, LANES) of the ray."""
+    colour: NDArray[np.float32]
+    """(P, 3, LANES) linear."""
 
 
 @inner_kernel
-def note_hits(block: RayBlock, p: int, scratch: NDArray[np.float32]) -> None:
-    """Take a packet's hits into `scratch` (SCRATCH_ROWS, LANES): where, and the normal there.
+def note_hits(block: RayBlock, count: int, scratch: Scratch) -> None:
+    """Take the hits of the block's first `count` packets into `scratch`.
 
-    Normals become unit vectors on the side of the camera; the first row says whether anything was
-    hit.
+    Normals become unit vectors on the side of the camera. Here and below one call handles many
+    packets: handing over so many arrays costs as much as the rays of one.
     """
-    rays = block.rays[p]
-    for k in range(LANES):
-        nx, ny, nz = rays[NORMAL, k], rays[NORMAL + 1, k], rays[NORMAL + 2, k]
-        dx, dy, dz = rays[DIRECTION, k], rays[DIRECTION + 1, k], rays[DIRECTION + 2, k]
-        scale = f4(1.0) / np.sqrt(max(nx * nx + ny * ny + nz * nz, f4(1e-30)))
-        if nx * dx + ny * dy + nz * dz > f4(0.0):
-            scale = -scale
-        far = rays[FAR, k]
-        scratch[_HIT, k] = f4(1.0) if block.instance[p, k] >= 0 else f4(0.0)
-        scratch[_PLACE_X, k] = rays[ORIGIN, k] + far * dx
-        scratch[_PLACE_X + 1, k] = rays[ORIGIN + 1, k] + far * dy
-        scratch[_PLACE_X + 2, k] = rays[ORIGIN + 2, k] + far * dz
-        scratch[_NORMAL_X, k] = nx * scale
-        scratch[_NORMAL_X + 1, k] = ny * scale
-        scratch[_NORMAL_X + 2, k] = nz * scale
+    for p in range(count):
+        rays, hit, instance = block.rays[p], scratch.hit[p], block.instance[p]
+        distance, direction = scratch.distance[p], scratch.direction[p]
+        for k in range(LANES):
+            nx, ny, nz = rays[NORMAL, k], rays[NORMAL + 1, k], rays[NORMAL + 2, k]
+            dx, dy, dz = rays[DIRECTION, k], rays[DIRECTION + 1, k], rays[DIRECTION + 2, k]
+            along = nx * dx + ny * dy + nz * dz
+            size = np.sqrt(max(nx * nx + ny * ny + nz * nz, f4(1e-30)))
+            scale = (f4(-1.0) if along > f4(0.0) else f4(1.0)) / size
+            far = rays[FAR, k]
+            hit[_HIT, k] = f4(1.0) if instance[k] >= 0 else f4(0.0)
+            hit[_PLACE_X, k] = rays[ORIGIN, k] + far * dx
+            hit[_PLACE_X + 1, k] = rays[ORIGIN + 1, k] + far * dy
+            hit[_PLACE_X + 2, k] = rays[ORIGIN + 2, k] + far * dz
+            hit[_NORMAL_X, k] = nx * scale
+            hit[_NORMAL_X + 1, k] = ny * scale
+            hit[_NORMAL_X + 2, k] = nz * scale
+            distance[k] = far
+            direction[0, k], direction[1, k], direction[2, k] = dx, dy, dz
 
 
 @inner_kernel
 def find_shadows(
     scene: SceneHandle,
     block: RayBlock,
-    p: int,
+    count: int,
     near_count: int,
     light: Light,
-    scratch: NDArray[np.float32],
-    distance: NDArray[np.float32],
-    direction: NDArray[np.float32],
+    scratch: Scratch,
 ) -> None:
-    """Say in `scratch` how the sun falls on each hit: the cosine, negative from behind, 0 in shade.
+    """Note how much of the sun falls on each hit, the cosine with it: 0 in the shade.
 
-    distance (LANES,), direction (3, LANES): the packet's rays, replaced by those of the shadows.
+    The block's rays are replaced by those towards the sun.
     """
-    rays, valid, sun = block.rays[p], block.valid, light.sun
-    wanted = False
-    for k in range(LANES):
-        nx, ny, nz = scratch[_NORMAL_X, k], scratch[_NORMAL_X + 1, k], scratch[_NORMAL_X + 2, k]
-        cosine = nx * sun[0] + ny * sun[1] + nz * sun[2]
-        distance[k] = rays[FAR, k]
-        through = light.surface[block.material[p, k], 7] > f4(0.0)
-        lit = scratch[_HIT, k] > f4(0.0) and (cosine > f4(0.0) or through)
-        scratch[_LIT, k] = cosine if lit else f4(0.0)
-        valid[k] = -1 if lit else 0
-        wanted = wanted or lit
-        # A step off the surface, on the side where the sun is.
-        off = (f4(2e-3) + f4(1e-4) * distance[k]) * (f4(1.0) if cosine > f4(0.0) else f4(-1.0))
-        for j in range(3):
-            direction[j, k] = rays[DIRECTION + j, k]
-        rays[ORIGIN, k] = scratch[_PLACE_X, k] + off * nx
-        rays[ORIGIN + 1, k] = scratch[_PLACE_X + 1, k] + off * ny
-        rays[ORIGIN + 2, k] = scratch[_PLACE_X + 2, k] + off * nz
-        for j in range(3):
-            rays[DIRECTION + j, k] = sun[j]
-        rays[FAR, k] = f4(SHADOW_REACH_M)
-    if not wanted or sun[2] <= f4(0.0):
-        if sun[2] <= f4(0.0):
-            for k in range(LANES):
-                scratch[_LIT, k] = f4(0.0)
-        return
-    occluded_packet(valid.ctypes.data, scene.static, rays.ctypes.data, block.coherent.ctypes.data)
-    for n in range(near_count):
-        hide_behind_body(scene, block, p, LANES, block.near[n])
-    for k in range(LANES):
-        if rays[FAR, k] < f4(0.0):
-            scratch[_LIT, k] = f4(0.0)
+    valid, surface = block.valid, light.surface
+    sx, sy, sz = light.sun[0], light.sun[1], light.sun[2]
+    is_day = sz > f4(0.0)
+    for p in range(count):
+        rays, hit, material = block.rays[p], scratch.hit[p], block.material[p]
+        wanted = False
+        for k in range(LANES):
+            nx, ny, nz = hit[_NORMAL_X, k], hit[_NORMAL_X + 1, k], hit[_NORMAL_X + 2, k]
+            cosine = nx * sx + ny * sy + nz * sz
+            met = is_day and hit[_HIT, k] > f4(0.0)
+            lit = met and cosine > f4(0.0)
+            # What comes through from behind is taken as half shaded, without looking.
+            behind = f4(0.5) * surface[material[k], 7] if met else f4(0.0)
+            hit[_LIT, k] = cosine if lit else -cosine * behind
+            valid[k] = -1 if lit else 0
+            wanted = wanted or lit
+            # A step off the surface, on the side of the camera and the sun.
+            off = f4(2e-3) + f4(1e-4) * scratch.distance[p, k]
+            rays[ORIGIN, k] = hit[_PLACE_X, k] + off * nx
+            rays[ORIGIN + 1, k] = hit[_PLACE_X + 1, k] + off * ny
+            rays[ORIGIN + 2, k] = hit[_PLACE_X + 2, k] + off * nz
+            rays[DIRECTION, k], rays[DIRECTION + 1, k], rays[DIRECTION + 2, k] = sx, sy, sz
+            rays[FAR, k] = f4(SHADOW_REACH_M)
+        if not wanted:
+            continue
+        arguments = block.coherent.ctypes.data if run_together(rays, LANES) else 0
+        occluded_packet(valid.ctypes.data, scene.static, rays.ctypes.data, arguments)
+        for n in range(near_count):
+            hide_behind_body(scene, block, p, LANES, block.near[n])
+        for k in range(LANES):
+            if valid[k] != 0 and rays[FAR, k] < f4(0.0):
+                hit[_LIT, k] = f4(0.0)
 
 
 @inner_kernel
@@ -112,43 +128,39 @@ def _grey(grain: NDArray[np.float32], x: Any, y: Any) -> Any:
 def _texture(light: Light, material: int, x: Any, y: Any, z: Any, steep: bool) -> Any:
     """How much of the second colour a surface has at a place, 0 to 1."""
     size = light.surface[material, 6]
-    u, v = (x + y, z) if steep else (x, y)
-    coarse = _grey(light.grain, u * size, v * size)
-    fine = _grey(light.grain, u * size * f4(7.0) + f4(13.0), v * size * f4(7.0) + f4(5.0))
-    return f4(0.6) * coarse + f4(0.4) * fine
+    u, v = ((x + y) * size, z * size) if steep else (x * size, y * size)
+    i = np.int64(u * f4(8.0) + _FAR_OFF) & _MASK
+    j = np.int64(v * f4(8.0) + _FAR_OFF) & _MASK
+    fine = light.grain[i, j]
+    return f4(0.7) * _grey(light.grain, u, v) + f4(0.3) * fine
 
 
 @inner_kernel
-def shade(
-    block: RayBlock,
-    p: int,
-    light: Light,
-    scratch: NDArray[np.float32],
-    distance: NDArray[np.float32],
-    direction: NDArray[np.float32],
-    colour: NDArray[np.float32],
-) -> None:
-    """Linear colours (3, LANES) of a packet, after `find_shadows`."""
-    for k in range(LANES):
-        if scratch[_HIT, k] == f4(0.0):
-            _sky(light, direction, k, colour)
-            continue
-        material = block.material[p, k]
-        nz = scratch[_NORMAL_X + 2, k]
-        x, y, z = scratch[_PLACE_X, k], scratch[_PLACE_X + 1, k], scratch[_PLACE_X + 2, k]
-        share = _texture(light, material, x, y, z, abs(nz) < f4(0.7))
-        tint = f4(0.85) + f4(0.3) * light.grain[block.instance[p, k] & _MASK, material & _MASK]
-        cosine = scratch[_LIT, k]
-        # From behind a leaf lets a part through.
-        sunlit = cosine if cosine > f4(0.0) else -cosine * light.surface[material, 7]
-        above = f4(0.5) + f4(0.5) * nz
-        clear = np.exp(f4(-light.extinction_per_m) * distance[k])
-        for j in range(3):
-            first, second = light.surface[material, j], light.surface[material, 3 + j]
-            own = (first + share * (second - first)) * tint
-            sky = above * (light.zenith[j] + f4(0.35) * light.horizon[j])
-            lit = light.sun_colour[j] * sunlit + sky + (f4(1.0) - above) * light.bounce[j]
-            colour[j, k] = own * lit * f4(1.6) * clear + light.horizon[j] * (f4(1.0) - clear)
+def shade(block: RayBlock, count: int, light: Light, scratch: Scratch) -> None:
+    """Linear colours of the block's first `count` packets, after `find_shadows`."""
+    for p in range(count):
+        hit, colour = scratch.hit[p], scratch.colour[p]
+        materials, instances = block.material[p], block.instance[p]
+        for k in range(LANES):
+            if hit[_HIT, k] == f4(0.0):
+                _sky(light, scratch.direction[p], k, colour)
+                continue
+            material = materials[k]
+            nz = hit[_NORMAL_X + 2, k]
+            x, y, z = hit[_PLACE_X, k], hit[_PLACE_X + 1, k], hit[_PLACE_X + 2, k]
+            share = _texture(light, material, x, y, z, abs(nz) < f4(0.7))
+            own_grey = light.grain[instances[k] & _MASK, np.int64(material) & _MASK]
+            tint = f4(0.85) + f4(0.3) * own_grey
+            sunlit = hit[_LIT, k]
+            above = f4(0.5) + f4(0.5) * nz
+            step: Any = np.int64(scratch.distance[p, k] * light.clear_per_m)
+            clear = light.clear[min(step, CLEAR - 1)]
+            for j in range(3):
+                first, second = light.surface[material, j], light.surface[material, 3 + j]
+                own = (first + share * (second - first)) * tint
+                bounce, horizon = light.bounce[j], light.horizon[j]
+                lit = light.sun_colour[j] * sunlit + bounce + above * (light.overhead[j] - bounce)
+                colour[j, k] = horizon + clear * (own * lit - horizon)
 
 
 @inner_kernel
