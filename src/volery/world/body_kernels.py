@@ -56,6 +56,16 @@ def body_pose(
 
 
 @inner_kernel
+def body_sphere(bodies: BodyTable, row: int) -> tuple[float, float, float, float]:
+    """Centre (x, y, z) and radius, m, of what a body stays within during the interval."""
+    a, b = bodies.start, bodies.end
+    x, y = 0.5 * (a[row, 0] + b[row, 0]), 0.5 * (a[row, 1] + b[row, 1])
+    z = 0.5 * (a[row, 2] + b[row, 2])
+    dx, dy, dz = a[row, 0] - x, a[row, 1] - y, a[row, 2] - z
+    return x, y, z, bodies.radius[row] + np.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@inner_kernel
 def near_bodies(
     bodies: BodyTable,
     low: tuple[float, float, float],

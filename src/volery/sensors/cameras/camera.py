@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from volery.core.workers import Workers, new_counter
 from volery.sensors.aim_kernels import LidarBatch
-from volery.sensors.cameras.camera_kernels import NORMALS, PIECE, Frames, Optics, take_pictures
+from volery.sensors.cameras.camera_kernels import NORMALS, Frames, Optics, take_pictures
 from volery.sensors.cameras.light import Light
 from volery.sensors.cameras.model import CameraModel
+from volery.sensors.cameras.pixel_table import PIECE
 from volery.sensors.lidar import move_bodies
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.embree import LANES

@@ -12,24 +12,22 @@ from volery.core.rng import random_bits
 from volery.core.workers import fetch_add
 from volery.sensors.aim_kernels import LidarBatch, sensor_frame
 from volery.sensors.cameras.light import CODES, Light
-from volery.sensors.cameras.pixel_table import PixelTable
+from volery.sensors.cameras.pixel_table import PIECE, PixelTable
 from volery.sensors.cameras.shade_kernels import (
     SCRATCH_ROWS,
     Scratch,
     find_shadows,
     note_hits,
     shade,
+    shading_bodies,
 )
 from volery.vehicle.pose_history import PoseHistory
+from volery.world.body_kernels import body_sphere
 from volery.world.embree import DIRECTION, FAR, LANES, ORIGIN
 from volery.world.scene_kernels import RayBlock, SceneHandle, cast_block, near_bodies
 
-PIECE = 2048 // LANES
-"""Packets of a piece."""
 NORMALS = 4096
 """Size of the table of normal numbers: its largest is 3.7 standard deviations."""
-_SHADOW_MARGIN_M = 5.0
-"""Bodies this far beyond a camera's reach may still throw a shadow into its picture."""
 
 f4 = np.float32
 
@@ -93,27 +91,46 @@ def _aim(
 @inner_kernel
 def _near(
     scene: SceneHandle,
+    table: PixelTable,
     batch: LidarBatch,
     shot: int,
+    piece: int,
     history: PoseHistory,
     optics: Optics,
     near: NDArray[np.int32],
 ) -> int:
-    """List the other UAVs that the picture may show; their number."""
-    if scene.bodies.scene.shape[0] == 0:
+    """List the other UAVs that a piece of the picture may show; their number."""
+    bodies = scene.bodies
+    if bodies.scene.shape[0] == 0:
         return 0
     start = batch.sweep_start_ns[shot]
     a = sensor_frame(batch, shot, history, start)
     b = sensor_frame(batch, shot, history, start + optics.readout_ns)
-    count: int = near_bodies(
-        scene.bodies,
+    count = near_bodies(
+        bodies,
         (min(a[0], b[0]), min(a[1], b[1]), min(a[2], b[2])),
         (max(a[0], b[0]), max(a[1], b[1]), max(a[2], b[2])),
-        optics.reach_m + _SHADOW_MARGIN_M,
+        optics.reach_m,
         batch.uav[shot],
         near,
     )
-    return count
+    cone = table.cone[piece]
+    x = cone[0] * a[3] + cone[1] * a[6] + cone[2] * a[9]
+    y = cone[0] * a[4] + cone[1] * a[7] + cone[2] * a[10]
+    z = cone[0] * a[5] + cone[1] * a[8] + cone[2] * a[11]
+    kept = 0
+    for n in range(count):
+        cx, cy, cz, radius = body_sphere(bodies, near[n])
+        dx, dy, dz = cx - a[0], cy - a[1], cz - a[2]
+        away = np.sqrt(dx * dx + dy * dy + dz * dz)
+        if away > radius:
+            sine = radius / away
+            edge = cone[3] * np.sqrt(1.0 - sine * sine) - cone[4] * sine
+            if dx * x + dy * y + dz * z < edge * away:
+                continue
+        near[kept] = near[n]
+        kept += 1
+    return kept
 
 
 @inner_kernel
@@ -236,9 +253,10 @@ def take_pictures(
         shot = number // pieces
         if shot >= batch.uav.shape[0]:
             return
-        first = (number % pieces) * PIECE
+        piece = number % pieces
+        first = piece * PIECE
         own = min(PIECE, packets - first)
-        near_count = _near(scene, batch, shot, history, optics, block.near)
+        near_count = _near(scene, table, batch, shot, piece, history, optics, block.near)
         _aim(table, batch, shot, history, first, own, block)
         for p in range(own):
             time = batch.sweep_start_ns[shot] + table.after_ns[first + p]
@@ -248,6 +266,7 @@ def take_pictures(
         _write_geometry(table, optics, batch, block, first, own, shot, frames)
         if wants_colour:
             note_hits(block, own, scratch)
+            near_count = shading_bodies(scene, batch.uav[shot], light, scratch, own, block.near)
             find_shadows(scene, block, own, near_count, light, scratch)
             shade(block, own, light, scratch)
             _write_colour(table, optics, light, batch, first, own, shot, scratch.colour, frames)

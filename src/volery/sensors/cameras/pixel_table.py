@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from volery.sensors.cameras.lens import undistort
 from volery.world.embree import LANES
 
+PIECE = 2048 // LANES
+"""Packets of a piece of work: a compact part of the picture, 16 x 8 tiles."""
+_PIECE_ACROSS, _PIECE_DOWN = 16, 8
 _OFFSETS = {
     1: np.array([[0.0, 0.0]]),
     # A rotated grid: four rows and four columns are met, so that edges of any slope are smoothed.
@@ -33,6 +36,9 @@ class PixelTable(NamedTuple):
     """(P, LANES) where the lens shows nothing."""
     after_ns: NDArray[np.int64]
     """(P,) when it is exposed, after the first row."""
+    cone: NDArray[np.float64]
+    """(pieces, 5) what holds all rays of a piece of PIECE packets: its axis in the sensor's axes,
+    cosine and sine of its half angle. All around where a rolling shutter turns it."""
     samples: int
 
 
@@ -50,6 +56,10 @@ def make_table(
     across, down = -(-width // side), -(-height // side)
     y, x = np.mgrid[0:side, 0:side].reshape(2, -1)
     tile_y, tile_x = np.mgrid[0:down, 0:across].reshape(2, -1, 1) * side
+    rows, columns = tile_y[:, 0] // side, tile_x[:, 0] // side
+    pieces = (columns, rows, columns // _PIECE_ACROSS, rows // _PIECE_DOWN)
+    order = np.lexsort(pieces)
+    tile_y, tile_x = tile_y[order], tile_x[order]
     u, v = tile_x + x, tile_y + y
     inside = (u < width) & (v < height)
     u, v = np.minimum(u, width - 1), np.minimum(v, height - 1)
@@ -68,5 +78,18 @@ def make_table(
         np.ascontiguousarray(np.repeat(pixel, samples, axis=1), dtype=np.int64),
         blind,
         np.round(share * readout_ns).astype(np.int64),
+        _cones(rays, readout_ns),
         samples,
     )
+
+
+def _cones(rays: NDArray[np.float64], readout_ns: int) -> NDArray[np.float64]:
+    """Cones of the pieces of `rays` (P, 3, LANES); see `PixelTable.cone`."""
+    cones = []
+    for first in range(0, len(rays), PIECE):
+        own = np.moveaxis(rays[first : first + PIECE], 1, -1).reshape(-1, 3)
+        axis = own.mean(axis=0)
+        axis /= np.linalg.norm(axis)
+        cosine = -1.0 if readout_ns else float((own @ axis).min()) - 1e-6
+        cones.append([*axis, cosine, np.sqrt(max(1.0 - cosine**2, 0.0))])
+    return np.array(cones)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from volery.core.compiled import inner_kernel
 from volery.sensors.cameras.light import CLEAR, GRAIN, Light
-from volery.world.body_kernels import hide_behind_body
+from volery.world.body_kernels import body_sphere, hide_behind_body
 from volery.world.embree import DIRECTION, FAR, LANES, NORMAL, ORIGIN, occluded_packet
 from volery.world.scene_kernels import RayBlock, SceneHandle, run_together
 
@@ -63,6 +63,57 @@ def note_hits(block: RayBlock, count: int, scratch: Scratch) -> None:
             hit[_NORMAL_X + 2, k] = nz * scale
             distance[k] = far
             direction[0, k], direction[1, k], direction[2, k] = dx, dy, dz
+
+
+@inner_kernel
+def shading_bodies(
+    scene: SceneHandle,
+    uav: int,
+    light: Light,
+    scratch: Scratch,
+    count: int,
+    near: NDArray[np.int32],
+) -> int:
+    """List the other UAVs whose shadows may fall on the hits; their number.
+
+    Each is a sphere that moves away from the sun, the hits are a ball.
+    """
+    bodies = scene.bodies
+    low, high = _box(scratch, count)
+    if bodies.scene.shape[0] == 0 or low[0] > high[0]:
+        return 0
+    cx, cy, cz = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
+    ball = np.sqrt((high[0] - cx) ** 2 + (high[1] - cy) ** 2 + (high[2] - cz) ** 2)
+    first = uav - uav % bodies.crew
+    found = 0
+    for row in range(first, first + bodies.crew):
+        x, y, z, radius = body_sphere(bodies, row)
+        dx, dy, dz = x - cx, y - cy, z - cz
+        along = dx * light.sun[0] + dy * light.sun[1] + dz * light.sun[2]
+        reach = ball + radius
+        aside = dx * dx + dy * dy + dz * dz - along * along
+        if row != uav and -reach < along < SHADOW_REACH_M + reach and aside < reach * reach:
+            near[found] = row
+            found += 1
+    return found
+
+
+@inner_kernel
+def _box(
+    scratch: Scratch, count: int
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Lowest and highest corner of the box around all hits; the other way round without any."""
+    x0 = y0 = z0 = np.inf
+    x1 = y1 = z1 = -np.inf
+    for p in range(count):
+        hit = scratch.hit[p]
+        for k in range(LANES):
+            if hit[_HIT, k] > f4(0.0):
+                x, y, z = hit[_PLACE_X, k], hit[_PLACE_X + 1, k], hit[_PLACE_X + 2, k]
+                x0, x1 = min(x0, x), max(x1, x)
+                y0, y1 = min(y0, y), max(y1, y)
+                z0, z1 = min(z0, z), max(z1, z)
+    return (x0, y0, z0), (x1, y1, z1)
 
 
 @inner_kernel

@@ -220,3 +220,24 @@ def test_noise_has_the_stated_size(picture):
 
 def test_the_shipped_camera_loads():
     assert load_camera().without_noise() == CameraModel(name="pinhole camera")
+
+
+def test_a_uav_out_of_sight_throws_its_shadow_into_the_picture(two):
+    """From 20 m up the picture is 23 m wide; the sun is 45 degrees high in the east."""
+    down = rotations.from_rpy(0.0, np.pi / 2, 0.0)
+    light = make_light(sun_elevation_deg=45.0, sun_azimuth_deg=90.0)
+    model = CameraModel(width=320, height=320)
+
+    def colour(other):
+        history = new_history([[0.0, 0.0, 20.0], other], [down, rotations.IDENTITY], 1_000_000)
+        batch = make_batch([0], [0], [0], [0], [0], stack_mounts([make_mount()]))
+        seen = take(two, model, light, batch, history)
+        assert not (seen.instance == two.moving_offset + 1).any()
+        return seen.colour[0].astype(int)
+
+    # 16 m up and 16 m to the east: its shadow falls on the middle, itself is beyond the edge.
+    changed = np.abs(colour([16.0, 0.0, 16.0]) - colour([80.0, 0.0, 1.0])).sum(axis=-1) > 0
+    rows, columns = np.nonzero(changed)
+    assert len(rows) >= 3
+    assert abs(rows.mean() - 159.5) < 8
+    assert abs(columns.mean() - 159.5) < 8
