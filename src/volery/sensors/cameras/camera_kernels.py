@@ -30,6 +30,9 @@ NORMALS = 4096
 """Size of the table of normal numbers: its largest is 3.7 standard deviations."""
 
 f4 = np.float32
+_LAST = np.uint64(NORMALS - 1)
+_CHANNEL_BITS, _DEPTH_BITS = np.uint64(12), np.uint64(36)
+"""Three channels and the depth draw from twelve of a pixel's random bits each."""
 
 
 class Frames(NamedTuple):
@@ -134,16 +137,10 @@ def _near(
 
 
 @inner_kernel
-def _bits(table: PixelTable, batch: LidarBatch, shot: int, pixel: int) -> Any:
-    """Random bits of a pixel in a picture: they follow from stream, picture and pixel alone."""
-    pixels = table.direction.shape[0] * LANES
-    return random_bits(batch.key[shot], batch.scan_number[shot] * pixels + pixel)
-
-
-@inner_kernel
-def _draw(optics: Optics, bits: Any, j: int) -> float:
-    """Normal number j (0 to 3) of a pixel whose random bits are `bits`."""
-    return float(optics.normals[(bits >> np.uint64(12 * j)) & np.uint64(NORMALS - 1)])
+def _first_number(table: PixelTable, batch: LidarBatch, shot: int) -> int:
+    """Where in its stream a picture's random bits begin: a number a pixel."""
+    room = table.direction.shape[0] * LANES
+    return int(batch.scan_number[shot] * room)
 
 
 @inner_kernel
@@ -160,6 +157,7 @@ def _write_geometry(
     """Depth and labels of pixels, of the first sample of each."""
     wants_depth, wants_labels = frames.depth.shape[1] > 0, frames.instance.shape[1] > 0
     is_noisy = optics.depth_noise_per_m > 0.0
+    normals, key, number = optics.normals, batch.key[shot], _first_number(table, batch, shot)
     near, far = f4(optics.near_m), f4(optics.far_m)
     for p in range(count):
         pixels, blinds = table.pixel[first + p], table.blind[first + p]
@@ -176,8 +174,8 @@ def _write_geometry(
                 elif depth < near:
                     depth = f4(-np.inf)
                 elif is_noisy:
-                    bits = _bits(table, batch, shot, pixel)
-                    depth += f4(optics.depth_noise_per_m * _draw(optics, bits, 3)) * depth * depth
+                    drawn = normals[(random_bits(key, number + pixel) >> _DEPTH_BITS) & _LAST]
+                    depth += f4(optics.depth_noise_per_m) * drawn * depth * depth
                 frames.depth[shot, pixel] = depth
             if wants_labels:
                 frames.instance[shot, pixel] = instance[k] if seen else -1
@@ -201,6 +199,7 @@ def _write_colour(
     scale = f4(optics.exposure / samples)
     is_noisy = optics.read_noise > 0.0 or optics.shot_noise > 0.0
     dark, bright = f4(optics.read_noise**2), f4(optics.shot_noise**2)
+    normals, key, number = optics.normals, batch.key[shot], _first_number(table, batch, shot)
     bits: Any = np.uint64(0)
     for p in range(count):
         colour, pixels, blinds = colours[p], table.pixel[first + p], table.blind[first + p]
@@ -209,7 +208,7 @@ def _write_colour(
             if pixel < 0:
                 continue
             if is_noisy:
-                bits = _bits(table, batch, shot, pixel)
+                bits = random_bits(key, number + pixel)
             for j in range(3):
                 total = f4(0.0)
                 for n in range(samples):
@@ -217,7 +216,8 @@ def _write_colour(
                         total += min(max(colour[j, k + n], f4(0.0)), f4(1e4))
                 lit = total * scale
                 if is_noisy:
-                    lit += f4(_draw(optics, bits, j)) * np.sqrt(dark + bright * min(lit, f4(1.0)))
+                    lit += normals[bits & _LAST] * np.sqrt(dark + bright * min(lit, f4(1.0)))
+                    bits >>= _CHANNEL_BITS
                 code = min(max(lit, f4(0.0)), f4(1.0)) * f4(CODES - 1) + f4(0.5)
                 frames.colour[shot, pixel, j] = light.code[int(code)]
 
