@@ -156,7 +156,7 @@ class Flight:
         head = f"{trouble}: flew" if trouble else "Flew"
         typer.echo(
             f"{head} {simulated:.1f} s with {count} UAV{'s' if count != 1 else ''} "
-            f"in {self._wall_s:.1f} s ({factor:.1f} x real time)"
+            f"in {self._wall_s:.1f} s ({factor:.1f} x real time){self._reason(trouble)}"
         )
         events = [e for e in self._simulation.events if str(e.kind) in {"impact", "collision"}]
         for event in events[:_CONTACTS_SHOWN]:
@@ -164,6 +164,16 @@ class Flight:
         if len(events) > _CONTACTS_SHOWN:
             counts = Counter(event.uav for event in events)
             typer.echo(f"  and more: {len(events)} contacts of {len(counts)} UAVs in all")
+
+    def _reason(self, trouble: str) -> str:
+        """Why a flight that nobody stopped is over before its time."""
+        scenario = self._simulation.scenario
+        early = self._simulation.time_s < scenario.duration_s
+        return "; all are down" if early and not trouble and self._all_down() else ""
+
+    def _all_down(self) -> bool:
+        simulation = self._simulation
+        return simulation.scenario.ends_when == "all_landed" and not simulation.quitting
 
     def _tell_files(self, report: Path | None) -> None:
         if self._log is not None:

@@ -33,7 +33,7 @@ def node(
     via: Annotated[
         str | None,
         typer.Option(
-            envvar="VOLERY_VIA", help=f"Way into the graph: {WAYS}; {DEFAULT_VIA} by default."
+            help=f"Way into the graph: {WAYS}; else the profile's, VOLERY_VIA, {DEFAULT_VIA}."
         ),
     ] = None,
     namespace: Annotated[str | None, typer.Option(help="Such as /uav1.")] = None,

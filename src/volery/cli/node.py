@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -44,7 +45,7 @@ def run_node(options: NodeOptions) -> None:
     except ValidationError:
         raise BridgeError(f"a node is named module:Class, not '{options.node}'") from None
     name = options.node.rpartition(":")[2]
-    via = options.via or profile.via or DEFAULT_VIA
+    via = options.via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
     with closing(open_link(via, name)) as link:
         host = NodeHost(link, clock=profile.clock)
         context = host.context(absolute_names(profile.remap, namespace))

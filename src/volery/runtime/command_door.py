@@ -24,6 +24,8 @@ from volery.runtime.trajectory_messages import follow_message
 from volery.runtime.uav import Uav
 
 _TRIGGER = "std_srvs/srv/Trigger"
+_BUSY = (FlightMode.TAKE_OFF, FlightMode.LAND, FlightMode.RETURN)
+"""Modes that no topic ends: who asks for a landing gets it while a stream of Twists goes on."""
 
 
 def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Close]:
@@ -32,12 +34,12 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
     `cmd_vel`, `goal_pose`, `trajectory` and, for a kinematic UAV that something outside moves,
     `pose_command`: where it stands from the next step on.
 
-    A Twist is taken in the level heading frame, a pose and a trajectory in the map. During take-off
-    and on the ground they are ignored, and so are those that are none: a refused command on a topic
-    has nobody to tell. A Twist that is taken comes out again on `cmd_vel/applied`, stamped with the
-    simulated time from which it is in force, by which clients measure round trips. The services
-    take_off, hold, land and return_home answer with `success` and a reason. What is returned ends
-    all that.
+    A Twist is taken in the level heading frame, a pose and a trajectory in the map. On the ground,
+    during take-off, landing and return they are ignored, and so are those that are none: a refused
+    command on a topic has nobody to tell. A Twist that is taken comes out again on
+    `cmd_vel/applied`, stamped with the simulated time from which it is in force, by which clients
+    measure round trips. The services take_off, hold, land and return_home answer with `success` and
+    a reason. What is returned ends all that.
     """
     applied = graph.advertise(f"/{uav.name}/cmd_vel/applied", TwistStamped)
 
@@ -95,7 +97,7 @@ def stand_at_message(uav: Uav, message: Any) -> None:
 
 def _careful(uav: Uav, take: Callable[[Any], None]) -> Callable[[Published], None]:
     def receive(published: Published) -> None:
-        if uav.mode is FlightMode.TAKE_OFF:
+        if uav.mode in _BUSY:
             return
         try:
             take(published.message)
