@@ -1,0 +1,27 @@
+"""The page of figures: several runs of a bench are told by their median and their span."""
+
+from volery.bench.document import render
+from volery.bench.registry import Result
+
+
+def run(rays, bench="lidar", machine="a"):
+    return Result(bench, {"processor": machine}, {"rays_per_s_1_thread": rays})
+
+
+def test_the_median_of_several_runs_is_judged_and_the_span_is_told():
+    page = render([run(4e6), run(7e6), run(5e6)])
+    assert "median of 3 runs" in page
+    row = "| `rays_per_s_1_thread` | 5e+06 (4e+06 .. 7e+06) | >= 6e+06 (missed) |"
+    assert row in page
+    assert page.count("## lidar") == 1
+
+
+def test_a_single_run_stands_alone():
+    assert "| `rays_per_s_1_thread` | 7e+06 | >= 6e+06 |" in render([run(7e6)])
+
+
+def test_runs_of_two_machines_are_not_mixed():
+    page = render([run(4e6), run(7e6, machine="b")])
+    assert "## lidar (machine 1)" in page
+    assert "## lidar (machine 2)" in page
+    assert "median of" not in page
