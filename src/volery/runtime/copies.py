@@ -32,10 +32,9 @@ from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.copy_block import CopyBlock, CopyEvent, Reading
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
-from volery.runtime.worlds import build_forest, build_terrain
+from volery.runtime.worlds import build_forest, build_scene, build_terrain
 from volery.scenario.schema import Scenario
 from volery.vehicle.fleet import FleetState
-from volery.world.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -66,7 +65,7 @@ class Copies:
         self.scenario = scenario
         self.terrain = build_terrain(scenario)
         self.forest = build_forest(scenario, self.terrain)
-        self.scene = Scene(self.terrain, self.forest)
+        self.scene = build_scene(scenario, self.terrain, self.forest)
         self._starts = place(scenario, self.scene, self.terrain)
         ends = np.linspace(0, count, min(threads, count) + 1).round().astype(int).tolist()
         self._blocks = [

@@ -41,11 +41,10 @@ from volery.runtime.snapshot import Snapshot
 from volery.runtime.spawning import Spawner
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
-from volery.runtime.worlds import build_forest, build_terrain
+from volery.runtime.worlds import build_forest, build_scene, build_terrain
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario, UavType
 from volery.sensors.mount import Mount
-from volery.world.scene import Scene
 from volery.world.weather import Weather
 
 if TYPE_CHECKING:
@@ -79,7 +78,7 @@ class Simulation:
         self.scenario = scenario
         self.terrain = build_terrain(scenario)
         self.forest = build_forest(scenario, self.terrain)
-        self.scene = Scene(self.terrain, self.forest, threads=threads)
+        self.scene = build_scene(scenario, self.terrain, self.forest, threads=threads)
         self._closed = False
         self._pacer = Pacer()
 

@@ -1,4 +1,4 @@
-"""Builds terrain, forest and weather of a scenario."""
+"""Builds terrain, forest, solids and weather of a scenario."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from volery.scenario import wind as schema
 from volery.scenario.files import resolve
 from volery.scenario.schema import GridTerrain, InventoryForest, ProceduralForest, Scenario
 from volery.world.forest import Forest, forest_from_inventory, procedural_forest
+from volery.world.scene import Scene, Solid
 from volery.world.terrain import Terrain
 from volery.world.weather import W20_M_S, Gust, LogProfile, PowerProfile, Weather, WindField
 
@@ -72,6 +73,19 @@ def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
             terrain=terrain,
         )
     return None
+
+
+def build_solids(scenario: Scenario, terrain: Terrain) -> tuple[Solid, ...]:
+    """What stands in the scenario's world beside the trees, one kind after the other."""
+    del scenario, terrain
+    return ()
+
+
+def build_scene(
+    scenario: Scenario, terrain: Terrain, forest: Forest | None, *, threads: int = 1
+) -> Scene:
+    """All that sensors of the scenario can see but for the UAVs."""
+    return Scene(terrain, forest, solids=build_solids(scenario, terrain), threads=threads)
 
 
 def build_weather(scenario: Scenario) -> Weather:
