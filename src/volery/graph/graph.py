@@ -24,6 +24,7 @@ from volery.core.errors import GraphError
 from volery.graph.actions import Actions
 from volery.graph.messages import Published, message_type, type_name
 from volery.graph.parameters import Parameters
+from volery.graph.qos import DEFAULT_QOS, QoSProfile
 from volery.graph.reply import Reply
 from volery.graph.zero import zero_message
 
@@ -217,12 +218,13 @@ class Graph:
         callback: Callback,
         msgtype: str | type[Any] | None = None,
         *,
-        depth: int = 10,  # noqa: ARG002
+        qos: QoSProfile = DEFAULT_QOS,  # noqa: ARG002
     ) -> Subscription:
         """Call `callback` with each message of `topic`, which must exist or be given a type.
 
-        depth: how many messages may wait; in lock step none ever does. What latched publishers
-        sent before comes first, with the next delivery; its `time_ns` is that of this subscription.
+        qos: counts where messages have to wait, which in lock step none ever does. What latched
+        publishers sent before comes first, with the next delivery; its `time_ns` is that of this
+        subscription.
         """
         with self._members:
             found = self._known_topic(topic, msgtype)

@@ -6,8 +6,9 @@ import threading
 from typing import Any, Protocol, runtime_checkable
 
 from volery.core.errors import GraphError
+from volery.graph.mailbox import Mailbox, Wake
 from volery.graph.reply import Reply
-from volery.graph.session import Handler, Mailbox, Wake
+from volery.graph.session import Handler
 
 
 class Link(Protocol):
@@ -28,7 +29,13 @@ class Link(Protocol):
         """Publish on `topic` no more."""
 
     def subscribe(
-        self, topic: str, msgtype: str | None = None, *, depth: int = ..., wake: Wake
+        self,
+        topic: str,
+        msgtype: str | None = None,
+        *,
+        depth: int = ...,
+        reliable: bool = ...,
+        wake: Wake,
     ) -> Mailbox:
         """Begin to receive `topic`."""
 

@@ -24,6 +24,7 @@ from volery.graph.client import Client
 from volery.graph.graph import Graph, Publisher, Subscription, check_period
 from volery.graph.messages import Published, message_type
 from volery.graph.parameters import Parameter, same_kind
+from volery.graph.qos import DEFAULT_DEPTH, QoSProfile, profile_of
 from volery.graph.thinking import Deferring, DelayedPublisher, Thinker
 
 
@@ -112,29 +113,42 @@ class Node:
         return Clock(self._now_ns)
 
     def create_publisher(
-        self, msg_type: type[Any], topic: str, qos: int = 10, *, latched: bool = False
+        self,
+        msg_type: type[Any],
+        topic: str,
+        qos: int | QoSProfile = DEFAULT_DEPTH,
+        *,
+        latched: bool = False,
     ) -> Publisher:
-        """Publish `msg_type` on `topic`; `qos` is the queue depth of outside subscribers.
+        """Publish `msg_type` on `topic`; each subscriber decides how messages wait for it.
 
-        `latched` hands the last message to those who subscribe later, as rclpy's durability
-        TRANSIENT_LOCAL does.
+        `latched`, or durability TRANSIENT_LOCAL, hands the last message to those who subscribe
+        later.
         """
-        _check_depth(qos)
+        latched = profile_of(qos).latched or latched
         publisher = self._context.graph.advertise(self.resolve(topic), msg_type, latched=latched)
         self._held.append(publisher.cancel)
         return publisher if self._thinker is None else DelayedPublisher(publisher, self._thinker)
 
     def create_subscription(
-        self, msg_type: type[Any], topic: str, callback: Callable[[Any], None], qos: int = 10
+        self,
+        msg_type: type[Any],
+        topic: str,
+        callback: Callable[[Any], None],
+        qos: int | QoSProfile = DEFAULT_DEPTH,
     ) -> Subscription:
-        """Call `callback(message)` for each message of `topic`; of more than `qos` the newest."""
-        _check_depth(qos)
+        """Call `callback(message)` for each message of `topic`.
+
+        qos: what happens where messages come faster than they are taken, which can only be in a
+        process of its own. A depth keeps the newest so many; see `graph.qos.QoSProfile`.
+        """
+        profile = profile_of(qos)
 
         def receive(published: Published) -> None:
             self._run(lambda: callback(published.message), f"message on {published.topic}")
 
         subscription = self._context.graph.subscribe(
-            self.resolve(topic), receive, msg_type, depth=qos
+            self.resolve(topic), receive, msg_type, qos=profile
         )
         self._held.append(subscription.cancel)
         return subscription
@@ -253,11 +267,6 @@ class Node:
         """Set what `parameter_values` gave."""
         for name, value in values.items():
             self._parameters[name].value = value
-
-
-def _check_depth(qos: int) -> None:
-    if qos < 1:
-        raise GraphError(f"queue depth must be at least 1, not {qos}")
 
 
 def _blank(response_type: type[Any]) -> Any:

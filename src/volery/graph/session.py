@@ -14,9 +14,7 @@ newest. A client that does not read loses messages of its own and delays nobody.
 
 from __future__ import annotations
 
-import itertools
 import threading
-from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -24,79 +22,15 @@ from typing import Any
 
 from volery.core.errors import GraphError
 from volery.graph.graph import Graph, Publisher, Subscription
-from volery.graph.messages import Published, message_type
+from volery.graph.mailbox import Mailbox, MailboxInfo, Wake
+from volery.graph.messages import message_type
+from volery.graph.qos import DEFAULT_DEPTH, check_depth
 from volery.graph.reply import Reply
 
 Post = Callable[[Callable[[], Any]], "Future[Any]"]
 """Has a function called by the simulation's thread; the future holds its result or error."""
-Wake = Callable[[], None]
-"""Tells a door's thread, from the simulation's, that there is something to take; must not block."""
 Handler = Callable[[Any, Reply], None]
 """Takes a request in the simulation's thread, at once, and answers through the reply later."""
-
-_arrivals = itertools.count()
-DEFAULT_DEPTH = 10
-MOST_DEPTH = 100_000
-
-
-@dataclass(frozen=True)
-class MailboxInfo:
-    """How a subscription of an outside client fares."""
-
-    topic: str
-    received: int
-    dropped: int
-    waiting: int
-
-
-class Mailbox:
-    """Messages of one topic that await one outside client: the newest `depth` of them."""
-
-    def __init__(self, topic: str, depth: int, wake: Wake) -> None:
-        self.topic = topic
-        self._waiting: deque[tuple[int, Published]] = deque()
-        self._depth = depth
-        self._wake = wake
-        self._lock = threading.Lock()
-        self._received = 0
-        self._dropped = 0
-
-    def put(self, published: Published) -> None:
-        """Add a message; the oldest one goes where there is no room."""
-        with self._lock:
-            self._received += 1
-            was_empty = not self._waiting
-            if len(self._waiting) >= self._depth:
-                self._waiting.popleft()
-                self._dropped += 1
-            self._waiting.append((next(_arrivals), published))
-        if was_empty:
-            self._wake()
-
-    def take(self, most: int | None = None) -> list[Published]:
-        """Remove and return what waits, oldest first, at most `most` messages."""
-        return [published for _, published in self.take_numbered(most)]
-
-    def take_numbered(self, most: int | None = None) -> list[tuple[int, Published]]:
-        """Like `take`, with numbers that tell the order of arrival among all mailboxes."""
-        with self._lock:
-            if most is None or most >= len(self._waiting):
-                taken = list(self._waiting)
-                self._waiting.clear()
-                return taken
-            return [self._waiting.popleft() for _ in range(most)]
-
-    @property
-    def next_number(self) -> int | None:
-        """Number, as of `take_numbered`, of the message to be taken next; None if none waits."""
-        with self._lock:
-            return self._waiting[0][0] if self._waiting else None
-
-    @property
-    def info(self) -> MailboxInfo:
-        """Counts so far."""
-        with self._lock:
-            return MailboxInfo(self.topic, self._received, self._dropped, len(self._waiting))
 
 
 @dataclass(frozen=True)
@@ -201,16 +135,17 @@ class Session:
         msgtype: str | None = None,
         *,
         depth: int = DEFAULT_DEPTH,
+        reliable: bool = False,
         wake: Wake,
     ) -> Mailbox:
         """Begin to receive `topic`, which must exist or be given a type.
 
-        What latched publishers sent before waits in the mailbox already. `wake` is called, from the
-        simulation's thread, whenever a message comes to an empty mailbox.
+        depth, reliable: see `Mailbox`. What latched publishers sent before waits in the mailbox
+        already. `wake` is called, from the simulation's thread, whenever a message comes to an
+        empty mailbox.
         """
-        if not 1 <= depth <= MOST_DEPTH:
-            raise GraphError(f"queue depth must be 1 to {MOST_DEPTH}, not {depth}")
-        mailbox = Mailbox(topic, depth, wake)
+        check_depth(depth)
+        mailbox = Mailbox(topic, depth, wake, reliable=reliable)
         with self._lock:
             self._check_open()
             self._mailboxes[mailbox] = self._graph.attach(topic, mailbox.put, msgtype)

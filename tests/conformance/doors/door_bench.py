@@ -74,6 +74,10 @@ class Client:
     def subscribe(self, topic, msgtype=STRING):
         raise NotImplementedError
 
+    def subscribe_reliably(self, topic):
+        """Receive every String of a topic, however long the client dawdles."""
+        raise NotImplementedError
+
     def call(self, service):
         """Answer of a Trigger; raises `Refused`."""
         raise NotImplementedError
@@ -114,6 +118,20 @@ class Ours:
         """A function that publishes."""
         made = self.live.graph.advertise(topic, msgtype, latched=latched)
         return lambda message: self.live.do(lambda: made.publish(message))
+
+    def burst(self, topic):
+        """A function that publishes many texts, without letting doors read in between."""
+        made = self.live.graph.advertise(topic, STRING)
+
+        def publish(texts):
+            def all_at_once():
+                for text in texts:
+                    made.publish(String(text))
+                self.live.graph.deliver()
+
+            self.live.do(all_at_once)
+
+        return publish
 
     def collect(self, topic, msgtype=STRING):
         """A list that fills with messages."""

@@ -98,6 +98,7 @@ class Ros1Bench(Bench):
     cannot = MappingProxyType(
         {
             "own types": "the master alone compares types, and only warns",
+            "reliability": "in TCPROS publishers decide how messages wait",
             "limits": "TCPROS knows none",
             "listening": "nodes take free ports",
             "leaving": "the door stands for all nodes, those that are gone too",

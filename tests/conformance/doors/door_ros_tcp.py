@@ -187,6 +187,10 @@ class PlainConnector(RosTcpPartner):
         self._kinds[topic] = msgtype
         self.command("subscribe", topic=topic, message_name=_short(msgtype))
 
+    def subscribe_reliably(self, topic):
+        self._kinds[topic] = "std_msgs/msg/String"
+        self.command("subscribe", topic=topic, message_name="std_msgs/String", queue_size=0)
+
     def offer(self, service):
         self._offered.add(service)
         self.command("unity_service", topic=service, message_name="std_srvs/Trigger")
@@ -267,6 +271,7 @@ class ConnectorBench(Bench):
             "errors": "a connector has no way to tell an endpoint; it notes what was wrong",
             "own types": "a connector names the types",
             "advertising": "endpoints announce nothing",
+            "reliability": "endpoints do not subscribe",
             "listening": "it connects",
             "leaving": "endpoints stay where they are",
         }

@@ -145,6 +145,12 @@ class PlainClient(RosbridgePartner):
         fields = {"topic": topic, "type": msgtype, "queue_length": 10}
         self.send("subscribe", **fields, compression=self._compression)
 
+    def subscribe_reliably(self, topic):
+        self._kinds[topic] = STRING
+        qos = {"reliability": "reliable", "durability": "volatile", "history": "keep_last"}
+        fields = {"topic": topic, "type": STRING, "compression": self._compression}
+        self.send("subscribe", **fields, qos=qos)
+
     def offer(self, service):
         self._offered.add(service)
         self.send("advertise_service", service=service, type=TRIGGER)
@@ -263,6 +269,7 @@ class ClientBench(Bench):
             "errors": "a program notes what is wrong with its server, and tells it nothing",
             "own types": "the program names the types",
             "advertising": "servers announce nothing to their clients",
+            "reliability": "servers do not subscribe",
             "listening": "it connects",
             "leaving": "servers stay where they are",
             "limits": "what its server sends is the program's own choice",

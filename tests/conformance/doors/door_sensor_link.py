@@ -131,6 +131,7 @@ class SensorLinkBench(Bench):
             "late joiners": "nothing is latched",
             "large messages in": "only poses go in",
             "topics": "its frames name UAVs, not topics",
+            "reliability": "its streams keep the newest",
             "advertising": "clients announce nothing",
         }
     )

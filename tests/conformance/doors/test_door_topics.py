@@ -10,6 +10,8 @@ from volery.graph import messages as m
 
 TEXTS = ["", "Grüße, 無人機 🚁", "a\0b", "\u202e rtl \u0301\U0010ffff", "x" * 70_000]
 LARGE = 8 << 20
+BURST = 5000
+"""Messages at once, between two breaths of a door."""
 
 
 def image(size):
@@ -87,6 +89,15 @@ def test_what_a_client_latches_awaits_our_side(bench, client):
     late = bench.ours.collect("/plan")
     until(lambda: late)
     assert late[0].data == "kept"
+
+
+def test_reliable_subscribers_miss_nothing_of_a_burst(bench, client):
+    bench.needs("reliability")
+    publish = bench.ours.burst(bench.topic_out)
+    client.subscribe_reliably(bench.topic_out)
+    client.settle()
+    publish([f"{k}" for k in range(BURST)])
+    assert [client.next() for _ in range(BURST)] == [f"{k}" for k in range(BURST)]
 
 
 def test_thousands_of_topics(bench, client):

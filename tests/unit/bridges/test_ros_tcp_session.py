@@ -256,3 +256,23 @@ def test_a_large_message_that_does_not_fit_is_refused():
     for generation in ("ros1", "ros2"):
         with pytest.raises(GraphError, match="OccupancyGrid"):
             payloads_of(generation).published(published)
+
+
+def test_a_queue_without_end_loses_nothing_or_says_so(monkeypatch):
+    monkeypatch.setattr("volery.graph.mailbox.MOST_DEPTH", 100)
+    bench = Bench()
+    session = EndpointSession(bench.gateway, "c", "ros1", 2, lambda: None)
+    subscribe(session, "/out", queue_size=0)
+    drain(session)
+
+    def publish(count):
+        for k in range(count):
+            bench.publisher.publish(String(f"{k}"))
+        bench.work_off()
+        return drain(session)
+
+    assert len(publish(50)) == 50
+    (error,) = publish(200)
+    assert error.destination == "__error"
+    assert b"too slow" in bytes(error.payload)
+    assert publish(1) == []

@@ -47,6 +47,40 @@ def test_publish_and_subscribe(bench, client, spelling):
     assert client.read() == []
 
 
+def test_reliable_subscriptions_lose_nothing(bench, client):
+    client.send("subscribe", topic="/out", type=STRING, qos={"reliability": "reliable"})
+    publish(bench, *map(str, range(500)))
+    assert [answer["msg"]["data"] for answer in client.read()] == [str(k) for k in range(500)]
+
+
+def test_reliable_subscriptions_end_with_an_error_where_they_must(bench, client, monkeypatch):
+    monkeypatch.setattr("volery.graph.mailbox.MOST_DEPTH", 100)
+    client.send("subscribe", topic="/out", type=STRING, qos={"reliability": "reliable"})
+    publish(bench, *map(str, range(500)))
+    (status,) = client.read()
+    assert status["level"] == "error"
+    assert "too slow" in status["msg"]
+    publish(bench, "later")
+    assert client.read() == []
+    client.send("subscribe", topic="/out", type=STRING)
+    publish(bench, "again")
+    assert client.read()[0]["msg"] == {"data": "again"}
+
+
+def test_quality_of_service_of_an_advertisement(bench, client):
+    qos = {"durability": "transient_local", "reliability": "system_default", "depth": 1}
+    client.send("advertise", topic="/plan", type=STRING, qos=qos)
+    assert [t.latched for t in bench.graph.topics() if t.name == "/plan"] == [True]
+
+
+@pytest.mark.parametrize(
+    "qos", [3, {"depth": 0}, {"depth": "many"}, {"reliability": "very"}, {"durability": 1}]
+)
+def test_quality_of_service_that_cannot_be(client, qos):
+    client.send("subscribe", topic="/out", type=STRING, qos=qos)
+    assert "qos" in client.read()[0]["msg"]
+
+
 def test_publishing_where_others_do_needs_no_announcement(bench, client):
     seen = []
     bench.graph.subscribe("/cmd", seen.append, "geometry_msgs/msg/Twist")

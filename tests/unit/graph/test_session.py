@@ -57,6 +57,39 @@ def test_a_mailbox_keeps_the_newest_and_counts_the_rest(bench):
     assert texts(mailbox) == ["7", "8", "9"]
 
 
+def test_a_reliable_mailbox_keeps_all(bench):
+    session = bench.gateway.open("slow")
+    mailbox = session.subscribe("/out", STRING, depth=3, reliable=True, wake=quiet)
+    publisher = bench.graph.advertise("/out", STRING)
+    for k in range(1000):
+        publisher.publish(String(str(k)))
+    bench.work_off()
+    assert mailbox.info.dropped == 0
+    assert texts(mailbox) == [str(k) for k in range(1000)]
+    assert mailbox.failure is None
+
+
+@pytest.mark.parametrize("limit", ["MOST_DEPTH", "MOST_RELIABLE_BYTES"])
+def test_a_reliable_mailbox_that_overflows_says_so_and_ends(bench, monkeypatch, limit):
+    monkeypatch.setattr(f"volery.graph.mailbox.{limit}", {"MOST_DEPTH": 20}.get(limit, 2000))
+    wakes = []
+    session = bench.gateway.open("slow")
+    mailbox = session.subscribe("/out", STRING, reliable=True, wake=lambda: wakes.append(1))
+    publisher = bench.graph.advertise("/out", STRING)
+    for _ in range(3):  # as long as somebody takes them, any number may come
+        for _ in range(19):
+            publisher.publish(String("x" * 100))
+        bench.work_off()
+        assert len(mailbox.take()) == 19
+    for _ in range(30):
+        publisher.publish(String("x" * 100))
+    bench.work_off()
+    assert "reliable subscription of '/out' ended" in mailbox.failure
+    assert mailbox.take() == []
+    assert mailbox.info.dropped == 21
+    assert len(wakes) > 3
+
+
 def test_some_may_be_taken_and_the_rest_later(bench):
     mailbox = bench.gateway.open("c").subscribe("/out", STRING, wake=quiet)
     publisher = bench.graph.advertise("/out", STRING)

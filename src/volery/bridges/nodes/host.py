@@ -25,6 +25,7 @@ from volery.graph.graph import Subscription
 from volery.graph.link import Link
 from volery.graph.messages import Clock, Published, Time, message_type
 from volery.graph.node import Context
+from volery.graph.qos import QoSProfile
 
 ClockKind = Literal["auto", "simulated", "wall"]
 _LONGEST_WAIT_S = 0.2
@@ -60,7 +61,9 @@ class NodeHost:
         self.graph = MirroredGraph(link, self.now_ns, self._woken.set)
         self._clock: Subscription | None = None
         if clock != "wall":
-            self._clock = self.graph.subscribe("/clock", self._on_clock, Clock, depth=_CLOCKS_KEPT)
+            self._clock = self.graph.subscribe(
+                "/clock", self._on_clock, Clock, qos=QoSProfile(_CLOCKS_KEPT)
+            )
 
     def context(self, remap: Mapping[str, str] | None = None) -> Context:
         """What a node stands on; `remap` gives topics and services other names."""

@@ -8,9 +8,10 @@ from typing import Any
 from volery.core.errors import GraphError
 from volery.graph.graph import AsyncHandler, Callback, Graph, Publisher, Subscription
 from volery.graph.link import Link, call_and_wait
+from volery.graph.mailbox import Mailbox
 from volery.graph.messages import Published, type_name
+from volery.graph.qos import DEFAULT_QOS, QoSProfile
 from volery.graph.reply import Reply
-from volery.graph.session import DEFAULT_DEPTH, Mailbox
 
 _CALL_TIMEOUT_S = 10.0
 
@@ -48,15 +49,17 @@ class MirroredGraph(Graph):
         callback: Callback,
         msgtype: str | type[Any] | None = None,
         *,
-        depth: int = DEFAULT_DEPTH,
+        qos: QoSProfile = DEFAULT_QOS,
     ) -> Subscription:
         """Call `callback` with each message that comes through the link.
 
-        The first subscriber of a topic decides how many may wait.
+        The first subscriber of a topic decides how messages wait.
         """
         name = type_name(msgtype) if isinstance(msgtype, type) else msgtype
         if topic not in self._mailboxes:
-            self._mailboxes[topic] = self._link.subscribe(topic, name, depth=depth, wake=self._wake)
+            self._mailboxes[topic] = self._link.subscribe(
+                topic, name, depth=qos.depth, reliable=qos.reliable, wake=self._wake
+            )
         readers = self._readers.setdefault(topic, [])
         readers.append(callback)
         return _RemoteSubscription(readers, callback, lambda: self._leave(topic))
@@ -76,8 +79,12 @@ class MirroredGraph(Graph):
     def hand_out(self) -> bool:
         """Call back for everything that has come, in the order of arrival; whether there was any.
 
-        What comes meanwhile waits for the next call.
+        What comes meanwhile waits for the next call. `GraphError` where a reliable subscription
+        has lost messages: this process is too slow for it.
         """
+        for mailbox in self._mailboxes.values():
+            if mailbox.failure is not None:
+                raise GraphError(mailbox.failure)
         come = [
             (number, topic, published)
             for topic, mailbox in self._mailboxes.items()

@@ -18,17 +18,12 @@ from typing import Any
 from volery.bridges.ros1.node import Receive, join_ros1
 from volery.bridges.ros1.raw import raw_message_class
 from volery.core.errors import BridgeError, GraphError
+from volery.graph.mailbox import Mailbox, Wake
 from volery.graph.messages import Published, message_type, type_name
+from volery.graph.qos import DEFAULT_DEPTH, check_depth
 from volery.graph.reply import Reply
 from volery.graph.ros1 import ros1_codec
-from volery.graph.session import (
-    DEFAULT_DEPTH,
-    MOST_DEPTH,
-    Handler,
-    Mailbox,
-    SessionInfo,
-    Wake,
-)
+from volery.graph.session import Handler, SessionInfo
 
 _MASTER_EACH_S = 1.0
 _SERVICE_TIMEOUT_S = 30.0
@@ -104,19 +99,19 @@ class Ros1Client:
         msgtype: str | None = None,
         *,
         depth: int = DEFAULT_DEPTH,
+        reliable: bool = False,
         wake: Wake,
     ) -> Mailbox:
         """Begin to receive `topic`, which must be published somewhere or be given a type.
 
         The time of a message is that of its arrival, by the computer's clock.
         """
-        if not 1 <= depth <= MOST_DEPTH:
-            raise GraphError(f"queue depth must be 1 to {MOST_DEPTH}, not {depth}")
+        check_depth(depth)
         found = msgtype or self._node.topic_type(topic)
         if found is None:
             raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
         self._codec.learn(found)
-        mailbox = Mailbox(topic, depth, wake)
+        mailbox = Mailbox(topic, depth, wake, reliable=reliable)
         with self._lock:
             self._check_open()
             receive = self._receiver(topic, found, mailbox)

@@ -29,8 +29,10 @@ from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.wire import Frame, FrameParser, Generation, number_field
 from volery.core.errors import BridgeError, GraphError
+from volery.graph.mailbox import Mailbox, Wake
+from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.reply import Reply
-from volery.graph.session import DEFAULT_DEPTH, Handler, Mailbox, SessionInfo, Wake
+from volery.graph.session import Handler, SessionInfo
 
 MOST_COMPLAINTS = 100
 _LIST_TIMEOUT_S = 5.0
@@ -153,6 +155,7 @@ class RosTcpClient:
         msgtype: str | None = None,
         *,
         depth: int = DEFAULT_DEPTH,
+        reliable: bool = False,
         wake: Wake,
     ) -> Mailbox:
         """Begin to receive `topic`; without a type the endpoint is asked for it.
@@ -164,7 +167,7 @@ class RosTcpClient:
             msgtype = self.topic_types().get(topic)
             if msgtype is None:
                 raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
-        return self._topics.subscribe(topic, msgtype, depth, wake)
+        return self._topics.subscribe(topic, msgtype, depth, reliable, wake)
 
     def unsubscribe(self, mailbox: Mailbox) -> None:
         """Receive no more; what waits can still be taken."""

@@ -10,10 +10,11 @@ from volery.bridges.ros_tcp.client_line import Line
 from volery.bridges.ros_tcp.wire import Frame
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.cdr import known
+from volery.graph.mailbox import Mailbox, MailboxInfo, Wake
 from volery.graph.messages import Published, stamp_of
+from volery.graph.qos import check_depth
 from volery.graph.reply import Reply
 from volery.graph.ros1_names import ros2_name
-from volery.graph.session import MOST_DEPTH, Mailbox, MailboxInfo, Wake
 
 QUEUE_SIZE = 100
 """Messages of a topic that the endpoint lets wait for whom it passes them on to."""
@@ -24,6 +25,7 @@ class _Subscription:
     msgtype: str
     mailboxes: list[Mailbox] = field(default_factory=list)
     depth: int = 1
+    reliable: bool = False
 
 
 class ClientTopics:
@@ -86,18 +88,20 @@ class ClientTopics:
 
     # ----------------------------------------------------------------------------- subscriptions
 
-    def subscribe(self, topic: str, msgtype: str, depth: int, wake: Wake) -> Mailbox:
+    def subscribe(
+        self, topic: str, msgtype: str, depth: int, reliable: bool, wake: Wake
+    ) -> Mailbox:
         """Begin to receive a topic. `GraphError` for an unknown type, or a second one."""
         known(msgtype)
-        if not 1 <= depth <= MOST_DEPTH:
-            raise GraphError(f"queue depth must be 1 to {MOST_DEPTH}, not {depth}")
-        mailbox = Mailbox(topic, depth, wake)
+        check_depth(depth)
+        mailbox = Mailbox(topic, depth, wake, reliable=reliable)
         with self._line.lock:
             found = self._subscriptions.setdefault(topic, _Subscription(msgtype))
             if found.msgtype != msgtype:
                 raise GraphError(f"topic '{topic}' carries {found.msgtype}, not {msgtype}")
             found.mailboxes.append(mailbox)
             found.depth = max(found.depth, depth)
+            found.reliable = found.reliable or reliable
             self._subscribe(topic, found)
         return mailbox
 
@@ -169,7 +173,7 @@ class ClientTopics:
     def _subscribe(self, topic: str, subscription: _Subscription) -> None:
         fields: dict[str, Any] = {"message_name": self._line.payloads.short(subscription.msgtype)}
         if ros_tcp.QUEUE_SIZE in self._line.features:
-            fields["queue_size"] = subscription.depth
+            fields["queue_size"] = 0 if subscription.reliable else subscription.depth
         self._line.command("subscribe", topic=topic, **fields)
 
     def _remove(self, what: str, topic: str) -> None:

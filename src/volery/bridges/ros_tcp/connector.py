@@ -20,7 +20,9 @@ from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.unity import Selection, UnitySession
 from volery.bridges.ros_tcp.wire import FrameParser
 from volery.core.errors import BridgeError
-from volery.graph.session import DEFAULT_DEPTH, Gateway, Wake
+from volery.graph.mailbox import Wake
+from volery.graph.qos import DEFAULT_DEPTH
+from volery.graph.session import Gateway
 
 _REFRESH_S = 0.5
 _NOTES = 100

@@ -22,7 +22,9 @@ from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.session import EndpointSession
 from volery.bridges.ros_tcp.wire import MOST_PAYLOAD_BYTES, FrameParser, Generation
 from volery.core.errors import BridgeError
-from volery.graph.session import DEFAULT_DEPTH, Gateway, Wake
+from volery.graph.mailbox import Wake
+from volery.graph.qos import DEFAULT_DEPTH
+from volery.graph.session import Gateway
 
 SILENCE_S = 15.0
 """Fifteen keepalives of Unity's Connector."""

@@ -16,7 +16,9 @@ from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.payloads import Payloads
 from volery.bridges.ros_tcp.wire import Bytes
 from volery.core.errors import GraphError
-from volery.graph.session import DEFAULT_DEPTH, Mailbox, Session, Wake
+from volery.graph.mailbox import Mailbox, Wake
+from volery.graph.qos import DEFAULT_DEPTH
+from volery.graph.session import Session
 
 _BATCH_BYTES = 64 << 10
 _BATCH_PARTS = 128
@@ -79,7 +81,13 @@ class Outbox:
         return self._command_bytes > _MOST_WAITING_BYTES
 
     def stream(
-        self, destination: str, topic: str, msgtype: str, depth: int = DEFAULT_DEPTH
+        self,
+        destination: str,
+        topic: str,
+        msgtype: str,
+        depth: int = DEFAULT_DEPTH,
+        *,
+        reliable: bool = False,
     ) -> None:
         """Send messages of `topic` as frames to `destination` from now on.
 
@@ -93,7 +101,7 @@ class Outbox:
             self._stir()
 
         self.payloads.learn(msgtype)
-        mailbox = self._session.subscribe(topic, msgtype, depth=depth, wake=stir)
+        mailbox = self._session.subscribe(topic, msgtype, depth=depth, reliable=reliable, wake=stir)
         self.end_stream(destination)
         stream.mailbox = mailbox
         self._streams[destination] = stream
@@ -125,6 +133,8 @@ class Outbox:
                 size += len(frame)
                 continue
             stream = self._next_stream()
+            if stream is None and self._commands:  # a topic that ended has been told of
+                continue
             if stream is None:
                 break
             size += self._add_message(stream, parts)
@@ -151,7 +161,12 @@ class Outbox:
         return None
 
     def _plan(self, stream: _Stream) -> None:
-        """Give a topic its turn."""
+        """Give a topic its turn, or end it where it has lost what it must not."""
+        if stream.mailbox is not None and stream.mailbox.failure is not None:
+            failure = stream.mailbox.failure
+            self.end_stream(stream.destination)
+            self._on_error(failure)
+            return
         number = stream.next_number
         if number is not None and not stream.queued:
             stream.queued = True

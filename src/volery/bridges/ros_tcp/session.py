@@ -23,8 +23,10 @@ from volery.bridges.ros_tcp.payloads import (
 )
 from volery.bridges.ros_tcp.wire import Frame, Generation, number_field, text_field
 from volery.core.errors import BridgeError, GraphError
+from volery.graph.mailbox import Wake
+from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.reply import Reply
-from volery.graph.session import DEFAULT_DEPTH, Gateway, Wake
+from volery.graph.session import Gateway
 
 MOST_DEPTH = 1000
 MOST_REGISTRATIONS = 10_000
@@ -132,7 +134,9 @@ class EndpointSession:
         name, msgtype = _name_in(fields), topic_type(text_field(fields, "message_name"))
         if self.outbox.streams >= MOST_REGISTRATIONS:
             raise BridgeError(f"over {MOST_REGISTRATIONS} topics")
-        self.outbox.stream(name, absolute(name), msgtype, _depth(fields, self._depth))
+        depth = _depth(fields, self._depth)
+        reliable = fields.get("queue_size") == 0
+        self.outbox.stream(name, absolute(name), msgtype, depth, reliable=reliable)
 
     def _remove_subscriber(self, fields: Fields) -> None:
         if not self.outbox.end_stream(text_field(fields, "topic")):
@@ -219,7 +223,7 @@ class EndpointSession:
 
 
 def _depth(fields: Fields, default: int) -> int:
-    """Messages that may wait, by the client's `queue_size`; in ROS a queue of 0 has no end."""
+    """Messages that may wait, by the client's `queue_size`; in ROS a queue of 0 loses nothing."""
     depth = number_field({"queue_size": default, **fields}, "queue_size")
     return min(max(depth, 1), MOST_DEPTH) if depth else MOST_DEPTH
 

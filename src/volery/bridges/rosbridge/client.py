@@ -26,8 +26,10 @@ from volery.bridges.rosbridge.client_state import ClientState
 from volery.bridges.rosbridge.forms import Generation
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES, Frame
 from volery.core.errors import BridgeError, GraphError
+from volery.graph.mailbox import Mailbox, Wake
+from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.reply import Reply
-from volery.graph.session import DEFAULT_DEPTH, Handler, Mailbox, SessionInfo, Wake
+from volery.graph.session import Handler, SessionInfo
 
 _FIRST_PAUSE_S = 0.1
 _LONGEST_PAUSE_S = 5.0
@@ -145,6 +147,7 @@ class RosbridgeClient:
         msgtype: str | None = None,
         *,
         depth: int = DEFAULT_DEPTH,
+        reliable: bool = False,
         wake: Wake,
     ) -> Mailbox:
         """Begin to receive `topic`; without a type the server is asked for it.
@@ -156,7 +159,7 @@ class RosbridgeClient:
             msgtype = self._ask_type("topic_type", {"topic": topic})
             if not msgtype:
                 raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
-        return self._state.subscribe(topic, msgtype, depth, wake)
+        return self._state.subscribe(topic, msgtype, depth, reliable, wake)
 
     def unsubscribe(self, mailbox: Mailbox) -> None:
         """Receive no more; what waits can still be taken."""

@@ -28,10 +28,12 @@ from volery.bridges.rosbridge.wire import (
 from volery.core.errors import GraphError, VoleryError
 from volery.graph.json_decoding import decode_plain
 from volery.graph.json_form import JsonForm
+from volery.graph.mailbox import Mailbox, Wake
 from volery.graph.messages import Published, stamp_of, typestore
+from volery.graph.qos import check_depth
 from volery.graph.reply import Reply
 from volery.graph.ros1_names import ros1_name, ros2_name
-from volery.graph.session import MOST_DEPTH, Handler, Mailbox, SessionInfo, Wake
+from volery.graph.session import Handler, SessionInfo
 
 MOST_WAITING = 1000
 """Publications that may wait for the network."""
@@ -44,6 +46,7 @@ class _Topic:
     msgtype: str
     mailboxes: list[Mailbox] = field(default_factory=list)
     depth: int = 1
+    reliable: bool = False
 
 
 @dataclass(frozen=True)
@@ -202,18 +205,20 @@ class ClientState:
                 self.dropped += 1
         self._wake()
 
-    def subscribe(self, topic: str, msgtype: str, depth: int, wake: Wake) -> Mailbox:
+    def subscribe(
+        self, topic: str, msgtype: str, depth: int, reliable: bool, wake: Wake
+    ) -> Mailbox:
         """Begin to receive a topic."""
         _check_type(msgtype)
-        if not 1 <= depth <= MOST_DEPTH:
-            raise GraphError(f"queue depth must be 1 to {MOST_DEPTH}, not {depth}")
-        mailbox = Mailbox(topic, depth, wake)
+        check_depth(depth)
+        mailbox = Mailbox(topic, depth, wake, reliable=reliable)
         with self._lock:
             found = self._topics.setdefault(topic, _Topic(msgtype))
             if found.msgtype != msgtype:
                 raise GraphError(f"topic '{topic}' carries {found.msgtype}, not {msgtype}")
             found.mailboxes.append(mailbox)
             found.depth = max(found.depth, depth)
+            found.reliable = found.reliable or reliable
             self._order(self._subscription(topic, found))
         return mailbox
 
@@ -303,13 +308,16 @@ class ClientState:
         return {"op": "advertise_service", "service": service, "type": self._spelled(srvtype)}
 
     def _subscription(self, name: str, topic: _Topic) -> Operation:
-        return {
+        operation: Operation = {
             "op": "subscribe",
             "topic": name,
             "type": self._spelled(topic.msgtype),
             "queue_length": topic.depth,
             "compression": "cbor",
         }
+        if topic.reliable:
+            operation["qos"] = {"reliability": "reliable"}
+        return operation
 
     # ------------------------------------------------------------------------------------- input
 

@@ -7,6 +7,13 @@ from typing import Any
 
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError
+from volery.graph.qos import (
+    DEFAULT_DEPTH,
+    MOST_DEPTH,
+    DurabilityPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
 
 Id = str | int | float | None
 """What a client may name an operation by; it is echoed as it came."""
@@ -64,6 +71,27 @@ def read_choice(operation: Operation, key: str, choices: tuple[str, ...]) -> str
     if value not in choices:
         raise BridgeError(f"{operation['op']}: '{key}' must be one of {', '.join(choices)}")
     return str(value)
+
+
+def read_qos(operation: Operation) -> QoSProfile | None:
+    """Quality of service as newer rosbridges take it, or None. `BridgeError` for what cannot be.
+
+    Of `{"depth", "reliability", "durability", "history", "lifespan"}` the first three count here.
+    """
+    given = operation.get("qos")
+    if given is None:
+        return None
+    if not isinstance(given, dict):
+        raise BridgeError(f"{operation['op']}: 'qos' must be an object")
+    chosen = {key: value for key, value in given.items() if value != "system_default"}
+    fields: Operation = {**chosen, "op": f"{operation['op']}: qos"}
+    reliability = read_choice(fields, "reliability", tuple(ReliabilityPolicy))
+    durability = read_choice(fields, "durability", tuple(DurabilityPolicy))
+    return QoSProfile(
+        int(read_number(fields, "depth", DEFAULT_DEPTH, 1, MOST_DEPTH)),
+        ReliabilityPolicy(reliability),
+        DurabilityPolicy(durability),
+    )
 
 
 def absolute(name: str) -> str:

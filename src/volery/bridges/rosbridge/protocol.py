@@ -102,7 +102,7 @@ class RosbridgePeer:
         self._numbers = itertools.count()
         self._closed = False
         self._now_s = 0.0
-        self._topics = Topics(session, wake, shared.now_ns)
+        self._topics = Topics(session, wake, shared.now_ns, self._complain)
         guarded = self._poster(post)
         self._services = Services(session, shared.forms, self.send, guarded)
         self._actions = Actions(session.graph, shared.forms, self.send, guarded)
@@ -233,6 +233,7 @@ class RosbridgePeer:
             else:
                 yield frame
             yield from self._answers()
+        yield from self._answers()  # topics that ended have been told of
 
     def due_s(self, now_s: float) -> float | None:
         """When to call `frames` again though nobody woke; None: not before `wake`."""
@@ -256,6 +257,9 @@ class RosbridgePeer:
             return iter((text,))
         least = -(-len(text) // MOST_FRAGMENTS)
         return split(text, max(size, least), f"fragments:{next(self._numbers)}")
+
+    def _complain(self, text: str) -> None:
+        self._status("error", text, {})
 
     def _status(self, level: str, text: str, operation: Operation) -> None:
         if _LOUDNESS[level] > _LOUDNESS[self._level]:

@@ -14,6 +14,7 @@ from volery.bridges.rosbridge.fields import (
     read_id,
     read_number,
     read_optional_text,
+    read_qos,
     read_text,
 )
 from volery.bridges.rosbridge.forms import COMPRESSIONS
@@ -21,9 +22,11 @@ from volery.bridges.rosbridge.wire import Operation
 from volery.core.clock import stamp_from_ns
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.json_decoding import decode_plain
+from volery.graph.mailbox import Mailbox
 from volery.graph.messages import Published, typestore
+from volery.graph.qos import DEFAULT_DEPTH, MOST_DEPTH
 from volery.graph.ros1_names import ros2_name
-from volery.graph.session import DEFAULT_DEPTH, MOST_DEPTH, Mailbox, Session
+from volery.graph.session import Session
 
 MOST_STREAMS = 10_000
 """Topics that a client may subscribe to, and publish on."""
@@ -44,6 +47,8 @@ class Wishes:
     fragment_size: int | None = None
     """Characters a fragment."""
     compression: str = "none"
+    reliable: bool = False
+    """Whether no message may be lost."""
 
     @property
     def depth(self) -> int:
@@ -56,11 +61,14 @@ class Wishes:
 def read_wishes(operation: Operation) -> Wishes:
     """Wishes of a `subscribe` operation. `BridgeError` for values that cannot be."""
     size = read_number(operation, "fragment_size", 0, 0, 1e9)
+    qos = read_qos(operation)
+    length = int(read_number(operation, "queue_length", 0, 0, MOST_DEPTH))
     return Wishes(
         read_number(operation, "throttle_rate", 0, 0, 1e9) / 1000.0,
-        int(read_number(operation, "queue_length", 0, 0, MOST_DEPTH)),
+        length or (0 if qos is None else qos.depth),
         int(size) or None,
         read_choice(operation, "compression", COMPRESSIONS),
+        qos is not None and qos.reliable,
     )
 
 
@@ -72,6 +80,7 @@ def combine(wishes: list[Wishes]) -> Wishes:
         max(w.queue_length for w in wishes),
         min(sizes) if sizes else None,
         max((w.compression for w in wishes), key=COMPRESSIONS.index),
+        any(w.reliable for w in wishes),
     )
 
 
@@ -85,7 +94,7 @@ class Stream:
         self.requests: dict[Id, Wishes] = {}
         self.wishes = Wishes()
         self.mailbox: Mailbox | None = None
-        self._depth = 0
+        self._tuned = (0, False)
         self._left: deque[Published] = deque()
         """What waited in a mailbox that another one has replaced."""
         self._next_s = float("-inf")
@@ -96,12 +105,12 @@ class Stream:
         anew: somebody joined, who shall get what is latched though it was sent before.
         """
         self.wishes = combine(list(self.requests.values()))
-        depth = self.wishes.depth
+        depth, reliable = tuned = self.wishes.depth, self.wishes.reliable
         latched = anew and self.mailbox is not None and bool(_latched(session, self.name))
-        if depth == self._depth and not latched:
+        if tuned == self._tuned and not latched:
             return
         topic = absolute(self.name)
-        mailbox = session.subscribe(topic, self.msgtype, depth=depth, wake=wake)
+        mailbox = session.subscribe(topic, self.msgtype, depth=depth, reliable=reliable, wake=wake)
         waiting: list[Published] = []
         if self.mailbox is not None:
             session.unsubscribe(self.mailbox)
@@ -109,8 +118,8 @@ class Stream:
         # both mailboxes were open for a moment: what came meanwhile lies in both
         seen = {id(published) for published in (*self._left, *waiting)}
         new = [published for published in mailbox.take() if id(published) not in seen]
-        self._left = deque((*self._left, *waiting, *new), maxlen=depth)
-        self.mailbox, self._depth = mailbox, depth
+        self._left = deque((*self._left, *waiting, *new), maxlen=None if reliable else depth)
+        self.mailbox, self._tuned = mailbox, tuned
 
     def take(self, now_s: float) -> Published | None:
         """The next message, if there is one and its time has come."""
@@ -126,6 +135,11 @@ class Stream:
         if self.wishes.throttle_s:
             self._next_s = now_s + self.wishes.throttle_s
         return found
+
+    @property
+    def failure(self) -> str | None:
+        """Why nothing comes any more, if so."""
+        return None if self.mailbox is None else self.mailbox.failure
 
     def due_s(self, now_s: float) -> float | None:
         """When to look again; None until the mailbox wakes."""
@@ -143,9 +157,14 @@ class Topics:
     """The topics of one client."""
 
     def __init__(
-        self, session: Session, wake: Callable[[], None], now_ns: Callable[[], int]
+        self,
+        session: Session,
+        wake: Callable[[], None],
+        now_ns: Callable[[], int],
+        complain: Callable[[str], None],
     ) -> None:
         self._session = session
+        self._complain = complain
         self._wake = wake
         self._now_ns = now_ns
         self._streams: dict[str, Stream] = {}
@@ -161,7 +180,9 @@ class Topics:
         msgtype = ros2_name(read_text(operation, "type"))
         if topic not in self._published and len(self._published) >= MOST_STREAMS:
             raise BridgeError(f"advertise: more than {MOST_STREAMS} topics")
-        self._session.advertise(topic, msgtype, latched=operation.get("latch") is True)
+        qos = read_qos(operation)
+        latched = operation.get("latch") is True or (qos is not None and qos.latched)
+        self._session.advertise(topic, msgtype, latched=latched)
         self._published[topic] = msgtype
 
     def unadvertise(self, operation: Operation) -> None:
@@ -234,7 +255,12 @@ class Topics:
         if stream.requests:
             self._tune(stream, anew=False)
             return
-        del self._streams[name]
+        self._end(stream)
+
+    def _end(self, stream: Stream) -> None:
+        """Send a topic no more."""
+        stream.requests.clear()
+        self._streams.pop(stream.name, None)
         if stream.mailbox is not None:
             self._session.unsubscribe(stream.mailbox)
 
@@ -252,6 +278,9 @@ class Topics:
                 if published is not None:
                     yield stream, published
                     still.append(stream)
+                elif stream.failure is not None:
+                    self._end(stream)
+                    self._complain(stream.failure)
                 elif stream.due_s(now_s) is not None:
                     self._held.append(stream)
             busy = still

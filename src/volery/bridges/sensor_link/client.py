@@ -27,7 +27,8 @@ from volery.bridges.sensor_link.payloads import (
 from volery.bridges.sensor_link.server import IMAGE_PORT, PORT
 from volery.bridges.sensor_link.wire import Frame, FrameParser, Kind, encode_frame
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.session import Gateway, Mailbox, Session
+from volery.graph.mailbox import Mailbox
+from volery.graph.session import Gateway, Session
 
 _READ_BYTES = 256 << 10
 _DEPTH = 20

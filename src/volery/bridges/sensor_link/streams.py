@@ -20,8 +20,9 @@ from volery.bridges.sensor_link.wire import (
 )
 from volery.core.clock import NS_PER_S
 from volery.core.errors import BridgeError, GraphError
+from volery.graph.mailbox import Mailbox
 from volery.graph.messages import Published
-from volery.graph.session import Gateway, Mailbox, Session
+from volery.graph.session import Gateway, Session
 
 SENSORS = (Kind.LASER_SCAN, Kind.POSE, Kind.IMU, Kind.SONAR)
 IMAGES = (Kind.IMAGE,)

@@ -1,0 +1,127 @@
+"""Where messages of one topic wait for one client of another thread."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from volery.graph.messages import Published
+from volery.graph.qos import MOST_DEPTH
+
+Wake = Callable[[], None]
+"""Tells a door's thread, from the simulation's, that there is something to take; must not block."""
+
+MOST_RELIABLE_BYTES = 256 * 1024 * 1024
+"""What may wait for a reliable subscriber, in arrays; beyond, its subscription ends."""
+
+_arrivals = itertools.count()
+
+
+@dataclass(frozen=True)
+class MailboxInfo:
+    """How a subscription of an outside client fares."""
+
+    topic: str
+    received: int
+    dropped: int
+    waiting: int
+
+
+class Mailbox:
+    """Messages of one topic that await one client.
+
+    With best effort the newest `depth` of them. A `reliable` one loses none, up to MOST_DEPTH
+    messages or MOST_RELIABLE_BYTES: a client that is farther behind will never catch up, so the
+    mailbox then empties, takes no more and says in `failure` why.
+    """
+
+    def __init__(self, topic: str, depth: int, wake: Wake, *, reliable: bool = False) -> None:
+        self.topic = topic
+        self.failure: str | None = None
+        """Why nothing comes any more; None while all is well."""
+        self._waiting: deque[tuple[int, Published]] = deque()
+        self._depth = depth
+        self._reliable = reliable
+        self._bytes = 0
+        self._wake = wake
+        self._lock = threading.Lock()
+        self._received = 0
+        self._dropped = 0
+
+    def put(self, published: Published) -> None:
+        """Add a message; where there is no room the oldest one goes, or all if reliable."""
+        with self._lock:
+            if self.failure is not None:
+                return
+            self._received += 1
+            was_empty = not self._waiting
+            if self._reliable:
+                self._bytes += array_bytes(published.message)
+                if len(self._waiting) >= MOST_DEPTH or self._bytes > MOST_RELIABLE_BYTES:
+                    self._give_up()
+            elif len(self._waiting) >= self._depth:
+                self._waiting.popleft()
+                self._dropped += 1
+            if self.failure is None:
+                self._waiting.append((next(_arrivals), published))
+        if was_empty or self.failure is not None:
+            self._wake()
+
+    def _give_up(self) -> None:
+        size = self._bytes / 2**20
+        self.failure = (
+            f"reliable subscription of '{self.topic}' ended: {len(self._waiting)} messages "
+            f"({size:.0f} MB) waited for a client that is too slow"
+        )
+        self._dropped += len(self._waiting) + 1
+        self._waiting.clear()
+        self._bytes = 0
+
+    def take(self, most: int | None = None) -> list[Published]:
+        """Remove and return what waits, oldest first, at most `most` messages."""
+        return [published for _, published in self.take_numbered(most)]
+
+    def take_numbered(self, most: int | None = None) -> list[tuple[int, Published]]:
+        """Like `take`, with numbers that tell the order of arrival among all mailboxes."""
+        with self._lock:
+            count = len(self._waiting) if most is None else min(most, len(self._waiting))
+            taken = [self._waiting.popleft() for _ in range(count)]
+            if self._reliable:
+                self._bytes -= sum(array_bytes(published.message) for _, published in taken)
+            return taken
+
+    @property
+    def next_number(self) -> int | None:
+        """Number, as of `take_numbered`, of the message to be taken next; None if none waits."""
+        with self._lock:
+            return self._waiting[0][0] if self._waiting else None
+
+    @property
+    def info(self) -> MailboxInfo:
+        """Counts so far."""
+        with self._lock:
+            return MailboxInfo(self.topic, self._received, self._dropped, len(self._waiting))
+
+
+def array_bytes(message: Any) -> int:
+    """Bytes of the arrays and texts that a message holds at its first two levels.
+
+    What makes messages large lies there; the rest is small beside the limit.
+    """
+    size = 0
+    for field in fields(message):
+        value = getattr(message, field.name)
+        if isinstance(value, np.ndarray):
+            size += value.nbytes
+        elif isinstance(value, str | bytes | list) and not field.name.startswith("__"):
+            size += len(value)
+        elif is_dataclass(value):
+            inner = vars(value).values()
+            size += sum(array.nbytes for array in inner if isinstance(array, np.ndarray))
+    return size
