@@ -30,7 +30,7 @@ VOLERY = [sys.executable, "-m", "volery.cli"]
 class Run:
     """A simulation in a process of its own, its doors on free ports."""
 
-    def __init__(self, *doors, scenario="hover", seconds=120, port=0):
+    def __init__(self, *doors, scenario="hover", seconds=1200, port=0):
         words = [word for door in doors for word in ("--door", f"{door}={port}")]
         self.process = subprocess.Popen(
             [*VOLERY, "run", scenario, "--seconds", str(seconds), *words],
@@ -254,6 +254,10 @@ def test_a_port_in_use_is_told(run):
     assert "Traceback" not in done.stderr
 
 
+PLAYING, QUITTING, NO_WORLD = 1, 3, 4
+UNLOADING = 43
+
+
 def free_port():
     with socket.create_server(("127.0.0.1", 0)) as server:
         return server.getsockname()[1]
@@ -289,6 +293,46 @@ def test_a_client_loads_another_world():
                 name = answer(client, "/get_current_world").world.name
         unknown = answer(client, "/load_world", world_resource=world("atlantis"))
         assert unknown.result.result == 2
+    finally:
+        client.close()
+        run.close()
+
+
+def test_a_client_unloads_the_world_and_loads_one_again():
+    """In between the doors are open, the state is NO_WORLD, and little can be asked."""
+    run = Run("rosbridge", seconds=600, port=free_port())
+    client = RosbridgeClient(f"ws://127.0.0.1:{run.ports[0]}")
+
+    def come_back(state):
+        until = time.monotonic() + 60.0
+        while True:
+            assert run.process.poll() is None
+            assert time.monotonic() < until
+            with suppress(GraphError):
+                if answer(client, "/get_simulation_state").state.state == state:
+                    return
+
+    try:
+        assert answer(client, "/unload_world").result.result == 1
+        come_back(NO_WORLD)
+        assert answer(client, "/get_current_world").result.result == 101
+        assert answer(client, "/unload_world").result.result == 101
+        assert len(answer(client, "/get_available_worlds").worlds) > 3
+        assert UNLOADING in answer(client, "/get_simulator_features").features.features
+        assert answer(client, "/load_world", world_resource=world("atlantis")).result.result == 2
+        with pytest.raises(GraphError, match="nobody offers"):
+            answer(client, "/get_entities")
+        assert answer(client, "/load_world", world_resource=world("hover")).result.result == 1
+        come_back(PLAYING)
+        assert answer(client, "/get_current_world").world.name == "hover"
+        assert answer(client, "/unload_world").result.result == 1
+        come_back(NO_WORLD)
+        quit_it = zero_message("simulation_interfaces/msg/SimulationState")
+        quit_it.state = PLAYING
+        assert answer(client, "/set_simulation_state", state=quit_it).result.result == 103
+        quit_it.state = QUITTING
+        assert answer(client, "/set_simulation_state", state=quit_it).result.result == 1
+        assert run.process.wait(20.0) == 0
     finally:
         client.close()
         run.close()

@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 __all__ = ["RunOptions", "fly", "parse_speed"]
 
 _THREADS = 2
+_GLANCE_S = 0.2
+"""How often a run without a world looks for Ctrl-C."""
+_FAREWELL_S = 0.1
+"""Time for the last answer to reach its client."""
 
 
 def parse_speed(text: str) -> float | None:
@@ -42,10 +46,13 @@ def fly(options: RunOptions) -> int:
     """Fly a scenario as the options say, then those that clients load; return the exit code."""
     with Interrupts() as interrupts:
         try:
-            code, wanted = _build_and_fly(options, interrupts)
-            while wanted is not None:
-                options = replace(options, scenario=wanted)
-                code, wanted = _build_and_fly(options, interrupts)
+            code, change = _build_and_fly(options, interrupts)
+            while change.asked and not code:
+                if change.wanted is None:
+                    code, change = _wait_for_world(options, interrupts)
+                else:
+                    options = replace(options, scenario=change.wanted)
+                    code, change = _build_and_fly(options, interrupts)
         except KeyboardInterrupt:
             if interrupts.gentle:
                 raise
@@ -54,8 +61,8 @@ def fly(options: RunOptions) -> int:
         return code
 
 
-def _build_and_fly(options: RunOptions, interrupts: Interrupts) -> tuple[int, str | None]:
-    """Exit code, and the scenario that a client wants instead."""
+def _build_and_fly(options: RunOptions, interrupts: Interrupts) -> tuple[int, _Change]:
+    """Exit code, and what a client wants instead."""
     from volery import Simulation
 
     scenario = _scenario_of(options)
@@ -76,7 +83,21 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts) -> tuple[int, st
                 code = Flight(simulation, options, progress, interrupts).fly()
         finally:
             simulation.close()
-    return code, None if code else change.wanted
+    return code, change
+
+
+def _wait_for_world(options: RunOptions, interrupts: Interrupts) -> tuple[int, _Change]:
+    """Keep the doors open with no world behind them; exit code, and what a client wants then."""
+    from volery.runtime.lobby import Lobby
+
+    change = _Change(options)
+    lobby = Lobby(change.ask)
+    typer.echo("no world is loaded; /load_world brings one, Ctrl-C ends", err=True)
+    with open_doors(lobby, options):
+        while not (change.asked or lobby.quitting or interrupts.pressed):
+            lobby.wait(_GLANCE_S)
+        lobby.wait(_FAREWELL_S)
+    return INTERRUPTED if interrupts.pressed else 0, change
 
 
 def _scenario_of(options: RunOptions) -> Scenario:
@@ -96,10 +117,12 @@ class _Change:
 
     def __init__(self, options: RunOptions) -> None:
         self._options = options
+        self.asked = False
         self.wanted: str | None = None
+        """Name of the scenario; None: no world at all."""
         self.quit: Callable[[], None] = _nothing
 
-    def ask(self, name: str) -> None:
+    def ask(self, name: str | None) -> None:
         """End the present flight for another one; `CommandError` where it must not end."""
         options = self._options
         for flag, given in (("--record", options.record), ("--report", options.report)):
@@ -107,8 +130,9 @@ class _Change:
                 raise CommandError(f"this run writes a file of one flight ({flag})")
         if options.digest:
             raise CommandError("this run prints the digest of one flight (--digest)")
-        _scenario_of(replace(options, scenario=name))
-        self.wanted = name
+        if name is not None:
+            _scenario_of(replace(options, scenario=name))
+        self.asked, self.wanted = True, name
         self.quit()
 
 

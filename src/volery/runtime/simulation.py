@@ -59,9 +59,9 @@ class Simulation:
 
     `threads` share the ray casting; results do not depend on their number. `recordings` is the
     folder in which clients of the graph may record, None: nowhere. `on_load` is called, in the
-    simulation's thread, with the name of a scenario that a client wants instead of this one; None:
-    that is refused. Use it as a context manager, or call `close` at the end. Raises `ScenarioError`
-    where the scenario cannot be built.
+    simulation's thread, with the name of a scenario that a client wants instead of this one, or
+    with None where it wants none; without `on_load` both are refused. Use it as a context manager,
+    or call `close` at the end. Raises `ScenarioError` where the scenario cannot be built.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Simulation:
         *,
         threads: int = 2,
         recordings: Path | None = None,
-        on_load: Callable[[str], None] | None = None,
+        on_load: Callable[[str | None], None] | None = None,
     ) -> None:
         if threads < 1:
             raise ScenarioError(f"threads must be at least 1 (found {threads})")

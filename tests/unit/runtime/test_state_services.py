@@ -32,7 +32,7 @@ def test_features_name_what_works_alone(simulate, flat_data):
     plain = features()
     assert {0, 1, 10, 11, 20, 23, 24, 25, 26, 31, 32, 33, 45, 50} <= plain
     assert not plain & {7, 9, 13, 40, 41, 43}
-    assert features(on_load=print) - plain == {40}
+    assert features(on_load=print) - plain == {40, 43}
 
 
 def test_playing_pausing_stopping(simulate, flat_data):
@@ -215,12 +215,13 @@ def test_worlds_are_the_scenarios_of_the_library(simulate, flat_data):
     current = ask(simulation, "/get_current_world").world
     assert current.name == "flat"
     assert current.world_resource.uri == ""
-    assert code_of(ask(simulation, "/unload_world")) == UNSUPPORTED
 
 
 def test_loading_is_the_owners_business(simulate, flat_data):
     wanted = {"world_resource": {"uri": "hover"}}
-    assert code_of(ask(simulate(flat_data), "/load_world", **wanted)) == UNSUPPORTED
+    alone = simulate(flat_data)
+    assert code_of(ask(alone, "/load_world", **wanted)) == UNSUPPORTED
+    assert code_of(ask(alone, "/unload_world")) == UNSUPPORTED
     loaded = []
     simulation = simulate(flat_data, on_load=loaded.append)
     response = ask(simulation, "/load_world", **wanted)
@@ -234,6 +235,8 @@ def test_loading_is_the_owners_business(simulate, flat_data):
     ):
         assert code_of(ask(simulation, "/load_world", world_resource=source)) == code
     assert len(loaded) == 1
+    assert code_of(ask(simulation, "/unload_world")) == OK
+    assert loaded[1] is None
 
     def refuse(name):
         raise CommandError(f"no memory for {name}")

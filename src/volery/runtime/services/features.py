@@ -40,12 +40,13 @@ class Feature(IntEnum):
     STEP_SIMULATION_ACTION = 33
     WORLD_LOADING = 40
     WORLD_TAGS = 42
+    WORLD_UNLOADING = 43
     WORLD_INFO_GETTING = 44
     AVAILABLE_WORLDS = 45
     SPAWNING_ENTITIES = 50
 
 
-_ON_CONDITION = {Feature.WORLD_LOADING}
+_ON_CONDITION = {Feature.WORLD_LOADING, Feature.WORLD_UNLOADING}
 
 
 def offer_features(graph: Graph, *, loads_worlds: bool) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +14,7 @@ from volery.runtime.services.playing import Playing
 from volery.runtime.services.recording import Recording
 from volery.runtime.services.spawning import Spawning
 from volery.runtime.services.stepping import offer_steps
-from volery.runtime.services.worlds import offer_worlds
+from volery.runtime.services.worlds import OnLoad, offer_worlds
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
@@ -36,7 +35,7 @@ def open_services(
     simulation: Simulation,
     *,
     recordings: Path | None = None,
-    on_load: Callable[[str], None] | None = None,
+    on_load: OnLoad | None = None,
 ) -> Services:
     """Offer the standard's services and ours; what the arguments mean, `Simulation` says."""
     graph = simulation.graph
@@ -45,7 +44,7 @@ def open_services(
     Spawning(simulation).offer()
     Playing(simulation).offer()
     offer_steps(simulation)
-    offer_worlds(simulation, on_load)
+    offer_worlds(graph, simulation.scenario, on_load)
     offer_named_poses(graph, simulation.starts)
     offer_air_and_faults(simulation)
     KeptStates(simulation).offer()

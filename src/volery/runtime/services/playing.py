@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _SRV = "simulation_interfaces/srv"
 _ALREADY_THERE = 101
 _TRANSITION_FAILED = 102
-_WRONG_TRANSITION = 103
+WRONG_TRANSITION = 103
 _TIME, _STATE, _SPAWNED, _ALL = 1, 2, 4, 255
 
 
@@ -65,20 +65,20 @@ class Playing:
         if wanted == state:
             raise RefusedError(_ALREADY_THERE, f"the simulation is {state.name} already")
         if state is State.QUITTING:
-            raise RefusedError(_WRONG_TRANSITION, "the simulation quits")
+            raise RefusedError(WRONG_TRANSITION, "the simulation quits")
         if wanted == State.PLAYING:
             self._stopped = False
             self._simulation.resume()
         elif wanted == State.PAUSED:
             if state is State.STOPPED:
-                raise RefusedError(_WRONG_TRANSITION, "it is stopped; play it, then pause it")
+                raise RefusedError(WRONG_TRANSITION, "it is stopped; play it, then pause it")
             self._simulation.pause()
         elif wanted == State.STOPPED:
             self._stop()
         elif wanted == State.QUITTING:
             self._simulation.quit()
         else:
-            raise RefusedError(_WRONG_TRANSITION, f"state {wanted} cannot be asked for")
+            raise RefusedError(WRONG_TRANSITION, f"state {wanted} cannot be asked for")
 
     def _stop(self) -> None:
         try:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from volery.core.errors import ScenarioError, VoleryError
+from volery.graph.graph import Graph
 from volery.runtime.services.filters import tag_filter
 from volery.runtime.services.offering import Code, Fields, RefusedError, filled, offer_result
 from volery.runtime.services.spawning import resource
@@ -14,19 +15,21 @@ from volery.scenario import library
 from volery.scenario.load import load_scenario
 from volery.scenario.schema import Scenario
 
-if TYPE_CHECKING:
-    from volery.runtime.simulation import Simulation
-
 _SRV = "simulation_interfaces/srv"
 _UNSUPPORTED_FORMAT = 101
 _NO_RESOURCE = 102
 _PARSE_ERROR = 103
+_NO_WORLD = 101
+
+OnLoad = Callable[[str | None], None]
+"""Has another scenario of the library flown instead of the present one, or, for None, no one."""
 
 
-def offer_worlds(simulation: Simulation, on_load: Callable[[str], None] | None) -> None:
-    """Offer what is known of worlds, and loading another one where `on_load` does that.
+def offer_worlds(graph: Graph, loaded: Scenario | None, on_load: OnLoad | None) -> None:
+    """Offer what is known of worlds, and loading and unloading them where `on_load` does that.
 
-    `on_load(name)` is the owner's business: the process builds another simulation.
+    That is the owner's business: the process builds another simulation, or none. `loaded`: the
+    present scenario.
     """
 
     def available(request: Any) -> Fields:
@@ -38,24 +41,29 @@ def offer_worlds(simulation: Simulation, on_load: Callable[[str], None] | None) 
         return {"worlds": [_world(s) for s in worlds if passes(tags_of(s))]}
 
     def current(_request: Any) -> Fields:
-        return {"world": _world(simulation.scenario)}
+        if loaded is None:
+            raise RefusedError(_NO_WORLD, "no world is loaded")
+        return {"world": _world(loaded)}
 
     def load(request: Any) -> Fields:
+        scenario = _wanted(request.world_resource) if on_load is not None else None
+        change(scenario)
+        return {"world": _world(scenario)} if scenario is not None else {}
+
+    def unload(_request: Any) -> None:
+        if loaded is None:
+            raise RefusedError(_NO_WORLD, "no world is loaded")
+        change(None)
+
+    def change(scenario: Scenario | None) -> None:
         if on_load is None:
             reason = "this process simulates one scenario; start another one for another world"
             raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
-        scenario = _wanted(request.world_resource)
         try:
-            on_load(scenario.name)
+            on_load(None if scenario is None else scenario.name)
         except VoleryError as error:
             raise RefusedError(Code.OPERATION_FAILED, str(error)) from None
-        return {"world": _world(scenario)}
 
-    def unload(_request: Any) -> Fields:
-        reason = "a simulation always has its world; load another one, or quit"
-        raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
-
-    graph = simulation.graph
     offer_result(graph, "/get_available_worlds", f"{_SRV}/GetAvailableWorlds", available)
     offer_result(graph, "/get_current_world", f"{_SRV}/GetCurrentWorld", current)
     offer_result(graph, "/load_world", f"{_SRV}/LoadWorld", load)
