@@ -7,6 +7,7 @@ A case is written once, in terms of `Bench` and `Client`. What a door's protocol
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import queue
 import socket
 import struct
@@ -27,6 +28,7 @@ TRIGGER = "std_srvs/srv/Trigger"
 LIMIT_BYTES = 12 << 20
 """Of one message, where a door can be told."""
 PATIENCE_S = 10.0
+_TCP_REPAIR = 19
 
 Triggered = message_type(f"{TRIGGER}_Response")
 
@@ -100,6 +102,10 @@ class Client:
 
     def reset(self):
         """Die: the connection ends without farewell (RST)."""
+        raise NotImplementedError
+
+    def sockets(self):
+        """Its connections."""
         raise NotImplementedError
 
     def close(self):
@@ -240,6 +246,19 @@ def taken_port():
     listener.bind(("127.0.0.1", 0))
     listener.listen(1)
     return listener, listener.getsockname()[1]
+
+
+def vanish(sock):
+    """End a connection so that the other end hears nothing: no FIN, no RST, as a pulled plug does.
+
+    Skips the test where the system does not allow it.
+    """
+    try:
+        sock.setsockopt(socket.IPPROTO_TCP, _TCP_REPAIR, 1)
+    except OSError as error:
+        pytest.skip(f"sockets cannot vanish here: {error}")
+    nowhere = (ctypes.c_char * 16)()  # a sockaddr of AF_UNSPEC: disconnect
+    assert ctypes.CDLL(None).connect(sock.fileno(), nowhere, 16) == 0
 
 
 def reset(sock, reader=None):

@@ -114,6 +114,9 @@ class RosTcpPartner(Client):
     def send_too_much(self):
         self.sock.sendall(struct.pack("<I", 3) + b"/in" + struct.pack("<I", 100 << 20))
 
+    def sockets(self):
+        return [self.sock]
+
     def reset(self):
         reset(self.sock, self._reader)
 

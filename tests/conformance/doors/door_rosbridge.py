@@ -88,6 +88,9 @@ class RosbridgePartner(Client):
     def send_half_a_frame(self):
         self.websocket.socket.sendall(b"\x81\xfe\x40\x00half")
 
+    def sockets(self):
+        return [self.websocket.socket]
+
     def reset(self):
         reset(self.websocket.socket)
 

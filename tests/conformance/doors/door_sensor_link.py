@@ -83,6 +83,9 @@ class LinkClient(Client):
         head = _HEAD.pack(1, _POSE_COMMAND, 1, 1 << 19, 0, 5)
         self.sock.sendall(SYNC + head + crc(head))
 
+    def sockets(self):
+        return [self.sock, self.images]
+
     def reset(self):
         for sock in (self.images, self.sock):
             reset(sock, self._readers.get(sock))

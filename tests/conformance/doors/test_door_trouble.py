@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from door_bench import IMAGE, STRING, Refused, taken_port
+from door_bench import IMAGE, STRING, Refused, taken_port, vanish
 from ros_tcp_client import until
 
 from volery.core.errors import VoleryError
@@ -26,6 +26,7 @@ _numbers = itertools.count(100)
 NOT_UTF8 = b"\xff\xfe\x80"
 STEP = 500_000
 STEPS = 200
+QUICK_PROBES = {"TCP_KEEPIDLE": 1, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 3}
 MOST_GROWTH = 60e6
 """Of a hundred megabytes published while somebody does not read."""
 
@@ -83,6 +84,41 @@ def test_a_client_comes_back_after_its_sudden_death(bench, client):
     again.subscribe(bench.topic_out)
     again.settle()
     served.check()
+
+
+def test_who_speaks_no_more_counts_as_gone(bench, others):
+    """A client that closes its half of the connection has left, whatever it would still read."""
+    bench.needs("leaving", "others")
+    others.check()
+    before = bench.ours.counts()
+    client = bench.connect()
+    client.advertise(bench.topic_in)
+    client.subscribe(bench.topic_out)
+    client.settle()
+    for sock in client.sockets():
+        sock.shutdown(socket.SHUT_WR)
+    until(lambda: bench.ours.counts() == before)
+    others.check()
+
+
+@pytest.mark.parametrize("talking", [True, False])
+def test_who_vanished_without_a_word_is_missed(bench, others, monkeypatch, talking):
+    """Neither FIN nor RST came: found out by what is sent to it, or by asking whether it lives."""
+    bench.needs("leaving", "others")
+    monkeypatch.setattr("volery.bridges.sockets.PROBES", QUICK_PROBES)
+    others.check()
+    before = bench.ours.counts()
+    client = bench.connect()
+    client.advertise(bench.topic_in)
+    client.subscribe(bench.topic_out)
+    client.settle()
+    for sock in client.sockets():
+        vanish(sock)
+    assert bench.ours.counts() != before
+    if talking:
+        others.check()
+    until(lambda: bench.ours.counts() == before)
+    others.check()
 
 
 def test_half_a_frame_and_silence_harm_nobody(bench, client, others):

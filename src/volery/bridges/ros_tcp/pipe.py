@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from volery.bridges.ros_tcp.wire import Bytes, Frame, FrameParser
+from volery.bridges.sockets import tend
 from volery.core.errors import BridgeError
 
 _BATCHES_A_TURN = 16
@@ -22,8 +23,6 @@ _FRAMES_A_TURN = 32
 _BITE_BYTES = 2048
 _LARGEST_BITE_BYTES = 16 << 20
 _FAREWELL_S = 1.0
-_PROBES = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
-"""The kernel asks a peer who is silent for 5 s, every 5 s, at most 3 times, whether it lives."""
 
 
 class Outgoing(Protocol):
@@ -69,11 +68,7 @@ class Pipe:
         self.last_received_s = self.last_sent_s = self._loop.time()
         """Instants of the loop's clock."""
         sock.setblocking(False)
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        for option, value in _PROBES.items():
-            if hasattr(socket, option):
-                sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+        tend(sock)
         self._loop.add_reader(sock, self._readable)
 
     def flush(self) -> None:

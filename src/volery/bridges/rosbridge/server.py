@@ -24,6 +24,7 @@ from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared, shows_token
 from volery.bridges.rosbridge.rosapi import RosApi
 from volery.bridges.rosbridge.rosapi_parameters import Parameters
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES
+from volery.bridges.sockets import tend
 from volery.core.errors import BridgeError
 from volery.graph.session import Gateway
 
@@ -209,6 +210,7 @@ class RosbridgeServer:
         assert self._gateway is not None
         loop = asyncio.get_running_loop()
         address = connection.remote_address or ("?", 0)
+        tend(connection.transport.get_extra_info("socket"))
         session = self._gateway.open(f"rosbridge {address[0]}:{address[1]}")
         bell = _Bell(loop)
 

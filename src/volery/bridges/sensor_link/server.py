@@ -18,6 +18,7 @@ from volery.bridges.sensor_link.outbox import Outbox
 from volery.bridges.sensor_link.payloads import encode_notice
 from volery.bridges.sensor_link.streams import IMAGES, SENSORS, Stream, Streams, period_from_hz
 from volery.bridges.sensor_link.wire import VERSION, Frame, FrameParser, Kind, encode_frame
+from volery.bridges.sockets import tend
 from volery.core.errors import BridgeError
 from volery.graph.session import Gateway
 
@@ -199,6 +200,7 @@ class _Client(asyncio.Protocol):
         self._transport = transport
         address = transport.get_extra_info("peername") or ("?", 0)
         self._name = f"{self._name} {address[0]}:{address[1]}"
+        tend(transport.get_extra_info("socket"))
         transport.set_write_buffer_limits(high=_WRITE_BUFFER_BYTES)
         if not self._port.admit(self):
             self._notify(f"there are {MOST_CLIENTS} clients already")
