@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.gaps import choose_heading, free_distances, wrap
+from volery.autonomy.gap_steering import Caution, GapSteering
 from volery.autonomy.ground_plane import GroundPlane
 from volery.autonomy.obstacle_memory import ObstacleMemory
 from volery.autonomy.scan_points import Pose, ScanProjector
@@ -30,9 +30,6 @@ Array = NDArray[np.float64]
 _PERIOD_S = 0.05
 _SONAR_MEMORY_S = 0.5
 _LEAST_CLIMB_M = 1.0
-_STUCK_AFTER_S = 8.0
-_STUCK_PROGRESS_M = 2.0
-_DETOUR_S = 5.0
 _STATE = (
     "_phase",
     "_pose",
@@ -42,11 +39,8 @@ _STATE = (
     "_range",
     "_ground",
     "_obstacles",
+    "_steering",
     "_low_obstacles",
-    "_last_heading",
-    "_progress",
-    "_detour",
-    "_detours",
     "_settle_at",
 )
 """Everything that changes in flight."""
@@ -84,8 +78,9 @@ class GapFollowing(Node):
         self._route = [np.array(point, dtype=np.float64) for point in route]
         self._height_m = self.declare_parameter("height_m", 3.0, read_only=False)
         self._speed_m_s = self.declare_parameter("speed_m_s", 3.0, read_only=False)
-        self._safe_radius = float(self.declare_parameter("safe_radius_m", 1.1).value)
-        self._deceleration = float(self.declare_parameter("deceleration_m_s2", 2.0).value)
+        radius = float(self.declare_parameter("safe_radius_m", 1.1).value)
+        deceleration = float(self.declare_parameter("deceleration_m_s2", 2.0).value)
+        self._steering = GapSteering(Caution(radius, deceleration))
         self._level = ScanProjector(self.declare_parameter("level_mount", [0.0, 0.0, 0.0]).value)
         self._nodding = ScanProjector(
             self.declare_parameter("nodding_mount", [0.0, 0.0, 0.0]).value
@@ -100,10 +95,6 @@ class GapFollowing(Node):
         self._ground = GroundPlane()
         self._obstacles = ObstacleMemory()
         self._low_obstacles = ObstacleMemory(half_width_m=10.0, looks_needed=3)
-        self._last_heading: float | None = None
-        self._progress: tuple[int, float] = (0, math.inf)
-        self._detour: tuple[int, float] | None = None
-        self._detours = 0
         self._settle_at: Array | None = None
 
         self.create_subscription(Odometry, "odom", self._on_odometry, 5)
@@ -195,15 +186,15 @@ class GapFollowing(Node):
     def _fly(self, pose: Pose) -> None:
         self._refit_ground(pose)
         to_goal = self._home[:2] + self._route[self._next_waypoint] - pose.position[:2]
-        distance = float(np.hypot(*to_goal))
-        if distance < 2.0 or (distance < 6.0 and self._is_stuck(distance)):
+        distance, now = float(np.hypot(*to_goal)), self.get_clock().now_ns()
+        if distance < 2.0 or (distance < 6.0 and self._steering.is_stuck(distance, now)):
             self._next_waypoint += 1
-            self._progress = (self.get_clock().now_ns(), math.inf)
+            self._steering.begin_leg(now)
             if self._next_waypoint == len(self._route):
                 self._phase = Phase.SETTLE
                 self._settle_at = self._landing_place(pose)
             return
-        self._go_towards(pose, to_goal, distance)
+        self._go_towards(pose, to_goal)
 
     def _settle(self, pose: Pose) -> None:
         """Move to a place without low growth, then land there."""
@@ -211,63 +202,19 @@ class GapFollowing(Node):
         assert self._settle_at is not None
         to_place = self._settle_at - pose.position[:2]
         distance = float(np.hypot(*to_place))
-        if distance < 0.6 or self._is_stuck(distance):
+        if distance < 0.6 or self._steering.is_stuck(distance, self.get_clock().now_ns()):
             if self._land.call().success:
                 self._phase = Phase.LAND
             return
-        self._go_towards(pose, to_place, distance)
+        self._go_towards(pose, to_place)
 
     def _wait(self, pose: Pose) -> None:
         """The flight mode lands by itself."""
 
-    def _go_towards(self, pose: Pose, to_goal: Array, distance: float) -> None:
-        now = self.get_clock().now_ns()
-        goal_angle = math.atan2(to_goal[1], to_goal[0])
-        goal_angle = self._detoured(goal_angle, distance, now)
-        obstacles = self._obstacles.around(pose.position[:2], now, 14.0)
-        free = free_distances(obstacles, self._safe_radius, 14.0)
-        heading = choose_heading(free, goal_angle, distance, self._last_heading)
-        if heading is None:
-            self._last_heading = None
-            self._publish(pose, np.zeros(2), 0.6)
-            return
-        self._last_heading = heading.angle
-        speed = self._speed_limit(heading.free_m, distance, obstacles)
-        misaligned = abs(float(wrap(np.array(heading.angle - pose.yaw))))
-        if misaligned > math.radians(50.0):
-            speed = min(speed, 0.5)  # look where you go before going there
-        direction = np.array([math.cos(heading.angle), math.sin(heading.angle)])
-        yaw_rate = 1.8 * float(wrap(np.array(heading.angle - pose.yaw)))
-        self._publish(pose, speed * direction, max(-1.2, min(1.2, yaw_rate)))
-
-    def _speed_limit(self, free_m: float, goal_m: float, obstacles: Array) -> float:
-        stop_within = max(min(free_m - 0.3, goal_m), 0.05)
-        speed = min(float(self._speed_m_s.value), math.sqrt(2.0 * self._deceleration * stop_within))
-        if len(obstacles):
-            nearest = float(np.hypot(obstacles[:, 0], obstacles[:, 1]).min())
-            speed = min(speed, max(0.4, 2.0 * (nearest - 0.4)))
-        return speed
-
-    def _detoured(self, goal_angle: float, distance: float, now: int) -> float:
-        """Turn aside for a while, left and right in turn, when there is no progress."""
-        if self._detour is not None and now < self._detour[0]:
-            return goal_angle + self._detour[1]
-        if self._detour is not None:
-            self._detour = None
-            self._progress = (now, distance)
-        if self._is_stuck(distance):
-            self._detours += 1
-            side = 1.0 if self._detours % 2 else -1.0
-            self._detour = (now + round(_DETOUR_S * 1e9), side * math.radians(100.0))
-        return goal_angle
-
-    def _is_stuck(self, distance: float) -> bool:
-        since, best = self._progress
-        now = self.get_clock().now_ns()
-        if distance < best - _STUCK_PROGRESS_M:
-            self._progress = (now, distance)
-            return False
-        return now - since > _STUCK_AFTER_S * 1e9
+    def _go_towards(self, pose: Pose, to_goal: Array) -> None:
+        now, top_speed = self.get_clock().now_ns(), float(self._speed_m_s.value)
+        velocity, yaw_rate = self._steering.steer(pose, to_goal, self._obstacles, now, top_speed)
+        self._publish(pose, velocity, yaw_rate)
 
     def _landing_place(self, pose: Pose) -> Array:
         """Nearest place within 8 m that has no growth within 1 m."""

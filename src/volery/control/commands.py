@@ -250,7 +250,8 @@ class FleetCommands:
 
     def hold(self, i: int) -> None:
         """Let UAV `i` stop and stay where it comes to rest."""
-        self._enter_guided(i, FlightMode.HOLD)["braking"] = True
+        pilot = self._enter_guided(i, FlightMode.HOLD)
+        pilot["braking"] = pilot["hurried"] = True
 
     def land(self, i: int) -> None:
         """Let UAV `i` stop, descend straight down and stop its rotors on the ground."""
@@ -340,6 +341,7 @@ class FleetCommands:
     def _command_velocity(self, i: int, velocity: ArrayLike, *, in_heading: bool) -> None:
         velocity = checked("velocity", velocity, (3,), 1e3)
         pilot = self._enter_guided(i, FlightMode.VELOCITY)
+        pilot["hurried"] |= not velocity.any() and bool(pilot["velocity_target"].any())
         pilot["velocity_target"] = velocity
         pilot["velocity_in_heading"] = in_heading
         pilot["deadline_step"] = self.step + pilot["timeout_steps"]

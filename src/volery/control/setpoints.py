@@ -50,7 +50,8 @@ PILOT = np.dtype(
         ("saturated", "?"),  # the rotors could not give the torque wanted last
         ("path_faces", "?"),  # the trajectory has headings
         ("errs", "?"),  # controllers fly on an estimate, see control.belief
-        ("spare", "u1", 2),  # no hidden padding: equal states are equal bytes
+        ("hurried", "?"),  # told to stop: guided with the next step, not with the next tick
+        ("spare", "u1", 1),  # no hidden padding: equal states are equal bytes
         ("thrust", "f8"),  # N along the body's z
         ("yaw_rate", "f8"),  # rad/s, fed forward to the rates
         ("full_thrust", "f8"),  # N: the most that one rotor gives at the battery's present voltage

@@ -111,6 +111,8 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     last L steps where identified plants have dead times, or of any size. jets: room for the search
     of neighbours (`new_jets`).
 
+    A UAV that was told to stop is guided out of turn, with the first of the steps.
+
     Ends early after a step in which a budget ran out, the events' buffer grew full or, with
     `event_ends`, anything was noted. The air around the UAVs is looked up each `air_steps`, a
     multiple of `guidance_steps`. Returns the steps done, the events written, and whether a
@@ -156,18 +158,20 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                 tick, period = step // air_steps, air_steps * dt
                 refresh_air(uavs[i], jets[i].downwash, air[0], air_nodes, grid, tick, period)
             for now in range(step, step + together):
+                guided = guiding or pilot.hurried
+                pilot.hurried = False
                 if body.asleep:
                     for k in range(3):
                         body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
                 else:
                     mode = pilot.mode
                     if references is None or model.kind == RIGID_BODY:
-                        turning = phase == 0
-                        if guiding:
+                        turning = phase == 0 or guided
+                        if guided:
                             believe_place(belief, body)
-                        if guiding or turning:
+                        if turning:
                             believe_attitude(belief, body, pilot.errs)
-                        if guiding:
+                        if guided:
                             guide(pilot, belief, model.gains, paths, now, dt)
                         if turning:
                             hold_attitude(pilot, belief, model.gains)
@@ -197,7 +201,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                             bounce,
                             scratch,
                             now,
-                            guiding,
+                            guided,
                             dt,
                         )
                     if touch != NO_TOUCH:
