@@ -22,6 +22,14 @@ class CameraSensor(MountedSensor):
     """Pixels, instead of the model's; so are those that follow."""
     height: Side | None = None
     horizontal_fov_deg: Annotated[float, Field(gt=0.0, lt=180.0)] | None = None
+    depth_encoding: Literal["32FC1", "16UC1"] = "32FC1"
+    """Of the depth picture: metres, or millimetres with 0 for what is not known (REP 118)."""
+    compressed: Literal["jpeg", "png", "none"] = "jpeg"
+    """Codec of the compressed colour picture; none: neither that nor a compressed depth."""
+    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 95
+    """As OpenCV and image_transport count it; 95 is their default."""
+    points: Literal["none", "xyz", "xyzrgb"] = "none"
+    """What a point of the cloud has."""
 
 
 class Daylight(Data):

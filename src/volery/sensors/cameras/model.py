@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from volery.sensors.cameras.lens import distort
+from volery.sensors.cameras.lens import distort, undistort
 from volery.sensors.cameras.pixel_table import PixelTable, make_table
 from volery.sensors.model import SensorModel, load_model
 
@@ -95,6 +95,16 @@ class CameraModel(SensorModel):
             self.samples,
             self.readout_ns,
         )
+
+    @cached_property
+    def ideal(self) -> NDArray[np.float32]:
+        """(height, width, 2) x and y, in the optical frame, of what a pixel sees at depth 1.
+
+        NaN where the lens shows nothing.
+        """
+        v, u = np.mgrid[0 : self.height, 0 : self.width]
+        seen = (np.stack([u, v], axis=-1) - np.array(self.centre_px)) / self.focal_px
+        return np.ascontiguousarray(undistort(seen, self.distortion), dtype=np.float32)
 
     def project(self, points: ArrayLike) -> Array:
         """Pixels (..., 2), column and row, of points (..., 3) in the optical frame, m.
