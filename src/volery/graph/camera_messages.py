@@ -3,7 +3,8 @@
 Colour is `rgb8`; depth `32FC1`, metres along the optical axis, NaN where nothing is known, -inf too
 near, inf too far, or `16UC1`, millimetres, 0 where nothing is known; labels `32SC1` (instance of
 the scene, -1 for none) and `mono8` (`Material`). The frame is the optical one: z forward, x right,
-y down.
+y down. Colour and intrinsics of a stereo pair are both in that of the left camera, as
+image_geometry's StereoCameraModel demands; what has a place in space is in the own one.
 """
 
 from __future__ import annotations
@@ -38,6 +39,14 @@ class Camera(NamedTuple):
 
     sensor: SensorId
     settings: CameraSensor
+    left: SensorId | None = None
+    """The left camera of a stereo pair, of which this is the right one."""
+
+    @property
+    def baseline_m(self) -> float:
+        """From the left camera of the pair to this, which is the right one; else 0."""
+        stereo = self.settings.stereo
+        return 0.0 if self.left is None or stereo is None else stereo.baseline_m
 
 
 def optical_frame(sensor: SensorId) -> str:
@@ -47,7 +56,7 @@ def optical_frame(sensor: SensorId) -> str:
 
 def colour(frames: CameraFrames, row: int, camera: Camera) -> Image:
     """`rgb8`."""
-    return _image(_header(frames, camera), frames.colour[row], "rgb8")
+    return _image(_pair_header(frames, camera), frames.colour[row], "rgb8")
 
 
 def compressed(frames: CameraFrames, row: int, camera: Camera) -> CompressedImage:
@@ -56,7 +65,7 @@ def compressed(frames: CameraFrames, row: int, camera: Camera) -> CompressedImag
     quality = camera.settings.jpeg_quality
     data = codecs.jpeg(picture, quality) if codec == "jpeg" else codecs.png(picture)
     text = f"rgb8; {codec} compressed bgr8"
-    return CompressedImage(_header(frames, camera), text, _read_only(data))
+    return CompressedImage(_pair_header(frames, camera), text, _read_only(data))
 
 
 def depth(frames: CameraFrames, row: int, camera: Camera) -> Image:
@@ -107,18 +116,19 @@ def material(frames: CameraFrames, row: int, camera: Camera) -> Image:
 
 
 def camera_info(frames: CameraFrames, row: int, camera: Camera) -> CameraInfo:  # noqa: ARG001
-    """Intrinsics; K and P are the same: nothing is rectified."""
+    """Intrinsics; P is K, but for the right camera's place in a pair: P[0, 3] = -fx baseline."""
     model = frames.model
     k = model.matrix
+    beside = np.array([[-model.focal_px * camera.baseline_m], [0.0], [0.0]])
     return CameraInfo(
-        _header(frames, camera),
+        _pair_header(frames, camera),
         model.height,
         model.width,
         "plumb_bob",
         _read_only(np.array(model.distortion)),
         _read_only(k.reshape(9)),
         _read_only(np.eye(3).reshape(9)),
-        _read_only(np.hstack([k, np.zeros((3, 1))]).reshape(12)),
+        _read_only(np.hstack([k, beside]).reshape(12)),
         0,
         0,
         RegionOfInterest(0, 0, 0, 0, False),
@@ -133,6 +143,10 @@ def _image(stamped: Header, picture: NDArray[Any], encoding: str) -> Image:
 
 def _header(frames: CameraFrames, camera: Camera) -> Header:
     return header(frames.stamp_ns, optical_frame(camera.sensor))
+
+
+def _pair_header(frames: CameraFrames, camera: Camera) -> Header:
+    return header(frames.stamp_ns, optical_frame(camera.left or camera.sensor))
 
 
 def _bytes(array: NDArray[Any]) -> NDArray[np.uint8]:

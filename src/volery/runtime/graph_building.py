@@ -29,7 +29,8 @@ def announce_sensors(publisher: GraphPublisher, fitted: Sequence[Fitted]) -> Non
         if sensor.lidar is not None:
             publisher.announce_lidar(sensor.id, sensor.lidar, sensor.topic, sensor.mount)
         elif isinstance(sensor.spec, CameraSensor):
-            publisher.announce_camera(Camera(sensor.id, sensor.spec), sensor.mount)
+            camera = Camera(sensor.id, sensor.spec, sensor.left)
+            publisher.announce_camera(camera, sensor.mount)
         else:
             publisher.announce(sensor.id, RESULT_OF[sensor.spec.kind], sensor.mount)
         if sensor.mount.nods:

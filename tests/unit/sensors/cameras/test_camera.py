@@ -222,6 +222,15 @@ def test_the_shipped_camera_loads():
     assert load_camera().without_noise() == CameraModel(name="pinhole camera")
 
 
+@pytest.mark.parametrize(("name", "far_m"), [("f450_front", 1300.0), ("f450_down", 100.0)])
+def test_the_cameras_of_the_f450_load(name, far_m):
+    """The edge of a picture with a field of view of 1 rad is half a radian off the axis."""
+    model = load_camera(name)
+    assert (model.width, model.height, model.far_m) == (640, 480, far_m)
+    edge = model.project([np.tan(0.5), 0.0, 1.0])
+    np.testing.assert_allclose(edge, [639.5, 239.5], atol=1e-9)
+
+
 def test_a_uav_out_of_sight_throws_its_shadow_into_the_picture(two):
     """From 20 m up the picture is 23 m wide; the sun is 45 degrees high in the east."""
     down = rotations.from_rpy(0.0, np.pi / 2, 0.0)
