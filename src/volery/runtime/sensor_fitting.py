@@ -53,7 +53,7 @@ RESULT_OF: dict[str, type[Samples]] = {
 """What each kind of sensor measures."""
 
 
-PICTURE = ("width", "height", "horizontal_fov_deg")
+PICTURE = ("width", "height", "horizontal_fov_deg", "samples")
 """What a scenario may change of a camera's model."""
 
 

@@ -29,6 +29,7 @@ class CameraSensor(MountedSensor):
     """Pixels, instead of the model's; so are those that follow."""
     height: Side | None = None
     horizontal_fov_deg: Annotated[float, Field(gt=0.0, lt=180.0)] | None = None
+    samples: Literal[1, 4] | None = None
     depth_encoding: Literal["32FC1", "16UC1"] = "32FC1"
     """Of the depth picture: metres, or millimetres with 0 for what is not known (REP 118)."""
     compressed: Literal["jpeg", "png", "none"] = "jpeg"

@@ -49,7 +49,8 @@ class CameraModel(SensorModel):
     """Standard deviation that light adds to a pixel which it just saturates; it goes with the
     square root of the light."""
     depth_noise_per_m: NonNegativeFloat = 0.0
-    """Standard deviation of the depth at 1 m; it grows with the square, as that of stereo does."""
+    """Standard deviation of 1 / depth, 1/m, as that of stereo; that of the depth grows with its
+    square, and is this at 1 m. What seems beyond `far_m` is told as inf."""
 
     @model_validator(mode="after")
     def _sees_something(self) -> Self:

@@ -218,6 +218,17 @@ def test_noise_has_the_stated_size(picture):
     assert abs(off.mean()) < 0.1 * wanted
 
 
+def test_noisy_depth_is_a_depth(picture):
+    """1/z = .0125 at 80 m with .004 of noise: never negative, too far where little is left."""
+    model = CameraModel(width=128, height=128, horizontal_fov_deg=5.0, depth_noise_per_m=0.004)
+    depth = picture(model, (0.0, 0.0, 20.0), solids=[wall(80.0)]).depth[0]
+    assert depth.min() > 25.0
+    assert (depth[np.isfinite(depth)] <= model.far_m).all()
+    lost = np.mean(depth == np.inf)  # 1/z below 1/200: 1.875 standard deviations
+    assert lost == pytest.approx(0.0304, abs=0.006)
+    assert np.median(1.0 / depth) == pytest.approx(1.0 / 80.0, rel=0.01)
+
+
 def test_the_shipped_camera_loads():
     assert load_camera().without_noise() == CameraModel(name="pinhole camera")
 
