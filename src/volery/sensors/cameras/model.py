@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,6 +74,15 @@ class CameraModel(SensorModel):
         """K (3, 3)."""
         (cx, cy), f = self.centre_px, self.focal_px
         return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
+
+    def model_copy(
+        self, *, update: Mapping[str, Any] | None = None, deep: bool = False
+    ) -> CameraModel:
+        """Copy with other numbers; what was worked out from the old ones stays behind."""
+        copy = super().model_copy(update=update, deep=deep)
+        for name in ("table", "ideal"):
+            copy.__dict__.pop(name, None)
+        return copy
 
     def without_noise(self) -> CameraModel:
         """The same camera, exact."""

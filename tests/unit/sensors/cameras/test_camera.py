@@ -218,6 +218,15 @@ def test_noise_has_the_stated_size(picture):
     assert abs(off.mean()) < 0.1 * wanted
 
 
+def test_a_changed_model_has_rays_of_its_own():
+    model = CameraModel(width=16, height=8)
+    assert model.table.after_ns.max() == 0
+    assert model.ideal.shape == (8, 16, 2)
+    other = model.model_copy(update={"width": 32, "readout_s": 0.01})
+    assert other.table.after_ns.max() > 0
+    assert other.ideal.shape == (8, 32, 2)
+
+
 def test_noisy_depth_is_a_depth(picture):
     """1/z = .0125 at 80 m with .004 of noise: never negative, too far where little is left."""
     model = CameraModel(width=128, height=128, horizontal_fov_deg=5.0, depth_noise_per_m=0.004)
