@@ -55,8 +55,11 @@ KINDS = [
     Kind("lidar", ("laser/horizontal/scan",), 40.0, "Hokuyo", "utm_30lx", 18_750_000, True,
          entry=LEANT),
     Kind("camera", ("camera/depth", "camera/image_raw", "camera/camera_info",
-                    "camera/labels/instance", "camera/labels/material"),
-         10.0, "Camera", "pinhole", entry={**DOWN_AHEAD, "width": 24, "height": 17}),
+                    "camera/labels/instance", "camera/labels/material",
+                    "camera/image_raw/compressed", "camera/depth/compressedDepth",
+                    "camera/points"),
+         10.0, "Camera", "pinhole",
+         entry={**DOWN_AHEAD, "width": 24, "height": 17, "points": "xyzrgb"}),
 ]  # fmt: skip
 
 every_kind = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.kind)

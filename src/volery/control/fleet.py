@@ -42,7 +42,15 @@ from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe, hover_thrusts
 from volery.vehicle.contact import steepest_cosine
 from volery.vehicle.downwash import new_jets
-from volery.vehicle.fleet import NEVER, FleetState, charge_battery, fit_rotors, new_bodies, state_of
+from volery.vehicle.fleet import (
+    NEVER,
+    FleetState,
+    RotorTurns,
+    charge_battery,
+    fit_rotors,
+    new_bodies,
+    state_of,
+)
 from volery.vehicle.plants import RIGID_BODY, Plant, RigidBody
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.terrain import TerrainGrid
@@ -160,6 +168,12 @@ class Fleet(FleetCommands):
     def time_ns(self) -> int:
         """Time since the start."""
         return self.step * self._dt_ns
+
+    def rotor_turns(self) -> RotorTurns:
+        """Where the rotors are, for some milliseconds around now."""
+        ticks = -(-self.step // self._periods[0])  # angles are those of the end of the tick
+        angle, speed = self.state.rotor_angle.copy(), self.state.rotor_speed.copy()
+        return RotorTurns(angle, speed, ticks * self._periods[0] * self._dt_ns)
 
     # ---------------------------------------------------------------------------------- time
 

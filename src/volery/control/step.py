@@ -22,7 +22,7 @@ from volery.vehicle.downwash import find_downwash
 from volery.vehicle.fleet import BODY
 from volery.vehicle.ground_effect import feel_ground, feels_ground
 from volery.vehicle.identified import IDENTIFIED
-from volery.vehicle.kernels import accelerate, carry, meet_ground, near_ground
+from volery.vehicle.kernels import accelerate, carry, meet_ground, near_ground, turn_rotors
 from volery.vehicle.kinematic import KINEMATIC
 from volery.vehicle.plant import PLANT
 from volery.vehicle.plants import KINEMATIC_MOTION, RIGID_BODY
@@ -154,6 +154,8 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
             if draining and plant.battery.capacity > 0.0 and drain(body, plant, pilot):
                 _note(events[written], step + 1, i, BATTERY_FELL, pilot.mode, 0.0, body)
                 written += 1
+            if guiding:
+                turn_rotors(body, plant, guidance_steps * dt)
             if airing and not body.asleep:
                 tick, period = step // air_steps, air_steps * dt
                 refresh_air(uavs[i], jets[i].downwash, air[0], air_nodes, grid, tick, period)

@@ -1,23 +1,52 @@
-"""Pictures as messages, by the conventions of sensor_msgs and cv_bridge.
+"""Pictures as messages, by the conventions of sensor_msgs, cv_bridge and image_transport.
 
 Colour is `rgb8`; depth `32FC1`, metres along the optical axis, NaN where nothing is known, -inf too
-near, inf too far; labels `32SC1` (instance of the scene, -1 for none) and `mono8` (`Material`). The
-frame is the optical one: z forward, x right, y down.
+near, inf too far, or `16UC1`, millimetres, 0 where nothing is known; labels `32SC1` (instance of
+the scene, -1 for none) and `mono8` (`Material`). The frame is the optical one: z forward, x right,
+y down. Colour and intrinsics of a stereo pair are both in that of the left camera, as
+image_geometry's StereoCameraModel demands; what has a place in space is in the own one.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.graph.channels import Channel
-from volery.graph.messages import CameraInfo, Header, Image, RegionOfInterest, header
+from volery.graph import picture_codecs as codecs
+from volery.graph.messages import (
+    CameraInfo,
+    CompressedImage,
+    Header,
+    Image,
+    PointCloud2,
+    PointField,
+    RegionOfInterest,
+    header,
+)
+from volery.scenario.camera import CameraSensor
+from volery.sensors.cameras.cloud import COLOURED, organised_points
 from volery.sensors.samples import CameraFrames, SensorId
 
 OPTICAL_ATTITUDE = np.array([-0.5, 0.5, -0.5, 0.5])
 """(4,) x y z w: the sensor's axes (x forward, y left, z up) from the optical ones."""
+_FIELDS = [PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate(COLOURED)]
+
+
+class Camera(NamedTuple):
+    """A camera as its messages tell of it."""
+
+    sensor: SensorId
+    settings: CameraSensor
+    left: SensorId | None = None
+    """The left camera of a stereo pair, of which this is the right one."""
+
+    @property
+    def baseline_m(self) -> float:
+        """From the left camera of the pair to this, which is the right one; else 0."""
+        stereo = self.settings.stereo
+        return 0.0 if self.left is None or stereo is None else stereo.baseline_m
 
 
 def optical_frame(sensor: SensorId) -> str:
@@ -25,77 +54,106 @@ def optical_frame(sensor: SensorId) -> str:
     return f"{sensor.path}_optical"
 
 
-def colour(frames: CameraFrames, row: int) -> Image | None:
+def colour(frames: CameraFrames, row: int, camera: Camera) -> Image:
     """`rgb8`."""
-    return _image(frames, frames.colour, row, "rgb8")
+    return _image(_pair_header(frames, camera), frames.colour[row], "rgb8")
 
 
-def depth(frames: CameraFrames, row: int) -> Image | None:
-    """`32FC1`."""
-    return _image(frames, frames.depth, row, "32FC1")
+def compressed(frames: CameraFrames, row: int, camera: Camera) -> CompressedImage:
+    """JPEG or PNG; `format` tells encoding, codec, and what OpenCV makes of it."""
+    codec, picture = camera.settings.compressed, frames.colour[row]
+    quality = camera.settings.jpeg_quality
+    data = codecs.jpeg(picture, quality) if codec == "jpeg" else codecs.png(picture)
+    text = f"rgb8; {codec} compressed bgr8"
+    return CompressedImage(_pair_header(frames, camera), text, _read_only(data))
 
 
-def instance(frames: CameraFrames, row: int) -> Image | None:
+def depth(frames: CameraFrames, row: int, camera: Camera) -> Image:
+    """`32FC1` or `16UC1`."""
+    encoding, seen = camera.settings.depth_encoding, frames.depth[row]
+    picture = seen if encoding == "32FC1" else codecs.millimetres(seen)
+    return _image(_header(frames, camera), picture, encoding)
+
+
+def compressed_depth(frames: CameraFrames, row: int, camera: Camera) -> CompressedImage:
+    """PNG of 16 bits after a header of 12 bytes."""
+    encoding, seen = camera.settings.depth_encoding, frames.depth[row]
+    data = (
+        codecs.packed_metres(seen, frames.model.far_m)
+        if encoding == "32FC1"
+        else codecs.packed_millimetres(codecs.millimetres(seen))
+    )
+    text = f"{encoding}; compressedDepth png"
+    return CompressedImage(_header(frames, camera), text, _read_only(data))
+
+
+def points(frames: CameraFrames, row: int, camera: Camera) -> PointCloud2:
+    """A point a pixel, in rows and columns; NaN where nothing is seen."""
+    own_colour = frames.colour[row] if camera.settings.points == "xyzrgb" else None
+    cloud = organised_points(frames.model, frames.depth[row], own_colour)
+    height, width, fields = cloud.shape
+    return PointCloud2(
+        _header(frames, camera),
+        height,
+        width,
+        _FIELDS[:fields],
+        False,  # little-endian
+        cloud.itemsize * fields,
+        cloud.itemsize * fields * width,
+        _bytes(cloud),
+        False,  # not dense: NaN stands for nothing
+    )
+
+
+def instance(frames: CameraFrames, row: int, camera: Camera) -> Image:
     """`32SC1`."""
-    return _image(frames, frames.instance, row, "32SC1")
+    return _image(_header(frames, camera), frames.instance[row], "32SC1")
 
 
-def material(frames: CameraFrames, row: int) -> Image | None:
+def material(frames: CameraFrames, row: int, camera: Camera) -> Image:
     """`mono8`."""
-    return _image(frames, frames.material, row, "mono8")
+    return _image(_header(frames, camera), frames.material[row], "mono8")
 
 
-def camera_info(frames: CameraFrames, row: int) -> CameraInfo:
-    """Intrinsics; K and P are the same: nothing is rectified."""
+def camera_info(frames: CameraFrames, row: int, camera: Camera) -> CameraInfo:  # noqa: ARG001
+    """Intrinsics; P is K, but for the right camera's place in a pair: P[0, 3] = -fx baseline."""
     model = frames.model
     k = model.matrix
+    beside = np.array([[-model.focal_px * camera.baseline_m], [0.0], [0.0]])
     return CameraInfo(
-        _header(frames, row),
+        _pair_header(frames, camera),
         model.height,
         model.width,
         "plumb_bob",
         _read_only(np.array(model.distortion)),
         _read_only(k.reshape(9)),
         _read_only(np.eye(3).reshape(9)),
-        _read_only(np.hstack([k, np.zeros((3, 1))]).reshape(12)),
+        _read_only(np.hstack([k, beside]).reshape(12)),
         0,
         0,
         RegionOfInterest(0, 0, 0, 0, False),
     )
 
 
-CAMERA_CHANNELS = (
-    Channel("/image_raw", Image, colour),
-    Channel("/depth", Image, depth),
-    Channel("/camera_info", CameraInfo, camera_info),
-    Channel("/labels/instance", Image, instance),
-    Channel("/labels/material", Image, material),
-)
-PART_OF_SUFFIX = {
-    "/image_raw": "colour",
-    "/depth": "depth",
-    "/camera_info": "depth",
-    "/labels/instance": "labels",
-    "/labels/material": "labels",
-}
-"""What of a picture must be made for a topic; intrinsics come with the cheapest."""
-
-
-def _image(frames: CameraFrames, pictures: NDArray[Any], row: int, encoding: str) -> Image | None:
-    if not pictures[row].size:
-        return None
-    picture = np.ascontiguousarray(pictures[row])
-    data = picture.view(np.uint8).reshape(-1)
-    data.flags.writeable = False
+def _image(stamped: Header, picture: NDArray[Any], encoding: str) -> Image:
     height, width = picture.shape[:2]
-    return Image(_header(frames, row), height, width, encoding, 0, len(data) // height, data)
+    data = _bytes(picture)
+    return Image(stamped, height, width, encoding, 0, len(data) // height, data)
 
 
-def _header(frames: CameraFrames, row: int) -> Header:
-    return header(frames.stamp_ns, optical_frame(frames.sensors[row]))
+def _header(frames: CameraFrames, camera: Camera) -> Header:
+    return header(frames.stamp_ns, optical_frame(camera.sensor))
 
 
-def _read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
-    array = array.copy()
+def _pair_header(frames: CameraFrames, camera: Camera) -> Header:
+    return header(frames.stamp_ns, optical_frame(camera.left or camera.sensor))
+
+
+def _bytes(array: NDArray[Any]) -> NDArray[np.uint8]:
+    """The array's memory, in its order."""
+    return _read_only(np.ascontiguousarray(array).view(np.uint8).reshape(-1))
+
+
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
     array.flags.writeable = False
     return array

@@ -34,6 +34,7 @@ Vector3 = _ros2.geometry_msgs__msg__Vector3
 Odometry = _ros2.nav_msgs__msg__Odometry
 Clock = _ros2.rosgraph_msgs__msg__Clock
 CameraInfo = _ros2.sensor_msgs__msg__CameraInfo
+CompressedImage = _ros2.sensor_msgs__msg__CompressedImage
 Image = _ros2.sensor_msgs__msg__Image
 RegionOfInterest = _ros2.sensor_msgs__msg__RegionOfInterest
 FluidPressure = _ros2.sensor_msgs__msg__FluidPressure

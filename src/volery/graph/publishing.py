@@ -16,12 +16,8 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.engine.events import Event
-from volery.graph.camera_messages import (
-    CAMERA_CHANNELS,
-    OPTICAL_ATTITUDE,
-    PART_OF_SUFFIX,
-    optical_frame,
-)
+from volery.graph.camera_messages import OPTICAL_ATTITUDE, Camera, optical_frame
+from volery.graph.camera_publishing import CameraPublisher
 from volery.graph.channels import Channel
 from volery.graph.graph import Graph, Publisher
 from volery.graph.lidar_publishing import LidarPublisher, laser_frame
@@ -65,10 +61,7 @@ from volery.vehicle.battery import BatteryLevel
 
 Array = NDArray[np.float64]
 
-CHANNELS: dict[type[Any], tuple[Channel, ...]] = {
-    **NAVIGATION_CHANNELS,
-    CameraFrames: CAMERA_CHANNELS,
-}
+CHANNELS: dict[type[Any], tuple[Channel, ...]] = {**NAVIGATION_CHANNELS}
 """Topics of the kinds of samples that have a channel for each."""
 
 _NO_EFFORT = np.zeros(0)
@@ -86,6 +79,8 @@ class GraphPublisher:
         self._graph = graph
         self._publishers: dict[str, Publisher] = {}
         self._lidars = LidarPublisher(graph)
+        self.cameras = CameraPublisher(graph)
+        """Tells what of pictures is wanted."""
         self._mounts: dict[str, Mount] = {}
         self._clock = graph.advertise("/clock", Clock)
         self._tf = graph.advertise("/tf", TFMessage)
@@ -95,6 +90,7 @@ class GraphPublisher:
         self._static: list[TransformStamped] = []
         self._by_kind: dict[type[Any], Callable[[Any], None]] = {
             LidarScans: self._lidars.publish,
+            CameraFrames: self.cameras.publish,
             ImuReadings: self._imus,
             RangeReadings: self._ranges,
             OdometryReadings: self._odometry,
@@ -124,18 +120,15 @@ class GraphPublisher:
                 message_class = Imu if kind is ImuReadings else Range
                 self._advertise(f"/{sensor.uav_name}/{sensor.name}", message_class)
             self._static.append(_mount_transform(base, sensor.path, mount))
-            if kind is CameraFrames:
-                optical = make_mount(attitude_body=OPTICAL_ATTITUDE)
-                self._static.append(_mount_transform(sensor.path, optical_frame(sensor), optical))
 
-    def wanted_parts(self, cameras: Sequence[SensorId]) -> set[str]:
-        """What of the pictures of these cameras somebody would receive."""
-        return {
-            PART_OF_SUFFIX[channel.suffix]
-            for channel in CAMERA_CHANNELS
-            for camera in cameras
-            if self._publishers[channel.topic(camera)].wanted
-        }
+    def announce_camera(self, camera: Camera, mount: Mount) -> None:
+        """Advertise what a camera publishes, and place its frame and that of its pictures."""
+        self._static_sent = False
+        self.cameras.announce(camera)
+        sensor, optical = camera.sensor, make_mount(attitude_body=OPTICAL_ATTITUDE)
+        base = f"{sensor.uav_name}/base_link"
+        self._static.append(_mount_transform(base, sensor.path, mount))
+        self._static.append(_mount_transform(sensor.path, optical_frame(sensor), optical))
 
     def announce_lidar(self, sensor: SensorId, model: LidarModel, topic: str, mount: Mount) -> None:
         """Advertise what a LIDAR publishes and place its frame."""
@@ -157,6 +150,7 @@ class GraphPublisher:
         for topic in [topic for topic in self._publishers if topic.startswith(below)]:
             self._publishers.pop(topic).cancel()
         self._lidars.retire(uav_name)
+        self.cameras.retire(uav_name)
         own = f"{uav_name}/"
         self._static = [t for t in self._static if not t.child_frame_id.startswith(own)]
         self._static_sent = False

@@ -117,7 +117,7 @@ class Crew:
         for bank in parts.banks:
             if bank.name == "camera":
                 cameras: Any = bank
-                cameras.bank.wants = partial(self.publisher.wanted_parts, bank.sensors)
+                cameras.bank.wants = partial(self.publisher.cameras.wanted_parts, bank.sensors)
         for row, start in enumerate(self.starts):
             if start.name in fresh:
                 self.beginnings[start.name] = Beginning(begun, row)

@@ -10,6 +10,7 @@ from volery.core.errors import CommandError, ScenarioError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.engine.faults import FaultPlan
+from volery.graph.camera_messages import Camera
 from volery.graph.graph import Graph
 from volery.graph.node import Context, Node
 from volery.graph.publishing import GraphPublisher
@@ -17,6 +18,7 @@ from volery.runtime.node_loading import start_node
 from volery.runtime.placement import Start
 from volery.runtime.sensor_fitting import RESULT_OF, Fitted
 from volery.runtime.uav import Uav
+from volery.scenario.camera import CameraSensor
 from volery.scenario.schema import Scenario
 from volery.sensors.samples import JointAngles
 
@@ -26,6 +28,9 @@ def announce_sensors(publisher: GraphPublisher, fitted: Sequence[Fitted]) -> Non
     for sensor in fitted:
         if sensor.lidar is not None:
             publisher.announce_lidar(sensor.id, sensor.lidar, sensor.topic, sensor.mount)
+        elif isinstance(sensor.spec, CameraSensor):
+            camera = Camera(sensor.id, sensor.spec, sensor.left)
+            publisher.announce_camera(camera, sensor.mount)
         else:
             publisher.announce(sensor.id, RESULT_OF[sensor.spec.kind], sensor.mount)
         if sensor.mount.nods:

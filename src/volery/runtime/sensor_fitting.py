@@ -16,6 +16,7 @@ from volery.core.rng import stream_key
 from volery.graph.lidar_publishing import lidar_topic
 from volery.runtime.placement import Start
 from volery.scenario import schema
+from volery.scenario.camera import CameraSensor
 from volery.sensors.lidar_model import LidarModel, load_lidar
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.samples import (
@@ -52,7 +53,7 @@ RESULT_OF: dict[str, type[Samples]] = {
 """What each kind of sensor measures."""
 
 
-PICTURE = ("width", "height", "horizontal_fov_deg")
+PICTURE = ("width", "height", "horizontal_fov_deg", "samples")
 """What a scenario may change of a camera's model."""
 
 
@@ -66,6 +67,8 @@ class Fitted:
     key: np.uint64
     lidar: LidarModel | None = None
     """What kind of LIDAR it is, if it is one."""
+    left: SensorId | None = None
+    """The left camera of a stereo pair, of which this is the right one."""
 
     @property
     def bank_key(self) -> tuple[Any, ...]:
@@ -101,8 +104,34 @@ def fit_sensors(scenario: schema.Scenario, starts: Sequence[Start]) -> list[Fitt
         for row, start in enumerate(starts)
         for spec in scenario.types[start.type_name].sensors
     ]
+    fitted = [camera for sensor in fitted for camera in _pair(scenario.seed, sensor)]
     _check_topics(scenario, fitted)
     return fitted
+
+
+def _pair(seed: int, sensor: Fitted) -> list[Fitted]:
+    """The left and the right camera of a stereo pair; any other sensor as it is."""
+    spec = sensor.spec
+    if not isinstance(spec, CameraSensor) or spec.stereo is None:
+        return [sensor]
+    ids = [replace(sensor.id, name=f"{spec.name}/{side}") for side in ("left", "right")]
+    aside = [0.5 * spec.stereo.baseline_m, -0.5 * spec.stereo.baseline_m]  # y is to the left
+    return [
+        replace(
+            sensor,
+            id=own,
+            mount=_moved(sensor.mount, y),
+            key=noise_key(seed, spec.kind, own),
+            left=None if own is ids[0] else ids[0],
+        )
+        for own, y in zip(ids, aside, strict=True)
+    ]
+
+
+def _moved(mount: Mount, y: float) -> Mount:
+    """The mount, `y` m further along its own y axis."""
+    offset = rotations.rotate(mount.attitude_body, np.array([0.0, y, 0.0]))
+    return mount._replace(position_body=mount.position_body + offset)
 
 
 def refit(fitted: Sequence[Fitted], seed: int, first_row: int = 0) -> list[Fitted]:

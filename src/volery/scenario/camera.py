@@ -11,6 +11,13 @@ from volery.scenario.base import Data, MountedSensor, Name, Rate
 Side = Annotated[int, Field(ge=1, le=8192)]
 
 
+class Stereo(Data):
+    """Two equal cameras side by side that look the same way, and expose at the same time."""
+
+    baseline_m: Annotated[float, Field(gt=0.0, le=10.0)]
+    """From the left one to the right one."""
+
+
 class CameraSensor(MountedSensor):
     """A camera of a named model; x of its frame looks along the optical axis, z is up."""
 
@@ -22,6 +29,17 @@ class CameraSensor(MountedSensor):
     """Pixels, instead of the model's; so are those that follow."""
     height: Side | None = None
     horizontal_fov_deg: Annotated[float, Field(gt=0.0, lt=180.0)] | None = None
+    samples: Literal[1, 4] | None = None
+    depth_encoding: Literal["32FC1", "16UC1"] = "32FC1"
+    """Of the depth picture: metres, or millimetres with 0 for what is not known (REP 118)."""
+    compressed: Literal["jpeg", "png", "none"] = "jpeg"
+    """Codec of the compressed colour picture; none: neither that nor a compressed depth."""
+    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 95
+    """As OpenCV and image_transport count it; 95 is their default."""
+    points: Literal["none", "xyz", "xyzrgb"] = "none"
+    """What a point of the cloud has."""
+    stereo: Stereo | None = None
+    """Makes it a pair, `NAME/left` and `NAME/right`; `position_m` is the middle between them."""
 
 
 class Daylight(Data):

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from volery.vehicle.airframe import Airframe, RotorPlace
 from volery.world.materials import Material
 from volery.world.mesh import Mesh
+from volery.world.rotor_kernels import DISC_SIDES
 from volery.world.scene_content import BodyShape
 
 Array = NDArray[np.float64]
 
-_DISC_SIDES = 16
 _ARM_WIDTH_M = 0.025
 
 _BOX_CORNERS = np.array(
@@ -32,14 +32,16 @@ _BOX_TRIANGLES = np.array(
 def body_shape(airframe: Airframe) -> BodyShape:
     """Box, arms and rotor discs of an airframe, in FLU about its centre of mass, m.
 
-    A turning rotor is a disc: a LIDAR's pulse of some nanoseconds meets a blade or passes, but a
-    sweep sees the whole circle.
+    A turning rotor is a disc to a LIDAR: a pulse of some nanoseconds meets a blade or passes, but a
+    sweep sees the whole circle. A camera sees the blades where they are (`world.rotor_kernels`).
     """
     solid = [_box(np.zeros(3), np.array(airframe.body.size_m), 0.0)]
     solid += [_arm(place) for place in airframe.rotors.places]
-    discs = [_disc(place, airframe.rotors.radius_m) for place in airframe.rotors.places]
+    radius = airframe.rotors.radius_m
+    rotors = np.array([_turning(place, radius) for place in airframe.rotors.places])
+    discs = [_disc(rotor) for rotor in rotors]
     return BodyShape(
-        ((_joined(solid), Material.UAV_BODY), (_joined(discs), Material.ROTOR)),
+        ((_joined(solid), Material.UAV_BODY), (_joined(discs), Material.ROTOR)), rotors
     )
 
 
@@ -58,16 +60,22 @@ def _arm(place: RotorPlace) -> tuple[Array, NDArray[np.uint32]]:
     return _box(np.array([x / 2.0, y / 2.0, z / 2.0]), size, math.atan2(y, x))
 
 
-def _disc(place: RotorPlace, radius: float) -> tuple[Array, NDArray[np.uint32]]:
+def _turning(place: RotorPlace, radius: float) -> Array:
+    """Row (10,) of `BodyShape.rotors`."""
     axis = np.array(place.axis)
     side = np.cross(axis, [1.0, 0.0, 0.0] if abs(axis[0]) < 0.9 else [0.0, 1.0, 0.0])
     side /= np.linalg.norm(side)
-    other = np.cross(axis, side)
-    angle = np.arange(_DISC_SIDES) * (2.0 * math.pi / _DISC_SIDES)
+    other = np.cross(axis, side) * (1.0 if place.direction == "ccw" else -1.0)
+    return np.concatenate([place.position_m, side, other, [radius]])
+
+
+def _disc(rotor: Array) -> tuple[Array, NDArray[np.uint32]]:
+    centre, side, other, radius = rotor[:3], rotor[3:6], rotor[6:9], rotor[9]
+    angle = np.arange(DISC_SIDES) * (2.0 * math.pi / DISC_SIDES)
     rim = radius * (np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * other)
-    vertices = np.vstack([np.zeros(3), rim]) + np.array(place.position_m)
-    k = np.arange(_DISC_SIDES)
-    triangles = np.stack([np.zeros_like(k), k + 1, (k + 1) % _DISC_SIDES + 1], axis=1)
+    vertices = np.vstack([np.zeros(3), rim]) + centre
+    k = np.arange(DISC_SIDES)
+    triangles = np.stack([np.zeros_like(k), k + 1, (k + 1) % DISC_SIDES + 1], axis=1)
     return vertices, triangles.astype(np.uint32)
 
 

@@ -22,6 +22,7 @@ BODY = np.dtype(
         ("battery_voltage", "f8"),
         ("battery_current", "f8"),
         ("battery_level", "i8"),
+        ("rotor_angle", "f8", MAX_ROTORS),  # turned so far, at the end of the guidance tick
         ("rotor_health", "f8", MAX_ROTORS),
         ("rotor_lift", "f8", MAX_ROTORS),  # N s^2: thrust over speed squared, wear and ground in it
         ("free_acceleration", "f8", 3),  # on the ground, acceleration_map without its push ...
@@ -77,6 +78,8 @@ class FleetState(NamedTuple):
     """(N, 3) rad/s^2, FLU, the mean over the last step."""
     rotor_speed: Array
     """(N, MAX_ROTORS) rad/s; columns beyond a UAV's rotors stay zero."""
+    rotor_angle: Array
+    """(N, MAX_ROTORS) rad that each has turned, its sense aside; see `RotorTurns`."""
     rotor_health: Array
     """(N, MAX_ROTORS) share of the new rotor's thrust; 0: lost, it stops; zero beyond a UAV's
     rotors. `Fleet.set_rotor_health` changes it."""
@@ -98,6 +101,20 @@ class FleetState(NamedTuple):
     """(N,) m that may be flown before the clearance to solids must be looked up; inf: ever."""
     separation_budget: Array
     """(N,) m likewise, for the distance to other UAVs."""
+
+
+class RotorTurns(NamedTuple):
+    """How far the rotors have turned at a time, and how fast they turn."""
+
+    angle: Array
+    """(N, MAX_ROTORS) rad at `time_ns`, its sense aside."""
+    speed: Array
+    """(N, MAX_ROTORS) rad/s."""
+    time_ns: int
+
+    def at(self, time_ns: int) -> Array:
+        """Angles (N, MAX_ROTORS), rad, at a time close by, at a constant speed."""
+        return self.angle + self.speed * (1e-9 * (time_ns - self.time_ns))
 
 
 def new_bodies(position_map: Array, attitude: Array) -> NDArray[np.void]:

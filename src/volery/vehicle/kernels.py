@@ -92,6 +92,17 @@ def accelerate(body: Any, plant: Any, command: Any, dt: float) -> None:
 
 
 @inner_kernel
+def turn_rotors(body: Any, plant: Any, seconds: float) -> None:
+    """Count on how far the rotors turn within a guidance tick, from its start to its end.
+
+    Cameras see by it where the blades are; nothing of the motion depends on it, so the speed at the
+    start of the tick will do.
+    """
+    for r in range(plant.rotors):
+        body.rotor_angle[r] += body.rotor_speed[r] * seconds
+
+
+@inner_kernel
 def near_ground(body: Any, dt: float) -> bool:
     """Whether the ground must be looked at in this step."""
     vx, vy, vz = three(body.velocity_map)

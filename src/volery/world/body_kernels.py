@@ -18,14 +18,21 @@ from volery.world.embree import (
     GEOMETRY,
     INVALID,
     LANES,
+    NEAR,
     NORMAL,
     ORIGIN,
+    PRIMITIVE,
     intersect_packet,
     occluded_packet,
 )
+from volery.world.materials import Material
+from volery.world.rotor_kernels import meets_blade
 from volery.world.scene_memory import BodyTable, RayBlock, SceneHandle
 
 _INVALID = np.uint32(INVALID)
+_ROTOR = int(Material.ROTOR)
+_PAST_M = np.float32(1e-4)
+"""A ray that went through a gap starts again this far behind the disc."""
 
 
 @inner_kernel
@@ -159,6 +166,43 @@ def _into_body(
 
 
 @inner_kernel
+def _leave_gaps(bodies: BodyTable, block: RayBlock, p: int, row: int) -> bool:
+    """Let rays that met a rotor between its blades start again behind it; whether any did."""
+    found, words, rays = block.body_rays, block.body_words, block.rays[p]
+    again = False
+    for k in range(LANES):
+        part = words[GEOMETRY, k]
+        if block.body_valid[k] == 0 or part == _INVALID or bodies.material[row, part] != _ROTOR:
+            continue
+        far = found[FAR, k]
+        x = found[ORIGIN, k] + far * found[DIRECTION, k]
+        y = found[ORIGIN + 1, k] + far * found[DIRECTION + 1, k]
+        z = found[ORIGIN + 2, k] + far * found[DIRECTION + 2, k]
+        triangle = int(words[PRIMITIVE, k])
+        if not meets_blade(bodies, row, triangle, block.fraction[p], x, y, z):
+            words[GEOMETRY, k] = _INVALID
+            found[NEAR, k] = far + _PAST_M
+            found[FAR, k] = rays[FAR, k]
+            again = True
+    return again
+
+
+@inner_kernel
+def _cast_in_body(bodies: BodyTable, block: RayBlock, p: int, row: int) -> None:
+    """Closest hits of the body-frame packet, through the gaps of turning rotors."""
+    found, valid = block.body_rays, block.body_valid
+    intersect_packet(valid.ctypes.data, bodies.scene[row], found.ctypes.data, 0)
+    if bodies.rotors.shape[1] == 0:
+        return
+    for _ in range(bodies.rotors.shape[1]):  # each disc is met once at most
+        if not _leave_gaps(bodies, block, p, row):
+            break
+        intersect_packet(valid.ctypes.data, bodies.scene[row], found.ctypes.data, 0)
+    for k in range(LANES):
+        found[NEAR, k] = 0.0
+
+
+@inner_kernel
 def cast_at_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: int) -> None:
     """Let one body shorten the rays of packet `p`."""
     bodies = scene.bodies
@@ -168,7 +212,7 @@ def cast_at_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: i
         return
     _into_body(scene.bodies, block, p, lanes, row, pose)
     found = block.body_rays
-    intersect_packet(block.body_valid.ctypes.data, bodies.scene[row], found.ctypes.data, 0)
+    _cast_in_body(bodies, block, p, row)
     a, b, c = _rotation(pose[3], pose[4], pose[5], pose[6])
     for k in range(lanes):
         part = block.body_words[GEOMETRY, k]
@@ -194,6 +238,12 @@ def hide_behind_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, ro
     for k in range(lanes):
         if block.valid[k] == 0 or rays[FAR, k] < 0.0:
             sees[k] = 0
+    if scene.bodies.rotors.shape[1] > 0:
+        _cast_in_body(scene.bodies, block, p, row)
+        for k in range(lanes):
+            if sees[k] != 0 and block.body_words[GEOMETRY, k] != _INVALID:
+                rays[FAR, k] = -np.inf
+        return
     occluded_packet(sees.ctypes.data, scene.bodies.scene[row], found.ctypes.data, 0)
     for k in range(lanes):
         if sees[k] != 0 and found[FAR, k] < 0.0:

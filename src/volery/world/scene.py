@@ -65,6 +65,8 @@ def _no_bodies() -> BodyTable:
         start=np.zeros((0, 7)),
         end=np.zeros((0, 7)),
         crew=1,
+        rotors=np.zeros((0, 0, 10)),
+        turn=np.zeros((0, 0, 2)),
     )
 
 
@@ -91,6 +93,7 @@ class Scene:
         self._content = collect(terrain, forest, detail, self.solids)
         self.backend: EmbreeBackend | EmbreexBackend = _make_backend(self._content, backend)
         self._bodies = _no_bodies()
+        self._rotors = self._bodies.rotors
         self._is_twin = False
 
     @property
@@ -108,6 +111,17 @@ class Scene:
         """What compiled kernels need to cast in this scene; only while the scene is open."""
         return self.backend.handle(self._bodies)
 
+    def handle_with_blades(
+        self, start: NDArray[np.float64], end: NDArray[np.float64]
+    ) -> SceneHandle:
+        """A handle whose rays see the blades of turning rotors instead of discs.
+
+        start, end: (N, R or more) rad, how far each has turned at either end of the interval.
+        """
+        count, most, _ = self._rotors.shape
+        turn = np.ascontiguousarray(np.stack([start[:count, :most], end[:count, :most]], axis=-1))
+        return self.backend.handle(self._bodies._replace(rotors=self._rotors, turn=turn))
+
     def twin(self) -> Scene:
         """The same static world with moving bodies of its own, for another thread.
 
@@ -116,6 +130,7 @@ class Scene:
         twin = copy.copy(self)
         twin.workers = Workers(1)
         twin._bodies = _no_bodies()
+        twin._rotors = twin._bodies.rotors
         twin._is_twin = True
         return twin
 
@@ -161,7 +176,14 @@ class Scene:
             start=pose,
             end=pose.copy(),
             crew=max(len(index) // copies, 1),
+            rotors=np.zeros((len(index), 0, 10)),
+            turn=np.zeros((len(index), 0, 2)),
         )
+        most = max((len(shape.rotors) for shape in shapes), default=0)
+        rotors = np.zeros((len(shapes), most, 10))
+        for i, shape in enumerate(shapes):
+            rotors[i, : len(shape.rotors)] = shape.rotors
+        self._rotors = rotors[index]
 
     def move_bodies(
         self,

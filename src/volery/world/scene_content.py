@@ -7,7 +7,7 @@ or more parts; a part is a mesh with a material, shared by all instances of a tr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,6 +40,10 @@ class BodyShape:
     """What the others see of a UAV: meshes in the body frame (FLU) with their materials."""
 
     parts: tuple[tuple[Mesh, Material], ...]
+    rotors: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 10)))
+    """(R, 10) turning rotors: centre, two unit vectors in the disc of which it turns the first one
+    towards the second, radius, m. The part of material ROTOR has `DISC_SIDES` triangles for each
+    (`rotor_kernels`), in order; without any it is solid."""
 
     @property
     def radius(self) -> float:

@@ -31,6 +31,11 @@ class BodyTable(NamedTuple):
     """(N, 7) the same at fraction 1: the newest pose."""
     crew: int
     """UAVs of one copy of a scenario: a UAV's rays see the others of its own copy alone."""
+    rotors: NDArray[np.float64]
+    """(N, R, 10) `BodyShape.rotors`, for rays that tell blades from gaps; (N, 0, 10) for those that
+    see discs."""
+    turn: NDArray[np.float64]
+    """(N, R, 2) rad, angles of the rotors at fractions 0 and 1."""
 
 
 class SceneHandle(NamedTuple):

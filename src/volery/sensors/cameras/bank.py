@@ -79,7 +79,15 @@ class CameraBank:
             self._mounts,
         )
         parts = self.wants() or EVERY_PART
-        pictures = take(self._scene, self._model, self._light, batch, fleet.history, parts=parts)
+        pictures = take(
+            self._scene,
+            self._model,
+            self._light,
+            batch,
+            fleet.history,
+            rotors=fleet.rotor_turns(),
+            parts=parts,
+        )
         return CameraFrames(self.sensors, time_ns, self._model, **_arrays(pictures))
 
     def get_state(self) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from volery.sensors.cameras.light import Light
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.cameras.pixel_table import PIECE
 from volery.sensors.lidar import move_bodies
+from volery.vehicle.fleet import RotorTurns
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.embree import LANES
 from volery.world.scene import Scene
@@ -47,6 +48,7 @@ def take(
     batch: LidarBatch,
     history: PoseHistory,
     *,
+    rotors: RotorTurns | None = None,
     parts: Collection[Part] = EVERY_PART,
     workers: Workers | None = None,
 ) -> Pictures:
@@ -54,7 +56,8 @@ def take(
 
     Noise follows from `key` and `scan_number`, the number of a camera's picture.
     `history` must reach from the earliest exposure to the end of the latest one's readout. A camera
-    does not see its own UAV. The same picture comes of any number of threads.
+    does not see its own UAV. The rotors of others are where `rotors` says; None: blurred to discs.
+    The same picture comes of any number of threads.
     """
     if not scene.compiled:
         raise NotImplementedError("cameras need Embree's library; see `volery doctor`")
@@ -70,7 +73,12 @@ def take(
         start = int(batch.sweep_start_ns.min())
         end = int(batch.sweep_start_ns.max()) + model.readout_ns
         bodies = move_bodies(scene, history, start, end)
-        handle, table, counter = scene.handle, model.table, new_counter()
+        table, counter = model.table, new_counter()
+        handle = (
+            scene.handle
+            if rotors is None
+            else scene.handle_with_blades(rotors.at(start), rotors.at(end))
+        )
         reach = model.far_m / float(table.direction[:, 0].min())
         optics = Optics(
             model.near_m,

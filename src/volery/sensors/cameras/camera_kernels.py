@@ -175,7 +175,9 @@ def _write_geometry(
                     depth = f4(-np.inf)
                 elif is_noisy:
                     drawn = normals[(random_bits(key, number + pixel) >> _DEPTH_BITS) & _LAST]
-                    depth += f4(optics.depth_noise_per_m) * drawn * depth * depth
+                    # The noise of stereo is one of 1 / depth; without any left it is too far.
+                    share = f4(1.0) + f4(optics.depth_noise_per_m) * drawn * depth
+                    depth = depth / share if share * far > depth else f4(np.inf)
                 frames.depth[shot, pixel] = depth
             if wants_labels:
                 frames.instance[shot, pixel] = instance[k] if seen else -1

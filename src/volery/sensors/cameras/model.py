@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from volery.sensors.cameras.lens import distort
+from volery.sensors.cameras.lens import distort, undistort
 from volery.sensors.cameras.pixel_table import PixelTable, make_table
 from volery.sensors.model import SensorModel, load_model
 
@@ -49,7 +50,8 @@ class CameraModel(SensorModel):
     """Standard deviation that light adds to a pixel which it just saturates; it goes with the
     square root of the light."""
     depth_noise_per_m: NonNegativeFloat = 0.0
-    """Standard deviation of the depth at 1 m; it grows with the square, as that of stereo does."""
+    """Standard deviation of 1 / depth, 1/m, as that of stereo; that of the depth grows with its
+    square, and is this at 1 m. What seems beyond `far_m` is told as inf."""
 
     @model_validator(mode="after")
     def _sees_something(self) -> Self:
@@ -73,6 +75,15 @@ class CameraModel(SensorModel):
         (cx, cy), f = self.centre_px, self.focal_px
         return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
 
+    def model_copy(
+        self, *, update: Mapping[str, Any] | None = None, deep: bool = False
+    ) -> CameraModel:
+        """Copy with other numbers; what was worked out from the old ones stays behind."""
+        copy = super().model_copy(update=update, deep=deep)
+        for name in ("table", "ideal"):
+            copy.__dict__.pop(name, None)
+        return copy
+
     def without_noise(self) -> CameraModel:
         """The same camera, exact."""
         none = {"read_noise": 0.0, "shot_noise": 0.0, "depth_noise_per_m": 0.0}
@@ -95,6 +106,16 @@ class CameraModel(SensorModel):
             self.samples,
             self.readout_ns,
         )
+
+    @cached_property
+    def ideal(self) -> NDArray[np.float32]:
+        """(height, width, 2) x and y, in the optical frame, of what a pixel sees at depth 1.
+
+        NaN where the lens shows nothing.
+        """
+        v, u = np.mgrid[0 : self.height, 0 : self.width]
+        seen = (np.stack([u, v], axis=-1) - np.array(self.centre_px)) / self.focal_px
+        return np.ascontiguousarray(undistort(seen, self.distortion), dtype=np.float32)
 
     def project(self, points: ArrayLike) -> Array:
         """Pixels (..., 2), column and row, of points (..., 3) in the optical frame, m.

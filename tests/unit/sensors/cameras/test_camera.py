@@ -218,8 +218,37 @@ def test_noise_has_the_stated_size(picture):
     assert abs(off.mean()) < 0.1 * wanted
 
 
+def test_a_changed_model_has_rays_of_its_own():
+    model = CameraModel(width=16, height=8)
+    assert model.table.after_ns.max() == 0
+    assert model.ideal.shape == (8, 16, 2)
+    other = model.model_copy(update={"width": 32, "readout_s": 0.01})
+    assert other.table.after_ns.max() > 0
+    assert other.ideal.shape == (8, 32, 2)
+
+
+def test_noisy_depth_is_a_depth(picture):
+    """1/z = .0125 at 80 m with .004 of noise: never negative, too far where little is left."""
+    model = CameraModel(width=128, height=128, horizontal_fov_deg=5.0, depth_noise_per_m=0.004)
+    depth = picture(model, (0.0, 0.0, 20.0), solids=[wall(80.0)]).depth[0]
+    assert depth.min() > 25.0
+    assert (depth[np.isfinite(depth)] <= model.far_m).all()
+    lost = np.mean(depth == np.inf)  # 1/z below 1/200: 1.875 standard deviations
+    assert lost == pytest.approx(0.0304, abs=0.006)
+    assert np.median(1.0 / depth) == pytest.approx(1.0 / 80.0, rel=0.01)
+
+
 def test_the_shipped_camera_loads():
     assert load_camera().without_noise() == CameraModel(name="pinhole camera")
+
+
+@pytest.mark.parametrize(("name", "far_m"), [("f450_front", 1300.0), ("f450_down", 100.0)])
+def test_the_cameras_of_the_f450_load(name, far_m):
+    """The edge of a picture with a field of view of 1 rad is half a radian off the axis."""
+    model = load_camera(name)
+    assert (model.width, model.height, model.far_m) == (640, 480, far_m)
+    edge = model.project([np.tan(0.5), 0.0, 1.0])
+    np.testing.assert_allclose(edge, [639.5, 239.5], atol=1e-9)
 
 
 def test_a_uav_out_of_sight_throws_its_shadow_into_the_picture(two):

@@ -1,0 +1,114 @@
+"""The topics of cameras: what each needs of a picture, and who is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from volery.graph import camera_messages as messages
+from volery.graph.camera_messages import Camera
+from volery.graph.graph import Graph, Publisher
+from volery.graph.messages import CameraInfo, CompressedImage, Image, PointCloud2
+from volery.scenario.camera import CameraSensor
+from volery.sensors.cameras.camera import Part
+from volery.sensors.samples import CameraFrames, SensorId
+
+
+class _Channel(NamedTuple):
+    """One of the topics of a camera."""
+
+    suffix: str
+    message_class: type[Any]
+    message: Callable[[CameraFrames, int, Camera], Any]
+    parts: Callable[[CameraSensor], tuple[Part, ...]]
+    """What of a picture must be made for it; nothing: the camera does not offer it."""
+
+
+def _always(*parts: Part) -> Callable[[CameraSensor], tuple[Part, ...]]:
+    return lambda _: parts
+
+
+def _if_compressed(part: Part) -> Callable[[CameraSensor], tuple[Part, ...]]:
+    return lambda settings: () if settings.compressed == "none" else (part,)
+
+
+def _of_points(settings: CameraSensor) -> tuple[Part, ...]:
+    parts: dict[str, tuple[Part, ...]] = {
+        "none": (),
+        "xyz": ("depth",),
+        "xyzrgb": ("colour", "depth"),
+    }
+    return parts[settings.points]
+
+
+_CHANNELS = (
+    _Channel("/image_raw", Image, messages.colour, _always("colour")),
+    _Channel(
+        "/image_raw/compressed", CompressedImage, messages.compressed, _if_compressed("colour")
+    ),
+    _Channel("/depth", Image, messages.depth, _always("depth")),
+    _Channel(
+        "/depth/compressedDepth",
+        CompressedImage,
+        messages.compressed_depth,
+        _if_compressed("depth"),
+    ),
+    _Channel("/points", PointCloud2, messages.points, _of_points),
+    # Intrinsics come with the cheapest part.
+    _Channel("/camera_info", CameraInfo, messages.camera_info, _always("depth")),
+    _Channel("/labels/instance", Image, messages.instance, _always("labels")),
+    _Channel("/labels/material", Image, messages.material, _always("labels")),
+)
+
+
+class CameraPublisher:
+    """Publishes the pictures of all cameras."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self._cameras: dict[str, Camera] = {}
+        self._publishers: dict[str, dict[_Channel, Publisher]] = {}
+
+    def announce(self, camera: Camera) -> None:
+        """Advertise what a camera publishes."""
+        sensor = camera.sensor
+        self._cameras[sensor.path] = camera
+        self._publishers[sensor.path] = {
+            channel: self._graph.advertise(f"/{sensor.path}{channel.suffix}", channel.message_class)
+            for channel in _CHANNELS
+            if channel.parts(camera.settings)
+        }
+
+    def retire(self, uav_name: str) -> None:
+        """Publish no more for the cameras of a UAV."""
+        for path in [path for path in self._cameras if path.startswith(f"{uav_name}/")]:
+            del self._cameras[path]
+            for publisher in self._publishers.pop(path).values():
+                publisher.cancel()
+
+    def wanted_parts(self, cameras: Sequence[SensorId]) -> set[Part]:
+        """What of the pictures of these cameras somebody would receive."""
+        return {
+            part
+            for sensor in cameras
+            for channel, publisher in self._publishers[sensor.path].items()
+            if publisher.wanted
+            for part in channel.parts(self._cameras[sensor.path].settings)
+        }
+
+    def publish(self, frames: CameraFrames) -> None:
+        """Queue the messages of one picture of each camera, where somebody receives them.
+
+        Who has come since the picture was made gets the next one.
+        """
+        made = {
+            "colour": frames.colour.size > 0,
+            "depth": frames.depth.size > 0,
+            "labels": frames.instance.size > 0,
+        }
+        for row, sensor in enumerate(frames.sensors):
+            camera = self._cameras[sensor.path]
+            for channel, publisher in self._publishers[sensor.path].items():
+                parts = channel.parts(camera.settings)
+                if publisher.wanted and all(made[part] for part in parts):
+                    publisher.publish(channel.message(frames, row, camera))

@@ -1,0 +1,73 @@
+"""Pictures as bytes: JPEG, PNG, and depth as image_transport's `compressedDepth` packs it.
+
+What stands here follows `compressed_image_transport` and `compressed_depth_image_transport`
+(image_transport_plugins, ros-perception): their subscribers turn it back into pictures.
+"""
+
+from __future__ import annotations
+
+import struct
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_PNG_LEVEL = 3
+"""image_transport's and OpenCV's default."""
+_QUANTIZATION = 100.0
+"""m: depth at which a step of the coded depth is 1 m; image_transport's default."""
+_INVERSE_DEPTH = 0
+_HEADER = struct.Struct("<i2f")
+"""Kind of coding and its two numbers, as the plugin's memory holds them: 12 bytes."""
+_MOST = 65535
+
+
+def jpeg(picture: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+    """JPEG of (height, width, 3) sRGB; quality 1 to 100 on libjpeg's scale."""
+    return _encoded(picture, format="JPEG", quality=quality)
+
+
+def png(picture: NDArray[Any]) -> NDArray[np.uint8]:
+    """PNG of (height, width, 3) sRGB, or of (height, width) 16-bit greys."""
+    return _encoded(picture, format="PNG", compress_level=_PNG_LEVEL)
+
+
+def millimetres(depth: NDArray[np.float32]) -> NDArray[np.uint16]:
+    """Depth (height, width) m in whole mm (REP 118); 0: not known, or beyond 65.535 m."""
+    with np.errstate(invalid="ignore"):
+        scaled = np.rint(depth * np.float32(1000.0))
+        known = (scaled > 0.0) & (scaled <= _MOST)
+    return np.where(known, scaled, 0.0).astype(np.uint16)
+
+
+def packed_millimetres(depth: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    """`compressedDepth` of depth in mm: nothing is lost."""
+    return _with_header(0.0, 0.0, depth)
+
+
+def packed_metres(depth: NDArray[np.float32], far_m: float) -> NDArray[np.uint8]:
+    """`compressedDepth` of depth in m, of which it keeps `A / depth + B` in 16 bits.
+
+    A = q (q + 1) and B = 1 - A / far with q = 100 m: steps are z^2 / A, 1 cm at 10 m. What is not
+    known, beyond `far_m`, or nearer than the 16 bits reach (.15 m) is 0, which comes back as NaN.
+    """
+    a = _QUANTIZATION * (_QUANTIZATION + 1.0)
+    b = 1.0 - a / far_m
+    with np.errstate(invalid="ignore", divide="ignore"):
+        coded = np.floor(np.float32(a) / depth + np.float32(b))
+        known = (depth > 0.0) & (depth < far_m) & (coded <= _MOST)
+    return _with_header(a, b, np.where(known, coded, 0.0).astype(np.uint16))
+
+
+def _with_header(a: float, b: float, depth: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    header = np.frombuffer(_HEADER.pack(_INVERSE_DEPTH, a, b), np.uint8)
+    return np.concatenate([header, png(depth)])
+
+
+def _encoded(picture: NDArray[Any], **options: Any) -> NDArray[np.uint8]:
+    from PIL import Image
+
+    file = BytesIO()
+    Image.fromarray(np.ascontiguousarray(picture)).save(file, **options)
+    return np.frombuffer(file.getbuffer(), np.uint8)

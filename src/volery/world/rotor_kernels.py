@@ -1,0 +1,40 @@
+"""Compiled turning rotors: where in a disc a ray meets a blade, and where it goes on.
+
+A rotor is two opposite blades and a hub. Their shape is a modelling choice for small propellers:
+the chord falls linearly from .22 of the radius at the axis to .10 at the tip, which fills .10 of
+the disc, and the hub with the motor has .12 of the radius. Blades are flat and lie in the disc.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from volery.core.compiled import inner_kernel
+from volery.world.scene_memory import BodyTable
+
+DISC_SIDES = 16
+"""Triangles of the mesh of a rotor's disc."""
+_HUB = 0.12
+_ROOT, _TAPER = 0.22, 0.12
+
+
+@inner_kernel
+def meets_blade(
+    bodies: BodyTable, row: int, triangle: int, fraction: float, x: float, y: float, z: float
+) -> bool:
+    """Whether there is a blade or hub at a place of a rotor's disc, body frame.
+
+    triangle: its number in the mesh of all discs of a body. fraction: of the interval of motion.
+    """
+    rotor = min(triangle // DISC_SIDES, bodies.rotors.shape[1] - 1)
+    place, turn = bodies.rotors[row, rotor], bodies.turn[row, rotor]
+    dx, dy, dz = x - place[0], y - place[1], z - place[2]
+    a = dx * place[3] + dy * place[4] + dz * place[5]
+    b = dx * place[6] + dy * place[7] + dz * place[8]
+    radius = place[9]
+    away = np.sqrt(a * a + b * b)
+    if radius == 0.0 or away <= _HUB * radius:  # without a radius it is no rotor that turns
+        return True
+    angle = turn[0] + fraction * (turn[1] - turn[0])
+    beside = abs(b * np.cos(angle) - a * np.sin(angle))
+    return bool(2.0 * beside <= _ROOT * radius - _TAPER * away)
