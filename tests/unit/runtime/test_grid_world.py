@@ -126,16 +126,16 @@ def test_a_map_of_the_graph_becomes_blocks(simulate, blocks_data):
     simulation.run(0.1)
     assert (shown[0].info.width, shown[0].info.height) == (3, 7)
     assert shown[0].data.tolist() == [0, 0, 100] * 7
-    # Row 0 lies at the lowest y: of the two rows, that at y >= 0 has its block at x = 4.
-    rows = [100, 0, 0, 0, 0, 49, 0, 0, 0, 50]
-    sender.publish(occupancy(rows, 5, y=-1.0))
+    # Row 0 lies at the lowest y: of the two rows, that around y = 0 has its block at x = 4.
+    rows = [0, 100, 0, 0, 0, 49, 0, 0, 0, 50]
+    sender.publish(occupancy(rows, 5, y=-1.5))
     simulation.step(1)
     simulation.run(0.03)
     assert ahead.ranges[-1] == pytest.approx(4.0, abs=1e-3)
-    assert shown[-1].data.tolist() == [100, *[0] * 8, 100]
+    assert shown[-1].data.tolist() == [0, 100, *[0] * 7, 100]
     assert (simulation.grid_world.current.name, simulation.grid_world.current.rows) == ("map_in", 2)
     half = np.sqrt(0.5)  # a quarter turn: the rows run towards -x, the columns towards y
-    sender.publish(occupancy([0, 0, 0, 100], 2, x=9.0, y=-1.0, turn=(0, 0, half, half)))
+    sender.publish(occupancy([0, 0, 0, 100], 2, x=9.0, y=-1.5, turn=(0, 0, half, half)))
     simulation.run(0.03)
     assert ahead.ranges[-1] == pytest.approx(7.0, abs=1e-3)
 
@@ -234,8 +234,9 @@ def test_who_is_in_a_new_block_touches_it_with_the_next_step(simulate, blocks_da
     assert {event.kind for event in simulation.events} == {EventKind.WORLD}
     sender = simulation.graph.advertise("/map_in", OccupancyGrid)
     sender.publish(occupancy([100], 1, x=-20.0, y=-20.0, resolution=40.0))
+    simulation.step(1)  # it is taken at the end of this one
     at_ns = simulation.time_ns
-    simulation.step(2)
+    simulation.step(5)
     touch = next(e for e in simulation.events if e.kind is EventKind.COLLISION)
     assert (touch.uav, touch.partner, touch.time_ns) == ("uav1", "block", at_ns + 1_000_000)
 

@@ -34,6 +34,8 @@ RECEIVED = "map_in"
 _BLOCKED, _FREE = 100, 0
 _BLOCKED_FROM = 50
 """Occupancy, in per cent, from which a cell is blocked."""
+_LARGEST = 1e6
+"""Component of a quaternion that need not be of unit length."""
 _LEVEL = 1e-3
 """Largest x and y of the quaternion of an origin that counts as level."""
 
@@ -130,9 +132,11 @@ def grid_of(message: Any, block_height_m: float, *, unknown_is_blocked: bool = F
 
 def _yaw(turn: Any) -> float:
     q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=np.float64)
+    if not (np.abs(q) < _LARGEST).all():
+        raise CommandError(f"the origin of a map is turned by {q.tolist()}, which is no rotation")
     length = float(np.linalg.norm(q))
     if length == 0.0:  # a message that was not filled in
         return 0.0
-    if not math.isfinite(length) or max(abs(q[0]), abs(q[1])) > _LEVEL * length:
+    if max(abs(q[0]), abs(q[1])) > _LEVEL * length:
         raise CommandError(f"the origin of a map turns about z alone, not by {q.tolist()}")
     return float(rotations.yaw_of(q / length))
