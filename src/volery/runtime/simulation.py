@@ -9,8 +9,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
 from numpy.typing import ArrayLike
 
+from volery.control.setpoints import checked, checked_attitude
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError, ScenarioError
 from volery.engine.engine import Engine
@@ -46,6 +48,7 @@ from volery.runtime.worlds import build_forest, build_scene, build_terrain
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario, UavType
 from volery.sensors.mount import Mount
+from volery.world.things import MovingThings
 from volery.world.weather import Weather
 
 if TYPE_CHECKING:
@@ -53,6 +56,8 @@ if TYPE_CHECKING:
 
 _CLOCK_PERIOD_S = 0.01
 _DIGEST_PERIOD_S = 0.01
+_FARTHEST_M, _FASTEST_M_S = 1e5, 100.0
+"""Of things that are put somewhere."""
 
 
 class Simulation:
@@ -122,7 +127,9 @@ class Simulation:
         self._loop = RunLoop(self._engine, self._pacer, scenario.duration_s, self._has_ended)
         self._relocator = Relocator(self._engine, self.scene, self.terrain, self._crew)
         open_lock_step(self)
-        self._services: Services = open_services(self, recordings=recordings, on_load=on_load)
+        self._services: Services = open_services(
+            self, recordings=recordings, on_load=on_load, every=self._engine.every
+        )
         self._keeper = Keeper(
             self._engine,
             self.graph,
@@ -386,6 +393,35 @@ class Simulation:
         """
         self._check_open()
         self._relocator.move(self._row_of(name), velocity_map, omega_map)
+
+    @property
+    def things(self) -> MovingThings | None:
+        """People, vehicles and birds of the scenario; None where it has none."""
+        return self.scene.things
+
+    def put_thing(
+        self,
+        name: str,
+        position_map: ArrayLike,
+        attitude: ArrayLike | None = None,
+        velocity_map: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Put a thing at (3,) m with (4,) x y z w, map from body, from now on.
+
+        It goes on from there at `velocity_map` (3,) m/s; without an attitude it keeps its own.
+        `CommandError` for one that does not exist, that goes its own way, or for such a place.
+        """
+        self._check_open()
+        if self.things is None or name not in self.things.names:
+            known = "none" if self.things is None else ", ".join(self.things.names)
+            raise CommandError(f"there is no thing '{name}'; known: {known}")
+        row = self.things.names.index(name)
+        if attitude is None:
+            attitude = self.things.poses_at(self.time_ns)[row, 3:]
+        position = checked("position", position_map, (3,), _FARTHEST_M)
+        velocity = checked("velocity", velocity_map, (3,), _FASTEST_M_S)
+        pose = np.concatenate([position, checked_attitude(attitude)])
+        self._engine.put_thing(row, pose, velocity)
 
     def spawn_uav(
         self,

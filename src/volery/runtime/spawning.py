@@ -83,6 +83,9 @@ class Spawner:
             )
         if name in self._crew.uavs:
             raise SpawnError(SpawnFault.NAME_TAKEN, f"there is a UAV '{name}' already")
+        things = self._scene.things
+        if things is not None and name in things.names:
+            raise SpawnError(SpawnFault.NAME_TAKEN, f"there is a thing '{name}' already")
 
     def _airframe_of(self, kind: str) -> Airframe:
         if kind not in self.kinds:

@@ -6,6 +6,7 @@ import math
 
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
 from volery.runtime.grid_map_building import starting_blocks
+from volery.runtime.thing_building import build_things
 from volery.scenario import wind as schema
 from volery.scenario.files import SHIPPED_DATA, resolve
 from volery.scenario.schema import GridTerrain, InventoryForest, ProceduralForest, Scenario
@@ -82,7 +83,11 @@ def build_scene(
     scenario: Scenario, terrain: Terrain, forest: Forest | None, *, threads: int = 1
 ) -> Scene:
     """All that sensors of the scenario can see but for the UAVs."""
-    return Scene(terrain, forest, solids=build_solids(scenario, terrain), threads=threads)
+    scene = Scene(terrain, forest, solids=build_solids(scenario, terrain), threads=threads)
+    things = build_things(scenario, terrain)
+    if things is not None:
+        scene.set_things(things)
+    return scene
 
 
 def build_weather(scenario: Scenario) -> Weather:

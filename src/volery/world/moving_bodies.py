@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,21 +14,6 @@ from volery.world.scene_memory import BodyTable
 
 _NOWHERE = (0.0, 0.0, -1e6, 0.0, 0.0, 0.0, 1.0)
 """Pose of a body that was not placed yet: far below the map."""
-
-
-class ThingsThatMove(Protocol):
-    """People, vehicles, birds: a shape and a name each, and where they are at any time."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of T things."""
-
-    @property
-    def shapes(self) -> tuple[BodyShape, ...]:
-        """What each looks like."""
-
-    def poses_at(self, time_ns: int) -> NDArray[np.float64]:
-        """(T, 7) x y z qx qy qz qw, map from body, of the present or a moment just past."""
 
 
 class BodyRows(NamedTuple):

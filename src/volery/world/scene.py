@@ -21,10 +21,11 @@ from volery.core.workers import Workers
 from volery.world.embree import EmbreeUnavailableError
 from volery.world.embree_backend import EmbreeBackend
 from volery.world.embreex_fallback import EmbreexBackend
-from volery.world.moving_bodies import NO_ROWS, ThingsThatMove, body_rows, body_table
+from volery.world.moving_bodies import NO_ROWS, body_rows, body_table
 from volery.world.scene_content import BodyShape, SceneContent, Solid, collect, with_solids
 from volery.world.scene_memory import SceneHandle
 from volery.world.terrain import Terrain
+from volery.world.things.moving import MovingThings
 from volery.world.trees.model import DetailLevel
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ class Scene:
         self.solids = tuple(solids)
         self._content = collect(terrain, forest, detail, self.solids)
         self.backend: EmbreeBackend | EmbreexBackend = _make_backend(self._content, backend)
-        self.things: ThingsThatMove | None = None
+        self.things: MovingThings | None = None
         """What moves by itself and is seen by all."""
         self._uav_rows, self._thing_rows, self._crew = NO_ROWS, NO_ROWS, 1
         self._bodies = body_table(NO_ROWS, NO_ROWS, 1)
@@ -166,7 +167,7 @@ class Scene:
         self._crew = max(len(index) // copies, 1)
         self._bodies = body_table(self._uav_rows, self._thing_rows, self._crew)
 
-    def set_things(self, things: ThingsThatMove) -> None:
+    def set_things(self, things: MovingThings) -> None:
         """Let `things` be seen by all; `move_things` places them."""
         scenes = self.backend.shape_scenes(things.shapes)
         self.things = things

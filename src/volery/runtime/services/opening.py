@@ -16,6 +16,7 @@ from volery.runtime.services.playing import Playing
 from volery.runtime.services.recording import Recording
 from volery.runtime.services.spawning import Spawning
 from volery.runtime.services.stepping import offer_steps
+from volery.runtime.services.things import offer_things
 from volery.runtime.services.worlds import offer_worlds
 
 if TYPE_CHECKING:
@@ -38,8 +39,12 @@ def open_services(
     *,
     recordings: Path | None = None,
     on_load: Callable[[str], None] | None = None,
+    every: Callable[..., None],
 ) -> Services:
-    """Offer the standard's services and ours; what the arguments mean, `Simulation` says."""
+    """Offer the standard's services and ours; what the arguments mean, `Simulation` says.
+
+    `every(period_s, callback, wanted=...)` has something done in simulated time.
+    """
     graph = simulation.graph
     offer_features(graph, loads_worlds=on_load is not None)
     Entities(simulation).offer()
@@ -49,6 +54,8 @@ def open_services(
     offer_worlds(simulation, on_load)
     offer_named_poses(graph, simulation.starts)
     offer_air_and_faults(simulation)
+    if simulation.things is not None:
+        offer_things(simulation, simulation.things, every)
     if simulation.scenario.world.grid_map is not None:
         settings = simulation.scenario.world.grid_map
         offer_grid_maps(graph, simulation.grid_world, settings, lambda: simulation.time_ns)
