@@ -125,7 +125,8 @@ class Scene:
         """Let `solids` stand in the place of those that stood so far, between two questions.
 
         Solids at the beginning that are the same objects as before are not touched, nor are ground
-        and trees. Returns the instance number from which on instances are others than before.
+        and trees. Twins must not be asked afterwards. Returns the instance number from which on
+        instances are others than before.
         """
         if self._is_twin:
             raise ValueError("a twin shows the static world of its scene, which alone can change")

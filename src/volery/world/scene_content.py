@@ -31,7 +31,8 @@ class Solid:
     """A fixed thing in the map: a wall, a building; its mesh is in map coordinates.
 
     What lies below an upper side of the mesh, seen from its back, counts as inside the solid: a
-    mesh is closed but for its underside, or has no upper side at all.
+    mesh is closed but for its underside, or has no upper side at all. Where one stands on another,
+    a millimetre between them tells whose side is met first.
     """
 
     mesh: Mesh

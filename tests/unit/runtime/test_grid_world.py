@@ -19,6 +19,7 @@ from volery.graph.messages import (
     Quaternion,
     time_from_ns,
 )
+from volery.runtime.services.grid_maps import grid_of
 
 SCAN = "/uav1/laser/horizontal/scan"
 FIRST_WALL_M, TALL_M, LOW_M = 6.0, 6.0, 1.0
@@ -138,6 +139,24 @@ def test_a_map_of_the_graph_becomes_blocks(simulate, blocks_data):
     sender.publish(occupancy([0, 0, 0, 100], 2, x=9.0, y=-1.5, turn=(0, 0, half, half)))
     simulation.run(0.03)
     assert ahead.ranges[-1] == pytest.approx(7.0, abs=1e-3)
+
+
+def test_a_matrix_stands_as_it_is_read_and_told_as_the_message_wants(simulate, tmp_path, flat_data):
+    """The first line is the top, at the highest y; a message begins with the lowest."""
+    (tmp_path / "l.csv").write_text("1,0\n1,0\n1,1\n")  # an L
+    world = {"grid_map": {"maps": [{"file": str(tmp_path / "l.csv")}], "origin_m": [5.0, 5.0]}}
+    simulation = simulate({**flat_data, "world": world})
+    shown = []
+    simulation.graph.subscribe("/map", lambda m: shown.append(m.message))
+    simulation.step(1)
+    assert shown[0].data.tolist() == [100, 100, 100, 0, 100, 0]
+    x, y = np.meshgrid([5.5, 6.5], [7.5, 6.5, 5.5])
+    above = np.column_stack([x.ravel(), y.ravel(), np.full(6, 20.0)])
+    down = simulation.scene.cast(above, np.tile([0.0, 0.0, -1.0], (6, 1)), 50.0)
+    heights = (20.0 - down.distance).reshape(3, 2)
+    np.testing.assert_allclose(heights, [[5, 0], [5, 0], [5, 5]], atol=1e-5)
+    again = grid_of(shown[0], 5.0)
+    np.testing.assert_array_equal(again.blocked, simulation.grid_world.current.blocked)
 
 
 @pytest.mark.parametrize(("blocked", "want"), [(False, np.inf), (True, 3.0)])

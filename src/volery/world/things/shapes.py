@@ -1,8 +1,8 @@
 """Simple shapes that one knows at a glance: a person, a car, a bird.
 
 Frames are FLU. The origin of a person and of a car lies on the ground below the middle, that of a
-bird in its middle. Parts are closed and do not lie in each other, so that looks around know what is
-inside. Sizes are modelling choices near those of everyday life.
+bird in its middle. Parts are closed and a millimetre apart, so that a look upwards from inside one
+meets its own top first (see `Solid`). Sizes are modelling choices near those of everyday life.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from volery.world.things.primitives import box, ellipsoid, plate, wheel
 def person() -> BodyShape:
     """1.75 m tall, in mid-stride, arms at the sides."""
     clothes = [
-        box([0.05, 0.03, 0.0], [0.21, 0.17, 0.85]),  # left leg, ahead
-        box([-0.21, -0.17, 0.0], [-0.05, -0.03, 0.85]),
-        box([-0.13, -0.20, 0.85], [0.13, 0.20, 1.45]),
+        box([0.05, 0.03, 0.0], [0.21, 0.17, 0.849]),  # left leg, ahead
+        box([-0.21, -0.17, 0.0], [-0.05, -0.03, 0.849]),
+        box([-0.13, -0.20, 0.85], [0.13, 0.20, 1.449]),
         box([-0.18, 0.22, 0.95], [-0.06, 0.32, 1.43]),  # left arm, behind
         box([0.06, -0.32, 0.95], [0.18, -0.22, 1.43]),
     ]
     skin = [
         ellipsoid([0.0, 0.0, 1.60], [0.10, 0.08, 0.15]),
-        box([-0.17, 0.23, 0.80], [-0.07, 0.31, 0.95]),  # hands
-        box([0.07, -0.31, 0.80], [0.17, -0.23, 0.95]),
+        box([-0.17, 0.23, 0.80], [-0.07, 0.31, 0.949]),  # hands
+        box([0.07, -0.31, 0.80], [0.17, -0.23, 0.949]),
     ]
     return BodyShape(((concatenate(clothes), Material.CLOTHES), (concatenate(skin), Material.SKIN)))
 
@@ -37,11 +37,11 @@ def car() -> BodyShape:
     """4.4 m long, 1.8 m wide, 1.45 m high, looking along x."""
     paint = [
         box([-2.2, -0.9, 0.45], [2.2, 0.9, 0.85]),
-        box([-1.7, -0.6, 0.25], [1.7, 0.6, 0.45]),  # floor between the wheels
+        box([-1.7, -0.6, 0.25], [1.7, 0.6, 0.449]),  # floor between the wheels
         box([-1.4, -0.75, 1.35], [0.6, 0.75, 1.45]),  # roof
     ]
-    dark = [box([-1.6, -0.8, 0.85], [0.9, 0.8, 1.35])]  # windows all around
-    dark += [wheel([x, y, 0.225], 0.225, 0.2) for x in (-1.35, 1.35) for y in (-0.75, 0.75)]
+    dark = [box([-1.6, -0.8, 0.851], [0.9, 0.8, 1.349])]  # windows all around
+    dark += [wheel([x, y, 0.224], 0.224, 0.2) for x in (-1.35, 1.35) for y in (-0.75, 0.75)]
     return BodyShape(
         ((concatenate(paint), Material.CAR_PAINT), (concatenate(dark), Material.RUBBER))
     )

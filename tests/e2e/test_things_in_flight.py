@@ -66,7 +66,7 @@ def test_lidars_cameras_and_sonars_see_them(simulate, things_data):
     simulation = simulate(things_data)
     scans, ranges = listen(simulation, SCAN), listen(simulation, "/uav1/range")
     depth = listen(simulation, "/uav1/camera/depth")
-    labels = listen(simulation, "/uav1/camera/materials")
+    labels = listen(simulation, "/uav1/camera/labels/material")
     simulation.run(0.3)
     assert ahead(scans[-1]) == pytest.approx(6.0 - 2.2, abs=1e-3)
     middle = np.frombuffer(depth[-1].data, np.float32).reshape(48, 64)[24, 32]
@@ -237,8 +237,8 @@ def test_copies_see_them_too(things_data):
     things_data["types"]["f450"]["sensors"] = things_data["types"]["f450"]["sensors"][:2]
     with Copies(parse_scenario(things_data), 3) as copies:
         copies.run(0.1)
-        ranges = copies.reading("uav1", "horizontal")["ranges"]
-        middle = ranges.reshape(3, -1)[:, ranges.reshape(3, -1).shape[1] // 2]
+        ranges = copies.reading("uav1", "horizontal")["echoes"][:, 0]
+        middle = ranges[:, ranges.shape[1] // 2]
         np.testing.assert_allclose(middle, 3.8, atol=1e-3)
 
 
