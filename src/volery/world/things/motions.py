@@ -5,14 +5,13 @@ A pose is (7,): x y z m, qx qy qz qw, map from body (FLU).
 
 from __future__ import annotations
 
+import bisect
 import math
 from collections.abc import Callable, Sequence
 from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from volery.core import rotations
 
 Array = NDArray[np.float64]
 HeightAt = Callable[[float, float], float]
@@ -53,42 +52,49 @@ class WaypointMotion:
         if at_end == "loop":
             points = np.vstack([points, points[:1]])
         length = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        keep = np.append(True, length > 0.0)
-        self._points = points[keep]
-        self._way = np.concatenate([[0.0], np.cumsum(length[length > 0.0])])
+        moves = length > 0.0
+        self._points: list[tuple[float, ...]] = [
+            tuple(point) for point in points[np.append(True, moves)].tolist()
+        ]
+        self._way: list[float] = [0.0, *np.cumsum(length[moves]).tolist()]
+        """How far along the way each point lies, m."""
         self._at_end = at_end
         self._start_s = start_s
-        self._turn_m = min(turn_m, 0.25 * float(self._way[-1]))
+        self._turn_m = min(turn_m, 0.25 * self._way[-1])
         self._ground = ground
         self.speed_m_s = speed_m_s
 
     def pose_at(self, time_s: float) -> Array:
         """See `Motion`."""
         way = self.speed_m_s * max(time_s - self._start_s, 0.0)
-        length = float(self._way[-1])
         if self._at_end == "stop":
-            way = min(way, length)
-        x, y, *rest = self._place(way).tolist()
+            way = min(way, self._way[-1])
+        x, y, *rest = self._place(way)
         z = rest[0] if self._ground is None else self._ground(x, y)
-        return np.array([x, y, z, *rotations.from_rpy(0.0, 0.0, self._heading(way)).tolist()])
+        half = 0.5 * self._heading(way)
+        return np.array([x, y, z, 0.0, 0.0, math.sin(half), math.cos(half)])
 
     def _heading(self, way: float) -> float:
         ahead, behind = self._place(way + self._turn_m), self._place(way - self._turn_m)
-        dx, dy = (ahead - behind)[:2].tolist()
+        dx, dy = ahead[0] - behind[0], ahead[1] - behind[1]
         if math.hypot(dx, dy) < 1e-9:  # at the very point where it turns back, or straight up
-            dx, dy = (self._place(way + 2e-3 * self._turn_m) - self._place(way))[:2].tolist()
+            ahead, behind = self._place(way + 2e-3 * self._turn_m), self._place(way)
+            dx, dy = ahead[0] - behind[0], ahead[1] - behind[1]
         return math.atan2(dy, dx)
 
-    def _place(self, way: float) -> Array:
-        """Where it is after `way` m; before the start and after an end it goes on as it ends."""
-        length = float(self._way[-1])
+    def _place(self, way: float) -> list[float]:
+        """Where it is after `way` m, by the numbers of a waypoint; an end is not passed."""
+        length = self._way[-1]
         if self._at_end == "loop":
             way %= length
         elif self._at_end == "back":
             way %= 2.0 * length
             way = min(way, 2.0 * length - way)
-        columns = (np.interp(way, self._way, column) for column in self._points.T)
-        return np.array(list(columns))
+        way = min(max(way, 0.0), length)
+        k = min(bisect.bisect_right(self._way, way), len(self._way) - 1)
+        share = (way - self._way[k - 1]) / (self._way[k] - self._way[k - 1])
+        pair = zip(self._points[k - 1], self._points[k], strict=True)
+        return [a + share * (b - a) for a, b in pair]
 
 
 class CircleMotion:
@@ -103,7 +109,7 @@ class CircleMotion:
         start_rad: float = 0.0,
         clockwise: bool = False,
     ) -> None:
-        self._centre = np.asarray(centre, dtype=np.float64)
+        self._centre = tuple(float(value) for value in centre)
         self._radius = radius_m
         self._start = start_rad
         self._sense = -1.0 if clockwise else 1.0
@@ -114,10 +120,13 @@ class CircleMotion:
         """See `Motion`."""
         turned = self.speed_m_s / self._radius * max(time_s, 0.0)
         angle = self._start + self._sense * turned
-        out = np.array([math.cos(angle), math.sin(angle), 0.0])
-        heading = angle + self._sense * math.pi / 2.0
-        attitude = rotations.from_rpy(-self._sense * self._lean, 0.0, heading)
-        return np.concatenate([self._centre + self._radius * out, attitude])
+        x, y, z = self._centre
+        x, y = x + self._radius * math.cos(angle), y + self._radius * math.sin(angle)
+        heading = 0.5 * (angle + self._sense * math.pi / 2.0)
+        roll = -0.5 * self._sense * self._lean
+        # Heading about z, then roll about x: the product of two half-angle quaternions.
+        a, b, c, d = math.sin(roll), math.cos(roll), math.sin(heading), math.cos(heading)
+        return np.array([x, y, z, a * d, a * c, b * c, b * d])
 
 
 class GivenMotion:
