@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.engine.events import Event, EventKind
+from volery.engine.thing_contacts import ThingContacts, ThingLooks
 from volery.world.scene import Scene
 
 Array = NDArray[np.float64]
@@ -60,6 +61,7 @@ class Collisions:
         emit: Callable[[Event], None],
         *,
         copies: int = 1,
+        looks: ThingLooks | None = None,
     ) -> None:
         self._fleet = fleet
         self._scene = scene
@@ -71,8 +73,16 @@ class Collisions:
         self._crew = len(names) // copies
         self._touching_uav = np.zeros((len(names), self._crew), dtype=bool)
         """Who touches whom (row, place of the other in the copy)."""
+        self._things = None if looks is None else ThingContacts(fleet, looks, self._touch_thing)
+        """Touches of things that move by themselves, where there are any."""
+        self._moving = None if looks is None else looks.things
         fleet.state.contact_budget[:] = 0.0
         fleet.state.separation_budget[:] = 0.0
+
+    @property
+    def next_look_ns(self) -> int | None:
+        """When somebody has to look again at the latest; None where that follows from motion."""
+        return None if self._things is None else self._things.next_look_ns
 
     def resolve(self, time_ns: int) -> None:
         """Look around every UAV whose budget is used up; strike, report, and refill."""
@@ -80,12 +90,20 @@ class Collisions:
         used_up = np.flatnonzero(state.contact_budget <= 0.0)
         if len(used_up):
             self._resolve_solids(used_up, time_ns)
-        for i in np.flatnonzero(state.separation_budget <= 0.0):
+        used_up = np.flatnonzero(state.separation_budget <= 0.0)
+        for i in used_up:
             self._resolve_others(int(i), time_ns)
+        if self._things is not None:
+            self._things.resolve(used_up, time_ns)
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps beside the fleet's own budgets: who touches what."""
-        return {"solid": self._touched_solid.copy(), "uav": self._touching_uav.copy()}
+        things = None if self._things is None else self._things.get_state()
+        return {
+            "solid": self._touched_solid.copy(),
+            "uav": self._touching_uav.copy(),
+            "things": things,
+        }
 
     def forget(self, rows: NDArray[np.int64]) -> None:
         """Take UAVs as new: they touch nothing, and look around at once."""
@@ -94,8 +112,20 @@ class Collisions:
         for row in rows.tolist():
             crew = self._crew_of(row)
             self._touching_uav[crew, row - crew.start] = False
+        if self._things is not None:
+            self._things.forget(rows)
         self._fleet.state.contact_budget[rows] = 0.0
         self._fleet.state.separation_budget[rows] = 0.0
+
+    def look_again(self, first_instance: int) -> None:
+        """Look around every UAV at once: the world has changed from that instance on."""
+        self._touched_solid[self._touched_solid >= first_instance] = -1
+        self._fleet.state.contact_budget[:] = 0.0
+
+    def look_at_things(self) -> None:
+        """Look at once at things, one of which was put somewhere."""
+        if self._things is not None:
+            self._things.look_again()
 
     def continue_from(self, other: Collisions, kept: Sequence[tuple[int, int]]) -> None:
         """Know who touches what of another fleet's UAVs: own row and the other's, for each pair.
@@ -105,11 +135,15 @@ class Collisions:
         own, theirs = np.array(kept, np.int64).reshape(-1, 2).T
         self._touched_solid[own] = other._touched_solid[theirs]
         self._touching_uav[np.ix_(own, own)] = other._touching_uav[np.ix_(theirs, theirs)]
+        if self._things is not None and other._things is not None:
+            self._things.continue_from(other._things, own, theirs)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
         self._touched_solid[...] = state["solid"]
         self._touching_uav[...] = state["uav"]
+        if self._things is not None:
+            self._things.set_state(state["things"])
 
     # ----------------------------------------------------------------------- trees and solids
 
@@ -122,6 +156,8 @@ class Collisions:
         for k, i in enumerate(rows):
             if gaps[k] <= 0.0:
                 away = state.position_map[i] - found.nearest[k]
+                if found.distance[k] < 0.0:  # inside
+                    away = -away
                 self._touch_solid(int(i), away, int(found.instance[k]), time_ns)
             elif gaps[k] > _RELEASE_M:
                 self._touched_solid[i] = -1
@@ -169,6 +205,21 @@ class Collisions:
             self._report(j, approach, self._names[i], time_ns)
         if approach > 0.0:
             self._fleet.strike_pair(i, j, normal, self._response.restitution, _FRICTION)
+
+    # ------------------------------------------------------------------------------------- things
+
+    def _touch_thing(self, i: int, k: int, away: Array, is_new: bool, time_ns: int) -> None:
+        """A thing is not moved by what it meets; a UAV is struck as fast as the two approach."""
+        assert self._moving is not None
+        state, normal = self._fleet.state, _unit(away)
+        velocity = self._moving.velocity_at(k, time_ns)
+        approach = -float(normal @ (state.velocity_map[i] - velocity))
+        if is_new:
+            self._report(i, approach, self._moving.names[k], time_ns)
+        if approach > 0.0:
+            state.velocity_map[i] -= velocity
+            self._fleet.strike(i, normal, self._response.restitution, _FRICTION)
+            state.velocity_map[i] += velocity
 
     def _crew_of(self, i: int) -> slice:
         """Rows of the copy that UAV `i` belongs to."""

@@ -9,10 +9,11 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.clock import NS_PER_S, Schedule, ns_from_s, s_from_ns
+from volery.core.errors import CommandError
 from volery.engine import flight_log
 from volery.engine.agenda import Agenda
 from volery.engine.collisions import BOUNCE, CRASH, Collisions
@@ -23,10 +24,11 @@ from volery.engine.partners import Partner
 from volery.engine.regrouping import common_rows, continue_bank
 from volery.engine.restart import Keys, restart_sensors
 from volery.engine.stages import STAGES, Tick, take_commands
+from volery.engine.thing_contacts import ThingLooks
 from volery.sensors.bank import Bank
 from volery.sensors.faults import FaultTable
 from volery.sensors.samples import Samples
-from volery.world.scene import Scene
+from volery.world.scene import Scene, Solid
 from volery.world.terrain import Terrain
 from volery.world.weather import Gust, Weather
 
@@ -97,6 +99,11 @@ class Engine:
         self.names = names
         """Of the UAVs, in fleet order."""
         self._response = CRASH if crash_on_contact else BOUNCE
+        self.things = scene.things
+        """What moves through the world by itself, where there is anything."""
+        self._looks = (
+            None if self.things is None else ThingLooks(self.things, compiled=scene.compiled)
+        )
         self.collisions = self._new_collisions(copies)
         self.banks = tuple(banks)
         self.estimation = estimation
@@ -186,6 +193,27 @@ class Engine:
             Event(self.time_ns, self.names[uav], kind, (x, y, z), 0.0, detail=detail)
         )
 
+    def note_world(self, detail: str) -> None:
+        """Let a change of the world be an event."""
+        nowhere = (0.0, 0.0, 0.0)
+        self._new_events.append(
+            Event(self.time_ns, "", EventKind.WORLD, nowhere, 0.0, detail=detail)
+        )
+
+    def replace_solids(self, solids: Sequence[Solid]) -> None:
+        """Let other solids stand in the world from the next physics step on; see `Scene`."""
+        self.collisions.look_again(self.scene.replace_solids(solids))
+
+    def put_thing(self, row: int, pose: ArrayLike, velocity: ArrayLike) -> None:
+        """Put a thing at `pose` (7,) from now on, moving on at `velocity` (3,) m/s, map.
+
+        `CommandError` for one that has a way of its own.
+        """
+        if self.things is None:
+            raise CommandError("there are no things in this world")
+        self.things.say(row, self.time_ns, pose, velocity)
+        self.collisions.look_at_things()
+
     def collect_events(self) -> list[Event]:
         """Events since the last call, oldest first."""
         self._new_events += flight_log.drain(self.fleet, self.names)
@@ -246,6 +274,7 @@ class Engine:
             "banks": [bank.get_state() for bank in self.banks],
             "due": [part.get_state() for part in self._due],
             "estimation": None if self.estimation is None else self.estimation.get_state(),
+            "things": None if self.things is None else self.things.get_state(),
             "new_events": list(self._new_events),
         }
 
@@ -259,6 +288,8 @@ class Engine:
             part.set_state(kept)
         if self.estimation is not None:
             self.estimation.set_state(state["estimation"])
+        if self.things is not None:
+            self.things.set_state(state["things"])
         self._new_events[:] = state["new_events"]
 
     # -------------------------------------------------------------------------------- inside
@@ -272,7 +303,15 @@ class Engine:
 
     def _new_collisions(self, copies: int) -> Collisions:
         emit = self._new_events.append
-        return Collisions(self.fleet, self.scene, self.names, self._response, emit, copies=copies)
+        return Collisions(
+            self.fleet,
+            self.scene,
+            self.names,
+            self._response,
+            emit,
+            copies=copies,
+            looks=self._looks,
+        )
 
     def _new_agenda(self, *, after_step: int) -> Agenda[SensorBank]:
         agenda: Agenda[SensorBank] = Agenda(self.dt_ns)
@@ -287,7 +326,10 @@ class Engine:
         return agenda
 
     def _due_step(self) -> int:
-        steps = (part.next_step() for part in self._due)
+        steps = [part.next_step() for part in self._due]
+        look_ns = self.collisions.next_look_ns
+        if look_ns is not None:
+            steps.append(-(-look_ns // self.dt_ns))
         return min((s for s in steps if s is not None), default=1 << 62)
 
     def _run_tick(self, tick: Tick) -> None:

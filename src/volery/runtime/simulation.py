@@ -9,8 +9,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
 from numpy.typing import ArrayLike
 
+from volery.control.setpoints import checked, checked_attitude
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError, ScenarioError
 from volery.engine.engine import Engine
@@ -28,6 +30,7 @@ from volery.runtime.building import place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.crew import Crew
 from volery.runtime.graph_building import all_down, plan_faults
+from volery.runtime.grid_world import GridWorld
 from volery.runtime.keeping import Keeper
 from volery.runtime.lock_step import open_lock_step
 from volery.runtime.outlet import Outlet
@@ -45,6 +48,7 @@ from volery.runtime.worlds import build_forest, build_scene, build_terrain
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario, UavType
 from volery.sensors.mount import Mount
+from volery.world.things import MovingThings
 from volery.world.weather import Weather
 
 if TYPE_CHECKING:
@@ -52,6 +56,8 @@ if TYPE_CHECKING:
 
 _CLOCK_PERIOD_S = 0.01
 _DIGEST_PERIOD_S = 0.01
+_FARTHEST_M, _FASTEST_M_S = 1e5, 100.0
+"""Of things that are put somewhere."""
 
 
 class Simulation:
@@ -100,6 +106,8 @@ class Simulation:
             crash_on_contact=scenario.physics.on_contact == "crash",
             estimation=parts.estimation,
         )
+        self.grid_world = GridWorld(scenario, self._engine)
+        """The grid map whose blocks stand in the world, and how it is changed."""
         self._faults = FaultPlan(self._engine)
         self._crew = Crew(
             scenario,
@@ -119,7 +127,9 @@ class Simulation:
         self._loop = RunLoop(self._engine, self._pacer, scenario.duration_s, self._has_ended)
         self._relocator = Relocator(self._engine, self.scene, self.terrain, self._crew)
         open_lock_step(self)
-        self._services: Services = open_services(self, recordings=recordings, on_load=on_load)
+        self._services: Services = open_services(
+            self, recordings=recordings, on_load=on_load, every=self._engine.every
+        )
         self._keeper = Keeper(
             self._engine,
             self.graph,
@@ -129,6 +139,7 @@ class Simulation:
             self._crew,
             self._partners,
             self.outlet,
+            self.grid_world,
         )
         self._spawner = Spawner(self._crew, self._keeper, self.scene, self.terrain)
         self._crew.take_off(self.uavs)
@@ -345,9 +356,9 @@ class Simulation:
     def reset(self, seed: int | None = None) -> None:
         """Go back to the start, with the scenario's seed or another one.
 
-        All that follows is what a fresh simulation does, but for the world: terrain and trees stay
-        as they are (a scenario's `world.seed` fixes them apart from all other randomness). UAVs
-        that were spawned go, those that were deleted come back.
+        All that follows is what a fresh simulation does, but for the world: a grid map is the one
+        of the start again, terrain and trees stay as they are (a scenario's `world.seed` fixes them
+        apart from all other randomness). UAVs that were spawned go, deleted ones come back.
         """
         self._check_open()
         if seed is not None:
@@ -382,6 +393,35 @@ class Simulation:
         """
         self._check_open()
         self._relocator.move(self._row_of(name), velocity_map, omega_map)
+
+    @property
+    def things(self) -> MovingThings | None:
+        """People, vehicles and birds of the scenario; None where it has none."""
+        return self.scene.things
+
+    def put_thing(
+        self,
+        name: str,
+        position_map: ArrayLike,
+        attitude: ArrayLike | None = None,
+        velocity_map: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Put a thing at (3,) m with (4,) x y z w, map from body, from now on.
+
+        It goes on from there at `velocity_map` (3,) m/s; without an attitude it keeps its own.
+        `CommandError` for one that does not exist, that goes its own way, or for such a place.
+        """
+        self._check_open()
+        if self.things is None or name not in self.things.names:
+            known = "none" if self.things is None else ", ".join(self.things.names)
+            raise CommandError(f"there is no thing '{name}'; known: {known}")
+        row = self.things.names.index(name)
+        if attitude is None:
+            attitude = self.things.poses_at(self.time_ns)[row, 3:]
+        position = checked("position", position_map, (3,), _FARTHEST_M)
+        velocity = checked("velocity", velocity_map, (3,), _FASTEST_M_S)
+        pose = np.concatenate([position, checked_attitude(attitude)])
+        self._engine.put_thing(row, pose, velocity)
 
     def spawn_uav(
         self,

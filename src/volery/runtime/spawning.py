@@ -34,7 +34,7 @@ from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
-_TAKEN = ("volery", "tf", "tf_static", "clock", "events", "rosapi")
+_TAKEN = ("volery", "tf", "tf_static", "clock", "events", "rosapi", "map", "map_in", "things")
 """What else stands at the root of the graph."""
 
 
@@ -83,6 +83,9 @@ class Spawner:
             )
         if name in self._crew.uavs:
             raise SpawnError(SpawnFault.NAME_TAKEN, f"there is a UAV '{name}' already")
+        things = self._scene.things
+        if things is not None and name in things.names:
+            raise SpawnError(SpawnFault.NAME_TAKEN, f"there is a thing '{name}' already")
 
     def _airframe_of(self, kind: str) -> Airframe:
         if kind not in self.kinds:

@@ -25,7 +25,9 @@ from volery.scenario.base import (
 )
 from volery.scenario.camera import CameraSensor, Daylight
 from volery.scenario.faults import Fault
+from volery.scenario.grid_map import GridMapWorld
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
+from volery.scenario.things import Things, check_things
 from volery.scenario.wind import Wind
 
 # ------------------------------------------------------------------------------------------ world
@@ -86,6 +88,8 @@ class World(Data):
     """Seed of the trees alone; None: the scenario's seed grows them too."""
     terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
     forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
+    grid_map: GridMapWorld | None = None
+    things: Things = ()
     wind: Wind = Wind()
     light: Daylight = Daylight()
     origin: Origin = Origin()
@@ -93,6 +97,11 @@ class World(Data):
     gnss_denied: bool = False
     """No satellite signals anywhere, for the whole run."""
     gnss_denied_areas: tuple[DeniedArea, ...] = ()
+
+    @model_validator(mode="after")
+    def _things_have_names(self) -> Self:
+        check_things(self.things)
+        return self
 
 
 # ------------------------------------------------------------------------------- sensors and UAVs

@@ -17,7 +17,7 @@ _KEPT_BLOCKS = 8
 
 
 class BodyTable(NamedTuple):
-    """The moving bodies, one row a UAV."""
+    """The moving bodies, one row a UAV, then one a thing that moves by itself."""
 
     scene: NDArray[np.int64]
     """(N,) Embree scene of the shape, in the body frame."""
@@ -36,6 +36,8 @@ class BodyTable(NamedTuple):
     see discs."""
     turn: NDArray[np.float64]
     """(N, R, 2) rad, angles of the rotors at fractions 0 and 1."""
+    things: int
+    """How many of the last rows are things: people, vehicles, birds. Everybody sees them."""
 
 
 class SceneHandle(NamedTuple):

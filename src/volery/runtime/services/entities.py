@@ -1,15 +1,16 @@
-"""Entities of the standard: the UAVs, what is known of them, and where they may be put."""
+"""Entities of the standard: UAVs and things, what is known of them, where they may be put."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core import rotations
 from volery.core.errors import PlacementError
 from volery.graph.messages import Point, Pose, Quaternion, Twist, Vector3, header, message_type
+from volery.runtime.services.entity_views import Entity, entities_of_things, entity_of_uav
 from volery.runtime.services.filters import (
     BoundsType,
     Category,
@@ -18,8 +19,6 @@ from volery.runtime.services.filters import (
     tag_filter,
 )
 from volery.runtime.services.offering import Code, Fields, RefusedError, filled, offer_result
-from volery.runtime.uav import Uav
-from volery.vehicle.body_shape import body_shape
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
@@ -34,7 +33,7 @@ _FASTEST = 100.0
 
 
 class Entities:
-    """Answers questions about the UAVs of a simulation, and moves them."""
+    """Answers questions about UAVs and things of a simulation, and moves them."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
@@ -55,72 +54,75 @@ class Entities:
     # ---------------------------------------------------------------------------------- questions
 
     def _names(self, request: Any) -> Fields:
-        return {"entities": self._chosen(request.filters)}
+        return {"entities": [entity.name for entity in self._chosen(request.filters)]}
 
     def _states(self, request: Any) -> Fields:
-        names = self._chosen(request.filters)
-        uavs = self._simulation.uavs
-        return {"entities": names, "states": [self._state_of(uavs[name]) for name in names]}
+        chosen = self._chosen(request.filters)
+        states = [self._state_of(entity) for entity in chosen]
+        return {"entities": [entity.name for entity in chosen], "states": states}
 
     def _state(self, request: Any) -> Fields:
         return {"state": self._state_of(self._find(request.entity))}
 
     def _info(self, request: Any) -> Fields:
-        uav = self._find(request.entity)
-        kind = self._simulation.types[uav.type_name]
-        category = filled(f"{_MSG}/EntityCategory", {"category": int(Category.ROBOT)})
+        entity = self._find(request.entity)
+        category = filled(f"{_MSG}/EntityCategory", {"category": int(entity.category)})
         info = {
             "category": category,
-            "description": f"UAV of type {uav.type_name}: {kind.airframe}, {kind.plant}",
-            "tags": tags_of(uav),
+            "description": entity.description,
+            "tags": list(entity.tags),
         }
         return {"info": filled(f"{_MSG}/EntityInfo", info)}
 
     def _bounds(self, request: Any) -> Fields:
-        shape = body_shape(self._find(request.entity).airframe)
+        shape = self._find(request.entity).shape
         corners = np.vstack([mesh.vertices for mesh, _material in shape.parts])
         points = [_vector(corners.max(axis=0)), _vector(corners.min(axis=0))]
         return {"bounds": filled(f"{_MSG}/Bounds", {"type": BoundsType.BOX, "points": points})}
 
-    def _chosen(self, filters: Any) -> list[str]:
-        """Names of the UAVs that pass all filters, in fleet order."""
+    def _all(self) -> Iterator[Entity]:
+        """UAVs in fleet order, then things."""
+        simulation = self._simulation
+        for uav in simulation.uavs.values():
+            yield entity_of_uav(uav, simulation.types)
+        yield from entities_of_things(simulation.things, simulation.time_ns)
+
+    def _chosen(self, filters: Any) -> list[Entity]:
+        """Those that pass all filters."""
         is_named, is_tagged = name_filter(filters.filter), tag_filter(filters.tags)
         is_inside = bounds_filter(filters.bounds)
         categories = {int(c.category) for c in filters.categories}
-        if categories and Category.ROBOT not in categories:
-            return []
         return [
-            name
-            for name, uav in self._simulation.uavs.items()
-            if is_named(name)
-            and is_tagged(tags_of(uav))
-            and is_inside(uav.position_map, uav.airframe.body.collision_radius_m)
+            entity
+            for entity in self._all()
+            if (not categories or entity.category in categories)
+            and is_named(entity.name)
+            and is_tagged(entity.tags)
+            and is_inside(entity.position, entity.radius_m)
         ]
 
-    def _state_of(self, uav: Uav) -> Any:
-        attitude = uav.attitude
-        turn, spin = (
-            rotations.rotate(attitude, v) for v in (uav.omega_body, uav.angular_acceleration_body)
-        )
+    def _state_of(self, entity: Entity) -> Any:
         accel = message_type("geometry_msgs/msg/Accel")
         state = {
             "header": header(self._simulation.time_ns, "map"),
-            "pose": pose_message(uav.position_map, attitude),
-            "twist": Twist(_vector(uav.velocity_map), _vector(turn)),
-            "acceleration": accel(_vector(uav.acceleration_map), _vector(spin)),
+            "pose": pose_message(entity.position, entity.attitude),
+            "twist": Twist(_vector(entity.velocity), _vector(entity.omega)),
+            "acceleration": accel(
+                _vector(entity.acceleration), _vector(entity.angular_acceleration)
+            ),
         }
         return filled(f"{_MSG}/EntityState", state)
 
-    def _find(self, name: str) -> Uav:
-        uav = self._simulation.uavs.get(name)
-        if uav is None:
+    def _find(self, name: str) -> Entity:
+        found = next((entity for entity in self._all() if entity.name == name), None)
+        if found is None:
             raise RefusedError(Code.NOT_FOUND, f"there is no entity '{name}'")
-        return uav
+        return found
 
     # ------------------------------------------------------------------------------------ changes
 
     def _set_state(self, request: Any) -> None:
-        uav, state = self._find(request.entity), request.state
+        entity, state = self._find(request.entity), request.state
         if state.header.frame_id not in ("", "map"):
             reason = f"states are set in 'map', not in '{state.header.frame_id}'"
             raise RefusedError(Code.OPERATION_FAILED, reason)
@@ -136,10 +138,27 @@ class Entities:
             if not np.isfinite(twist).all() or np.abs(twist).max() > _FASTEST:
                 reason = f"a twist is up to {_FASTEST:g} m/s or rad/s"
                 raise RefusedError(Code.OPERATION_FAILED, reason)
+        if entity.category is not Category.ROBOT:
+            self._set_thing(entity, request)
+            return
         if request.set_pose:
-            self._place(uav.name, state.pose)
+            self._place(entity.name, state.pose)
         if request.set_twist:
-            self._simulation.push_uav(uav.name, *twist)
+            self._simulation.push_uav(entity.name, *twist)
+
+    def _set_thing(self, entity: Entity, request: Any) -> None:
+        position, attitude = entity.position, entity.attitude
+        velocity = np.zeros(3)
+        if request.set_pose:
+            pose = request.state.pose
+            turn = pose.orientation
+            position = np.array(_numbers(pose.position))
+            attitude = np.array([turn.x, turn.y, turn.z, turn.w])
+        if request.set_twist:
+            if any(_numbers(request.state.twist.angular)):
+                raise RefusedError(Code.FEATURE_UNSUPPORTED, "things do not turn by a twist")
+            velocity = np.array(_numbers(request.state.twist.linear))
+        self._simulation.put_thing(entity.name, position, attitude, velocity)
 
     def _place(self, name: str, pose: Any) -> None:
         turn = pose.orientation
@@ -148,11 +167,6 @@ class Entities:
             self._simulation.place_uav(name, _numbers(pose.position), attitude)
         except PlacementError as error:
             raise RefusedError(_INVALID_POSE, str(error)) from None
-
-
-def tags_of(uav: Uav) -> list[str]:
-    """What a UAV can be found by: `uav`, its type in the scenario, its airframe."""
-    return list(dict.fromkeys(["uav", uav.type_name, uav.airframe.name]))
 
 
 def pose_message(position: Array, attitude: Array) -> Pose:

@@ -56,8 +56,8 @@ def offer_features(graph: Graph, *, loads_worlds: bool) -> None:
         "simulation_interfaces/msg/SimulatorFeatures",
         {
             "features": np.array(features, dtype=np.uint16),
-            "custom_info": "Volery: entities are UAVs, worlds are scenarios, /volery/* is beside "
-            "the standard",
+            "custom_info": "Volery: entities are UAVs and things, worlds are scenarios, "
+            "/volery/* is beside the standard",
         },
     )
     response = message_type(f"{_SRV}_Response")

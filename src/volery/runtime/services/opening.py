@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from volery.runtime.services.air_and_faults import offer_air_and_faults
 from volery.runtime.services.entities import Entities
 from volery.runtime.services.features import offer_features
+from volery.runtime.services.grid_maps import offer_grid_maps
 from volery.runtime.services.kept_states import KeptStates
 from volery.runtime.services.named_poses import offer_named_poses
 from volery.runtime.services.playing import Playing
 from volery.runtime.services.recording import Recording
 from volery.runtime.services.spawning import Spawning
 from volery.runtime.services.stepping import offer_steps
+from volery.runtime.services.things import offer_things
 from volery.runtime.services.worlds import OnLoad, offer_worlds
 
 if TYPE_CHECKING:
@@ -36,8 +39,12 @@ def open_services(
     *,
     recordings: Path | None = None,
     on_load: OnLoad | None = None,
+    every: Callable[..., None],
 ) -> Services:
-    """Offer the standard's services and ours; what the arguments mean, `Simulation` says."""
+    """Offer the standard's services and ours; what the arguments mean, `Simulation` says.
+
+    `every(period_s, callback, wanted=...)` has something done in simulated time.
+    """
     graph = simulation.graph
     offer_features(graph, loads_worlds=on_load is not None)
     Entities(simulation).offer()
@@ -47,6 +54,11 @@ def open_services(
     offer_worlds(graph, simulation.scenario, on_load)
     offer_named_poses(graph, simulation.starts)
     offer_air_and_faults(simulation)
+    if simulation.things is not None:
+        offer_things(simulation, simulation.things, every)
+    if simulation.scenario.world.grid_map is not None:
+        settings = simulation.scenario.world.grid_map
+        offer_grid_maps(graph, simulation.grid_world, settings, lambda: simulation.time_ns)
     KeptStates(simulation).offer()
     recording = Recording(graph, recordings)
     recording.offer()

@@ -71,9 +71,11 @@ def offer_worlds(graph: Graph, loaded: Scenario | None, on_load: OnLoad | None) 
 
 
 def tags_of(scenario: Scenario) -> list[str]:
-    """What a world can be found by: its ground, and `forest` where trees stand."""
+    """What a world can be found by: its ground, `forest` where trees stand, `grid_map`."""
     world = scenario.world
-    return [f"{world.terrain.kind}_ground", *(["forest"] if world.forest is not None else [])]
+    parts = {"forest": world.forest, "grid_map": world.grid_map}
+    there = [name for name, part in parts.items() if part is not None]
+    return [f"{world.terrain.kind}_ground", *there]
 
 
 def _wanted(source: Any) -> Scenario:

@@ -1,0 +1,85 @@
+"""What there is to know of an entity of the standard, be it a UAV or a thing that moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core import rotations
+from volery.runtime.services.filters import Category
+from volery.runtime.uav import Uav
+from volery.scenario.schema import UavType
+from volery.vehicle.body_shape import body_shape
+from volery.world.scene_content import BodyShape
+from volery.world.things import MovingThings
+
+Array = NDArray[np.float64]
+
+_CATEGORIES = {"person": Category.HUMAN}
+"""Of kinds of things; all others are dynamic objects."""
+
+
+@dataclass(frozen=True, eq=False)
+class Entity:
+    """One entity now; vectors in the map."""
+
+    name: str
+    category: Category
+    description: str
+    tags: tuple[str, ...]
+    shape: BodyShape
+    radius_m: float
+    """Of a ball that stands for it."""
+    position: Array
+    attitude: Array
+    velocity: Array
+    omega: Array
+    acceleration: Array
+    angular_acceleration: Array
+
+
+def entity_of_uav(uav: Uav, types: Mapping[str, UavType]) -> Entity:
+    """A UAV."""
+    kind = types[uav.type_name]
+    turn, spin = (
+        rotations.rotate(uav.attitude, v) for v in (uav.omega_body, uav.angular_acceleration_body)
+    )
+    return Entity(
+        name=uav.name,
+        category=Category.ROBOT,
+        description=f"UAV of type {uav.type_name}: {kind.airframe}, {kind.plant}",
+        tags=tuple(dict.fromkeys(["uav", uav.type_name, uav.airframe.name])),
+        shape=body_shape(uav.airframe),
+        radius_m=uav.airframe.body.collision_radius_m,
+        position=uav.position_map,
+        attitude=uav.attitude,
+        velocity=uav.velocity_map,
+        omega=turn,
+        acceleration=uav.acceleration_map,
+        angular_acceleration=spin,
+    )
+
+
+def entities_of_things(things: MovingThings | None, time_ns: int) -> Iterator[Entity]:
+    """All things, in order."""
+    if things is None:
+        return
+    poses, still = things.poses_at(time_ns), np.zeros(3)
+    for row, thing in enumerate(things.things):
+        yield Entity(
+            name=thing.name,
+            category=_CATEGORIES.get(thing.kind, Category.DYNAMIC_OBJECT),
+            description=f"{thing.kind} that moves by itself",
+            tags=("thing", thing.kind),
+            shape=thing.shape,
+            radius_m=thing.shape.radius,
+            position=poses[row, :3],
+            attitude=poses[row, 3:],
+            velocity=things.velocity_at(row, time_ns),
+            omega=still,
+            acceleration=still,
+            angular_acceleration=still,
+        )

@@ -1,0 +1,56 @@
+"""From a scenario's things to what moves through its world."""
+
+from __future__ import annotations
+
+import math
+
+from volery.core import rotations
+from volery.scenario import things as schema
+from volery.scenario.schema import Scenario
+from volery.world.terrain import Terrain
+from volery.world.things import SHAPES, MovingThings, Thing
+from volery.world.things.motions import CircleMotion, GivenMotion, HeightAt, Motion, WaypointMotion
+
+_TURN_M = {"person": 0.3, "car": 2.0, "bird": 2.0}
+"""How far ahead of a waypoint, and behind it, a thing turns: a modelling choice."""
+
+
+def build_things(scenario: Scenario, terrain: Terrain) -> MovingThings | None:
+    """Things of the scenario, None without any."""
+    if not scenario.world.things:
+        return None
+    shapes = {name: SHAPES[name]() for name in {thing.shape for thing in scenario.world.things}}
+
+    def ground(x: float, y: float) -> float:
+        return float(terrain.height(x, y))
+
+    return MovingThings(
+        [
+            Thing(thing.name, thing.shape, shapes[thing.shape], _motion(thing, ground))
+            for thing in scenario.world.things
+        ]
+    )
+
+
+def _motion(thing: schema.Thing, ground: HeightAt) -> Motion:
+    motion = thing.motion
+    if isinstance(motion, schema.Waypoints):
+        return WaypointMotion(
+            motion.waypoints_m,
+            motion.speed_m_s,
+            motion.at_end,
+            start_s=motion.start_s,
+            turn_m=_TURN_M[thing.shape],
+            ground=ground if len(motion.waypoints_m[0]) == 2 else None,
+        )
+    if isinstance(motion, schema.Circle):
+        return CircleMotion(
+            motion.centre_m,
+            motion.radius_m,
+            motion.speed_m_s,
+            start_rad=math.radians(motion.start_deg),
+            clockwise=motion.clockwise,
+        )
+    x, y, *rest = motion.position_m
+    attitude = rotations.from_rpy(0.0, 0.0, math.radians(motion.yaw_deg))
+    return GivenMotion([x, y, rest[0] if rest else ground(x, y), *attitude.tolist()])
