@@ -23,6 +23,7 @@ from volery.scenario.base import (
     Vector2,
     check_rectangle,
 )
+from volery.scenario.city import City
 from volery.scenario.camera import CameraSensor, Daylight
 from volery.scenario.faults import Fault
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
@@ -80,12 +81,13 @@ class ProceduralForest(Data):
 
 
 class World(Data):
-    """Ground, trees, air."""
+    """Ground, trees, buildings, air."""
 
     seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
-    """Seed of the trees alone; None: the scenario's seed grows them too."""
+    """Seed of what stands in the world alone; None: the scenario's seed grows it too."""
     terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
     forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
+    city: City | None = None
     wind: Wind = Wind()
     light: Daylight = Daylight()
     origin: Origin = Origin()

@@ -17,6 +17,14 @@ class Material(IntEnum):
     UAV_BODY = 4
     ROTOR = 5
     WALL = 6
+    FACADE = 7
+    """Outer wall with windows."""
+    ROOF = 8
+    ASPHALT = 9
+    PAVING = 10
+    METAL = 11
+    PAINTED = 12
+    """Of a colour that its solid states."""
 
 
 _DIFFUSE_REFLECTIVITY_905_NM = {
@@ -27,6 +35,12 @@ _DIFFUSE_REFLECTIVITY_905_NM = {
     Material.UAV_BODY: 0.15,  # modelling choice: dark plastic and carbon fibre
     Material.ROTOR: 0.05,  # modelling choice: black blades that fill a part of their disc
     Material.WALL: 0.60,  # modelling choice: light plaster
+    Material.FACADE: 0.50,  # modelling choice: plaster, less its panes, which reflect away
+    Material.ROOF: 0.25,  # modelling choice: painted sheet metal and bitumen
+    Material.ASPHALT: 0.17,  # modelling choice: worn asphalt, between fresh (.1) and aged (.25)
+    Material.PAVING: 0.35,  # modelling choice: granite setts and concrete slabs
+    Material.METAL: 0.45,  # modelling choice: galvanized steel, dull
+    Material.PAINTED: 0.50,  # modelling choice: light paint
 }
 
 REFLECTIVITY = np.array([_DIFFUSE_REFLECTIVITY_905_NM[material] for material in Material])

@@ -19,8 +19,10 @@ from volery.core.workers import Workers
 from volery.world.embree import EmbreeUnavailableError
 from volery.world.embree_backend import EmbreeBackend
 from volery.world.embreex_fallback import EmbreexBackend
+from volery.world.enclosure import enclosing
 from volery.world.materials import Material
-from volery.world.scene_content import BodyShape, SceneContent, Solid, collect
+from volery.world.ground_cover import BARE_GROUND, GroundCover
+from volery.world.scene_content import BodyShape, Look, SceneContent, Solid, collect
 from volery.world.scene_memory import BodyTable, SceneHandle
 from volery.world.terrain import Terrain
 from volery.world.trees.model import DetailLevel
@@ -28,7 +30,7 @@ from volery.world.trees.model import DetailLevel
 if TYPE_CHECKING:
     from volery.world.forest import Forest
 
-__all__ = ["BodyShape", "Clearance", "Hits", "Scene", "Solid"]
+__all__ = ["BodyShape", "Clearance", "Hits", "Look", "Scene", "Solid"]
 
 Backend = Literal["auto", "embree", "embreex"]
 
@@ -83,12 +85,13 @@ class Scene:
         *,
         detail: DetailLevel = DetailLevel.SENSING,
         solids: Sequence[Solid] = (),
+        cover: GroundCover = BARE_GROUND,
         backend: Backend = "auto",
         threads: int = 1,
     ) -> None:
         self.workers = Workers(threads)
         self.solids = tuple(solids)
-        self._content = collect(terrain, forest, detail, self.solids)
+        self._content = collect(terrain, forest, detail, self.solids, cover)
         self.backend: EmbreeBackend | EmbreexBackend = _make_backend(self._content, backend)
         self._bodies = _no_bodies()
         self._is_twin = False
@@ -247,6 +250,15 @@ class Scene:
         )
         self.backend.clearance(p, float(reach_m), include_terrain, result)
         return result
+
+    def enclosing(self, points: ArrayLike) -> NDArray[np.int32]:
+        """Instance of the solid inside which each of the points (P, 3), m, map, lies; -1: none.
+
+        Solids whose surface has holes enclose nothing there. Trees are not asked.
+        """
+        p = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        found = enclosing([solid.mesh for solid in self.solids], p)
+        return np.where(found < 0, -1, found + 1 + self._content.trees).astype(np.int32)
 
 
 def _new_hits(count: int) -> Hits:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.world.embree import PaddedMesh, padded
+from volery.world.ground_cover import BARE_GROUND, GroundCover
 from volery.world.materials import Material
 from volery.world.mesh import Mesh
 from volery.world.point_query import TriangleTable
@@ -26,6 +27,18 @@ if TYPE_CHECKING:
 _MOST_PARTS = 2
 
 
+class Look(NamedTuple):
+    """How a solid of material FACADE or PAINTED differs from others, for cameras."""
+
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Linear red, green, blue; factors of the material's own colour."""
+    foot_m: float = 0.0
+    """z in the map from which storeys are counted."""
+    storey_m: float = 1.0
+    storeys: int = 0
+    """Rows of windows; 0: none."""
+
+
 @dataclass(frozen=True, eq=False)
 class Solid:
     """A fixed thing in the map: a wall, a test cylinder; its mesh is in map coordinates."""
@@ -33,6 +46,9 @@ class Solid:
     mesh: Mesh
     material: Material
     name: str
+    top: Material | None = None
+    """Of faces that look up more than sideways; None: `material`, too."""
+    look: Look = Look()
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +86,9 @@ class SceneContent:
     """(trees, 3, 4) map from tree."""
     has_terrain: bool
     solids: int
+    look: NDArray[np.float32]
+    """(instances, 6) rows of `Look`."""
+    cover: GroundCover
 
     @property
     def trees(self) -> int:
@@ -103,8 +122,20 @@ def _instance_bounds(
     return bounds
 
 
+def _looks(before: int, solids: Sequence[Solid]) -> NDArray[np.float32]:
+    rows = np.zeros((before + len(solids), 6), dtype=np.float32)
+    for row, solid in zip(rows[before:], solids, strict=True):
+        colour, *storeys = solid.look
+        row[:3], row[3:] = colour, storeys
+    return rows
+
+
 def collect(
-    terrain: Terrain | None, forest: Forest | None, detail: DetailLevel, solids: Sequence[Solid]
+    terrain: Terrain | None,
+    forest: Forest | None,
+    detail: DetailLevel,
+    solids: Sequence[Solid],
+    cover: GroundCover = BARE_GROUND,
 ) -> SceneContent:
     """Tables of a world at one level of detail."""
     models = forest.models if forest is not None else ()
@@ -139,7 +170,8 @@ def collect(
         material[1 : 1 + trees] = (Material.WOOD, Material.LEAF)
     first[1 + trees :] = solid_part + np.arange(len(solids))
     for i, solid in enumerate(solids):
-        material[1 + trees + i] = solid.material
+        top = solid.material if solid.top is None else solid.top
+        material[1 + trees + i] = (solid.material, top)
 
     boxes = np.array([_part_bounds(part) for part in parts]).reshape(-1, 2, 3)
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
@@ -168,4 +200,6 @@ def collect(
         tree_transforms=tree_transforms,
         has_terrain=terrain is not None,
         solids=len(solids),
+        look=_looks(1 + trees, solids),
+        cover=cover,
     )
