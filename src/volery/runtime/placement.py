@@ -119,11 +119,7 @@ def _nearest_free(
                 np.linalg.norm(candidate - other.position_map) > 2.0 * _ROOM_TO_STAND_M
                 for other in others
             )
-            if (
-                apart
-                and room.min() >= _ROOM_TO_STAND_M
-                and scene.enclosing(candidate[None])[0] < 0
-            ):
+            if apart and room.min() >= _ROOM_TO_STAND_M and scene.enclosing(candidate[None])[0] < 0:
                 return candidate
     raise PlacementError(
         f"{where}: no free place within {_SEARCH_RADIUS_M:g} m of "

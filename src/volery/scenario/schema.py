@@ -23,8 +23,8 @@ from volery.scenario.base import (
     Vector2,
     check_rectangle,
 )
-from volery.scenario.city import City
 from volery.scenario.camera import CameraSensor, Daylight
+from volery.scenario.city import City
 from volery.scenario.faults import Fault
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
 from volery.scenario.wind import Wind

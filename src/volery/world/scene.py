@@ -20,8 +20,8 @@ from volery.world.embree import EmbreeUnavailableError
 from volery.world.embree_backend import EmbreeBackend
 from volery.world.embreex_fallback import EmbreexBackend
 from volery.world.enclosure import enclosing
-from volery.world.materials import Material
 from volery.world.ground_cover import BARE_GROUND, GroundCover
+from volery.world.materials import Material
 from volery.world.scene_content import BodyShape, Look, SceneContent, Solid, collect
 from volery.world.scene_memory import BodyTable, SceneHandle
 from volery.world.terrain import Terrain

@@ -39,6 +39,10 @@ class Look(NamedTuple):
     """Rows of windows; 0: none."""
 
 
+PLAIN = Look()
+"""The material's own colour, no windows."""
+
+
 @dataclass(frozen=True, eq=False)
 class Solid:
     """A fixed thing in the map: a wall, a test cylinder; its mesh is in map coordinates."""
@@ -48,7 +52,7 @@ class Solid:
     name: str
     top: Material | None = None
     """Of faces that look up more than sideways; None: `material`, too."""
-    look: Look = Look()
+    look: Look = PLAIN
 
 
 @dataclass(frozen=True, eq=False)

@@ -190,9 +190,7 @@ def _texture(light: Light, material: int, x: Any, y: Any, z: Any, steep: bool) -
 
 
 @inner_kernel
-def shade(
-    scene: SceneHandle, block: RayBlock, count: int, light: Light, scratch: Scratch
-) -> None:
+def shade(scene: SceneHandle, block: RayBlock, count: int, light: Light, scratch: Scratch) -> None:
     """Linear colours of the block's first `count` packets, after `find_shadows`."""
     for p in range(count):
         hit, colour = scratch.hit[p], scratch.colour[p]
@@ -211,7 +209,6 @@ def shade(
             above = f4(0.5) + f4(0.5) * nz
             step: Any = np.int64(scratch.distance[p, k] * light.clear_per_m)
             clear = light.clear[min(step, CLEAR - 1)]
-            has_look = material == _FACADE or material == _PAINTED
             glass, window = f4(0.0), np.int64(0)
             if material == _FACADE:
                 nx, ny, far = hit[_NORMAL_X, k], hit[_NORMAL_X + 1, k], scratch.distance[p, k]
@@ -219,7 +216,7 @@ def shade(
             for j in range(3):
                 first, second = light.surface[material, j], light.surface[material, 3 + j]
                 own = (first + share * (second - first)) * tint
-                if has_look:
+                if material == _FACADE or material == _PAINTED:  # noqa: PLR1714, SIM109 - compiled
                     own *= scene.look[instances[k], j] * (f4(1.0) - glass)
                 bounce, horizon = light.bounce[j], light.horizon[j]
                 lit = light.sun_colour[j] * sunlit + bounce + above * (light.overhead[j] - bounce)

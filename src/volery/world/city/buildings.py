@@ -116,15 +116,13 @@ def _wall(ring: Array, low_m: float, high_m: float) -> Mesh:
     for k, (along, height) in enumerate(itertools.product((ring[:-1], ring[1:]), (low_m, high_m))):
         corners[:, k, :2] = along
         corners[:, k, 2] = height
-    first = 4 * np.arange(count, dtype=np.uint32)[:, None]
-    quads = np.concatenate([first + (0, 2, 3), first + (0, 3, 1)]).astype(np.uint32)
-    return Mesh(corners.reshape(-1, 3).astype(np.float32), quads)
+    first = 4 * np.arange(count, dtype=np.uint32)[:, None, None]
+    quads = first + np.array([[0, 2, 3], [0, 3, 1]], dtype=np.uint32)
+    return Mesh(corners.reshape(-1, 3).astype(np.float32), quads.reshape(-1, 3))
 
 
 def _level(triangles: Array, height_m: float) -> Mesh:
     """Triangles (n, 3, 2) at a height."""
     points = np.full((3 * len(triangles), 3), height_m)
     points[:, :2] = triangles.reshape(-1, 2)
-    return Mesh(
-        points.astype(np.float32), np.arange(len(points), dtype=np.uint32).reshape(-1, 3)
-    )
+    return Mesh(points.astype(np.float32), np.arange(len(points), dtype=np.uint32).reshape(-1, 3))

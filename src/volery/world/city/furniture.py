@@ -92,7 +92,9 @@ def _apart(places: Array, least_m: float) -> NDArray[np.bool_]:
     side = max(least_m, 1e-3)
     for k, (x, y) in enumerate(places[:, :2].tolist()):
         i, j = int(x // side), int(y // side)
-        near = (p for di in (-1, 0, 1) for dj in (-1, 0, 1) for p in cells.get((i + di, j + dj), ()))
+        near = (
+            p for di in (-1, 0, 1) for dj in (-1, 0, 1) for p in cells.get((i + di, j + dj), ())
+        )
         if all((x - px) ** 2 + (y - py) ** 2 >= least_m**2 for px, py in near):
             kept[k] = True
             cells.setdefault((i, j), []).append((x, y))
@@ -137,7 +139,9 @@ def _prism(radius_m: float, low_m: float, high_m: float, sides: int) -> Mesh:
 
 
 def _box(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) -> Mesh:
-    points = [[a, b, c] for c in z for a, b in ((x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]))]
+    points = [
+        [a, b, c] for c in z for a, b in ((x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]))
+    ]
     sides = [(0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (3, 2, 1, 0), (4, 5, 6, 7)]
     faces = [f for a, b, c, d in sides for f in ((a, b, c), (a, c, d))]
     return Mesh(np.array(points, np.float32), np.array(faces, np.uint32))

@@ -89,7 +89,9 @@ def _length_m(given: Any) -> float | None:
     match = _LENGTH.fullmatch(str(given)) if isinstance(given, str | int | float) else None
     if match is None:
         return None
-    length = float(match[1]) * (1.0 if match[2].lower().startswith("m") or not match[2] else _FOOT_M)
+    length = float(match[1]) * (
+        1.0 if match[2].lower().startswith("m") or not match[2] else _FOOT_M
+    )
     return length if 0.0 < length <= TALLEST_M else None
 
 

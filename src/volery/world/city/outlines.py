@@ -196,6 +196,8 @@ def _without_hidden(
     """Leave out what stands twice, or inside a building at least as tall; of twins the first."""
     import shapely
 
+    if not outlines:
+        return (), []
     shapes = [outline.footprint for outline in outlines]
     first, second = shapely.STRtree(shapes).query(shapes, predicate="intersects")
     gone: dict[int, str] = {}

@@ -81,9 +81,7 @@ def kerb_lines(streets: Streets, from_wall_m: float, roadway_m: float) -> tuple[
     around = shapely.orient_polygons(streets.blocks.buffer(from_wall_m, quad_segs=_ROUND))
     lines = shapely.line_merge(around.boundary.intersection(along), directed=True)
     parts = shapely.get_parts(lines)
-    return tuple(
-        shapely.get_coordinates(part) for part in parts if part.geom_type == "LineString"
-    )
+    return tuple(shapely.get_coordinates(part) for part in parts if part.geom_type == "LineString")
 
 
 def cover_of(streets: Streets) -> GroundCover:
