@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
 from volery.core.geodesy import LocalFrame
+from volery.runtime.user_meshes import mesh_solids
+from volery.runtime.world_files import SHIPPED_DATA
 from volery.scenario import wind as schema
 from volery.scenario.files import resolve
 from volery.scenario.schema import GridTerrain, InventoryForest, ProceduralForest, Scenario
@@ -18,8 +19,6 @@ from volery.world.ground_cover import BARE_GROUND
 from volery.world.scene import Scene, Solid
 from volery.world.terrain import Terrain
 from volery.world.weather import W20_M_S, Gust, LogProfile, PowerProfile, Weather, WindField
-
-SHIPPED_DATA = Path(__file__).resolve().parent.parent / "world" / "data"
 
 
 def build_terrain(scenario: Scenario) -> Terrain:
@@ -118,8 +117,9 @@ def build_solids(
     scenario: Scenario, terrain: Terrain, city: City | None = None
 ) -> tuple[Solid, ...]:
     """What stands in the scenario's world beside the trees, one kind after the other."""
-    del scenario, terrain
-    return city.solids if city is not None else ()
+    del terrain
+    buildings = city.solids if city is not None else ()
+    return buildings + mesh_solids(scenario)
 
 
 def build_scene(

@@ -27,6 +27,7 @@ from volery.scenario.camera import CameraSensor, Daylight
 from volery.scenario.city import City
 from volery.scenario.faults import Fault
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
+from volery.scenario.user_mesh import UserMesh
 from volery.scenario.wind import Wind
 
 # ------------------------------------------------------------------------------------------ world
@@ -88,6 +89,8 @@ class World(Data):
     terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
     forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
     city: City | None = None
+    meshes: Annotated[tuple[UserMesh, ...], Field(max_length=1000)] = ()
+    """Files of the user's own that stand in the world."""
     wind: Wind = Wind()
     light: Daylight = Daylight()
     origin: Origin = Origin()

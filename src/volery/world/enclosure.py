@@ -36,7 +36,7 @@ def enclosing(meshes: Sequence[Mesh], points: NDArray[np.float64]) -> NDArray[np
     boxes = np.array([mesh.bounds for mesh in meshes]).reshape(-1, 2, 3)
     for k, point in enumerate(points):
         near = ((boxes[:, 0] <= point) & (point <= boxes[:, 1])).all(axis=1)
-        for number in np.flatnonzero(near):
+        for number in np.flatnonzero(near).tolist():
             if abs(winding_number(meshes[number], point)) > 0.5:
                 found[k] = number
                 break

@@ -56,7 +56,7 @@ def pane_share(
 
 
 @inner_kernel
-def pane_light(light: Light, j: int, dz: Any, window: int) -> Any:
+def pane_light(light: Light, j: int, dz: Any, window: Any) -> Any:
     """Channel `j` of what a pane mirrors to a ray that falls at `dz`: sky above, street below."""
     dim = f4(0.12) + f4(0.25) * light.grain[window & _MASK, (window >> 6) & _MASK]
     horizon = light.horizon[j]

@@ -98,6 +98,15 @@ def make_light(
     )
 
 
+def base_colours() -> dict[Material, tuple[float, float, float]]:
+    """Linear (r, g, b) of each material, its texture averaged out."""
+    rows = _surface_table()
+    return {
+        material: (float(r), float(g), float(b))
+        for material, (r, g, b) in zip(_SURFACES, 0.5 * (rows[:, :3] + rows[:, 3:6]), strict=True)
+    }
+
+
 def _surface_table() -> NDArray[np.float32]:
     rows = [[*first, *second, size, through] for first, second, size, through in _SURFACES.values()]
     return np.array(rows, dtype=np.float32)
