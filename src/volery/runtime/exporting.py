@@ -8,6 +8,7 @@ from volery.runtime.worlds import build_city, build_forest, build_solids, build_
 from volery.scenario.schema import Scenario
 from volery.sensors.cameras.light import base_colours
 from volery.world.gltf import glb_of
+from volery.world.ground_cover import BARE_GROUND
 from volery.world.trees.model import DetailLevel
 
 
@@ -23,5 +24,6 @@ def export_world(
     city = build_city(scenario, terrain)
     forest = build_forest(scenario, terrain, city)
     solids = build_solids(scenario, terrain, city)
-    content = glb_of(terrain, forest, solids, colours=base_colours(), detail=detail)
+    cover = BARE_GROUND if city is None else city.cover
+    content = glb_of(terrain, forest, solids, colours=base_colours(), cover=cover, detail=detail)
     return path.write_bytes(content)

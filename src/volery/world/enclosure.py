@@ -30,12 +30,16 @@ def winding_number(mesh: Mesh, point: NDArray[np.float64]) -> float:
     return float(np.arctan2(volume, below).sum() / (2.0 * np.pi))
 
 
-def enclosing(meshes: Sequence[Mesh], points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """First of the meshes that holds each of the points (P, 3), -1 where none does."""
+def enclosing(
+    meshes: Sequence[Mesh], boxes: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """First of the meshes that holds each of the points (P, 3), -1 where none does.
+
+    boxes: (meshes, 6) lowest and highest corners.
+    """
     found = np.full(len(points), -1, dtype=np.int64)
-    boxes = np.array([mesh.bounds for mesh in meshes]).reshape(-1, 2, 3)
     for k, point in enumerate(points):
-        near = ((boxes[:, 0] <= point) & (point <= boxes[:, 1])).all(axis=1)
+        near = ((boxes[:, :3] <= point) & (point <= boxes[:, 3:])).all(axis=1)
         for number in np.flatnonzero(near).tolist():
             if abs(winding_number(meshes[number], point)) > 0.5:
                 found[k] = number

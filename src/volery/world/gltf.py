@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.frames import gltf_from_enu, q_gltf_from_enu
+from volery.world.cover_picture import cover_places, cover_png
+from volery.world.ground_cover import BARE_GROUND, GroundCover
 from volery.world.materials import Material
 from volery.world.mesh import Mesh
 from volery.world.scene_content import PLAIN, Look, Solid
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 Colours = Mapping[Material, tuple[float, float, float]]
 
 _FLOAT, _UINT32 = 5126, 5125
-_VERTICES, _INDICES = 34962, 34963
+_VERTICES, _INDICES, _CLAMP = 34962, 34963, 33071
 _DIGITS = 5
 """Of places, m: a hundredth of a millimetre."""
 _SMOOTH = {Material.METAL: 0.5, Material.PAINTED: 0.6}
@@ -43,12 +45,16 @@ def glb_of(
     solids: Sequence[Solid] = (),
     *,
     colours: Colours,
+    cover: GroundCover = BARE_GROUND,
     detail: DetailLevel = DetailLevel.SENSING,
 ) -> bytes:
     """A world as the bytes of a .glb file; colours: linear (r, g, b) of each material."""
     file = _File(colours)
     if terrain is not None:
-        file.add_node("ground", file.add_mesh([(terrain.mesh(), Material.GROUND, PLAIN)]))
+        ground = file.add_mesh([(terrain.mesh(), Material.GROUND, PLAIN)])
+        if cover.material.size:
+            file.lay_over(ground, terrain.mesh(), cover)
+        file.add_node("ground", ground)
     if forest is not None:
         _add_trees(file, forest, detail)
     for solid in solids:
@@ -87,7 +93,7 @@ def _parts_of(solid: Solid) -> list[tuple[Mesh, Material, Look]]:
 
 
 class _File:
-    """A glTF document that grows, and its two stretches of numbers."""
+    """A glTF document that grows, and its stretches of numbers."""
 
     def __init__(self, colours: Colours) -> None:
         self._colours = colours
@@ -99,6 +105,7 @@ class _File:
         self._vertices: list[bytes] = []
         self._indices: list[bytes] = []
         self._vertex_bytes = self._index_bytes = 0
+        self._places = self._picture = b""
 
     def add_node(self, name: str, mesh: int | None, **transform: list[float]) -> None:
         """Show mesh number `mesh`; nodes without a mesh are left out."""
@@ -121,19 +128,48 @@ class _File:
         self._meshes.append({"primitives": primitives})
         return len(self._meshes) - 1
 
+    def lay_over(self, number: int | None, mesh: Mesh, cover: GroundCover) -> None:
+        """Show a picture of the ground's cover on mesh `number`, made of `mesh`."""
+        if number is None:
+            return
+        self._picture = cover_png(cover, self._colours)
+        primitive = self._meshes[number]["primitives"][0]
+        primitive["attributes"]["TEXCOORD_0"] = self._add_floats(
+            cover_places(cover, mesh.vertices), "VEC2"
+        )
+        primitive["material"] = len(self._materials)
+        self._materials.append(
+            {
+                "name": "ground_cover",
+                "pbrMetallicRoughness": {
+                    "baseColorTexture": {"index": 0},
+                    "metallicFactor": 0.0,
+                    "roughnessFactor": 0.9,
+                },
+            }
+        )
+
     def _add_points(self, mesh: Mesh) -> int:
-        points = gltf_from_enu(mesh.vertices).astype("<f4")
+        points = gltf_from_enu(mesh.vertices).astype(np.float32)
+        number = self._add_floats(points, "VEC3")
+        ends = {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}
+        self._accessors[number] |= ends
+        return number
+
+    def _add_floats(self, rows: NDArray[np.float32], kind: str) -> int:
         accessor = {
-            "bufferView": 0,
-            "byteOffset": self._vertex_bytes,
+            "bufferView": 0 if kind == "VEC3" else 2,
+            "byteOffset": self._vertex_bytes if kind == "VEC3" else 0,
             "componentType": _FLOAT,
-            "count": len(points),
-            "type": "VEC3",
-            "min": points.min(axis=0).tolist(),
-            "max": points.max(axis=0).tolist(),
+            "count": len(rows),
+            "type": kind,
         }
-        self._vertices.append(points.tobytes())
-        self._vertex_bytes += points.nbytes
+        content = rows.astype("<f4").tobytes()
+        if kind == "VEC3":
+            self._vertices.append(content)
+            self._vertex_bytes += len(content)
+        else:
+            self._places = content
         self._accessors.append(accessor)
         return len(self._accessors) - 1
 
@@ -180,24 +216,34 @@ class _File:
         }
         chunks = b""
         if self._meshes:
-            split = self._vertex_bytes
+            pieces = [b"".join(self._vertices), b"".join(self._indices)]
+            views = [{"target": _VERTICES}, {"target": _INDICES}]
+            if self._picture:
+                pieces += [self._places, self._picture]
+                views += [{"target": _VERTICES}, {}]
+                document |= {
+                    "images": [{"bufferView": 3, "mimeType": "image/png"}],
+                    "samplers": [{"wrapS": _CLAMP, "wrapT": _CLAMP}],
+                    "textures": [{"sampler": 0, "source": 0}],
+                }
+            ends = np.cumsum([len(piece) for piece in pieces]).tolist()
             document |= {
                 "nodes": self._nodes,
                 "meshes": self._meshes,
                 "materials": self._materials,
                 "accessors": self._accessors,
                 "bufferViews": [
-                    {"buffer": 0, "byteLength": split, "target": _VERTICES},
                     {
                         "buffer": 0,
-                        "byteOffset": split,
-                        "byteLength": self._index_bytes,
-                        "target": _INDICES,
-                    },
+                        "byteOffset": end - len(piece),
+                        "byteLength": len(piece),
+                        **view,
+                    }
+                    for piece, end, view in zip(pieces, ends, views, strict=True)
                 ],
-                "buffers": [{"byteLength": split + self._index_bytes}],
+                "buffers": [{"byteLength": ends[-1]}],
             }
-            chunks = _chunk(b"BIN\0", b"".join([*self._vertices, *self._indices]), b"\0")
+            chunks = _chunk(b"BIN\0", b"".join(pieces), b"\0")
         text = json.dumps(document, separators=(",", ":")).encode()
         chunks = _chunk(b"JSON", text, b" ") + chunks
         return b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks

@@ -257,8 +257,10 @@ class Scene:
         Solids whose surface has holes enclose nothing there. Trees are not asked.
         """
         p = np.asarray(points, dtype=np.float64).reshape(-1, 3)
-        found = enclosing([solid.mesh for solid in self.solids], p)
-        return np.where(found < 0, -1, found + 1 + self._content.trees).astype(np.int32)
+        first = 1 + self._content.trees
+        boxes = self._content.table.bounds[first:]
+        found = enclosing([solid.mesh for solid in self.solids], boxes, p)
+        return np.where(found < 0, -1, found + first).astype(np.int32)
 
 
 def _new_hits(count: int) -> Hits:

@@ -33,7 +33,9 @@ def test_winding_numbers():
 
 def test_random_points_against_the_boxes():
     points = np.random.default_rng(5).uniform(-1.0, 8.0, (500, 3))
-    found = enclosing([cube(), wall(3.0), cube(4.0)], points)
+    meshes = [cube(), wall(3.0), cube(4.0)]
+    boxes = np.array([mesh.bounds.ravel() for mesh in meshes])
+    found = enclosing(meshes, boxes, points)
     in_yz = ((points[:, 1:] > 0.0) & (points[:, 1:] < 2.0)).all(axis=1)
     wanted = np.full(500, -1)
     wanted[in_yz & (points[:, 0] > 0.0) & (points[:, 0] < 2.0)] = 0

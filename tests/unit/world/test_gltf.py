@@ -12,6 +12,7 @@ from volery.core.frames import enu_from_gltf, gltf_from_enu
 from volery.sensors.cameras.light import base_colours
 from volery.world.forest import procedural_forest
 from volery.world.gltf import glb_of
+from volery.world.ground_cover import GroundCover
 from volery.world.materials import Material
 from volery.world.scene import Look, Scene, Solid
 from volery.world.terrain import Terrain
@@ -97,6 +98,29 @@ def test_north_is_minus_z_and_up_is_y(world, tmp_path):
     np.testing.assert_allclose((low[0], high[0]), (-30.0, 30.0))
     np.testing.assert_allclose((low[2], high[2]), (-30.0, 30.0))
     assert high[1] == pytest.approx(float(np.asarray(terrain.grid.heights).max()), abs=1e-4)
+
+
+def test_streets_lie_over_the_ground_as_a_picture(world, tmp_path):
+    """A point of the ground has, in the picture, the colour of its cell, and earth beyond."""
+    terrain, _, _ = world
+    cells = np.array([[Material.ASPHALT, Material.PAVING], [Material.PAVING, Material.ASPHALT]])
+    cover = GroundCover(cells.astype(np.uint8), -10.0, -20.0, 10.0)
+    content = glb_of(terrain, None, colours=base_colours(), cover=cover)
+    (mesh,) = loaded(content, tmp_path).geometry.values()
+    picture = np.asarray(mesh.visual.material.baseColorTexture.convert("RGB"), float)
+    places = np.asarray(mesh.visual.uv)
+    points = enu_from_gltf(mesh.vertices)
+    for x, y, wanted in (
+        (-6.0, -12.0, Material.ASPHALT),
+        (6.0, -12.0, Material.PAVING),
+        (-6.0, -6.0, Material.PAVING),
+        (18.0, 6.0, Material.GROUND),
+    ):
+        row = np.argmin(np.linalg.norm(points[:, :2] - (x, y), axis=1))
+        u, v = places[row].clip(0.0, 0.999)  # trimesh counts v from below
+        pixel = picture[int((1.0 - v) * len(picture)), int(u * picture.shape[1])] / 255.0
+        linear = np.where(pixel <= 0.04045, pixel / 12.92, ((pixel + 0.055) / 1.055) ** 2.4)
+        np.testing.assert_allclose(linear, base_colours()[wanted], atol=0.01)
 
 
 def test_a_world_of_nothing_is_still_a_file():
