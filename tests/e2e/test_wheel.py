@@ -31,6 +31,7 @@ def test_wheel_in_a_clean_environment(tmp_path):
     for suffix in (
         "scenario/library/forest_survey.toml",
         "world/data/forests/bei_trees.csv",
+        "world/data/city/helsinki_buildings.geojson",
         "vehicle/airframes/f450.toml",
         "sensors/models/utm_30lx.toml",
         "graph/definitions/std_srvs/srv/Trigger.srv",

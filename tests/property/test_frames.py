@@ -20,6 +20,7 @@ PAIRS = [
     (frames.frd_from_flu, frames.flu_from_frd),
     (frames.optical_from_flu, frames.flu_from_optical),
     (frames.unity_from_ros, frames.ros_from_unity),
+    (frames.gltf_from_enu, frames.enu_from_gltf),
 ]
 
 
@@ -80,3 +81,10 @@ def test_north_and_nose():
     facing_east_enu = rot.IDENTITY
     q = frames.q_ned_frd_from_enu_flu(facing_east_enu)
     assert rot.yaw_of(q) == pytest.approx(np.pi / 2)  # east is +90 deg from north
+
+
+@given(quaternions, vectors)
+def test_rotation_means_the_same_in_gltf(q, v):
+    expected = frames.gltf_from_enu(rot.rotate(q, v))
+    got = rot.rotate(frames.q_gltf_from_enu(q), frames.gltf_from_enu(v))
+    np.testing.assert_allclose(got, expected, atol=1e-9)

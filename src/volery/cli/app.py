@@ -183,6 +183,21 @@ def identify(
 
 @app.command()
 @guarded
+def export(
+    scenario: Annotated[str, typer.Argument(help="Name from `volery list`, or a TOML file.")],
+    file: Annotated[Path, typer.Argument(help="The .glb file to write (glTF 2.0, binary).")],
+    detail: Annotated[
+        str, typer.Option(help="Of the trees: visual, sensing or coarse.")
+    ] = "sensing",
+) -> None:
+    """Write the world of a scenario as glTF: ground, trees, buildings."""
+    from volery.cli.exporting import export_and_tell
+
+    export_and_tell(scenario, file, detail)
+
+
+@app.command()
+@guarded
 def doctor() -> None:
     """Check this machine and installation; each line is ok or says how to mend it."""
     from volery.cli.doctor import examine

@@ -158,6 +158,9 @@ class Flight:
             f"{head} {simulated:.1f} s with {count} UAV{'s' if count != 1 else ''} "
             f"in {self._wall_s:.1f} s ({factor:.1f} x real time){self._reason(trouble)}"
         )
+        city = self._simulation.city
+        if city is not None:
+            typer.echo(f"  {city.report.summary()}")
         events = [e for e in self._simulation.events if str(e.kind) in {"impact", "collision"}]
         for event in events[:_CONTACTS_SHOWN]:
             typer.echo(f"  {event.describe()}")

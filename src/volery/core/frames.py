@@ -2,6 +2,7 @@
 
 - NED world / FRD body: MAVLink's.
 - Optical: z forward, x right, y down; a camera's frames ending in `_optical`.
+- glTF: right-handed, y up: ENU (x, y, z) is glTF (x, z, -y), so that north lies at -z.
 - Unity: left-handed, x right, y up, z forward. ROS (x, y, z) = Unity (z, -x, y), so Unity
   (x, y, z) = ROS (-y, z, x). (The 2025 ROS + Unity3D article prints this equation with its two
   sides exchanged; this is the form of Unity's own ROS-TCP-Connector.)
@@ -66,6 +67,24 @@ def flu_from_optical(v: ArrayLike) -> Array:
     """Optical-frame vectors to forward-left-up."""
     v = np.asarray(v, dtype=np.float64)
     return np.stack([v[..., 2], -v[..., 0], -v[..., 1]], axis=-1)
+
+
+def gltf_from_enu(v: ArrayLike) -> Array:
+    """East-north-up vectors to glTF's axes (x, z, -y): y up."""
+    v = np.asarray(v, dtype=np.float64)
+    return np.stack([v[..., 0], v[..., 2], -v[..., 1]], axis=-1)
+
+
+def enu_from_gltf(v: ArrayLike) -> Array:
+    """Vectors in glTF's axes to east-north-up (x, -z, y)."""
+    v = np.asarray(v, dtype=np.float64)
+    return np.stack([v[..., 0], -v[..., 2], v[..., 1]], axis=-1)
+
+
+def q_gltf_from_enu(q: ArrayLike) -> Array:
+    """ENU rotation to glTF's axes: both are right-handed, so the axis maps as a vector."""
+    q = np.asarray(q, dtype=np.float64)
+    return np.concatenate([gltf_from_enu(q[..., :3]), q[..., 3:]], axis=-1)
 
 
 def unity_from_ros(v: ArrayLike) -> Array:

@@ -26,6 +26,7 @@ from volery.report.flight_data import (
     UavTrack,
 )
 from volery.report.scan_placing import end_ns, scan_points, stamp_ns
+from volery.report.structures import seen_from_above
 from volery.report.voxels import VoxelSet
 
 if TYPE_CHECKING:
@@ -149,6 +150,7 @@ class FlightCollector:
             uavs=tuple(self._finished(name, uav) for name, uav in self._uavs.items()),
             ground=Ground(np.asarray(grid.heights), (grid.origin_x, grid.origin_y), grid.spacing),
             trees=_trees(simulation.forest),
+            structures=seen_from_above(solid.mesh for solid in simulation.scene.solids),
             lidar=self._lidar_map(),
             events=tuple(_event(event) for event in simulation.events),
             stage_seconds=dict(simulation.stage_seconds),

@@ -68,6 +68,16 @@ class Trees:
 
 
 @dataclass(frozen=True)
+class Structures:
+    """Buildings and other solids as seen from above."""
+
+    tops: Array
+    """(K, 3, 2) triangles that look up, m"""
+    edges: Array
+    """(E, 2, 2) lines around them, m"""
+
+
+@dataclass(frozen=True)
 class LidarMap:
     """What the LIDARs saw, one point a voxel, M points."""
 
@@ -108,6 +118,7 @@ class FlightData:
     uavs: tuple[UavTrack, ...]
     ground: Ground
     trees: Trees | None = None
+    structures: Structures | None = None
     lidar: LidarMap | None = None
     events: tuple[FlightEvent, ...] = ()
     stage_seconds: Mapping[str, float] = field(default_factory=dict)

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
 from matplotlib.colors import LightSource, LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from volery.report.flight_data import FlightData, Ground
+from volery.report.flight_data import FlightData, Ground, Structures
 from volery.report.palette import uav_color
 
 _DPI = 110
@@ -34,10 +34,12 @@ Box = tuple[float, float, float, float]
 
 
 def top_view(flight: FlightData) -> bytes:
-    """Terrain, trees by the size of their crowns, and the paths."""
+    """Terrain, solids, trees by the size of their crowns, and the paths."""
     box = _frame(flight, margin_m=35.0)
     figure, axes = _map(box, "white")
     _draw_ground(axes, flight.ground, box)
+    if flight.structures is not None:
+        _draw_structures(axes, flight.structures, box)
     if flight.trees is not None:
         foot = flight.trees.position_map
         near = _inside(foot, box, 12.0)
@@ -204,6 +206,17 @@ def _draw_ground(axes: Axes, ground: Ground, box: Box) -> None:
         axes.clabel(lines, levels[::2], fontsize=8, fmt="%g m", inline_spacing=3)
     axes.set_xlim(box[0], box[2])
     axes.set_ylim(box[1], box[3])
+
+
+def _draw_structures(axes: Axes, structures: Structures, box: Box) -> None:
+    tops, edges = (
+        lines[_inside(lines.mean(axis=1), box, 60.0)]
+        for lines in (structures.tops, structures.edges)
+    )
+    axes.add_collection(
+        PolyCollection(list(tops), facecolors="#b9b2a8", edgecolors="#b9b2a8", linewidths=0.3)
+    )
+    axes.add_collection(LineCollection(list(edges), colors="#6f675c", linewidths=0.7))
 
 
 def _draw_paths(axes: Axes, flight: FlightData, outline: str) -> None:

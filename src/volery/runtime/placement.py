@@ -50,8 +50,8 @@ def place_uavs(
 ) -> tuple[Start, ...]:
     """Places of all UAVs, numbered from uav1 through the groups.
 
-    Raises `PlacementError` naming the UAV, its key and what it stands in: a tree, the ground,
-    another UAV.
+    Raises `PlacementError` naming the UAV, its key and what it stands in: a tree, a building,
+    the ground, another UAV.
     """
     starts: list[Start] = []
     for g, group in enumerate(scenario.uavs):
@@ -119,7 +119,7 @@ def _nearest_free(
                 np.linalg.norm(candidate - other.position_map) > 2.0 * _ROOM_TO_STAND_M
                 for other in others
             )
-            if apart and room.min() >= _ROOM_TO_STAND_M:
+            if apart and room.min() >= _ROOM_TO_STAND_M and scene.enclosing(candidate[None])[0] < 0:
                 return candidate
     raise PlacementError(
         f"{where}: no free place within {_SEARCH_RADIUS_M:g} m of "
@@ -157,7 +157,7 @@ def check_place(
 ) -> None:
     """`PlacementError` where a UAV cannot be at `place` (3,) m, map, among `others`.
 
-    where: what the message begins with. hint: what a user may do about a tree.
+    where: what the message begins with. hint: what a user may do about it.
     """
     at = f"position_m ({place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f})"
     x0, y0, x1, y1 = terrain.bounds
@@ -179,6 +179,9 @@ def check_place(
             f"{where}: {at} lies in {scene.instance_name(int(look.instance[0]))}, "
             f"{look.distance[0]:.2f} m from it; at least {radius:.2f} m is needed{hint}"
         )
+    around = int(scene.enclosing(place[None])[0])
+    if around >= 0:
+        raise PlacementError(f"{where}: {at} lies inside {scene.instance_name(around)}{hint}")
     for other in others:
         distance = float(np.linalg.norm(place - other.position_map))
         needed = radius + other.airframe.body.collision_radius_m

@@ -44,7 +44,7 @@ from volery.runtime.snapshot import Snapshot
 from volery.runtime.spawning import Spawner
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
-from volery.runtime.worlds import build_forest, build_scene, build_terrain
+from volery.runtime.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario, UavType
 from volery.sensors.mount import Mount
@@ -83,8 +83,9 @@ class Simulation:
         compile_kernels()
         self.scenario = scenario
         self.terrain = build_terrain(scenario)
-        self.forest = build_forest(scenario, self.terrain)
-        self.scene = build_scene(scenario, self.terrain, self.forest, threads=threads)
+        self.city = build_city(scenario, self.terrain)
+        self.forest = build_forest(scenario, self.terrain, self.city)
+        self.scene = build_scene(scenario, self.terrain, self.forest, self.city, threads=threads)
         self._closed = False
         self._pacer = Pacer()
 

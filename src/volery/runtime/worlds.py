@@ -1,16 +1,22 @@
-"""Builds terrain, forest, solids and weather of a scenario."""
+"""Builds terrain, forest, city, solids and weather of a scenario."""
 
 from __future__ import annotations
 
 import math
 
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
+from volery.core.geodesy import LocalFrame
 from volery.runtime.grid_map_building import starting_blocks
 from volery.runtime.thing_building import build_things
+from volery.runtime.user_meshes import mesh_solids
 from volery.scenario import wind as schema
 from volery.scenario.files import SHIPPED_DATA, resolve
 from volery.scenario.schema import GridTerrain, InventoryForest, ProceduralForest, Scenario
+from volery.world.city import City, FurnitureRule, HeightRule, StreetRule
+from volery.world.city import build_city as city_of_outlines
 from volery.world.forest import Forest, forest_from_inventory, procedural_forest
+from volery.world.forest_joining import joined
+from volery.world.ground_cover import BARE_GROUND
 from volery.world.scene import Scene, Solid
 from volery.world.terrain import Terrain
 from volery.world.weather import W20_M_S, Gust, LogProfile, PowerProfile, Weather, WindField
@@ -29,8 +35,31 @@ def build_terrain(scenario: Scenario) -> Terrain:
     return Terrain.flat(2.0 * reach, terrain.height_m, origin=(-reach, -reach))
 
 
-def build_forest(scenario: Scenario, terrain: Terrain) -> Forest | None:
-    """Trees of the scenario, None where it has no forest.
+def build_city(scenario: Scenario, terrain: Terrain) -> City | None:
+    """City of the scenario, None where it has none. Raises `DataFileError`."""
+    city, origin = scenario.world.city, scenario.world.origin
+    if city is None:
+        return None
+    streets = city.streets
+    try:
+        return city_of_outlines(
+            resolve(city.file, scenario.folder, SHIPPED_DATA),
+            LocalFrame.from_degrees(origin.latitude_deg, origin.longitude_deg, origin.altitude_m),
+            terrain,
+            seed=scenario.world_seed,
+            region=city.region_m,
+            heights=HeightRule(city.storey_m, city.default_height_m),
+            streets=StreetRule(streets.widest_m, streets.pavement_m),
+            furniture=FurnitureRule(
+                streets.lamp_spacing_m, streets.tree_spacing_m, streets.tree_share
+            ),
+        )
+    except DataFileError as error:
+        raise DataFileError(f"{scenario.name}: world.city: {error}") from None
+
+
+def build_forest(scenario: Scenario, terrain: Terrain, city: City | None = None) -> Forest | None:
+    """Trees of the scenario, those of a city's streets last; None where it has no forest.
 
     Raises `ScenarioError` where the forest cannot grow, has no trees or reaches beyond the terrain.
     """
@@ -49,7 +78,18 @@ def build_forest(scenario: Scenario, terrain: Terrain) -> Forest | None:
                 f"{scenario.name}: world.forest: {outside} trees stand beyond the terrain, which "
                 f"reaches from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m; region_m crops an inventory"
             )
-    return forest
+    return joined(forest, _street_trees(scenario, terrain, city))
+
+
+def _street_trees(scenario: Scenario, terrain: Terrain, city: City | None) -> Forest | None:
+    settings = scenario.world.city
+    if city is None or settings is None or not len(city.trees):
+        return None
+    species, seed = settings.streets.tree_species, scenario.world_seed
+    try:
+        return forest_from_inventory(city.trees, species=species, seed=seed, terrain=terrain)
+    except VoleryError as error:
+        raise ScenarioError(f"{scenario.name}: world.city.streets: {error}") from None
 
 
 def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
@@ -74,16 +114,31 @@ def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
     return None
 
 
-def build_solids(scenario: Scenario, terrain: Terrain) -> tuple[Solid, ...]:
+def build_solids(
+    scenario: Scenario, terrain: Terrain, city: City | None = None
+) -> tuple[Solid, ...]:
     """What stands in the scenario's world beside the trees, one kind after the other."""
-    return (*starting_blocks(scenario, terrain),)  # last: they can change, others keep numbers
+    buildings = city.solids if city is not None else ()
+    blocks = starting_blocks(scenario, terrain)  # last: they can change, others keep numbers
+    return (*buildings, *mesh_solids(scenario), *blocks)
 
 
 def build_scene(
-    scenario: Scenario, terrain: Terrain, forest: Forest | None, *, threads: int = 1
+    scenario: Scenario,
+    terrain: Terrain,
+    forest: Forest | None,
+    city: City | None = None,
+    *,
+    threads: int = 1,
 ) -> Scene:
     """All that sensors of the scenario can see but for the UAVs."""
-    scene = Scene(terrain, forest, solids=build_solids(scenario, terrain), threads=threads)
+    scene = Scene(
+        terrain,
+        forest,
+        solids=build_solids(scenario, terrain, city),
+        cover=BARE_GROUND if city is None else city.cover,
+        threads=threads,
+    )
     things = build_things(scenario, terrain)
     if things is not None:
         scene.set_things(things)

@@ -24,10 +24,12 @@ from volery.scenario.base import (
     check_rectangle,
 )
 from volery.scenario.camera import CameraSensor, Daylight
+from volery.scenario.city import City
 from volery.scenario.faults import Fault
 from volery.scenario.grid_map import GridMapWorld
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
 from volery.scenario.things import Things, check_things
+from volery.scenario.user_mesh import UserMesh
 from volery.scenario.wind import Wind
 
 # ------------------------------------------------------------------------------------------ world
@@ -82,13 +84,16 @@ class ProceduralForest(Data):
 
 
 class World(Data):
-    """Ground, trees, air."""
+    """Ground, trees, buildings, air."""
 
     seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
-    """Seed of the trees alone; None: the scenario's seed grows them too."""
+    """Seed of what stands in the world alone; None: the scenario's seed grows it too."""
     terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
     forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
+    city: City | None = None
     grid_map: GridMapWorld | None = None
+    meshes: Annotated[tuple[UserMesh, ...], Field(max_length=1000)] = ()
+    """Files of the user's own that stand in the world."""
     things: Things = ()
     wind: Wind = Wind()
     light: Daylight = Daylight()

@@ -88,6 +88,8 @@ class EmbreeBackend:
             moving_offset=content.instances,
             normal_matrix=content.normal_matrix,
             material=content.material,
+            look=content.look,
+            cover=content.cover,
             bodies=bodies,
         )
 

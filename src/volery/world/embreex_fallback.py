@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.core.workers import Workers
+from volery.world.ground_cover import ground_material
 from volery.world.mesh import Mesh, concatenate
 from volery.world.point_query import nearest_in_all
 from volery.world.scene_content import BodyShape, SceneContent
@@ -86,7 +87,15 @@ class EmbreexBackend:
     def handle(self, bodies: BodyTable) -> SceneHandle:
         """Tables as the main backend's, without an Embree scene: kernels cannot cast here."""
         content = self._content
-        return SceneHandle(0, content.instances, content.normal_matrix, content.material, bodies)
+        return SceneHandle(
+            static=0,
+            moving_offset=content.instances,
+            normal_matrix=content.normal_matrix,
+            material=content.material,
+            look=content.look,
+            cover=content.cover,
+            bodies=bodies,
+        )
 
     def shape_scenes(self, shapes: Sequence[BodyShape]) -> NDArray[np.int64]:
         """Numbers of the shapes in this backend."""
@@ -116,7 +125,11 @@ class EmbreexBackend:
         normal[hit] = n
         blocks = np.array(self._blocks, dtype=np.int64).reshape(-1, 2)[block]
         instance[hit] = blocks[:, 0]
-        material[hit] = handle.material[blocks[:, 0], blocks[:, 1]]
+        part = np.where(blocks[:, 0] > self._content.trees, _looks_up(n), blocks[:, 1])
+        material[hit] = handle.material[blocks[:, 0], part]
+        ground = np.flatnonzero(hit)[blocks[:, 0] == 0]
+        places = origins[ground] + distance[ground, None] * directions[ground]
+        material[ground] = [ground_material(handle.cover, x, y) for x, y, _ in places]
         bodies = handle.bodies
         uavs = len(bodies.scene) - bodies.things
         for row in range(len(bodies.scene)):
@@ -181,6 +194,12 @@ class EmbreexBackend:
     def close(self) -> None:
         """Forget the scenes."""
         self._shapes.clear()
+
+
+def _looks_up(normal: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether outward normals (n, 3) of any length point up more than sideways."""
+    x, y, z = normal.T
+    return np.asarray((z > 0.0) & (z * z > x * x + y * y))
 
 
 def _in_body(

@@ -23,6 +23,14 @@ class Material(IntEnum):
     CAR_PAINT = 10
     RUBBER = 11
     PLUMAGE = 12
+    FACADE = 13
+    """Outer wall with windows."""
+    ROOF = 14
+    ASPHALT = 15
+    PAVING = 16
+    METAL = 17
+    PAINTED = 18
+    """Of a colour that its solid states."""
 
 
 _DIFFUSE_REFLECTIVITY_905_NM = {
@@ -39,6 +47,12 @@ _DIFFUSE_REFLECTIVITY_905_NM = {
     Material.CAR_PAINT: 0.30,  # modelling choice: dark blue paint
     Material.RUBBER: 0.05,  # modelling choice: black tyres and tinted glass
     Material.PLUMAGE: 0.30,  # modelling choice: brown feathers
+    Material.FACADE: 0.50,  # modelling choice: plaster, less its panes, which reflect away
+    Material.ROOF: 0.25,  # modelling choice: painted sheet metal and bitumen
+    Material.ASPHALT: 0.17,  # modelling choice: worn asphalt, between fresh (.1) and aged (.25)
+    Material.PAVING: 0.35,  # modelling choice: granite setts and concrete slabs
+    Material.METAL: 0.45,  # modelling choice: galvanized steel, dull
+    Material.PAINTED: 0.50,  # modelling choice: light paint
 }
 
 REFLECTIVITY = np.array([_DIFFUSE_REFLECTIVITY_905_NM[material] for material in Material])

@@ -64,6 +64,20 @@ class Mesh:
             return np.zeros((2, 3))
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)]).astype(np.float64)
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether every edge lies between two triangles that run along it in opposite directions.
+
+        Vertices at the same place count as one.
+        """
+        _, same = np.unique(self.vertices, axis=0, return_inverse=True)
+        a, b, c = same.reshape(-1)[self.triangles].T
+        edges = np.concatenate([np.stack(pair, axis=1) for pair in ((a, b), (b, c), (c, a))])
+        edges = edges[edges[:, 0] != edges[:, 1]]
+        ways, counts = np.unique(edges, axis=0, return_counts=True)
+        back, others = np.unique(edges[:, ::-1], axis=0, return_counts=True)
+        return bool(np.array_equal(ways, back) and np.array_equal(counts, others))
+
     def transformed(self, transform: ArrayLike) -> Mesh:
         """Mesh in another frame; `transform` is (3, 4) or (4, 4): new point = M p + t.
 

@@ -21,8 +21,9 @@ from volery.core.workers import Workers
 from volery.world.embree import EmbreeUnavailableError
 from volery.world.embree_backend import EmbreeBackend
 from volery.world.embreex_fallback import EmbreexBackend
+from volery.world.ground_cover import BARE_GROUND, GroundCover
 from volery.world.moving_bodies import NO_ROWS, body_rows, body_table, with_blades
-from volery.world.scene_content import BodyShape, SceneContent, Solid, collect, with_solids
+from volery.world.scene_content import BodyShape, Look, SceneContent, Solid, collect, with_solids
 from volery.world.scene_memory import SceneHandle
 from volery.world.terrain import Terrain
 from volery.world.things.moving import MovingThings
@@ -31,7 +32,7 @@ from volery.world.trees.model import DetailLevel
 if TYPE_CHECKING:
     from volery.world.forest import Forest
 
-__all__ = ["BodyShape", "Clearance", "Hits", "Scene", "Solid"]
+__all__ = ["BodyShape", "Clearance", "Hits", "Look", "Scene", "Solid"]
 
 Backend = Literal["auto", "embree", "embreex"]
 
@@ -75,12 +76,13 @@ class Scene:
         *,
         detail: DetailLevel = DetailLevel.SENSING,
         solids: Sequence[Solid] = (),
+        cover: GroundCover = BARE_GROUND,
         backend: Backend = "auto",
         threads: int = 1,
     ) -> None:
         self.workers = Workers(threads)
         self.solids = tuple(solids)
-        self._content = collect(terrain, forest, detail, self.solids)
+        self._content = collect(terrain, forest, detail, self.solids, cover)
         self.backend: EmbreeBackend | EmbreexBackend = _make_backend(self._content, backend)
         self.things: MovingThings | None = None
         """What moves by itself and is seen by all."""
@@ -281,12 +283,22 @@ class Scene:
         )
         self.backend.clearance(p, float(reach_m), include_terrain, result)
         if self.solids:
-            enclosing = np.empty(len(p), dtype=np.int32)
-            self.backend.enclosing(p, enclosing)
+            enclosing = self.enclosing(p)
             inside = enclosing >= 0
             result.distance[inside] *= -1.0
             result.instance[inside] = enclosing[inside]
         return result
+
+    def enclosing(self, points: ArrayLike) -> NDArray[np.int32]:
+        """Instance of the solid inside which each of the points (P, 3), m, map, lies; -1: none."""
+        p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+        found = np.empty(len(p), dtype=np.int32)
+        self.backend.enclosing(p, found)
+        first = 1 + self._content.trees
+        for k in np.flatnonzero(found >= first):
+            if self.solids[found[k] - first].is_shell:
+                found[k] = -1
+        return found
 
 
 def _new_hits(count: int) -> Hits:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.world.embree import PaddedMesh, padded
+from volery.world.ground_cover import BARE_GROUND, GroundCover
 from volery.world.materials import Material
 from volery.world.mesh import Mesh
 from volery.world.point_query import TriangleTable
@@ -24,6 +25,22 @@ if TYPE_CHECKING:
     from volery.world.forest import Forest
 
 _MOST_PARTS = 2
+
+
+class Look(NamedTuple):
+    """How a solid of material FACADE or PAINTED differs from others, for cameras."""
+
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Linear red, green, blue; factors of the material's own colour."""
+    foot_m: float = 0.0
+    """z in the map from which storeys are counted."""
+    storey_m: float = 1.0
+    storeys: int = 0
+    """Rows of windows; 0: none."""
+
+
+PLAIN = Look()
+"""The material's own colour, no windows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +55,11 @@ class Solid:
     mesh: Mesh
     material: Material
     name: str
+    top: Material | None = None
+    """Of faces that look up more than sideways; None: `material`, too."""
+    look: Look = PLAIN
+    is_shell: bool = False
+    """Whether its surface has holes, so that it has no inside."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +101,9 @@ class SceneContent:
     """(trees, 3, 4) map from tree."""
     has_terrain: bool
     solids: int
+    look: NDArray[np.float32]
+    """(instances, 6) rows of `Look`."""
+    cover: GroundCover
 
     @property
     def trees(self) -> int:
@@ -116,11 +141,23 @@ def _instance_bounds(
     return bounds
 
 
+def _looks(before: int, solids: Sequence[Solid]) -> NDArray[np.float32]:
+    rows = np.zeros((before + len(solids), 6), dtype=np.float32)
+    for row, solid in zip(rows[before:], solids, strict=True):
+        colour, *storeys = solid.look
+        row[:3], row[3:] = colour, storeys
+    return rows
+
+
 def collect(
-    terrain: Terrain | None, forest: Forest | None, detail: DetailLevel, solids: Sequence[Solid]
+    terrain: Terrain | None,
+    forest: Forest | None,
+    detail: DetailLevel,
+    solids: Sequence[Solid],
+    cover: GroundCover = BARE_GROUND,
 ) -> SceneContent:
     """Tables of a world at one level of detail."""
-    return with_solids(_collect_land(terrain, forest, detail), 0, solids)
+    return with_solids(_collect_land(terrain, forest, detail, cover), 0, solids)
 
 
 def with_solids(content: SceneContent, kept: int, solids: Sequence[Solid]) -> SceneContent:
@@ -136,7 +173,8 @@ def with_solids(content: SceneContent, kept: int, solids: Sequence[Solid]) -> Sc
     upright = np.tile(np.eye(3, dtype=np.float32).reshape(1, 9), (count, 1))
     boxes = np.array([_part_bounds(part) for part in new]).reshape(-1, 2, 3)
     material = np.zeros((count, _MOST_PARTS), dtype=np.uint8)
-    material[:, 0] = [solid.material for solid in solids]
+    for row, solid in zip(material, solids, strict=True):
+        row[:] = solid.material, solid.material if solid.top is None else solid.top
     bounds = _instance_bounds(boxes[:, 0], boxes[:, 1], transform)
     vertices, triangles, length = _memory_of(new)
     places = len(staying) + np.arange(count)
@@ -153,6 +191,7 @@ def with_solids(content: SceneContent, kept: int, solids: Sequence[Solid]) -> Sc
             bounds=np.concatenate([old.bounds[:first], bounds]),
         ),
         material=np.concatenate([content.material[:first], material]),
+        look=np.concatenate([content.look[:first], _looks(0, solids)]),
         normal_matrix=np.concatenate([content.normal_matrix[:first], upright]),
         solids=kept + count,
     )
@@ -170,7 +209,7 @@ def _memory_of(
 
 
 def _collect_land(
-    terrain: Terrain | None, forest: Forest | None, detail: DetailLevel
+    terrain: Terrain | None, forest: Forest | None, detail: DetailLevel, cover: GroundCover
 ) -> SceneContent:
     """Tables of ground and trees alone."""
     models = forest.models if forest is not None else ()
@@ -230,4 +269,6 @@ def _collect_land(
         tree_transforms=tree_transforms,
         has_terrain=terrain is not None,
         solids=0,
+        look=_looks(1 + trees, ()),
+        cover=cover,
     )

@@ -23,6 +23,7 @@ from volery.world.embree import (
     intersect_packet,
     occluded_packet,
 )
+from volery.world.ground_cover import ground_material
 from volery.world.scene_memory import RayBlock, SceneHandle, new_block, thread_block
 
 __all__ = [
@@ -76,6 +77,24 @@ def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], reach: flo
 
 
 @inner_kernel
+def _ground_of(scene: SceneHandle, rays: NDArray[np.float32], k: int) -> int:
+    """`Material` of the ground that a packet's ray `k` hits."""
+    if scene.cover.material.shape[0] == 0:
+        return int(scene.material[0, 0])
+    far = rays[FAR, k]
+    x = rays[ORIGIN, k] + far * rays[DIRECTION, k]
+    y = rays[ORIGIN + 1, k] + far * rays[DIRECTION + 1, k]
+    return int(ground_material(scene.cover, x, y))
+
+
+@inner_kernel
+def _looks_up(rays: NDArray[np.float32], k: int) -> bool:
+    """Whether what ray `k` hits looks up more than sideways."""
+    x, y, z = rays[NORMAL, k], rays[NORMAL + 1, k], rays[NORMAL + 2, k]
+    return bool(z > np.float32(0.0) and z * z > x * x + y * y)
+
+
+@inner_kernel
 def run_together(rays: NDArray[np.float32], lanes: int) -> bool:
     """Whether first and last ray of a packet run close together."""
     last = lanes - 1
@@ -121,7 +140,10 @@ def cast_block(
                 material[p, k] = 0
             elif number == _INVALID:  # terrain and solids are geometry of the top level
                 instance[p, k] = part
-                material[p, k] = material_of[part, 0]
+                if part == 0:
+                    material[p, k] = _ground_of(scene, rays[p], k)
+                else:
+                    material[p, k] = material_of[part, 1 if _looks_up(rays[p], k) else 0]
             else:
                 instance[p, k] = number
                 material[p, k] = material_of[number, part]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.world.embree import INVALID, LANES, MASK, PACKET_ROWS, aligned, coherent_arguments
+from volery.world.ground_cover import GroundCover
 
 _KEPT_BLOCKS = 8
 
@@ -50,7 +51,10 @@ class SceneHandle(NamedTuple):
     normal_matrix: NDArray[np.float32]
     """(instances, 9) rows of the matrix that takes normals to the map (not unit length)."""
     material: NDArray[np.uint8]
-    """(instances, 2) of the instance's parts (trees: wood, leaves)."""
+    """(instances, 2) of the instance's parts (trees: wood, leaves; solids: sides, tops)."""
+    look: NDArray[np.float32]
+    """(instances, 6) rows of `scene_content.Look`."""
+    cover: GroundCover
     bodies: BodyTable
 
 

@@ -34,6 +34,7 @@ class FakeSimulation:
         self.cloud_mounts = {}
         self.terrain = Terrain.flat(100.0, 0.0, (-50.0, -50.0))
         self.forest = None
+        self.city = None
         self.events: list[Event] = []
         self.stage_seconds = {"lidars": 0.2, "dynamics": 0.1}
         self.closed = False
@@ -56,7 +57,7 @@ class FakeSimulation:
         def clearance(points: Any, reach_m: float, include_terrain: bool = True) -> Any:
             return SimpleNamespace(distance=np.full(len(points), reach_m))
 
-        return SimpleNamespace(clearance=clearance)
+        return SimpleNamespace(clearance=clearance, solids=())
 
     def enable_digest(self) -> None:
         self._digest = True

@@ -57,7 +57,7 @@ class FakeSimulation:
             assert not include_terrain
             return SimpleNamespace(distance=np.minimum(np.abs(points[:, 0] - 5.0), reach_m))
 
-        return SimpleNamespace(clearance=clearance)
+        return SimpleNamespace(clearance=clearance, solids=())
 
 
 def pose_at(t: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -270,5 +270,5 @@ def take_pictures(
             note_hits(block, own, scratch)
             near_count = shading_bodies(scene, batch.uav[shot], light, scratch, own, block.near)
             find_shadows(scene, block, own, near_count, light, scratch)
-            shade(block, own, light, scratch)
+            shade(scene, block, own, light, scratch)
             _write_colour(table, optics, light, batch, first, own, shot, scratch.colour, frames)

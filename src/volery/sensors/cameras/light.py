@@ -65,6 +65,12 @@ _SURFACES = {
     Material.CAR_PAINT: ((0.05, 0.12, 0.35), (0.05, 0.11, 0.32), 2.0, 0.0),
     Material.RUBBER: ((0.02, 0.02, 0.02), (0.03, 0.03, 0.03), 9.0, 0.0),
     Material.PLUMAGE: ((0.16, 0.11, 0.07), (0.09, 0.06, 0.04), 20.0, 0.0),
+    Material.FACADE: ((0.50, 0.50, 0.50), (0.43, 0.43, 0.43), 0.6, 0.0),
+    Material.ROOF: ((0.20, 0.16, 0.13), (0.25, 0.14, 0.10), 0.2, 0.0),
+    Material.ASPHALT: ((0.095, 0.095, 0.10), (0.07, 0.07, 0.075), 1.5, 0.0),
+    Material.PAVING: ((0.27, 0.255, 0.235), (0.22, 0.21, 0.20), 2.5, 0.0),
+    Material.METAL: ((0.10, 0.11, 0.11), (0.07, 0.08, 0.08), 8.0, 0.0),
+    Material.PAINTED: ((1.0, 1.0, 1.0), (0.9, 0.9, 0.9), 1.0, 0.0),
 }
 
 
@@ -96,6 +102,15 @@ def make_light(
         grain=_grain(),
         code=_codes(),
     )
+
+
+def base_colours() -> dict[Material, tuple[float, float, float]]:
+    """Linear (r, g, b) of each material, its texture averaged out."""
+    rows = _surface_table()
+    return {
+        material: (float(r), float(g), float(b))
+        for material, (r, g, b) in zip(_SURFACES, 0.5 * (rows[:, :3] + rows[:, 3:6]), strict=True)
+    }
 
 
 def _surface_table() -> NDArray[np.float32]:

@@ -8,14 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.compiled import inner_kernel
+from volery.sensors.cameras.facade_kernels import pane_light, pane_share
 from volery.sensors.cameras.light import CLEAR, GRAIN, Light
 from volery.world.body_kernels import body_sphere, hide_behind_body
 from volery.world.embree import DIRECTION, FAR, LANES, NORMAL, ORIGIN, occluded_packet
+from volery.world.materials import Material
 from volery.world.scene_kernels import RayBlock, SceneHandle, run_together
 
 SHADOW_REACH_M = 80.0
 """Farther away nothing throws a shadow: trees and houses are lower."""
 _MASK = GRAIN - 1
+_FACADE, _PAINTED = int(Material.FACADE), int(Material.PAINTED)
 # Rows of a packet's scratch memory.
 _HIT, _PLACE_X, _LIT, _NORMAL_X, SCRATCH_ROWS = 0, 1, 4, 5, 8
 
@@ -188,7 +191,7 @@ def _texture(light: Light, material: int, x: Any, y: Any, z: Any, steep: bool) -
 
 
 @inner_kernel
-def shade(block: RayBlock, count: int, light: Light, scratch: Scratch) -> None:
+def shade(scene: SceneHandle, block: RayBlock, count: int, light: Light, scratch: Scratch) -> None:
     """Linear colours of the block's first `count` packets, after `find_shadows`."""
     for p in range(count):
         hit, colour = scratch.hit[p], scratch.colour[p]
@@ -207,12 +210,21 @@ def shade(block: RayBlock, count: int, light: Light, scratch: Scratch) -> None:
             above = f4(0.5) + f4(0.5) * nz
             step: Any = np.int64(scratch.distance[p, k] * light.clear_per_m)
             clear = light.clear[min(step, CLEAR - 1)]
+            glass, window = f4(0.0), np.int64(0)
+            if material == _FACADE:
+                nx, ny, far = hit[_NORMAL_X, k], hit[_NORMAL_X + 1, k], scratch.distance[p, k]
+                glass, window = pane_share(scene.look[instances[k]], x, y, z, nx, ny, far)
             for j in range(3):
                 first, second = light.surface[material, j], light.surface[material, 3 + j]
                 own = (first + share * (second - first)) * tint
+                if material == _FACADE or material == _PAINTED:  # noqa: PLR1714, SIM109 - compiled
+                    own *= scene.look[instances[k], j] * (f4(1.0) - glass)
                 bounce, horizon = light.bounce[j], light.horizon[j]
                 lit = light.sun_colour[j] * sunlit + bounce + above * (light.overhead[j] - bounce)
-                colour[j, k] = horizon + clear * (own * lit - horizon)
+                seen = own * lit
+                if glass > f4(0.0):
+                    seen += glass * pane_light(light, j, scratch.direction[p, 2, k], window)
+                colour[j, k] = horizon + clear * (seen - horizon)
 
 
 @inner_kernel

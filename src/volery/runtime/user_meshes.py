@@ -1,0 +1,55 @@
+"""Meshes of the user's own as solids of a scenario's world."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core import rotations
+from volery.core.errors import DataFileError
+from volery.scenario.files import SHIPPED_DATA, resolve
+from volery.scenario.schema import Scenario
+from volery.scenario.user_mesh import UserMesh
+from volery.world.materials import Material
+from volery.world.mesh_files import FARTHEST_M, MeshFile, read_mesh
+from volery.world.scene import Look, Solid
+
+
+def mesh_solids(scenario: Scenario) -> tuple[Solid, ...]:
+    """A solid for each of `world.meshes`; a file that stands several times is read once.
+
+    Raises `DataFileError` that names scenario and key.
+    """
+    read: dict[tuple[Path, str | None], MeshFile] = {}
+    solids = []
+    for number, entry in enumerate(scenario.world.meshes):
+        try:
+            path = resolve(entry.file, scenario.folder, SHIPPED_DATA)
+            if (path, entry.up) not in read:
+                read[path, entry.up] = read_mesh(path, up=entry.up)
+            solids.append(_solid(entry, path, read[path, entry.up]))
+        except DataFileError as error:
+            raise DataFileError(f"{scenario.name}: world.meshes[{number}]: {error}") from None
+    return tuple(solids)
+
+
+def _solid(entry: UserMesh, path: Path, file: MeshFile) -> Solid:
+    mesh = file.mesh.transformed(_placing(entry))
+    far = float(np.abs(mesh.vertices).max())
+    if not far <= FARTHEST_M:
+        raise DataFileError(
+            f"{path} reaches {far:.3g} m from the map's origin, at most {FARTHEST_M:g} m is "
+            "allowed; is `scale` right?"
+        )
+    colour = entry.colour or file.colour
+    material, name = Material[entry.material.upper()], entry.name or path.stem
+    return Solid(mesh, material, name, look=Look(colour), is_shell=not mesh.is_closed)
+
+
+def _placing(entry: UserMesh) -> NDArray[np.float64]:
+    """(3, 4) map from file."""
+    turn = rotations.from_rpy(*np.radians(entry.rpy_deg))
+    axes = np.stack([rotations.rotate(turn, axis) for axis in np.eye(3)], axis=1)
+    return np.column_stack([axes * np.broadcast_to(entry.scale, 3), entry.position_m])

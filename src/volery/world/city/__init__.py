@@ -1,0 +1,26 @@
+"""Cities from building outlines.
+
+geojson.py     a file's features                heights.py    how tall a building is
+outlines.py    sound footprints, and a report   buildings.py  walls and roofs
+streets.py     pavement and asphalt             furniture.py  lamps and street trees
+city.py        all of it together
+"""
+
+from volery.world.city.buildings import Building, extruded
+from volery.world.city.city import City, build_city
+from volery.world.city.furniture import FurnitureRule
+from volery.world.city.heights import HeightRule
+from volery.world.city.outlines import Report, read_outlines
+from volery.world.city.streets import StreetRule
+
+__all__ = [
+    "Building",
+    "City",
+    "FurnitureRule",
+    "HeightRule",
+    "Report",
+    "StreetRule",
+    "build_city",
+    "extruded",
+    "read_outlines",
+]

@@ -1,0 +1,88 @@
+"""A city: everything that building outlines, a ground and a seed make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.errors import DataFileError
+from volery.core.geodesy import LocalFrame
+from volery.world.city.buildings import Building, solids_of, stand
+from volery.world.city.furniture import FurnitureRule, lamp_solids, place_lamps, place_trees
+from volery.world.city.heights import HeightRule
+from volery.world.city.outlines import Region, Report, read_outlines
+from volery.world.city.streets import StreetRule, cover_of, find_streets
+from volery.world.ground_cover import GroundCover
+from volery.world.inventory import Inventory
+from volery.world.scene_content import Solid
+from volery.world.terrain import Terrain
+
+
+@dataclass(frozen=True, eq=False)
+class City:
+    """A city on its ground, in the map.
+
+    solids: a building each, then a lamp each. lamps: (L, 4) place and direction of the arm.
+    trees: of the streets; they join the forest. report: what became of the outlines.
+    """
+
+    buildings: tuple[Building, ...]
+    lamps: NDArray[np.float64]
+    trees: Inventory
+    cover: GroundCover
+    solids: tuple[Solid, ...]
+    report: Report
+
+
+def build_city(
+    path: str | Path,
+    frame: LocalFrame,
+    terrain: Terrain,
+    *,
+    seed: int = 0,
+    region: Region | None = None,
+    heights: HeightRule | None = None,
+    streets: StreetRule | None = None,
+    furniture: FurnitureRule | None = None,
+) -> City:
+    """City of a GeoJSON file of outlines; `frame` is the map's place on the earth.
+
+    region: (x0, y0, x1, y1) in m; buildings whose middle lies in it stay. None keeps all.
+    Raises `DataFileError` for a file that is none, or has no building there, or for buildings
+    beyond the terrain.
+    """
+    outlines, report = read_outlines(path, frame, rule=heights or HeightRule(), region=region)
+    if not outlines:
+        raise DataFileError(f"{path}: no building is left\n{report}")
+    x0, y0, x1, y1 = terrain.bounds
+    boxes = np.array([outline.footprint.bounds for outline in outlines])
+    beyond = ((boxes < (x0, y0, x0, y0)) | (boxes > (x1, y1, x1, y1))).any(axis=1)
+    if beyond.any():
+        first = outlines[int(np.argmax(beyond))].id
+        raise DataFileError(
+            f"{path}: {int(beyond.sum())} buildings, {first} for one, reach beyond the terrain, "
+            f"which ends at ({x0:g}, {y0:g}) and ({x1:g}, {y1:g}) m; region_m crops the outlines"
+        )
+    rule = furniture or FurnitureRule()
+    buildings = stand(outlines, terrain)
+    found = find_streets([outline.footprint for outline in outlines], streets or StreetRule())
+    lamps = place_lamps(found, rule, seed)
+    lamps = lamps[_on(terrain, lamps)]
+    trees = place_trees(found, rule, seed, lamps)
+    return City(
+        buildings=buildings,
+        lamps=lamps,
+        trees=trees.within((x0, y0, x1, y1)),
+        cover=cover_of(found),
+        solids=solids_of(buildings, seed) + lamp_solids(lamps, terrain),
+        report=report,
+    )
+
+
+def _on(terrain: Terrain, places: NDArray[np.float64]) -> NDArray[np.bool_]:
+    x0, y0, x1, y1 = terrain.bounds
+    x, y = places[:, 0], places[:, 1]
+    return np.asarray((x >= x0) & (x < x1) & (y >= y0) & (y < y1))

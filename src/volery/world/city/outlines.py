@@ -1,0 +1,219 @@
+"""From features of a file to sound footprints in the map, with a report of what was mended.
+
+A sound footprint is a valid polygon, or several: simple rings, holes inside, no overlap. Outlines
+that cross themselves are rebuilt from the areas that they enclose, open ones are closed; what has
+no area, stands twice or is hidden in a taller building is dropped. Each of these is told by id.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.errors import DataFileError
+from volery.core.geodesy import LocalFrame
+from volery.world.city.geojson import Feature, Ring, read_features
+from volery.world.city.heights import Height, HeightRule, height_of
+
+Array = NDArray[np.float64]
+Region = tuple[float, float, float, float]
+
+LEAST_AREA_M2 = 1.0
+"""Smaller footprints are slips of the mapper (modelling choice)."""
+FARTHEST_M = 50_000.0
+"""From the map's origin: beyond it a flat map is wrong by 200 m of height."""
+_SAME = 0.999
+"""Share of two footprints that must agree for one to count as the other once more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A building as mapped: a shapely MultiPolygon in the map, m, whose area is positive."""
+
+    id: str
+    footprint: Any
+    height: Height
+
+
+@dataclass(frozen=True)
+class Report:
+    """What became of a file's outlines; pairs are an id and what was done or why."""
+
+    file: str
+    outlines: int
+    buildings: int
+    repaired: tuple[tuple[str, str], ...]
+    dropped: tuple[tuple[str, str], ...]
+    guessed: tuple[tuple[str, str], ...]
+    """Heights that could not be understood."""
+    heights: tuple[int, int, int]
+    """Buildings whose height came from `height`, from levels, from the default."""
+    outside: int
+    """Outlines beyond the region that was asked for."""
+
+    def summary(self) -> str:
+        """One line."""
+        text = f"{self.file}: {self.buildings} buildings of {self.outlines} outlines"
+        parts = [
+            f"{count} {what}"
+            for count, what in (
+                (self.outside, "outside the region"),
+                (len(self.repaired), "repaired"),
+                (len(self.dropped), "dropped"),
+                (len(self.guessed), "with a height not understood"),
+            )
+            if count
+        ]
+        return text + (": " + ", ".join(parts) if parts else "")
+
+    def __str__(self) -> str:
+        """The summary, then a line for each outline that needed something."""
+        lines = [self.summary()]
+        lines += [f"  repaired {own}: {what}" for own, what in self.repaired]
+        lines += [f"  dropped {own}: {why}" for own, why in self.dropped]
+        lines += [f"  default height for {own}: {why}" for own, why in self.guessed]
+        return "\n".join(lines)
+
+
+def read_outlines(
+    path: str | Path, frame: LocalFrame, *, rule: HeightRule, region: Region | None = None
+) -> tuple[tuple[Outline, ...], Report]:
+    """Sound outlines of a file around the map's origin, in the file's order.
+
+    region: (x0, y0, x1, y1) in m; buildings whose middle lies in it stay. None keeps all.
+    Raises `DataFileError`.
+    """
+    features = read_features(path)
+    _check_place(path, features, frame)
+    repaired: list[tuple[str, str]] = []
+    dropped: list[tuple[str, str]] = []
+    outlines: list[Outline] = []
+    outside = 0
+    for feature in features:
+        footprint, mended, fault = _footprint(feature, frame)
+        if fault:
+            dropped.append((feature.id, fault))
+            continue
+        if region is not None and not _lies_in(footprint, region):
+            outside += 1
+            continue
+        if mended:
+            repaired.append((feature.id, mended))
+        outlines.append(Outline(feature.id, footprint, height_of(feature.properties, rule)))
+    kept, again = _without_hidden(outlines)
+    return kept, Report(
+        file=Path(path).name,
+        outlines=len(features),
+        buildings=len(kept),
+        repaired=tuple(repaired),
+        dropped=tuple(dropped + again),
+        guessed=tuple((o.id, o.height.fault) for o in kept if o.height.fault),
+        heights=tuple(  # type: ignore[arg-type]  # three of them
+            sum(o.height.source == source for o in kept)
+            for source in ("height", "levels", "default")
+        ),
+        outside=outside,
+    )
+
+
+def _check_place(path: str | Path, features: Sequence[Feature], frame: LocalFrame) -> None:
+    rings = [ring for feature in features for polygon in feature.polygons for ring in polygon]
+    corners = [ring for ring in rings if len(ring)]
+    if not corners:
+        raise DataFileError(f"{path}: there is no outline of a building in it")
+    middle = np.median(np.concatenate(corners), axis=0)
+    away = float(np.linalg.norm(_in_map(middle[None], frame)))
+    if away > FARTHEST_M:
+        raise DataFileError(
+            f"{path}: the outlines lie {away / 1000.0:.0f} km from the map's origin; they are "
+            f"around latitude_deg = {middle[1]:.4f}, longitude_deg = {middle[0]:.4f} in "
+            "[world.origin]"
+        )
+
+
+def _in_map(ring: Ring, frame: LocalFrame) -> Array:
+    """Positions (n, 2) in degrees to x and y in the map, at the height of its origin."""
+    longitude, latitude = np.radians(ring).T
+    height = np.full(len(ring), frame.altitude_m)
+    return frame.enu_from_geodetic(np.stack([latitude, longitude, height], axis=1))[:, :2]
+
+
+def _footprint(feature: Feature, frame: LocalFrame) -> tuple[Any, str, str]:
+    """Footprint in the map, what was mended, or why there is none."""
+    import shapely
+
+    if not feature.polygons:
+        return None, "", f"{feature.shape} is no outline"
+    mended: list[str] = []
+    polygons = []
+    for rings in feature.polygons:
+        whole = [_closed(ring, mended) for ring in rings]
+        sound = [_in_map(ring, frame) for ring in whole if len(ring) >= 4]
+        if len(sound) < len(whole):
+            mended.append("a ring of fewer than three corners left out")
+        if sound and len(whole[0]) >= 4:
+            polygons.append(shapely.Polygon(sound[0], sound[1:]))
+    shape: Any = shapely.MultiPolygon(polygons)
+    if not shape.is_valid:
+        reason = shapely.is_valid_reason(shape).split("[")[0].lower()
+        mended.append(f"{reason}: rebuilt from the area it encloses")
+        shape = shapely.make_valid(shape, method="structure", keep_collapsed=False)
+    parts = [
+        part
+        for part in shapely.get_parts(shape)
+        if part.geom_type == "Polygon" and part.area >= LEAST_AREA_M2
+    ]
+    if not parts:
+        return None, "", f"no area of {LEAST_AREA_M2:g} m2"
+    joined = shapely.orient_polygons(shapely.MultiPolygon(parts))
+    return joined, "; ".join(dict.fromkeys(mended)), ""
+
+
+def _closed(ring: Ring, mended: list[str]) -> Ring:
+    """The ring without repeated corners, its last corner the first."""
+    if len(ring) and not np.array_equal(ring[0], ring[-1]):
+        mended.append("open: closed")
+        ring = np.concatenate([ring, ring[:1]])
+    fresh = np.ones(len(ring), dtype=bool)
+    fresh[1:] = (ring[1:] != ring[:-1]).any(axis=1)
+    return ring[fresh]
+
+
+def _lies_in(footprint: Any, region: Region) -> bool:
+    x0, y0, x1, y1 = footprint.bounds
+    x, y = (x0 + x1) / 2.0, (y0 + y1) / 2.0
+    return bool(region[0] <= x < region[2] and region[1] <= y < region[3])
+
+
+def _without_hidden(
+    outlines: Sequence[Outline],
+) -> tuple[tuple[Outline, ...], list[tuple[str, str]]]:
+    """Leave out what stands twice, or inside a building at least as tall; of twins the first."""
+    import shapely
+
+    if not outlines:
+        return (), []
+    shapes = [outline.footprint for outline in outlines]
+    first, second = shapely.STRtree(shapes).query(shapes, predicate="intersects")
+    gone: dict[int, str] = {}
+    for inner, outer in sorted(zip(first.tolist(), second.tolist(), strict=True)):
+        a, b = outlines[inner], outlines[outer]
+        if inner == outer or outer in gone or a.height.height_m > b.height.height_m:
+            continue
+        size, other = a.footprint.area, b.footprint.area
+        if size > other * (2.0 - _SAME):
+            continue
+        if a.footprint.intersection(b.footprint).area < _SAME * size:
+            continue
+        twins = size > _SAME * other and a.height.height_m == b.height.height_m
+        if not twins:
+            gone[inner] = f"hidden inside {b.id}, which is as tall"
+        elif inner > outer:
+            gone[inner] = f"the same as {b.id}"
+    kept = tuple(outline for k, outline in enumerate(outlines) if k not in gone)
+    return kept, [(outlines[k].id, why) for k, why in sorted(gone.items())]

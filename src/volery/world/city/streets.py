@@ -1,0 +1,124 @@
+"""Streets between buildings, read off the buildings alone.
+
+A gap between blocks narrower than `widest_m` counts as a street: pavement along the walls, asphalt
+between the kerbs where that leaves room for a car. Courtyards and alleys are paved. What lies
+farther from any wall is no street: it keeps the ground's own look.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.world.ground_cover import GroundCover
+from volery.world.materials import Material
+
+Array = NDArray[np.float64]
+
+_ROADWAY_M = 3.0
+"""Asphalt narrower than this is left out: no car fits (modelling choice)."""
+_CELL_M = 0.5
+_MOST_CELLS = 16_000_000
+"""Larger cities get larger cells."""
+_ROUGH_M = 0.1
+"""Kerbs may be off by this, which saves most of their corners."""
+_ROUND = 4
+"""Straight pieces of a quarter circle around corners."""
+
+
+@dataclass(frozen=True)
+class StreetRule:
+    """How gaps become streets; modelling choices."""
+
+    widest_m: float = 32.0
+    pavement_m: float = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Streets:
+    """Shapely areas in the map, m.
+
+    blocks: buildings with their courtyards. fabric: blocks and the gaps that are streets.
+    roadway: asphalt.
+    """
+
+    blocks: Any
+    fabric: Any
+    roadway: Any
+    rule: StreetRule
+
+
+def find_streets(footprints: Sequence[Any], rule: StreetRule) -> Streets:
+    """Streets between footprints (shapely polygons, map, m)."""
+    import shapely
+
+    walls = shapely.union_all(list(footprints))
+    filled = [shapely.Polygon(part.exterior) for part in shapely.get_parts(walls)]
+    blocks = shapely.union_all(filled)
+    reach = rule.widest_m / 2.0
+    fabric = blocks.buffer(reach, quad_segs=_ROUND).buffer(-reach, quad_segs=_ROUND)
+    road = fabric.difference(blocks.buffer(rule.pavement_m, quad_segs=_ROUND))
+    half = _ROADWAY_M / 2.0
+    road = road.buffer(-half, quad_segs=_ROUND).buffer(half, quad_segs=_ROUND).simplify(_ROUGH_M)
+    return Streets(blocks, fabric, road, rule)
+
+
+def kerb_lines(streets: Streets, from_wall_m: float, roadway_m: float) -> tuple[Array, ...]:
+    """Lines (n, 2) at a distance from the walls, along roadways at least `roadway_m` wide.
+
+    They run with the blocks on their left, so the street lies on their right.
+    """
+    import shapely
+
+    half = roadway_m / 2.0
+    wide = streets.roadway.buffer(-half, quad_segs=1).simplify(0.5)
+    along = wide.buffer(half + streets.rule.pavement_m, quad_segs=1)
+    around = shapely.orient_polygons(streets.blocks.buffer(from_wall_m, quad_segs=_ROUND))
+    lines = shapely.line_merge(around.boundary.intersection(along), directed=True)
+    parts = shapely.get_parts(lines)
+    return tuple(shapely.get_coordinates(part) for part in parts if part.geom_type == "LineString")
+
+
+def cover_of(streets: Streets) -> GroundCover:
+    """Paving and asphalt as a raster."""
+    paved = streets.fabric.union(streets.blocks.buffer(streets.rule.pavement_m, quad_segs=_ROUND))
+    if paved.is_empty:
+        return GroundCover(np.zeros((0, 0), np.uint8), 0.0, 0.0, 1.0)
+    x0, y0, x1, y1 = paved.bounds
+    cell = max(_CELL_M, math.sqrt((x1 - x0) * (y1 - y0) / _MOST_CELLS))
+    shape = math.ceil((y1 - y0) / cell), math.ceil((x1 - x0) / cell)
+    material = np.full(shape, Material.GROUND, dtype=np.uint8)
+    material[covered(paved, (x0, y0), cell, shape)] = Material.PAVING
+    material[covered(streets.roadway, (x0, y0), cell, shape)] = Material.ASPHALT
+    return GroundCover(material, x0, y0, cell)
+
+
+def covered(
+    area: Any, corner: tuple[float, float], cell_m: float, shape: tuple[int, int]
+) -> NDArray[np.bool_]:
+    """Cells (rows, columns) whose middle lies in a shapely area.
+
+    By the even-odd rule: along each row of cells, every edge that crosses it changes sides.
+    """
+    import shapely
+
+    rows, columns = shape
+    flips = np.zeros((rows, columns + 1), dtype=np.bool_)
+    for ring in shapely.get_rings(shapely.get_parts(area)):
+        # in cells, so that the middle of row i lies at v = i
+        u, v = (shapely.get_coordinates(ring) - corner).T / cell_m - 0.5
+        low, high = np.minimum(v[:-1], v[1:]), np.maximum(v[:-1], v[1:])
+        first = np.clip(np.ceil(low), 0, rows).astype(np.int64)
+        count = np.clip(np.ceil(high), 0, rows).astype(np.int64) - first
+        edge = np.repeat(np.arange(len(count)), count)
+        row = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + first[edge]
+        share = (row - v[edge]) / (v[edge + 1] - v[edge])
+        crossing = u[edge] + share * (u[edge + 1] - u[edge])
+        column = np.clip(np.ceil(crossing), 0, columns).astype(np.int64)
+        np.logical_xor.at(flips, (row, column), True)
+    return np.asarray(np.logical_xor.accumulate(flips[:, :-1], axis=1))

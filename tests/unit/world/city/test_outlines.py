@@ -1,0 +1,188 @@
+"""Outlines are read, mended or refused; every one that needed something is told by id."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from volery.core.errors import DataFileError
+from volery.core.geodesy import LocalFrame
+from volery.world.city.heights import HeightRule, height_of
+from volery.world.city.outlines import LEAST_AREA_M2, read_outlines
+
+FRAME = LocalFrame.from_degrees(60.0, 25.0, 0.0)
+RULE = HeightRule(storey_m=3.0, default_m=10.0)
+
+
+def degrees(points):
+    """Positions in degrees of points (x, y) in m near the origin."""
+    enu = np.column_stack([np.asarray(points, float), np.zeros(len(points))])
+    latitude, longitude, _ = np.degrees(FRAME.geodetic_from_enu(enu)).T
+    return np.column_stack([longitude, latitude]).tolist()
+
+
+def square(x=0.0, y=0.0, side=10.0):
+    return [[x, y], [x + side, y], [x + side, y + side], [x, y + side], [x, y]]
+
+
+def feature(*rings, own="b", **properties):
+    geometry = {"type": "Polygon", "coordinates": [degrees(ring) for ring in rings]}
+    return {"type": "Feature", "properties": {"id": own, **properties}, "geometry": geometry}
+
+
+@pytest.fixture
+def read(tmp_path):
+    def write_and_read(*features, **options):
+        path = tmp_path / "town.geojson"
+        data = {"type": "FeatureCollection", "features": list(features)}
+        path.write_text(json.dumps(data))
+        return read_outlines(path, FRAME, rule=RULE, **options)
+
+    return write_and_read
+
+
+def test_a_square_becomes_itself(read):
+    (outline,), report = read(feature(square(20.0, -30.0)))
+    assert outline.footprint.area == pytest.approx(100.0, rel=1e-6)
+    np.testing.assert_allclose(outline.footprint.bounds, (20, -30, 30, -20), atol=1e-6)
+    assert report.summary() == "town.geojson: 1 buildings of 1 outlines"
+
+
+def test_courtyards_stay_open(read):
+    (outline,), _ = read(feature(square(side=30.0), square(10.0, 10.0)[::-1]))
+    assert outline.footprint.area == pytest.approx(800.0, rel=1e-6)
+    assert not outline.footprint.contains(shapely.Point(15.0, 15.0))
+
+
+def test_several_polygons_are_one_building(read):
+    two = feature(square(), own="two")
+    two["geometry"] = {
+        "type": "MultiPolygon",
+        "coordinates": [[degrees(square())], [degrees(square(50.0))]],
+    }
+    (outline,), _ = read(two)
+    assert len(shapely.get_parts(outline.footprint)) == 2
+    assert outline.footprint.area == pytest.approx(200.0, rel=1e-6)
+
+
+def test_open_and_crossed_outlines_are_mended_and_told(read):
+    bow_tie = [[0, 0], [10, 10], [10, 0], [0, 10], [0, 0]]  # two triangles of 25 m2
+    outlines, report = read(
+        feature(square(100.0)[:-1], own="open"), feature(bow_tie, own="crossed")
+    )
+    assert [round(o.footprint.area, 3) for o in outlines] == [100.0, 50.0]
+    told = dict(report.repaired)
+    assert "closed" in told["open"]
+    assert "self-intersection" in told["crossed"]
+    assert "repaired crossed" in str(report)
+
+
+def test_what_is_no_building_is_dropped_with_the_reason(read):
+    line = feature(square(), own="line")
+    line["geometry"] = {"type": "LineString", "coordinates": degrees(square())}
+    nothing = {**feature(square(), own="nothing"), "geometry": None}
+    outlines, report = read(
+        feature(square(), own="whole"),
+        feature(square(), own="twin"),
+        feature(square(2.0, 2.0, 3.0), own="inside", height=5),
+        feature(square(5.0, 5.0, 3.0), own="tower", height=50),
+        feature(square(70.0, side=0.9 * math.sqrt(LEAST_AREA_M2)), own="speck"),
+        feature([[0, 0], [40, 0], [0, 0]], own="thread"),
+        line,
+        nothing,
+    )
+    assert [o.id for o in outlines] == ["whole", "tower"]
+    why = dict(report.dropped)
+    assert why["twin"] == "the same as whole"
+    assert why["inside"] == "hidden inside whole, which is as tall"
+    assert why["speck"] == why["thread"] == "no area of 1 m2"
+    assert (why["line"], why["nothing"]) == (
+        "LineString is no outline",
+        "no geometry is no outline",
+    )
+    assert len(why) == 6
+
+
+def test_a_region_crops(read):
+    outlines, report = read(
+        feature(square()), feature(square(90.0), own="far"), region=(-20.0, -20.0, 50.0, 50.0)
+    )
+    assert [o.id for o in outlines] == ["b"]
+    assert report.outside == 1
+
+
+@pytest.mark.parametrize(
+    ("properties", "height_m", "storeys", "source"),
+    [
+        ({"height": 12.5}, 12.5, 4, "height"),
+        ({"height": "12.13 m"}, 12.13, 4, "height"),
+        ({"height": "40 ft"}, 12.192, 4, "height"),
+        ({"height": "18", "building:levels": "5"}, 18.0, 5, "height"),
+        ({"building:levels": "3.5"}, 10.5, 4, "levels"),
+        ({"building:levels": 6}, 18.0, 6, "levels"),
+        ({"building:levels": "3;4"}, 12.0, 4, "levels"),
+        ({"building:levels": "0"}, 10.0, 3, "default"),
+        ({}, 10.0, 3, "default"),
+    ],
+)
+def test_heights(properties, height_m, storeys, source):
+    height = height_of(properties, RULE)
+    assert height.height_m == pytest.approx(height_m)
+    assert (height.storeys, height.source, height.fault) == (storeys, source, "")
+
+
+@pytest.mark.parametrize("height", ["tall", -3, 0, 1e9, True, [3], "nan", "12 parsecs"])
+def test_heights_not_understood_are_told(read, height):
+    (outline,), report = read(feature(square(), height=height))
+    assert outline.height.height_m == 10.0
+    assert "is no length" in dict(report.guessed)["b"]
+
+
+def spoilt(change):
+    data = {"type": "FeatureCollection", "features": [feature(square(), own="way/7")]}
+    change(data)
+    return json.dumps(data)
+
+
+def _set(key, value):
+    def change(data):
+        data["features"][0]["geometry"][key] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "not valid JSON"),
+        ("[" * 100_000, "nested too deeply"),
+        ("[]", "FeatureCollection"),
+        ('{"type": "FeatureCollection"}', "'features' must be a list"),
+        (spoilt(lambda d: d.update(features=[3])), "feature 1: it must be an object"),
+        (spoilt(lambda d: d.update(features=[])), "no outline of a building"),
+        (spoilt(lambda d: d.update(crs={"properties": {"name": "EPSG:3879"}})), "WGS 84"),
+        (spoilt(_set("type", "Blob")), r"feature 1 \(id way/7\): 'Blob' is no type"),
+        (spoilt(_set("coordinates", "x")), r"\(id way/7\): 'coordinates' of a polygon must be a"),
+        (spoilt(_set("coordinates", [[["a", 1.0]]])), r"\(id way/7\): longitude and latitude"),
+        (spoilt(_set("coordinates", [[[200.0, 1.0]]])), r"\(id way/7\): longitude and latitude"),
+        (spoilt(_set("coordinates", [[[math.nan, 1.0]]])), r"\(id way/7\): longitude and lat"),
+        (spoilt(_set("coordinates", [[1.0, 2.0]])), r"\(id way/7\): a position is"),
+        (spoilt(_set("coordinates", [[[0.0, 0.0]]])), r"km from the map's origin"),
+    ],
+)
+def test_what_is_no_geojson_is_one_clear_error(tmp_path, text, message):
+    path = tmp_path / "town.geojson"
+    path.write_text(text)
+    with pytest.raises(DataFileError, match=message) as caught:
+        read_outlines(path, FRAME, rule=RULE)
+    assert "town.geojson" in str(caught.value)
+
+
+def test_missing_and_binary_files(tmp_path):
+    with pytest.raises(DataFileError, match="do not exist"):
+        read_outlines(tmp_path / "none.geojson", FRAME, rule=RULE)
+    (tmp_path / "b.geojson").write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(DataFileError, match="cannot be read"):
+        read_outlines(tmp_path / "b.geojson", FRAME, rule=RULE)
