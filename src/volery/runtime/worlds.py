@@ -12,7 +12,15 @@ from volery.scenario.schema import GridTerrain, InventoryForest, ProceduralFores
 from volery.world.forest import Forest, forest_from_inventory, procedural_forest
 from volery.world.scene import Scene, Solid
 from volery.world.terrain import Terrain
-from volery.world.weather import W20_M_S, Gust, LogProfile, PowerProfile, Weather, WindField
+from volery.world.weather import (
+    W20_M_S,
+    Gust,
+    LogProfile,
+    Particles,
+    PowerProfile,
+    Weather,
+    WindField,
+)
 
 SHIPPED_DATA = Path(__file__).resolve().parent.parent / "world" / "data"
 
@@ -97,7 +105,14 @@ def build_weather(scenario: Scenario) -> Weather:
         _read_field(scenario),
         W20_M_S[wind.turbulence] if wind.w20_m_s is None else wind.w20_m_s,
         tuple(_gust_of(gust, wind) for gust in wind.gusts),
+        _particles_of(scenario),
+        scenario.world.light.hour_of_day,
     )
+
+
+def _particles_of(scenario: Scenario) -> Particles:
+    given = scenario.world.weather
+    return Particles(**{k: v for k, v in given.model_dump().items() if v is not None})
 
 
 def _profile_of(wind: schema.Wind) -> LogProfile | PowerProfile | None:

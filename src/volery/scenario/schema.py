@@ -26,6 +26,7 @@ from volery.scenario.base import (
 from volery.scenario.camera import CameraSensor, Daylight
 from volery.scenario.faults import Fault
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
+from volery.scenario.weather import Weather
 from volery.scenario.wind import Wind
 
 # ------------------------------------------------------------------------------------------ world
@@ -87,6 +88,7 @@ class World(Data):
     terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
     forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
     wind: Wind = Wind()
+    weather: Weather = Weather()
     light: Daylight = Daylight()
     origin: Origin = Origin()
     magnetic_field: MagneticField = MagneticField()
