@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
 from volery.scenario import wind as schema
 from volery.scenario.files import resolve
-from volery.scenario.schema import GridTerrain, InventoryForest, ProceduralForest, Scenario
+from volery.scenario.schema import (
+    GridTerrain,
+    InventoryForest,
+    ProceduralForest,
+    Scenario,
+    World,
+)
 from volery.world.forest import Forest, forest_from_inventory, procedural_forest
 from volery.world.scene import Scene, Solid
 from volery.world.terrain import Terrain
@@ -21,6 +29,10 @@ from volery.world.weather import (
     Weather,
     WindField,
 )
+from volery.world.weather.sun import sun_angles
+
+if TYPE_CHECKING:
+    from volery.sensors.cameras.weather_light import LightOfTheHour
 
 SHIPPED_DATA = Path(__file__).resolve().parent.parent / "world" / "data"
 
@@ -108,6 +120,20 @@ def build_weather(scenario: Scenario) -> Weather:
         _particles_of(scenario),
         scenario.world.light.hour_of_day,
     )
+
+
+def sun_in(world: World, weather: Weather) -> tuple[float, float]:
+    """Elevation and azimuth, deg, of the sun in a weather."""
+    if weather.hour_of_day is None:
+        return world.light.sun_elevation_deg, world.light.sun_azimuth_deg
+    return sun_angles(world.origin.latitude_deg, world.light.date, weather.hour_of_day)
+
+
+def light_of(world: World) -> LightOfTheHour:
+    """The light that cameras see by, by weather and hour."""
+    from volery.sensors.cameras.weather_light import LightOfTheHour
+
+    return LightOfTheHour(partial(sun_in, world), world.light.visibility_m)
 
 
 def _particles_of(scenario: Scenario) -> Particles:

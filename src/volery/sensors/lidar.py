@@ -104,8 +104,8 @@ def sample_echoes(
     bodies, if it has any, are moved along that interval, so that every beam sees the other UAVs
     where they were; the scan's own UAV is not seen. Results do not depend on the number of threads
     or on which scans share a batch, but for the bodies' linear interpolation over the interval.
-    A pattern that goes on from sweep to sweep needs scans of one number in a batch. `air`: particles
-    in the air, None where it is clear.
+    A pattern that goes on from sweep to sweep needs scans of one number in a batch. `air`: what is
+    in it, None where it is clear.
     """
     echoes = _clear_echoes(scene, model, batch, history, intensities, workers)
     if air is not None and len(batch.uav):

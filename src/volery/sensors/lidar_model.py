@@ -87,7 +87,7 @@ class ParticleSight(SensorModel):
     beam_diameter_m: NonNegativeFloat = 0.005
     """Where it leaves the scanner (modelling choice)."""
     overlap_m: NonNegativeFloat = 1.0
-    """Nearer the receiver does not see all of the beam (Hahner et al. 2021: it does from 1 m on)."""
+    """Nearer the receiver does not see all of the beam (Hahner et al. 2021: from 1 m on)."""
     threshold_reflectivity: Annotated[float, Field(gt=0.0, le=1.0)] = 0.9
     """Of the surface that is just noticed at `max_m` (Kilic et al. 2021)."""
 

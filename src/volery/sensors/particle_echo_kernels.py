@@ -70,7 +70,7 @@ def _place_of(air: ParticleTable, kind: int, events: float) -> float:
             low = middle
         else:
             high = middle
-    return low + (events - table[low]) / max(table[high] - table[low], 1e-300)
+    return float(low + (events - table[low]) / max(table[high] - table[low], 1e-300))
 
 
 @inner_kernel
