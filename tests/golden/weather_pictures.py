@@ -1,6 +1,7 @@
-"""Pictures of a forest in every weather; `python tests/golden/weather_pictures.py` stores them anew.
+"""Pictures of a forest in every weather.
 
-With a folder, and if need be a width, it writes large ones there to look at:
+`python tests/golden/weather_pictures.py` stores them anew. With a folder, and if need be a width,
+it writes large ones there to look at:
 
     python tests/golden/weather_pictures.py /tmp/pictures 960
 """

@@ -23,8 +23,8 @@ from volery.vehicle.pose_history import PoseHistory
 
 _NEAREST_M = 0.3
 """Nearer ones are a blur that is not drawn."""
-_FAINT = 1e-3
-"""Share of a pixel's light below which nothing is drawn: a quarter of a byte's step."""
+_FAINT = 3e-4
+"""Share of a pixel's light below which nothing is drawn: the first byte above black."""
 _SHARE_BITS = np.uint64(16)
 _SHARE_MASK = np.uint64(0xFFFF)
 _CELL_MASK = 0xFFFFFFFF
@@ -89,7 +89,9 @@ def _draw(
     width = diameter_m * view.focal_px / ahead
     drawn = max(width, 1.0)
     quarter = 0.25 * np.pi
-    share = min(quarter * width * width / (drawn * length + quarter * drawn * drawn), 1.0)
+    # what is drawn below, the soft edge half a pixel wide included
+    area = drawn * length + quarter * drawn * drawn + np.pi / 12.0
+    share = min(quarter * width * width / area, 1.0)
     if share < _FAINT:
         return
     step: Any = np.int64(ahead * light.clear_per_m)
