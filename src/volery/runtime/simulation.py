@@ -246,7 +246,7 @@ class Simulation:
         return self._engine.fleet.weather
 
     def set_weather(self, weather: Weather) -> None:
-        """Let `weather` blow from the next guidance tick on, and be seen from the next measurement."""
+        """Let `weather` blow from the next guidance tick on and be seen in the next measurement."""
         self._engine.set_weather(weather)
         self._weather_topics.tell(weather)
 

@@ -10,6 +10,7 @@ from scipy import integrate
 from volery.core.errors import CommandError
 from volery.world.weather import CLEAR_AIR, Particles
 from volery.world.weather.particles import (
+    drop_speed,
     dust_extinction,
     extinction,
     fog_extinction,
@@ -80,6 +81,11 @@ def test_particles_add_up():
 def test_particles_out_of_range_are_refused(values):
     with pytest.raises(CommandError, match=f"{next(iter(values))}.*is allowed"):
         Particles(**values)
+
+
+def test_drops_fall_as_gunn_and_kinzer_measured():
+    for diameter, speed in ((1.0, 4.03), (2.0, 6.49), (4.0, 8.83)):  # 1949
+        assert drop_speed(diameter) == pytest.approx(speed, abs=0.15)
 
 
 def almanac(latitude_deg, date, hour):

@@ -19,6 +19,7 @@ from volery.sensors.cameras.light import Light
 from volery.world.weather import Weather
 from volery.world.weather.particles import (
     VISIBLE_NM,
+    drop_speed,
     number_per_mm,
     rain_extinction,
     rain_slope,
@@ -62,7 +63,7 @@ def falling_in(weather: Weather, light: Light) -> tuple[Falling, ...]:
         slope = rain_slope(rain)
         number = number_per_mm(rain_extinction(rain), slope)
         colour = _DROP_TRANSMITS * 0.5 * (light.zenith + light.horizon)
-        speed = fall_speed(_LEAST_MM + 1.0 / slope)
+        speed = drop_speed(_LEAST_MM + 1.0 / slope)
         found.append(_falling("rain", weather, speed, number, slope, _RAIN_REACH_M, colour))
     if snow > 0.0:
         slope = snow_slope(snow)
@@ -71,11 +72,6 @@ def falling_in(weather: Weather, light: Light) -> tuple[Falling, ...]:
         reach = _SNOW_REACH_M
         found.append(_falling("snow", weather, _FLAKES_FALL_M_S, number, slope, reach, colour))
     return tuple(found)
-
-
-def fall_speed(diameter_mm: float) -> float:
-    """Of a drop, m/s (Atlas, Srivastava and Sekhon 1973, 0.6 to 5.8 mm)."""
-    return 9.65 - 10.3 * math.exp(-0.6 * diameter_mm)
 
 
 def _falling(

@@ -92,6 +92,16 @@ def rain_slope(rain_mm_h: float) -> float:
     return float(4.1 * rain_mm_h**-0.21)
 
 
+def drop_speed(diameter_mm: float) -> float:
+    """With which a drop falls, m/s (Atlas, Srivastava and Sekhon 1973, 0.6 to 5.8 mm)."""
+    return max(9.65 - 10.3 * math.exp(-0.6 * diameter_mm), 0.1)
+
+
+def rain_speed(rain_mm_h: float) -> float:
+    """With which the drops fall that carry most of the water: of diameter 4 / slope, m/s."""
+    return drop_speed(4.0 / rain_slope(rain_mm_h))
+
+
 def rain_extinction(rain_mm_h: float) -> float:
     """Extinction coefficient of rain at any wavelength, 1/m."""
     if rain_mm_h == 0.0:

@@ -11,7 +11,7 @@ from volery.core.workers import Workers
 from volery.sensors.cameras.camera import _linear
 from volery.sensors.cameras.light import make_light
 from volery.sensors.cameras.model import CameraModel
-from volery.sensors.cameras.precipitation import fall_speed, falling_in
+from volery.sensors.cameras.precipitation import falling_in
 from volery.sensors.cameras.weather_light import LightOfTheHour, light_in
 from volery.world.materials import Material
 from volery.world.weather import CLEAR_AIR, Particles, Weather
@@ -156,9 +156,3 @@ def test_pictures_do_not_depend_on_threads(picture):
         for n in (1, 3)
     ]
     np.testing.assert_array_equal(*pictures)
-
-
-def test_drops_fall_as_atlas_measured():
-    """Gunn and Kinzer 1949: 4.03 m/s at 1 mm, 6.49 at 2 mm, 8.83 at 4 mm."""
-    for diameter, speed in ((1.0, 4.03), (2.0, 6.49), (4.0, 8.83)):
-        assert fall_speed(diameter) == pytest.approx(speed, abs=0.15)
