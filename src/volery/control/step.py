@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.control.air import refresh_air
+from volery.control.air import feel_rain, refresh_air
 from volery.control.belief import BELIEF, believe_attitude, believe_place, believed_rates
 from volery.control.flight_modes import CRASHED, guide, stop
 from volery.control.gains import GAINS
@@ -159,6 +159,8 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
             if airing and not body.asleep:
                 tick, period = step // air_steps, air_steps * dt
                 refresh_air(uavs[i], jets[i].downwash, air[0], air_nodes, grid, tick, period)
+                if air[0].rain_water > 0.0 and model.kind != KINEMATIC_MOTION:
+                    feel_rain(body, plant, air[0], period)
             for now in range(step, step + together):
                 guided = guiding or pilot.hurried
                 pilot.hurried = False

@@ -15,6 +15,7 @@ from volery.core.errors import DataFileError
 from volery.engine.engine import SensorBank
 from volery.runtime.navigation import denial, local_frame, magnetic_field_map
 from volery.runtime.sensor_fitting import PICTURE, RESULT_OF, Fitted
+from volery.runtime.worlds import light_of
 from volery.scenario import schema
 from volery.sensors.bank import Bank
 from volery.sensors.barometer import BarometerBank, load_barometer_model
@@ -112,10 +113,9 @@ class _Builder:
 
     def _camera(self, group: list[Fitted]) -> Bank:
         from volery.sensors.cameras.bank import CameraBank
-        from volery.sensors.cameras.light import make_light
         from volery.sensors.cameras.model import load_camera
 
-        spec, light = group[0].spec, self._world.light
+        spec = group[0].spec
         own = {name: getattr(spec, name) for name in PICTURE if getattr(spec, name) is not None}
         return CameraBank(
             load_camera(spec.model, self._folder).model_copy(update=own),
@@ -124,7 +124,7 @@ class _Builder:
             tuple(s.mount for s in group),
             _keys(group),
             self._scene,
-            make_light(light.sun_elevation_deg, light.sun_azimuth_deg, light.visibility_m),
+            light_of(self._world),
         )
 
     def _imu(self, group: list[Fitted]) -> Bank:

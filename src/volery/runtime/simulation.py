@@ -44,6 +44,7 @@ from volery.runtime.snapshot import Snapshot
 from volery.runtime.spawning import Spawner
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
+from volery.runtime.weather_messages import WeatherTopics
 from volery.runtime.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario, UavType
@@ -123,6 +124,10 @@ class Simulation:
         """In fleet order."""
         self._partners: list[Partner] = []
         self._keep_time(publisher)
+        self._weather_topics = WeatherTopics(
+            self.graph, scenario.world, lambda: self.weather, self.set_weather
+        )
+        self._weather_topics.tell(self.weather)
         self._crew.open(parts)
         plan_faults(self._faults, scenario)
         self._loop = RunLoop(self._engine, self._pacer, scenario.duration_s, self._has_ended)
@@ -249,12 +254,13 @@ class Simulation:
 
     @property
     def weather(self) -> Weather:
-        """The air."""
+        """The air: what blows, falls and hangs in it, and the hour."""
         return self._engine.fleet.weather
 
     def set_weather(self, weather: Weather) -> None:
-        """Let `weather` blow from the next guidance tick on."""
+        """Let `weather` blow from the next guidance tick on and be seen in the next measurement."""
         self._engine.set_weather(weather)
+        self._weather_topics.tell(weather)
 
     def gust_now(
         self, amplitude_map: tuple[float, float, float], rise_s: float, lasts_s: float = math.inf
@@ -262,6 +268,7 @@ class Simulation:
         """Let a 1-cosine gust of `amplitude_map` (3,) m/s begin now, over after `lasts_s`."""
         self._check_open()
         self._engine.gust_now(amplitude_map, rise_s, lasts_s)
+        self._weather_topics.tell(self.weather)
 
     def post(self, action: Callable[[], Any]) -> Future[Any]:
         """Have `action()` called by the simulation's thread before its next tick, or while paused.

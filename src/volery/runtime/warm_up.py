@@ -45,6 +45,7 @@ from volery.vehicle.kinematic import Kinematic
 from volery.vehicle.plants import Plant, RigidBody
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
+from volery.world.weather import Particles, Weather
 
 _IS_HELPER = "VOLERY_COMPILES_SENSORS"
 
@@ -142,6 +143,8 @@ def compile_the_rest() -> None:
     keys, place = np.zeros(2, dtype=np.uint64), np.zeros((2, 3))
     clouds = LidarBank(load_lidar("vlp_16"), schedule, sensors, mounts, keys, scene)
     PointMaker(clouds.sample(0, 0, fleet)).points(0)
+    fleet.set_weather(Weather(particles=Particles(rain_mm_h=1.0)))
+    clouds.sample(0, 0, fleet)
     gnss = load_gnss_model("gnss_m8")
     GnssBank(gnss, schedule, sensors, place, keys, LocalFrame(0, 0, 0)).sample(0, 0, fleet)
     scene.close()

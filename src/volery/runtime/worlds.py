@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from functools import partial
+from typing import TYPE_CHECKING
 
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
 from volery.core.geodesy import LocalFrame
@@ -11,7 +13,13 @@ from volery.runtime.thing_building import build_things
 from volery.runtime.user_meshes import mesh_solids
 from volery.scenario import wind as schema
 from volery.scenario.files import SHIPPED_DATA, resolve
-from volery.scenario.schema import GridTerrain, InventoryForest, ProceduralForest, Scenario
+from volery.scenario.schema import (
+    GridTerrain,
+    InventoryForest,
+    ProceduralForest,
+    Scenario,
+    World,
+)
 from volery.world.city import City, FurnitureRule, HeightRule, StreetRule
 from volery.world.city import build_city as city_of_outlines
 from volery.world.forest import Forest, forest_from_inventory, procedural_forest
@@ -19,7 +27,19 @@ from volery.world.forest_joining import joined
 from volery.world.ground_cover import BARE_GROUND
 from volery.world.scene import Scene, Solid
 from volery.world.terrain import Terrain
-from volery.world.weather import W20_M_S, Gust, LogProfile, PowerProfile, Weather, WindField
+from volery.world.weather import (
+    W20_M_S,
+    Gust,
+    LogProfile,
+    Particles,
+    PowerProfile,
+    Weather,
+    WindField,
+)
+from volery.world.weather.sun import sun_angles
+
+if TYPE_CHECKING:
+    from volery.sensors.cameras.weather_light import LightOfTheHour
 
 
 def build_terrain(scenario: Scenario) -> Terrain:
@@ -154,7 +174,28 @@ def build_weather(scenario: Scenario) -> Weather:
         _read_field(scenario),
         W20_M_S[wind.turbulence] if wind.w20_m_s is None else wind.w20_m_s,
         tuple(_gust_of(gust, wind) for gust in wind.gusts),
+        _particles_of(scenario),
+        scenario.world.light.hour_of_day,
     )
+
+
+def sun_in(world: World, weather: Weather) -> tuple[float, float]:
+    """Elevation and azimuth, deg, of the sun in a weather."""
+    if weather.hour_of_day is None:
+        return world.light.sun_elevation_deg, world.light.sun_azimuth_deg
+    return sun_angles(world.origin.latitude_deg, world.light.date, weather.hour_of_day)
+
+
+def light_of(world: World) -> LightOfTheHour:
+    """The light that cameras see by, by weather and hour."""
+    from volery.sensors.cameras.weather_light import LightOfTheHour
+
+    return LightOfTheHour(partial(sun_in, world), world.light.visibility_m)
+
+
+def _particles_of(scenario: Scenario) -> Particles:
+    given = scenario.world.weather
+    return Particles(**{k: v for k, v in given.model_dump().items() if v is not None})
 
 
 def _profile_of(wind: schema.Wind) -> LogProfile | PowerProfile | None:

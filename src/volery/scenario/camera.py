@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import datetime
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from volery.scenario.base import Data, MountedSensor, Name, Rate
 
@@ -43,10 +44,21 @@ class CameraSensor(MountedSensor):
 
 
 class Daylight(Data):
-    """Sun and clearness of the air."""
+    """Sun, by its angles or by the hour, and clearness of the air."""
 
     sun_elevation_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 50.0
     sun_azimuth_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 135.0
     """Clockwise from north."""
+    hour_of_day: Annotated[float, Field(ge=0.0, le=24.0)] | None = None
+    """Instead of the angles: local mean solar time at the map's origin. The sun stands still."""
+    date: datetime.date = datetime.date(2025, 6, 21)
+    """Where the sun stands by the hour, here or changed while running."""
     visibility_m: Annotated[float, Field(ge=1.0, le=1e6)] = 20_000.0
     """Meteorological optical range: where the contrast of things has faded to a twentieth."""
+
+    @model_validator(mode="after")
+    def _sun_is_told_once(self) -> Self:
+        angles = {"sun_elevation_deg", "sun_azimuth_deg"} & self.model_fields_set
+        if self.hour_of_day is not None and angles:
+            raise ValueError("hour_of_day takes the place of the sun's angles; leave them out")
+        return self

@@ -30,6 +30,7 @@ from volery.scenario.grid_map import GridMapWorld
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
 from volery.scenario.things import Things, check_things
 from volery.scenario.user_mesh import UserMesh
+from volery.scenario.weather import Weather
 from volery.scenario.wind import Wind
 
 # ------------------------------------------------------------------------------------------ world
@@ -96,6 +97,7 @@ class World(Data):
     """Files of the user's own that stand in the world."""
     things: Things = ()
     wind: Wind = Wind()
+    weather: Weather = Weather()
     light: Daylight = Daylight()
     origin: Origin = Origin()
     magnetic_field: MagneticField = MagneticField()

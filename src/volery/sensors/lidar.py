@@ -17,6 +17,8 @@ from volery.sensors.lidar_kernels import PIECE, measure_batch, scan_batch
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.measure_kernels import measure_scan
 from volery.sensors.mount import Mount
+from volery.sensors.particle_echo_kernels import weather_scans
+from volery.sensors.particle_echoes import ParticleTable
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.embree import LANES
 from volery.world.embreex_fallback import EmbreexBackend
@@ -93,6 +95,7 @@ def sample_echoes(
     history: PoseHistory,
     *,
     intensities: bool = False,
+    air: ParticleTable | None = None,
     workers: Workers | None = None,
 ) -> Echoes:
     """Make the batch's scans: ranges of all echoes, and their intensities where wanted.
@@ -101,8 +104,26 @@ def sample_echoes(
     bodies, if it has any, are moved along that interval, so that every beam sees the other UAVs
     where they were; the scan's own UAV is not seen. Results do not depend on the number of threads
     or on which scans share a batch, but for the bodies' linear interpolation over the interval.
-    A pattern that goes on from sweep to sweep needs scans of one number in a batch.
+    A pattern that goes on from sweep to sweep needs scans of one number in a batch. `air`: what is
+    in it, None where it is clear.
     """
+    echoes = _clear_echoes(scene, model, batch, history, intensities, workers)
+    if air is not None and len(batch.uav):
+        alone = echoes.ranges.size <= _FEW_BEAMS
+        team = workers or scene.workers
+        team.run(weather_scans, model.constants, air, batch, new_counter(), echoes, alone=alone)
+    return echoes
+
+
+def _clear_echoes(
+    scene: Scene,
+    model: LidarModel,
+    batch: LidarBatch,
+    history: PoseHistory,
+    intensities: bool,
+    workers: Workers | None,
+) -> Echoes:
+    """The batch's scans in clear air."""
     scans, beams = len(batch.uav), model.beams
     echoes = Echoes(
         np.empty((scans, model.echoes, beams), dtype=np.float32),

@@ -14,9 +14,11 @@ from volery.sensors.bank import rows_of, uav_rows
 from volery.sensors.lidar import make_batch, sample_echoes, stack_mounts
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
+from volery.sensors.particle_echoes import ParticleTable, particle_table
 from volery.sensors.samples import LidarScans, SensorId, owned
 from volery.vehicle.pose_history import KEPT_NS
 from volery.world.scene import Scene
+from volery.world.weather import CLEAR_AIR, Particles
 
 _LONGEST_SWEEP_NS = KEPT_NS - 10_000_000
 
@@ -58,6 +60,8 @@ class LidarBank:
         self._rows = uav_rows(sensors)
         self._first_scan = np.zeros(len(sensors), np.int64)
         self._mounts = stack_mounts(mounts)
+        self._particles: Particles = CLEAR_AIR
+        self._air: ParticleTable | None = None
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> LidarScans:
         """Scan number k of all LIDARs of the bank; `time_ns` is that of the first beam."""
@@ -66,7 +70,12 @@ class LidarBank:
             self._rows, np.arange(len(self._rows)), time_ns, self._keys, numbers, self._mounts
         )
         echoes = sample_echoes(
-            self._scene, self._model, batch, fleet.history, intensities=self._intensities
+            self._scene,
+            self._model,
+            batch,
+            fleet.history,
+            intensities=self._intensities,
+            air=self._air_of(fleet.weather.particles),
         )
         return LidarScans(
             self.sensors,
@@ -76,6 +85,14 @@ class LidarBank:
             owned(echoes.ranges),
             owned(echoes.intensities),
         )
+
+    def _air_of(self, particles: Particles) -> ParticleTable | None:
+        """The particles as this model meets them, made anew when they are others."""
+        if particles != self._particles:
+            clear = particles == CLEAR_AIR
+            self._air = None if clear else particle_table(self._model, particles)
+            self._particles = particles
+        return self._air
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""

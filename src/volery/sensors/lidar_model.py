@@ -81,6 +81,17 @@ class WarmUp(SensorModel):
     time_constant_s: PositiveFloat = 1.0
 
 
+class ParticleSight(SensorModel):
+    """How the scanner meets particles in the air; `particle_echoes` explains it."""
+
+    beam_diameter_m: NonNegativeFloat = 0.005
+    """Where it leaves the scanner (modelling choice)."""
+    overlap_m: NonNegativeFloat = 1.0
+    """Nearer the receiver does not see all of the beam (Hahner et al. 2021: from 1 m on)."""
+    threshold_reflectivity: Annotated[float, Field(gt=0.0, le=1.0)] = 0.9
+    """Of the surface that is just noticed at `max_m` (Kilic et al. 2021)."""
+
+
 class LidarModel(SensorModel):
     """A scanner; where the numbers come from stands in its data file."""
 
@@ -94,6 +105,7 @@ class LidarModel(SensorModel):
     mixed_pixels: MixedPixels
     intensity: Intensity | None = None
     warm_up: WarmUp = WarmUp()
+    particles: ParticleSight = ParticleSight()
     exact: bool = False
     """Exact distances: nothing is disturbed, rounded, lost or mixed."""
 

@@ -8,7 +8,7 @@ from scipy.optimize import fsolve
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.errors import CommandError
-from volery.world.weather import Gust, LogProfile, Weather, WindField
+from volery.world.weather import Gust, LogProfile, Particles, Weather, WindField
 
 G, RHO = 9.80665, 1.225
 MASS = F450.body.mass_kg
@@ -143,3 +143,20 @@ def test_too_many_gusts_are_refused_and_leave_the_weather_alone():
     with pytest.raises(CommandError, match="at most 64"):
         fleet.add_gust(Gust((1, 0, 0), 0, 1))
     assert len(fleet.weather.gusts) == 64
+
+
+def test_rain_pushes_down_with_the_momentum_that_its_drops_lose():
+    """A holding F450 carries rate x speed x area besides its weight."""
+    thrust = {}
+    for rate in (0.0, 200.0):
+        fleet = in_air(weather=Weather(particles=Particles(rain_mm_h=rate)))
+        fleet.advance(12_000, FLAT.grid)
+        squares = []
+        for _ in range(64):
+            fleet.advance(1, FLAT.grid)
+            squares.append((fleet.state.rotor_speed[0, :4] ** 2).sum())
+        thrust[rate] = LIFT * np.mean(squares)
+        assert np.abs(fleet.state.velocity_map[0]).max() < 1e-3
+    speed = 9.65 - 10.3 * np.exp(-0.6 * 4.0 / (4.1 * 200.0**-0.21))
+    assert thrust[0.0] == pytest.approx(MASS * G, rel=1e-6)
+    assert thrust[200.0] - thrust[0.0] == pytest.approx(200.0 / 3600.0 * speed * AREA[2], rel=0.02)

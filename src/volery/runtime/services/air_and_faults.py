@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from volery.core.errors import CommandError
-from volery.graph.messages import Vector3
 from volery.runtime.services.offering import Fields, offer_command
-from volery.world.weather import LogProfile, Weather
+from volery.runtime.weather_messages import changed, fields_of
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
@@ -22,16 +20,12 @@ def offer_air_and_faults(simulation: Simulation) -> None:
     """Offer set_weather, get_weather, gust and inject_fault."""
 
     def set_weather(request: Any) -> None:
-        wind = (request.wind.x, request.wind.y, request.wind.z)
-        weather = simulation.weather
-        simulation.set_weather(replace(weather, velocity_map=wind, w20_m_s=request.w20))
+        simulation.set_weather(changed(simulation.weather, request, request.only))
 
     def get_weather(_request: Any) -> Fields:
         weather = simulation.weather
         return {
-            "wind": Vector3(*weather.velocity_map),
-            "w20": weather.w20_m_s,
-            "profile": _profile_name(weather),
+            **fields_of(simulation.scenario.world, weather),
             "gusts": len(weather.gusts),
         }
 
@@ -52,11 +46,3 @@ def offer_air_and_faults(simulation: Simulation) -> None:
     offer_command(graph, "/volery/get_weather", f"{_OURS}/GetWeather", get_weather)
     offer_command(graph, "/volery/gust", f"{_OURS}/Gust", gust)
     offer_command(graph, "/volery/inject_fault", f"{_OURS}/InjectFault", inject_fault)
-
-
-def _profile_name(weather: Weather) -> str:
-    if weather.field is not None:
-        return "field"
-    if weather.profile is None:
-        return "uniform"
-    return "log" if isinstance(weather.profile, LogProfile) else "power"

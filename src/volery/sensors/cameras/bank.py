@@ -15,11 +15,13 @@ from volery.sensors.bank import rows_of, uav_rows
 from volery.sensors.cameras.camera import EVERY_PART, Part, Pictures, take
 from volery.sensors.cameras.light import Light
 from volery.sensors.cameras.model import CameraModel
+from volery.sensors.cameras.precipitation import falling_in
 from volery.sensors.lidar import make_batch, stack_mounts
 from volery.sensors.mount import Mount
 from volery.sensors.samples import CameraFrames, SensorId, owned
 from volery.vehicle.pose_history import KEPT_NS
 from volery.world.scene import Scene
+from volery.world.weather import Weather
 
 _LONGEST_READOUT_NS = KEPT_NS - 10_000_000
 
@@ -28,7 +30,7 @@ class CameraBank:
     """Pictures of all cameras of the bank; `keys` (S,) are their noise streams, or None.
 
     A picture is known when its last row has been read out. Only what somebody wants is made, as
-    `wants()` says: nobody's later picture depends on it.
+    `wants()` says: nobody's later picture depends on it. light_in: the light in a weather.
     """
 
     name = "camera"
@@ -41,7 +43,7 @@ class CameraBank:
         mounts: tuple[Mount, ...],
         keys: NDArray[np.uint64] | None,
         scene: Scene,
-        light: Light,
+        light_in: Callable[[Weather], Light],
     ) -> None:
         if model.readout_ns > _LONGEST_READOUT_NS:
             raise DataFileError(
@@ -60,7 +62,7 @@ class CameraBank:
         self._keys = np.zeros(len(sensors), np.uint64) if keys is None else keys.copy()
         self._first = np.zeros(len(sensors), np.int64)
         self._scene = scene
-        self._light = light
+        self._light_in = light_in
         self._rows = uav_rows(sensors)
         self._mounts = stack_mounts(mounts)
 
@@ -79,14 +81,16 @@ class CameraBank:
             self._mounts,
         )
         parts = self.wants() or EVERY_PART
+        light = self._light_in(fleet.weather)
         pictures = take(
             self._scene,
             self._model,
-            self._light,
+            light,
             batch,
             fleet.history,
             rotors=fleet.rotor_turns(),
             parts=parts,
+            falling=falling_in(fleet.weather, light),
         )
         return CameraFrames(self.sensors, time_ns, self._model, **_arrays(pictures))
 

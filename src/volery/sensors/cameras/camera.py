@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from functools import cache
 from statistics import NormalDist
 from typing import Literal, NamedTuple
@@ -16,6 +16,8 @@ from volery.sensors.cameras.camera_kernels import NORMALS, Frames, Optics, take_
 from volery.sensors.cameras.light import Light
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.cameras.pixel_table import PIECE
+from volery.sensors.cameras.precipitation import Falling
+from volery.sensors.cameras.weather_kernels import View, draw_falling
 from volery.sensors.lidar import move_bodies
 from volery.vehicle.fleet import RotorTurns
 from volery.vehicle.pose_history import PoseHistory
@@ -50,6 +52,7 @@ def take(
     *,
     rotors: RotorTurns | None = None,
     parts: Collection[Part] = EVERY_PART,
+    falling: Sequence[Falling] = (),
     workers: Workers | None = None,
 ) -> Pictures:
     """Expose the batch's pictures: the first row of each at its `sweep_start_ns`.
@@ -57,12 +60,15 @@ def take(
     Noise follows from `key` and `scan_number`, the number of a camera's picture.
     `history` must reach from the earliest exposure to the end of the latest one's readout. A camera
     does not see its own UAV. The rotors of others are where `rotors` says; None: blurred to discs.
-    The same picture comes of any number of threads.
+    The same picture comes of any number of threads. falling: drops and flakes, which are seen in
+    the colour picture alone.
     """
     if not scene.compiled:
         raise NotImplementedError("cameras need Embree's library; see `volery doctor`")
     shots, pixels = len(batch.uav), model.width * model.height
     colour, depth, labels = (pixels if part in parts else 0 for part in EVERY_PART)
+    if colour and falling:
+        depth = pixels  # to know what they are before
     frames = Frames(
         np.empty((shots, colour, 3), np.uint8),
         np.empty((shots, depth), np.float32),
@@ -98,14 +104,41 @@ def take(
                 handle, table, optics, light, batch, history, start, end, counter, block, frames
             )
 
-        (workers or scene.workers).run(expose)
+        team = workers or scene.workers
+        team.run(expose)
+        for kind in falling if colour else ():
+            view = _view_of(model)
+            team.run(draw_falling, view, light, kind, batch, history, new_counter(), frames)
     shape = shots, model.height, model.width
     return Pictures(
         frames.colour.reshape(*shape, 3) if colour else None,
-        frames.depth.reshape(shape) if depth else None,
+        frames.depth.reshape(shape) if "depth" in parts else None,
         frames.instance.reshape(shape) if labels else None,
         frames.material.reshape(shape) if labels else None,
     )
+
+
+def _view_of(model: CameraModel) -> View:
+    seen = model.table.direction[~model.table.blind.all(axis=1)]
+    return View(
+        model.width,
+        model.height,
+        model.focal_px,
+        model.centre_px,
+        np.array(model.distortion),
+        float((np.abs(seen[:, 1:]).max(axis=1) / seen[:, 0]).max()),
+        round(model.exposure_time_s * 1e9),
+        model.exposure,
+        _linear(),
+    )
+
+
+@cache
+def _linear() -> NDArray[np.float32]:
+    """(256,) light of a byte: IEC 61966-2-1 (sRGB)."""
+    coded = np.arange(256) / 255.0
+    light = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+    return np.asarray(light, dtype=np.float32)
 
 
 @cache

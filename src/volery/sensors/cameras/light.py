@@ -17,7 +17,7 @@ from volery.world.materials import Material
 CODES = 4096
 """Steps of the table from linear light to a byte."""
 CLEAR = 8192
-_LAST_DEPTH = 8.0
+LAST_DEPTH = 8.0
 """Optical depth at which nothing but haze is left: exp(-8) is a tenth of a byte's step."""
 GRAIN = 64
 """Side of the table of random greys."""
@@ -96,8 +96,8 @@ def make_light(
         horizon=_row(day * np.array([0.55, 0.66, 0.80])),
         bounce=_row(day * np.array([0.14, 0.14, 0.10])),
         overhead=_row(day * np.array([0.52, 0.79, 1.41])),
-        clear=_row(np.exp(-_LAST_DEPTH * (np.arange(CLEAR) + 0.5) / CLEAR)),
-        clear_per_m=CLEAR * 3.0 / (_LAST_DEPTH * visibility_m),
+        clear=_row(np.exp(-LAST_DEPTH * (np.arange(CLEAR) + 0.5) / CLEAR)),
+        clear_per_m=CLEAR * 3.0 / (LAST_DEPTH * visibility_m),
         surface=_surface_table(),
         grain=_grain(),
         code=_codes(),

@@ -44,6 +44,9 @@ class CameraModel(SensorModel):
     """Rays a pixel; 4 smooth the edges of the colour picture."""
     exposure: PositiveFloat = 1.0
     """Factor of the light."""
+    exposure_time_s: Annotated[float, Field(gt=0.0, le=0.05)] = 0.005
+    """How long the shutter is open: what falls leaves a streak as long as its way (modelling
+    choice)."""
     read_noise: NonNegativeFloat = 0.0
     """Standard deviation of a dark pixel, of the light that saturates it."""
     shot_noise: NonNegativeFloat = 0.0

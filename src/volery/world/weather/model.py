@@ -1,4 +1,4 @@
-"""What blows: frozen data, checked on construction with `CommandError`.
+"""What blows, falls and hangs in the air: frozen data, checked on construction (`CommandError`).
 
 The velocity of the air is the mean wind (a steady vector, with or without a profile over height, or
 a field over the map) plus all gusts plus turbulence. All vectors are map frame, ENU, m/s.
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from volery.core.errors import CommandError
 from volery.scenario.wind import MAX_GUSTS, MAX_WIND_M_S
+from volery.world.weather.particles import CLEAR_AIR, Particles
 from volery.world.weather.wind_field import WindField
 
 Vector = tuple[float, float, float]
@@ -91,7 +92,7 @@ class Gust:
 
 @dataclass(frozen=True, slots=True)
 class Weather:
-    """The air's motion everywhere and at all times.
+    """The air's motion everywhere and at all times, what is in it, and what hour it is.
 
     `Weather((6.0, 0.0, 0.0))` is a steady wind. A field takes the place of the steady wind and its
     profile. `w20_m_s` is the wind at 20 ft that sets the turbulence; 0: none.
@@ -102,11 +103,16 @@ class Weather:
     field: WindField | None = None
     w20_m_s: float = 0.0
     gusts: tuple[Gust, ...] = ()
+    particles: Particles = CLEAR_AIR
+    hour_of_day: float | None = None
+    """Local mean solar time, which sets the sun; None: it stands where the scenario puts it."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "velocity_map", _wind("velocity_map", self.velocity_map))
         object.__setattr__(self, "gusts", tuple(self.gusts))
         _within("w20_m_s", self.w20_m_s, 0.0, MAX_WIND_M_S)
+        if self.hour_of_day is not None:
+            _within("hour_of_day", self.hour_of_day, 0.0, 24.0)
         if self.field is not None and (self.profile is not None or self.velocity_map != _STILL):
             raise CommandError("a wind field takes the place of velocity_map and profile")
         if len(self.gusts) > MAX_GUSTS:
@@ -139,4 +145,4 @@ def _within(what: str, value: float, low: float, high: float) -> None:
 
 
 CALM = Weather()
-"""Air that stands still."""
+"""Air that stands still, with nothing in it."""

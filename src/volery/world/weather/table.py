@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from volery.scenario.wind import MAX_GUSTS
 from volery.world.weather.mean_wind import FIELD, LOG, POWER, UNIFORM
 from volery.world.weather.model import Gust, LogProfile, PowerProfile, Weather
+from volery.world.weather.particles import rain_speed
 
 AIR = np.dtype(
     [
@@ -21,6 +22,8 @@ AIR = np.dtype(
         ("field_origin", "f8", 3),
         ("field_inverse_spacing", "f8", 3),
         ("w20", "f8"),
+        ("rain_water", "f8"),  # kg of falling water in a m^3 of air
+        ("rain_speed", "f8"),  # with which it falls
         ("gusts", "i8"),
         ("gust_amplitude", "f8", (MAX_GUSTS, 3)),
         ("gust_slowness", "f8", (MAX_GUSTS, 3)),  # s later a m towards x, y, z
@@ -40,6 +43,10 @@ def air_of(weather: Weather) -> NDArray[np.void]:
     row["velocity"] = weather.velocity_map
     row["w20"] = weather.w20_m_s
     row["gusts"] = len(weather.gusts)
+    rain = weather.particles.rain_mm_h
+    if rain > 0.0:
+        row["rain_speed"] = rain_speed(rain)
+        row["rain_water"] = rain / 3600.0 / row["rain_speed"]  # 1 mm is 1 kg/m^2
     for g, gust in enumerate(weather.gusts):
         _write_gust(row, g, gust)
     profile, field = weather.profile, weather.field

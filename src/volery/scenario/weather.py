@@ -1,0 +1,29 @@
+"""What hangs in or falls through the air of a scenario."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from volery.scenario.base import Data
+
+MAX_RAIN_MM_H = 200.0
+MAX_SNOW_MM_H = 20.0
+"""Of water."""
+MIN_VISIBILITY_M = 5.0
+MAX_VISIBILITY_M = 100_000.0
+
+_Visibility = Annotated[float, Field(ge=MIN_VISIBILITY_M, le=MAX_VISIBILITY_M)]
+
+
+class Weather(Data):
+    """Rain, snow, fog and dust; alike everywhere, and constant until it is changed."""
+
+    rain_mm_h: Annotated[float, Field(ge=0.0, le=MAX_RAIN_MM_H)] = 0.0
+    snow_mm_h: Annotated[float, Field(ge=0.0, le=MAX_SNOW_MM_H)] = 0.0
+    """As water."""
+    fog_visibility_m: _Visibility | None = None
+    """Meteorological optical range in the fog alone; None: no fog."""
+    dust_visibility_m: _Visibility | None = None
+    """Likewise in the dust alone."""

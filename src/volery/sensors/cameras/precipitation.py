@@ -1,0 +1,96 @@
+"""Rain and snow as cameras see them: drops and flakes that fall through the map.
+
+They stand on a lattice that falls and drifts with the wind, one in each cell, at a place and of a
+size that follow from the cell's numbers alone: all cameras see the same ones, at any time. Numbers
+and sizes are those of `world.weather.particles`. Nearer than `reach_m` each larger than `least_mm`
+is drawn; what is smaller or farther away is part of the haze.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.rng import stream_key
+from volery.sensors.cameras.light import Light
+from volery.world.weather import Weather
+from volery.world.weather.particles import (
+    VISIBLE_NM,
+    drop_speed,
+    number_per_mm,
+    rain_extinction,
+    rain_slope,
+    snow_extinction,
+    snow_slope,
+)
+
+_LEAST_MM = 0.5
+_RAIN_REACH_M, _SNOW_REACH_M = 5.0, 8.0
+"""Where drops have become too faint, and flakes too small (modelling choices)."""
+_FLAKES_FALL_M_S = 1.0
+"""Of aggregates of dry snow (Locatelli and Hobbs 1974: 0.8 to 1.4 m/s)."""
+_DROP_TRANSMITS = 0.94
+"""Of the light of its surroundings, most of them in view through it (Garg and Nayar 2007)."""
+_FLAKE_REFLECTS = 0.9
+"""Modelling choice: clean snow."""
+
+
+class Falling(NamedTuple):
+    """Drops or flakes, for kernels."""
+
+    key: np.uint64
+    """Stream of the lattice's cells."""
+    velocity: NDArray[np.float64]
+    """(3,) m/s, map."""
+    cell_m: float
+    """Side of a cell."""
+    reach_m: float
+    least_mm: float
+    slope: float
+    """Of their numbers over the diameter, 1/mm."""
+    colour: NDArray[np.float32]
+    """(3,) linear."""
+
+
+def falling_in(weather: Weather, light: Light) -> tuple[Falling, ...]:
+    """What falls in a weather, in its light."""
+    found = []
+    rain, snow = weather.particles.rain_mm_h, weather.particles.snow_mm_h
+    if rain > 0.0:
+        slope = rain_slope(rain)
+        number = number_per_mm(rain_extinction(rain), slope)
+        colour = _DROP_TRANSMITS * 0.5 * (light.zenith + light.horizon)
+        speed = drop_speed(_LEAST_MM + 1.0 / slope)
+        found.append(_falling("rain", weather, speed, number, slope, _RAIN_REACH_M, colour))
+    if snow > 0.0:
+        slope = snow_slope(snow)
+        number = number_per_mm(snow_extinction(snow, VISIBLE_NM), slope)
+        colour = _FLAKE_REFLECTS * 0.5 * (light.overhead + light.bounce)
+        reach = _SNOW_REACH_M
+        found.append(_falling("snow", weather, _FLAKES_FALL_M_S, number, slope, reach, colour))
+    return tuple(found)
+
+
+def _falling(
+    name: str,
+    weather: Weather,
+    speed: float,
+    number: float,
+    slope: float,
+    reach: float,
+    colour: NDArray[np.float32],
+) -> Falling:
+    density = number / slope * math.exp(-slope * _LEAST_MM)
+    x, y, z = weather.velocity_map
+    return Falling(
+        key=stream_key(0, f"weather/{name}"),
+        velocity=np.array([x, y, z - speed]),
+        cell_m=max(density, 1e-9) ** (-1.0 / 3.0),
+        reach_m=reach,
+        least_mm=_LEAST_MM,
+        slope=slope,
+        colour=np.asarray(colour, dtype=np.float32),
+    )

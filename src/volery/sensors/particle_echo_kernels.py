@@ -1,0 +1,175 @@
+"""Scans made in rain, snow, fog or dust: what is lost and what is seen in the air; compiled.
+
+They are worked over after they were measured as in clear air, with numbers from streams of their
+own: without particles nothing is different, and nothing is computed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.compiled import inner_kernel, kernel
+from volery.core.rng import normal, random_bits, uniform
+from volery.core.workers import fetch_add
+from volery.sensors.aim_kernels import LidarBatch
+from volery.sensors.echo_kernels import MOST_ECHOES, Echoes, LidarConstants
+from volery.sensors.particle_echoes import KINDS, VOLUME, ParticleTable
+
+_STREAM = 1 << 61
+"""Number of the draw of a scan's stream that becomes the key of its particles."""
+_DRAWS = MOST_ECHOES + 3 * KINDS
+"""Of a beam: whether each echo is kept; place, strength and noise of each kind's false one."""
+
+
+@inner_kernel
+def _weaken(
+    lidar: LidarConstants,
+    air: ParticleTable,
+    i: int,
+    key: np.uint64,
+    counter: int,
+    ranges: NDArray[np.float32],
+    intensities: NDArray[np.float32],
+) -> None:
+    """Take away the echoes of beam `i` that are too weak now; those that stay move up."""
+    kept = 0
+    for m in range(ranges.shape[0]):
+        r: float = np.float64(ranges[m, i])
+        if not abs(r) < np.inf:
+            continue
+        brightness = intensities[m, i] if intensities.shape[0] > 0 else np.float32(0.0)
+        alike = r * np.exp(air.extinction * r)
+        ranges[m, i] = np.inf
+        if intensities.shape[0] > 0:
+            intensities[m, i] = 0.0
+        if alike > lidar.range_max:
+            continue
+        if lidar.noise:
+            before, now = r / lidar.range_max, alike / lidar.range_max
+            still = 1.0 - lidar.dropout_far * now * now
+            if uniform(key, counter + m) > still / (1.0 - lidar.dropout_far * before * before):
+                continue
+        ranges[kept, i] = r
+        if intensities.shape[0] > 0:
+            intensities[kept, i] = brightness * np.exp(-2.0 * air.extinction * r)
+        kept += 1
+
+
+@inner_kernel
+def _place_of(air: ParticleTable, kind: int, events: float) -> float:
+    """Index, with a fraction, at which so many events of a kind have come; < 0: never do."""
+    table = air.events[kind]
+    last = table.shape[0] - 1
+    if events >= table[last]:
+        return -1.0
+    low, high = 0, last
+    while high - low > 1:
+        middle = (low + high) // 2
+        if table[middle] <= events:
+            low = middle
+        else:
+            high = middle
+    return float(low + (events - table[low]) / max(table[high] - table[low], 1e-300))
+
+
+@inner_kernel
+def _between(values: NDArray[np.float64], place: float) -> float:
+    low = int(place)
+    f = place - low
+    return float((1.0 - f) * values[low] + f * values[low + 1])
+
+
+@inner_kernel
+def _insert(
+    i: int,
+    r: float,
+    brightness: float,
+    ranges: NDArray[np.float32],
+    intensities: NDArray[np.float32],
+) -> None:
+    """Put an echo in its place among those of beam `i`; the farthest of too many goes."""
+    m = ranges.shape[0] - 1
+    if not r < ranges[m, i]:
+        return
+    while m > 0 and r < ranges[m - 1, i]:
+        ranges[m, i] = ranges[m - 1, i]
+        if intensities.shape[0] > 0:
+            intensities[m, i] = intensities[m - 1, i]
+        m -= 1
+    ranges[m, i] = r
+    if intensities.shape[0] > 0:
+        intensities[m, i] = brightness
+
+
+@inner_kernel
+def _see_particles(
+    lidar: LidarConstants,
+    air: ParticleTable,
+    i: int,
+    surface: float,
+    key: np.uint64,
+    counter: int,
+    ranges: NDArray[np.float32],
+    intensities: NDArray[np.float32],
+) -> None:
+    """Enter the first false echo of each kind before the `surface` that beam `i` meets.
+
+    It needs the share of all light that any echo needs to be noticed beside others.
+    """
+    behind = 0.0
+    if ranges[0, i] < np.inf:
+        first: float = np.float64(ranges[0, i])
+        alike = first * np.exp(air.extinction * first)
+        behind = (lidar.range_max / alike) ** 2
+    for kind in range(KINDS):
+        draw = counter + MOST_ECHOES + 3 * kind
+        place = _place_of(air, kind, -np.log(uniform(key, draw)))
+        if place < 0.0:
+            continue
+        r = _between(air.range, place)
+        if r > surface - lidar.pulse_length:
+            continue
+        strength = 1.0 - _between(air.spread[kind], place) * np.log(uniform(key, draw + 1))
+        if kind != VOLUME:
+            strength *= strength
+        if strength < lidar.first_echo_share * (strength + behind):
+            continue
+        shine = air.brightness * strength * (r / lidar.range_max) ** 2
+        if lidar.range_exponent != 0.0:
+            near = lidar.reference_range / max(r, lidar.reference_range)
+            shine *= near**lidar.range_exponent
+        sigma = max(lidar.noise_floor, lidar.noise_slope * r + lidar.noise_offset)
+        r += sigma * normal(key, draw + 2)
+        r = lidar.resolution * np.floor(r / lidar.resolution + 0.5)
+        if r >= lidar.range_min:
+            _insert(i, r, min(shine, lidar.brightest), ranges, intensities)
+
+
+@kernel
+def weather_scans(
+    lidar: LidarConstants,
+    air: ParticleTable,
+    batch: LidarBatch,
+    counter: NDArray[np.int64],
+    echoes: Echoes,
+) -> None:
+    """Let particles act on whole scans, taken one by one from `counter`.
+
+    A LIDAR without noise loses what is beyond its reach, and sees no particles.
+    """
+    beams = echoes.ranges.shape[2]
+    while True:
+        scan = fetch_add(counter.ctypes.data)
+        if scan >= echoes.ranges.shape[0]:
+            return
+        ranges, intensities = echoes.ranges[scan], echoes.intensities[scan]
+        key = random_bits(batch.key[scan], _STREAM)
+        for i in range(beams):
+            if ranges[0, i] == -np.inf:
+                continue
+            number = (batch.scan_number[scan] * beams + i) * _DRAWS
+            surface: float = np.float64(ranges[0, i])
+            _weaken(lidar, air, i, key, number, ranges, intensities)
+            if lidar.noise:
+                _see_particles(lidar, air, i, surface, key, number, ranges, intensities)
