@@ -61,25 +61,27 @@ def _settled(component: Any) -> Any:
 
 
 @inner_kernel
-def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], reach: float) -> None:
-    """Set the rows of a packet that a cast changes."""
+def _make_ready(
+    rays: NDArray[np.float32], words: NDArray[np.uint32], p: int, reach: float
+) -> None:
+    """Set the rows of packet `p` that a cast changes."""
     for k in range(LANES):
-        rays[FAR, k] = reach
-        words[GEOMETRY, k] = _INVALID
-        words[INSTANCE, k] = _INVALID
+        rays[p, FAR, k] = reach
+        words[p, GEOMETRY, k] = _INVALID
+        words[p, INSTANCE, k] = _INVALID
     for j in range(DIRECTION, DIRECTION + 3):
         for k in range(LANES):
-            rays[j, k] = _settled(rays[j, k])
+            rays[p, j, k] = _settled(rays[p, j, k])
 
 
 @inner_kernel
-def run_together(rays: NDArray[np.float32], lanes: int) -> bool:
-    """Whether first and last ray of a packet run close together."""
+def run_together(rays: NDArray[np.float32], p: int, lanes: int) -> bool:
+    """Whether first and last ray of packet `p` run close together."""
     last = lanes - 1
     apart, along = 0.0, 0.0
     for row in range(3):
-        apart += abs(rays[ORIGIN + row, 0] - rays[ORIGIN + row, last])
-        along += rays[DIRECTION + row, 0] * rays[DIRECTION + row, last]
+        apart += abs(rays[p, ORIGIN + row, 0] - rays[p, ORIGIN + row, last])
+        along += rays[p, DIRECTION + row, 0] * rays[p, DIRECTION + row, last]
     return bool(apart < _TOGETHER_M and along > _TOGETHER_COSINE)
 
 
@@ -104,9 +106,9 @@ def cast_block(
         lanes = min(LANES, count - p * LANES)
         for k in range(lanes, LANES):
             valid[k] = 0
-        _make_ready(rays[p], words[p], limit)
+        _make_ready(rays, words, p, limit)
         if static != 0:
-            arguments = coherent_address if run_together(rays[p], lanes) else 0
+            arguments = coherent_address if run_together(rays, p, lanes) else 0
             intersect_packet(
                 valid_address, static, rays_address + p * (PACKET_ROWS * LANES * 4), arguments
             )
@@ -276,7 +278,7 @@ def find_occluded(
             _aim(block, origins, targets, first, p, lanes)
             rays = block.rays[p]
             if scene.static != 0:
-                arguments = block.coherent.ctypes.data if run_together(rays, lanes) else 0
+                arguments = block.coherent.ctypes.data if run_together(block.rays, p, lanes) else 0
                 occluded_packet(block.valid.ctypes.data, scene.static, rays.ctypes.data, arguments)
             for n in range(near_count):
                 hide_behind_body(scene, block, p, lanes, block.near[n])
