@@ -17,7 +17,7 @@ from volery.core import rotations
 from volery.core.workers import Workers
 from volery.world.mesh import Mesh, concatenate
 from volery.world.point_query import nearest_in_all
-from volery.world.scene_content import BodyShape, SceneContent
+from volery.world.scene_content import MATERIALS, BodyShape, SceneContent
 from volery.world.scene_memory import BodyTable, SceneHandle
 
 _SHORT_OF_TARGET_M = 1e-4
@@ -62,7 +62,7 @@ class EmbreexBackend:
 
     def __init__(self, content: SceneContent) -> None:
         self._content = content
-        self._blocks: list[tuple[int, int]] = []  # (instance, part) of each flattened mesh
+        self._blocks: list[tuple[int, int]] = []  # (instance, material) of each flattened mesh
         table = content.table
         flat = []
         for instance in range(content.instances):
@@ -70,14 +70,21 @@ class EmbreexBackend:
             for k in range(int(table.part_count[instance])):
                 part = content.parts[int(table.first_part[instance]) + k]
                 flat.append(Mesh(part.vertices[:-1], part.triangles).transformed(matrix))
-                self._blocks.append((instance, k))
+                self._blocks.append((instance, k % MATERIALS))
         self._flat = FlatScene(flat)
         self._shapes: list[FlatScene] = []
 
     def handle(self, bodies: BodyTable) -> SceneHandle:
         """Tables as the main backend's, without an Embree scene: kernels cannot cast here."""
         content = self._content
-        return SceneHandle(0, content.instances, content.normal_matrix, content.material, bodies)
+        return SceneHandle(
+            static=0,
+            moving_offset=content.instances,
+            trees=content.trees,
+            normal_matrix=content.normal_matrix,
+            material=content.material,
+            bodies=bodies,
+        )
 
     def shape_scenes(self, shapes: Sequence[BodyShape]) -> NDArray[np.int64]:
         """Numbers of the shapes in this backend."""

@@ -23,6 +23,7 @@ from volery.world.embree import (
     intersect_packet,
     occluded_packet,
 )
+from volery.world.point_query import instance_of
 from volery.world.scene_memory import RayBlock, SceneHandle, new_block, thread_block
 
 __all__ = [
@@ -39,6 +40,8 @@ __all__ = [
 ]
 
 _INVALID = np.uint32(INVALID)
+_SECOND = np.uint32(1)
+"""Odd parts of trees are leaves, the second of a tree's materials."""
 CHUNK = 512
 """Rays of one piece of work; a multiple of LANES, so that packets do not depend on the threads."""
 _TOGETHER_M, _TOGETHER_COSINE = 1.0, 0.9
@@ -61,9 +64,7 @@ def _settled(component: Any) -> Any:
 
 
 @inner_kernel
-def _make_ready(
-    rays: NDArray[np.float32], words: NDArray[np.uint32], p: int, reach: float
-) -> None:
+def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], p: int, reach: float) -> None:
     """Set the rows of packet `p` that a cast changes."""
     for k in range(LANES):
         rays[p, FAR, k] = reach
@@ -98,6 +99,7 @@ def cast_block(
     rays_address, valid_address = rays.ctypes.data, valid.ctypes.data
     coherent_address = block.coherent.ctypes.data
     static, material_of, matrix_of = scene.static, scene.material, scene.normal_matrix
+    trees = np.uint32(scene.trees)
     packets = (count + LANES - 1) // LANES
     limit: Any = np.float32(reach)
     for k in range(LANES):
@@ -119,17 +121,19 @@ def cast_block(
                 instance[p, k] = -1
                 material[p, k] = 0
             elif number == _INVALID:  # terrain and solids are geometry of the top level
-                instance[p, k] = part
-                material[p, k] = material_of[part, 0]
+                row = instance_of(part, trees)
+                instance[p, k] = row
+                material[p, k] = material_of[row, 0]
             else:
-                instance[p, k] = number
-                material[p, k] = material_of[number, part]
+                row = instance_of(number, trees)
+                instance[p, k] = row
+                material[p, k] = material_of[row, part & _SECOND]
                 x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
                 for j in range(3):
                     rays[p, NORMAL + j, k] = (
-                        matrix_of[number, 3 * j] * x
-                        + matrix_of[number, 3 * j + 1] * y
-                        + matrix_of[number, 3 * j + 2] * z
+                        matrix_of[row, 3 * j] * x
+                        + matrix_of[row, 3 * j + 1] * y
+                        + matrix_of[row, 3 * j + 2] * z
                     )
         for n in range(near_count):
             cast_at_body(scene, block, p, lanes, block.near[n])
