@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from volery.core.compiled import inner_kernel, kernel
 from volery.sensors.beam_table import TABLE_ROWS, BeamTable
-from volery.sensors.mount import Mount, sensor_attitude
+from volery.sensors.mount import nodded, nodding_angle
 from volery.vehicle.pose_history import PoseHistory, pose_at
 from volery.world.embree import DIRECTION, LANES, ORIGIN, PACKET_ROWS
 
@@ -59,20 +59,14 @@ class LidarBatch(NamedTuple):
 @inner_kernel
 def sensor_frame(batch: LidarBatch, scan: int, history: PoseHistory, time_ns: int) -> Frame:
     """Origin, x axis, y axis and z axis of the sensor in the map at a time."""
+    # Number by number: slices of arrays would be counted in memory that threads share.
     row = batch.mount[scan]
-    mounts = batch.mounts
-    mount = Mount(
-        mounts.position_body[row],
-        mounts.attitude_body[row],
-        mounts.nodding[row, 0],
-        mounts.nodding[row, 1],
-        mounts.nodding[row, 2],
-        mounts.nodding[row, 3],
-    )
+    place, base, nods = batch.mounts
     x, y, z, px, py, pz, pw = pose_at(history, batch.uav[scan], time_ns)
-    qx, qy, qz, qw = sensor_attitude(mount, time_ns)
+    angle = nodding_angle(nods[row, 0], nods[row, 1], nods[row, 2], nods[row, 3], time_ns)
+    qx, qy, qz, qw = nodded(base[row, 0], base[row, 1], base[row, 2], base[row, 3], angle)
     # The mount's position, turned into the map.
-    mx, my, mz = mount.position_body[0], mount.position_body[1], mount.position_body[2]
+    mx, my, mz = place[row, 0], place[row, 1], place[row, 2]
     tx = 2.0 * (py * mz - pz * my)
     ty = 2.0 * (pz * mx - px * mz)
     tz = 2.0 * (px * my - py * mx)
@@ -118,32 +112,35 @@ def aim_packets(
     # Flat slices with constant offsets: only so the compiler sees that nothing overlaps, and makes
     # vectors of the loop over the lanes.
     aims, out = table.lanes.reshape(table.lanes.size), rays.reshape(rays.size)
-    knots = table.knot_ns[first:]
-    a_ns = b_ns = knots[0, 0]
+    knot_ns = table.knot_ns
+    a_ns = b_ns = knot_ns[first, 0]
     a = b = sensor_frame(batch, scan, history, start + a_ns)
     for p in range(count):
-        if knots[p, 0] != a_ns:
-            a_ns = knots[p, 0]
+        q = first + p
+        if knot_ns[q, 0] != a_ns:
+            a_ns = knot_ns[q, 0]
             a = b if a_ns == b_ns else sensor_frame(batch, scan, history, start + a_ns)
-        if knots[p, 1] != b_ns:
-            b_ns = knots[p, 1]
+        if knot_ns[q, 1] != b_ns:
+            b_ns = knot_ns[q, 1]
             b = sensor_frame(batch, scan, history, start + b_ns)
         if b_ns - a_ns > _LONGEST_CHORD_NS:
-            _aim_one_by_one(table, batch, scan, history, first + p, rays[p])
+            _aim_one_by_one(table, batch, scan, history, q, rays, p)
             continue
-        q = first + p
         aim = aims[q * TABLE_ROWS * LANES : (q + 1) * TABLE_ROWS * LANES]
         ray = out[p * PACKET_ROWS * LANES : (p + 1) * PACKET_ROWS * LANES]
+        ox, oy, oz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        xx, xy, xz = b[3] - a[3], b[4] - a[4], b[5] - a[5]
+        yx, yy, yz = b[6] - a[6], b[7] - a[7], b[8] - a[8]
+        zx, zy, zz = b[9] - a[9], b[10] - a[10], b[11] - a[11]
         for k in range(LANES):
             c, s, u, f = aim[k], aim[LANES + k], aim[2 * LANES + k], aim[3 * LANES + k]
-            g = 1.0 - f
-            dx = c * (g * a[3] + f * b[3]) + s * (g * a[6] + f * b[6]) + u * (g * a[9] + f * b[9])
-            dy = c * (g * a[4] + f * b[4]) + s * (g * a[7] + f * b[7]) + u * (g * a[10] + f * b[10])
-            dz = c * (g * a[5] + f * b[5]) + s * (g * a[8] + f * b[8]) + u * (g * a[11] + f * b[11])
+            dx = c * (a[3] + f * xx) + s * (a[6] + f * yx) + u * (a[9] + f * zx)
+            dy = c * (a[4] + f * xy) + s * (a[7] + f * yy) + u * (a[10] + f * zy)
+            dz = c * (a[5] + f * xz) + s * (a[8] + f * yz) + u * (a[11] + f * zz)
             unit = 1.5 - 0.5 * (dx * dx + dy * dy + dz * dz)
-            ray[ORIGIN * LANES + k] = g * a[0] + f * b[0]
-            ray[(ORIGIN + 1) * LANES + k] = g * a[1] + f * b[1]
-            ray[(ORIGIN + 2) * LANES + k] = g * a[2] + f * b[2]
+            ray[ORIGIN * LANES + k] = a[0] + f * ox
+            ray[(ORIGIN + 1) * LANES + k] = a[1] + f * oy
+            ray[(ORIGIN + 2) * LANES + k] = a[2] + f * oz
             ray[DIRECTION * LANES + k] = dx * unit
             ray[(DIRECTION + 1) * LANES + k] = dy * unit
             ray[(DIRECTION + 2) * LANES + k] = dz * unit
@@ -157,17 +154,18 @@ def _aim_one_by_one(
     history: PoseHistory,
     packet: int,
     rays: NDArray[np.float32],
+    p: int,
 ) -> None:
-    """Fill one packet (PACKET_ROWS, LANES), looking the pose up for every ray."""
+    """Fill packet `p` of `rays`, looking the pose up for every ray."""
     start, end = table.knot_ns[packet, 0], table.knot_ns[packet, 1]
+    aim = table.lanes
     for k in range(LANES):
-        aim = table.lanes[packet]
-        c, s, u, f = aim[0, k], aim[1, k], aim[2, k], aim[3, k]
+        c, s, u, f = (aim[packet, 0, k], aim[packet, 1, k], aim[packet, 2, k], aim[packet, 3, k])
         after = start + round(f * (end - start))
         frame = sensor_frame(batch, scan, history, batch.sweep_start_ns[scan] + after)
         for j in range(3):
-            rays[ORIGIN + j, k] = frame[j]
-            rays[DIRECTION + j, k] = c * frame[3 + j] + s * frame[6 + j] + u * frame[9 + j]
+            rays[p, ORIGIN + j, k] = frame[j]
+            rays[p, DIRECTION + j, k] = c * frame[3 + j] + s * frame[6 + j] + u * frame[9 + j]
 
 
 @kernel

@@ -67,27 +67,24 @@ def make_mount(
 
 
 @inner_kernel
-def nodding_angle(mount: Mount, time_ns: int) -> float:
-    """Angle about the sensor's y axis at a time, rad."""
-    if mount.period_s <= 0.0:
-        return mount.offset_rad
+def nodding_angle(
+    amplitude_rad: float, period_s: float, offset_rad: float, phase_rad: float, time_ns: int
+) -> float:
+    """Angle of a `Mount` about the sensor's y axis at a time, rad."""
+    if period_s <= 0.0:
+        return offset_rad
     # The phase is reduced in integers first: a long run loses no precision.
-    period_ns = round(mount.period_s / _NS)
+    period_ns = round(period_s / _NS)
     turn = (time_ns % period_ns) / period_ns
-    angle: float = mount.offset_rad + mount.amplitude_rad * np.sin(_TWO_PI * turn + mount.phase_rad)
+    angle: float = offset_rad + amplitude_rad * np.sin(_TWO_PI * turn + phase_rad)
     return angle
 
 
 @inner_kernel
-def sensor_attitude(mount: Mount, time_ns: int) -> tuple[float, float, float, float]:
-    """Quaternion, body from sensor, at a time."""
-    x, y, z, w = (
-        mount.attitude_body[0],
-        mount.attitude_body[1],
-        mount.attitude_body[2],
-        mount.attitude_body[3],
-    )
-    angle = nodding_angle(mount, time_ns)
+def nodded(
+    x: float, y: float, z: float, w: float, angle: float
+) -> tuple[float, float, float, float]:
+    """Quaternion, body from sensor, of a mount with that quaternion at a nodding angle."""
     if angle == 0.0:
         return x, y, z, w
     half = 0.5 * angle
@@ -98,4 +95,6 @@ def sensor_attitude(mount: Mount, time_ns: int) -> tuple[float, float, float, fl
 @kernel
 def nodding_angle_at(mount: Mount, time_ns: int) -> float:
     """`nodding_angle` for callers in Python."""
-    return nodding_angle(mount, time_ns)
+    return nodding_angle(
+        mount.amplitude_rad, mount.period_s, mount.offset_rad, mount.phase_rad, time_ns
+    )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from volery.core.workers import Workers, new_counter
 from volery.world import embree
 from volery.world.point_query import callback_address, nearest_points, new_query_memory
-from volery.world.scene_content import BodyShape, SceneContent
+from volery.world.scene_content import MATERIALS, BodyShape, SceneContent
 from volery.world.scene_kernels import CHUNK, cast_rays, find_enclosing, find_occluded
 from volery.world.scene_memory import BodyTable, SceneHandle, thread_block
 
@@ -38,24 +38,19 @@ class EmbreeBackend:
         # point. Trees do without, for speed: an edge of theirs meets a ray only by chance.
         self._static = device.new_scene(flags=embree.SCENE_ROBUST)
         self._obstacles = device.new_scene(flags=embree.SCENE_ROBUST)  # without the ground
-        models = []
-        for first in content.tree_parts:
-            model = device.new_scene()
-            for k in range(2):
-                part = content.parts[first + k]
-                if len(part.triangles):
-                    device.attach_mesh([model], k, part)
-            device.commit(model)
-            models.append(model)
+        feet = [self._tree_piece(first, 0) for first in content.tree_parts]
+        crowns = [self._tree_piece(first, MATERIALS) for first in content.tree_parts]
         if content.has_terrain:
             device.attach_mesh([self._static], 0, content.parts[0])
         both = [self._static, self._obstacles]
-        device.attach_instances(
-            both,
-            np.arange(1, 1 + content.trees),
-            [models[i] for i in content.tree_model],
-            content.tree_transforms,
-        )
+        for first, pieces in ((1, feet), (1 + content.trees, crowns)):
+            rows = np.flatnonzero([pieces[i] != 0 for i in content.tree_model])
+            device.attach_instances(
+                both,
+                first + rows,
+                [pieces[i] for i in content.tree_model[rows]],
+                content.tree_transforms[rows],
+            )
         self._attach_solids(1 + content.trees)
 
     def replace_solids(self, content: SceneContent, first: int) -> None:
@@ -67,7 +62,7 @@ class EmbreeBackend:
         for number in range(first, self._content.instances):
             part = self._content.solid_part(number)
             if len(part.triangles):
-                self._device.detach_mesh(both, number, part)
+                self._device.detach_mesh(both, self._content.trees + number, part)
         self._content = content
         self._attach_solids(first)
 
@@ -75,10 +70,23 @@ class EmbreeBackend:
         both = [self._static, self._obstacles]
         for number in range(first, self._content.instances):
             part = self._content.solid_part(number)
-            if len(part.triangles):
-                self._device.attach_mesh(both, number, part)
+            if len(part.triangles):  # numbered behind the trees' crowns, see `instance_of`
+                self._device.attach_mesh(both, self._content.trees + number, part)
         for scene in both:
             self._device.commit(scene)
+
+    def _tree_piece(self, first: int, part: int) -> int:
+        """Scene of the foot or crown whose parts begin at `part` of a model; 0: it has none."""
+        parts = range(part, part + MATERIALS)
+        meshes = {k: self._content.parts[first + k] for k in parts}
+        if not any(len(mesh.triangles) for mesh in meshes.values()):
+            return 0
+        scene = self._device.new_scene()
+        for k, mesh in meshes.items():
+            if len(mesh.triangles):
+                self._device.attach_mesh([scene], k, mesh)
+        self._device.commit(scene)
+        return scene
 
     def handle(self, bodies: BodyTable) -> SceneHandle:
         """What kernels need, with these bodies."""
@@ -86,6 +94,7 @@ class EmbreeBackend:
         return SceneHandle(
             static=self._static,
             moving_offset=content.instances,
+            trees=content.trees,
             normal_matrix=content.normal_matrix,
             material=content.material,
             look=content.look,
@@ -155,11 +164,14 @@ class EmbreeBackend:
         """Fill distance, nearest, instance."""
         scene = self._static if include_terrain else self._obstacles
         table, memory = self._content.table, new_query_memory()
-        nearest_points(scene, callback_address(), table, points, reach, memory, *out)
+        trees = self._content.trees
+        nearest_points(scene, callback_address(), table, trees, points, reach, memory, *out)
 
     def enclosing(self, points: NDArray[np.float64], out: NDArray[np.int32]) -> None:
         """Fill `out` with the closed solid that each point lies in, -1 for none."""
-        find_enclosing(self._obstacles, points, thread_block(embree.LANES, 0), out)
+        find_enclosing(
+            self._obstacles, self._content.trees, points, thread_block(embree.LANES, 0), out
+        )
 
     def close(self) -> None:
         """Give all handles back."""

@@ -18,7 +18,7 @@ from volery.core.workers import Workers
 from volery.world.ground_cover import ground_material
 from volery.world.mesh import Mesh, concatenate
 from volery.world.point_query import nearest_in_all
-from volery.world.scene_content import BodyShape, SceneContent
+from volery.world.scene_content import MATERIALS, BodyShape, SceneContent
 from volery.world.scene_memory import BodyTable, SceneHandle
 
 _SHORT_OF_TARGET_M = 1e-4
@@ -72,7 +72,7 @@ class EmbreexBackend:
 
     def _flatten(self, content: SceneContent) -> None:
         self._content = content
-        self._blocks: list[tuple[int, int]] = []  # (instance, part) of each flattened mesh
+        self._blocks: list[tuple[int, int]] = []  # (instance, material) of each flattened mesh
         table = content.table
         flat = []
         for instance in range(content.instances):
@@ -80,7 +80,7 @@ class EmbreexBackend:
             for k in range(int(table.part_count[instance])):
                 part = content.parts[int(table.first_part[instance]) + k]
                 flat.append(Mesh(part.vertices[:-1], part.triangles).transformed(matrix))
-                self._blocks.append((instance, k))
+                self._blocks.append((instance, k % MATERIALS))
         self._flat = FlatScene(flat)
         self._solids = FlatScene(flat[len(flat) - content.solids :])
 
@@ -90,6 +90,7 @@ class EmbreexBackend:
         return SceneHandle(
             static=0,
             moving_offset=content.instances,
+            trees=content.trees,
             normal_matrix=content.normal_matrix,
             material=content.material,
             look=content.look,

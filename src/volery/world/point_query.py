@@ -75,7 +75,7 @@ def new_query_memory() -> QueryMemory:
         aligned((16,)),
         aligned((CONTEXT_WORDS,), np.uint32),
         np.zeros(_STATE_WORDS),
-        np.zeros(5, dtype=np.int64),
+        np.zeros(6, dtype=np.int64),
     )
 
 
@@ -90,6 +90,16 @@ def _make_pointer(_context: Any, _address: Any) -> Any:
 
 
 _pointer: Any = _make_pointer
+
+
+@inner_kernel
+def instance_of(number: Any, trees: Any) -> Any:
+    """Scene instance behind a geometry number of Embree's.
+
+    The ground is 0 and the feet of trees 1..T, as they are in the scene; then come the crowns of
+    the same trees, and after them the solids.
+    """
+    return number - trees if number > trees else number
 
 
 @inner_kernel
@@ -185,8 +195,8 @@ def _try_triangle(
 def _consider(arguments: Any) -> bool:
     """Embree's callback for one triangle; shrinks the query's radius when it is nearer."""
     words = _carray(arguments, (4,), np.int64)
-    # User data: addresses of state, vertices, triangles, first_part, transform.
-    user = _carray(_pointer(words[USER_WORD]), (5,), np.int64)
+    # User data: addresses of state, vertices, triangles, first_part, transform; then the trees.
+    user = _carray(_pointer(words[USER_WORD]), (6,), np.int64)
     state = _carray(_pointer(user[0]), (_STATE_WORDS,), np.float64)
     context = _carray(_pointer(words[CONTEXT_WORD]), (CONTEXT_WORDS,), np.uint32)
     triangle = words[PRIMITIVE_WORD] & 0xFFFFFFFF
@@ -194,6 +204,7 @@ def _consider(arguments: Any) -> bool:
     instance: Any = np.int64(context[CONTEXT_INSTANCE])
     if context[CONTEXT_STACK_SIZE] == 0:
         instance, part = part, 0
+    instance = instance_of(instance, user[5])
     part += _carray(_pointer(user[3] + 8 * instance), (1,), np.int64)[0]
     vertices = _carray(_pointer(user[1] + 8 * part), (1,), np.int64)[0]
     triangles = _carray(_pointer(user[2] + 8 * part), (1,), np.int64)[0]
@@ -229,6 +240,7 @@ def nearest_points(
     scene: int,
     callback: int,
     table: TriangleTable,
+    trees: int,
     points: NDArray[np.float64],
     reach: float,
     memory: QueryMemory,
@@ -243,6 +255,7 @@ def nearest_points(
     user[2] = table.triangles.ctypes.data
     user[3] = table.first_part.ctypes.data
     user[4] = table.transform.ctypes.data
+    user[5] = trees
     limit = min(reach, _FAR_AWAY_M)
     for i in range(points.shape[0]):
         for j in range(3):

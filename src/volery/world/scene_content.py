@@ -1,7 +1,8 @@
 """What a scene holds, as flat tables that both ray casting backends read.
 
 Instances: 0 is the terrain, 1..T the trees in forest order, then the solids. An instance shows one
-or more parts; a part is a mesh with a material, shared by all instances of a tree model.
+or more parts; a part is a mesh with a material, shared by all instances of a tree model. A tree has
+four: wood and leaves of its foot, wood and leaves of its crown (see `tree_pieces`).
 """
 
 from __future__ import annotations
@@ -19,12 +20,15 @@ from volery.world.materials import Material
 from volery.world.mesh import Mesh
 from volery.world.point_query import TriangleTable
 from volery.world.terrain import Terrain
+from volery.world.tree_pieces import foot_and_crown
 from volery.world.trees.model import DetailLevel
 
 if TYPE_CHECKING:
     from volery.world.forest import Forest
 
-_MOST_PARTS = 2
+MATERIALS = 2
+"""Of an instance at most; a tree's parts are of the first and the second by turns."""
+_TREE_PARTS = 4
 
 
 class Look(NamedTuple):
@@ -90,7 +94,7 @@ class SceneContent:
     parts: tuple[PaddedMesh, ...]
     table: TriangleTable
     material: NDArray[np.uint8]
-    """(instances, 2) materials of the instance's parts."""
+    """(instances, MATERIALS) materials of the instance's parts."""
     normal_matrix: NDArray[np.float32]
     """(instances, 9) rows of the inverse transpose of the instance's 3x3 matrix."""
     tree_parts: NDArray[np.int64]
@@ -172,7 +176,7 @@ def with_solids(content: SceneContent, kept: int, solids: Sequence[Solid]) -> Sc
     transform = np.tile(np.eye(3, 4), (count, 1, 1))
     upright = np.tile(np.eye(3, dtype=np.float32).reshape(1, 9), (count, 1))
     boxes = np.array([_part_bounds(part) for part in new]).reshape(-1, 2, 3)
-    material = np.zeros((count, _MOST_PARTS), dtype=np.uint8)
+    material = np.zeros((count, MATERIALS), dtype=np.uint8)
     for row, solid in zip(material, solids, strict=True):
         row[:] = solid.material, solid.material if solid.top is None else solid.top
     bounds = _instance_bounds(boxes[:, 0], boxes[:, 1], transform)
@@ -221,7 +225,8 @@ def _collect_land(
     for i, model in enumerate(models):
         tree_parts[i] = len(meshes)
         level = model.levels[detail]
-        meshes.extend((level.wood, level.leaves))
+        for piece in foot_and_crown(level):
+            meshes.extend((piece.wood, piece.leaves))
     parts = tuple(padded(mesh) for mesh in meshes)
     vertices, triangles, length = _memory_of(parts)
 
@@ -230,7 +235,7 @@ def _collect_land(
     first = np.zeros(count, dtype=np.int64)
     parts_of = np.ones(count, dtype=np.int64)
     parts_of[0] = terrain is not None
-    material = np.zeros((count, _MOST_PARTS), dtype=np.uint8)
+    material = np.zeros((count, MATERIALS), dtype=np.uint8)
     material[0] = Material.GROUND
     tree_transforms = np.zeros((0, 3, 4), dtype=np.float32)
     model_index = np.zeros(0, dtype=np.int32)
@@ -239,12 +244,12 @@ def _collect_land(
         model_index = np.asarray(forest.model_index, dtype=np.int32)
         transforms[1:] = tree_transforms
         first[1:] = tree_parts[model_index]
-        parts_of[1:] = 2
+        parts_of[1:] = _TREE_PARTS
         material[1:] = (Material.WOOD, Material.LEAF)
 
     boxes = np.array([_part_bounds(part) for part in parts]).reshape(-1, 2, 3)
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    for k in range(_MOST_PARTS):
+    for k in range(_TREE_PARTS):
         rows = parts_of > k
         low[rows] = np.minimum(low[rows], boxes[first[rows] + k, 0])
         high[rows] = np.maximum(high[rows], boxes[first[rows] + k, 1])

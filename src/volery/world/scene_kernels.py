@@ -24,6 +24,7 @@ from volery.world.embree import (
     occluded_packet,
 )
 from volery.world.ground_cover import ground_material
+from volery.world.point_query import instance_of
 from volery.world.scene_memory import RayBlock, SceneHandle, new_block, thread_block
 
 __all__ = [
@@ -41,6 +42,8 @@ __all__ = [
 ]
 
 _INVALID = np.uint32(INVALID)
+_SECOND = np.uint32(1)
+"""Odd parts of trees are leaves, the second of a tree's materials."""
 CHUNK = 512
 """Rays of one piece of work; a multiple of LANES, so that packets do not depend on the threads."""
 _TOGETHER_M, _TOGETHER_COSINE = 1.0, 0.9
@@ -65,43 +68,43 @@ def _settled(component: Any) -> Any:
 
 
 @inner_kernel
-def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], reach: float) -> None:
-    """Set the rows of a packet that a cast changes."""
+def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], p: int, reach: float) -> None:
+    """Set the rows of packet `p` that a cast changes."""
     for k in range(LANES):
-        rays[FAR, k] = reach
-        words[GEOMETRY, k] = _INVALID
-        words[INSTANCE, k] = _INVALID
+        rays[p, FAR, k] = reach
+        words[p, GEOMETRY, k] = _INVALID
+        words[p, INSTANCE, k] = _INVALID
     for j in range(DIRECTION, DIRECTION + 3):
         for k in range(LANES):
-            rays[j, k] = _settled(rays[j, k])
+            rays[p, j, k] = _settled(rays[p, j, k])
 
 
 @inner_kernel
-def _ground_of(scene: SceneHandle, rays: NDArray[np.float32], k: int) -> int:
-    """`Material` of the ground that a packet's ray `k` hits."""
+def _ground_of(scene: SceneHandle, rays: NDArray[np.float32], p: int, k: int) -> int:
+    """`Material` of the ground that ray `k` of packet `p` hits."""
     if scene.cover.material.shape[0] == 0:
         return int(scene.material[0, 0])
-    far = rays[FAR, k]
-    x = rays[ORIGIN, k] + far * rays[DIRECTION, k]
-    y = rays[ORIGIN + 1, k] + far * rays[DIRECTION + 1, k]
+    far = rays[p, FAR, k]
+    x = rays[p, ORIGIN, k] + far * rays[p, DIRECTION, k]
+    y = rays[p, ORIGIN + 1, k] + far * rays[p, DIRECTION + 1, k]
     return int(ground_material(scene.cover, x, y))
 
 
 @inner_kernel
-def _looks_up(rays: NDArray[np.float32], k: int) -> bool:
-    """Whether what ray `k` hits looks up more than sideways."""
-    x, y, z = rays[NORMAL, k], rays[NORMAL + 1, k], rays[NORMAL + 2, k]
+def _looks_up(rays: NDArray[np.float32], p: int, k: int) -> bool:
+    """Whether what ray `k` of packet `p` hits looks up more than sideways."""
+    x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
     return bool(z > np.float32(0.0) and z * z > x * x + y * y)
 
 
 @inner_kernel
-def run_together(rays: NDArray[np.float32], lanes: int) -> bool:
-    """Whether first and last ray of a packet run close together."""
+def run_together(rays: NDArray[np.float32], p: int, lanes: int) -> bool:
+    """Whether first and last ray of packet `p` run close together."""
     last = lanes - 1
     apart, along = 0.0, 0.0
     for row in range(3):
-        apart += abs(rays[ORIGIN + row, 0] - rays[ORIGIN + row, last])
-        along += rays[DIRECTION + row, 0] * rays[DIRECTION + row, last]
+        apart += abs(rays[p, ORIGIN + row, 0] - rays[p, ORIGIN + row, last])
+        along += rays[p, DIRECTION + row, 0] * rays[p, DIRECTION + row, last]
     return bool(apart < _TOGETHER_M and along > _TOGETHER_COSINE)
 
 
@@ -118,6 +121,7 @@ def cast_block(
     rays_address, valid_address = rays.ctypes.data, valid.ctypes.data
     coherent_address = block.coherent.ctypes.data
     static, material_of, matrix_of = scene.static, scene.material, scene.normal_matrix
+    trees = np.uint32(scene.trees)
     packets = (count + LANES - 1) // LANES
     limit: Any = np.float32(reach)
     for k in range(LANES):
@@ -126,9 +130,9 @@ def cast_block(
         lanes = min(LANES, count - p * LANES)
         for k in range(lanes, LANES):
             valid[k] = 0
-        _make_ready(rays[p], words[p], limit)
+        _make_ready(rays, words, p, limit)
         if static != 0:
-            arguments = coherent_address if run_together(rays[p], lanes) else 0
+            arguments = coherent_address if run_together(rays, p, lanes) else 0
             intersect_packet(
                 valid_address, static, rays_address + p * (PACKET_ROWS * LANES * 4), arguments
             )
@@ -139,20 +143,22 @@ def cast_block(
                 instance[p, k] = -1
                 material[p, k] = 0
             elif number == _INVALID:  # terrain and solids are geometry of the top level
-                instance[p, k] = part
-                if part == 0:
-                    material[p, k] = _ground_of(scene, rays[p], k)
+                row = instance_of(part, trees)
+                instance[p, k] = row
+                if row == 0:
+                    material[p, k] = _ground_of(scene, rays, p, k)
                 else:
-                    material[p, k] = material_of[part, 1 if _looks_up(rays[p], k) else 0]
+                    material[p, k] = material_of[row, 1 if _looks_up(rays, p, k) else 0]
             else:
-                instance[p, k] = number
-                material[p, k] = material_of[number, part]
+                row = instance_of(number, trees)
+                instance[p, k] = row
+                material[p, k] = material_of[row, part & _SECOND]
                 x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
                 for j in range(3):
                     rays[p, NORMAL + j, k] = (
-                        matrix_of[number, 3 * j] * x
-                        + matrix_of[number, 3 * j + 1] * y
-                        + matrix_of[number, 3 * j + 2] * z
+                        matrix_of[row, 3 * j] * x
+                        + matrix_of[row, 3 * j + 1] * y
+                        + matrix_of[row, 3 * j + 2] * z
                     )
         for n in range(near_count):
             cast_at_body(scene, block, p, lanes, block.near[n])
@@ -301,7 +307,7 @@ def find_occluded(
             _aim(block, origins, targets, first, p, lanes)
             rays = block.rays[p]
             if scene.static != 0:
-                arguments = block.coherent.ctypes.data if run_together(rays, lanes) else 0
+                arguments = block.coherent.ctypes.data if run_together(block.rays, p, lanes) else 0
                 occluded_packet(block.valid.ctypes.data, scene.static, rays.ctypes.data, arguments)
             for n in range(near_count):
                 hide_behind_body(scene, block, p, lanes, block.near[n])
@@ -312,6 +318,7 @@ def find_occluded(
 @kernel
 def find_enclosing(
     obstacles: int,
+    trees: int,
     points: NDArray[np.float64],
     block: RayBlock,
     enclosing: NDArray[np.int32],
@@ -338,6 +345,6 @@ def find_enclosing(
                 break
             if words[0, INSTANCE, 0] == _INVALID:
                 if rays[0, NORMAL + 2, 0] > np.float32(0.0):
-                    enclosing[i] = words[0, GEOMETRY, 0]
+                    enclosing[i] = instance_of(np.int64(words[0, GEOMETRY, 0]), trees)
                 break
             rays[0, ORIGIN + 2, 0] += rays[0, FAR, 0] + np.float32(_SHORT_OF_TARGET_M)

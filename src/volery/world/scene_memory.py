@@ -48,6 +48,8 @@ class SceneHandle(NamedTuple):
     """Embree scene of terrain, trees and solids."""
     moving_offset: int
     """Instance number of the first body."""
+    trees: int
+    """How many there are; see `point_query.instance_of` for Embree's numbers of them."""
     normal_matrix: NDArray[np.float32]
     """(instances, 9) rows of the matrix that takes normals to the map (not unit length)."""
     material: NDArray[np.uint8]

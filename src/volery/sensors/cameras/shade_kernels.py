@@ -158,7 +158,7 @@ def find_shadows(
             rays[FAR, k] = f4(SHADOW_REACH_M)
         if not wanted:
             continue
-        arguments = block.coherent.ctypes.data if run_together(rays, LANES) else 0
+        arguments = block.coherent.ctypes.data if run_together(block.rays, p, LANES) else 0
         occluded_packet(valid.ctypes.data, scene.static, rays.ctypes.data, arguments)
         for n in range(near_count):
             hide_behind_body(scene, block, p, LANES, block.near[n])
