@@ -4,6 +4,7 @@ A target takes a `Mutator`, feeds its parser, checks what must hold and returns 
 were. What it must not let out: any exception but those that its parser documents.
 """
 
+import grid_map_targets
 import log_targets
 import message_targets
 import rosbridge_targets
@@ -30,4 +31,8 @@ TARGETS = {
     "type_names": message_targets.type_names,
     "mcap": log_targets.mcap,
     "bag": log_targets.bag,
+    "grid_map_matrix": grid_map_targets.matrix,
+    "grid_map_moving_ai": grid_map_targets.moving_ai,
+    "grid_map_picture": grid_map_targets.picture,
+    "grid_map_message": grid_map_targets.occupancy,
 }

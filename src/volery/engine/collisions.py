@@ -97,6 +97,11 @@ class Collisions:
         self._fleet.state.contact_budget[rows] = 0.0
         self._fleet.state.separation_budget[rows] = 0.0
 
+    def look_again(self, first_instance: int) -> None:
+        """Look around every UAV at once: the world has changed from that instance on."""
+        self._touched_solid[self._touched_solid >= first_instance] = -1
+        self._fleet.state.contact_budget[:] = 0.0
+
     def continue_from(self, other: Collisions, kept: Sequence[tuple[int, int]]) -> None:
         """Know who touches what of another fleet's UAVs: own row and the other's, for each pair.
 
@@ -122,6 +127,8 @@ class Collisions:
         for k, i in enumerate(rows):
             if gaps[k] <= 0.0:
                 away = state.position_map[i] - found.nearest[k]
+                if found.distance[k] < 0.0:  # inside
+                    away = -away
                 self._touch_solid(int(i), away, int(found.instance[k]), time_ns)
             elif gaps[k] > _RELEASE_M:
                 self._touched_solid[i] = -1

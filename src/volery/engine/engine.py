@@ -26,7 +26,7 @@ from volery.engine.stages import STAGES, Tick, take_commands
 from volery.sensors.bank import Bank
 from volery.sensors.faults import FaultTable
 from volery.sensors.samples import Samples
-from volery.world.scene import Scene
+from volery.world.scene import Scene, Solid
 from volery.world.terrain import Terrain
 from volery.world.weather import Gust, Weather
 
@@ -185,6 +185,17 @@ class Engine:
         self._new_events.append(
             Event(self.time_ns, self.names[uav], kind, (x, y, z), 0.0, detail=detail)
         )
+
+    def note_world(self, detail: str) -> None:
+        """Let a change of the world be an event."""
+        nowhere = (0.0, 0.0, 0.0)
+        self._new_events.append(
+            Event(self.time_ns, "", EventKind.WORLD, nowhere, 0.0, detail=detail)
+        )
+
+    def replace_solids(self, solids: Sequence[Solid]) -> None:
+        """Let other solids stand in the world from the next physics step on; see `Scene`."""
+        self.collisions.look_again(self.scene.replace_solids(solids))
 
     def collect_events(self) -> list[Event]:
         """Events since the last call, oldest first."""

@@ -22,11 +22,16 @@ class EventKind(StrEnum):
     """Its battery ran low, critical or empty."""
     FAULT = "fault"
     """Something planned went wrong with it, or is well again."""
+    WORLD = "world"
+    """The world was changed, or a change refused; such an event is of no UAV."""
 
 
 @dataclass(frozen=True)
 class Event:
-    """One happening. `partner` names what was touched, `detail` anything else worth saying."""
+    """One happening; `uav` is empty where it is of none.
+
+    `partner` names what was touched, `detail` anything else worth saying.
+    """
 
     time_ns: int
     uav: str
@@ -41,6 +46,8 @@ class Event:
         x, y, z = self.position_map
         where = f"at ({x:.1f}, {y:.1f}, {z:.1f}) m"
         time = f"{s_from_ns(self.time_ns):.3f} s"
+        if self.kind is EventKind.WORLD:
+            return f"{time}  {self.detail}"
         if self.kind in (EventKind.MODE, EventKind.BATTERY, EventKind.FAULT):
             return f"{time}  {self.uav} {self.detail} {where}"
         what = {

@@ -17,6 +17,7 @@ from volery.graph.node import Node
 from volery.graph.publishing import GraphPublisher
 from volery.runtime.building import check_free
 from volery.runtime.crew import Crew
+from volery.runtime.grid_world import GridWorld
 from volery.runtime.outlet import Outlet
 from volery.runtime.placement import Start
 from volery.runtime.run_loop import RunLoop
@@ -46,6 +47,7 @@ class Keeper:
     crew: Crew
     partners: list[Partner]
     outlet: Outlet
+    grid_world: GridWorld
     _start: dict[str, Any] = field(init=False)
     _starts: tuple[Start, ...] = field(init=False)
     _new_nodes: NodeStates = field(init=False)
@@ -135,10 +137,12 @@ class Keeper:
             "digest": None if digest is None else digest.get_state(),
             "events": list(self.outlet.events),
             "owed_ns": self.loop.owed_ns,
+            "grid_map": self.grid_world.get_state(),
         }
 
     def _put_back(self, state: dict[str, Any]) -> None:
         put_back_nodes(self.crew.nodes, state["nodes"])
+        self.grid_world.set_state(state["grid_map"])
         self.engine.set_state(state["engine"])
         self.graph.set_state(state["graph"])
         self.faults.set_state(state["faults"])

@@ -28,6 +28,7 @@ from volery.runtime.building import place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.crew import Crew
 from volery.runtime.graph_building import all_down, plan_faults
+from volery.runtime.grid_world import GridWorld
 from volery.runtime.keeping import Keeper
 from volery.runtime.lock_step import open_lock_step
 from volery.runtime.outlet import Outlet
@@ -100,6 +101,8 @@ class Simulation:
             crash_on_contact=scenario.physics.on_contact == "crash",
             estimation=parts.estimation,
         )
+        self.grid_world = GridWorld(scenario, self._engine)
+        """The grid map whose blocks stand in the world, and how it is changed."""
         self._faults = FaultPlan(self._engine)
         self._crew = Crew(
             scenario,
@@ -129,6 +132,7 @@ class Simulation:
             self._crew,
             self._partners,
             self.outlet,
+            self.grid_world,
         )
         self._spawner = Spawner(self._crew, self._keeper, self.scene, self.terrain)
         self._crew.take_off(self.uavs)
@@ -345,9 +349,9 @@ class Simulation:
     def reset(self, seed: int | None = None) -> None:
         """Go back to the start, with the scenario's seed or another one.
 
-        All that follows is what a fresh simulation does, but for the world: terrain and trees stay
-        as they are (a scenario's `world.seed` fixes them apart from all other randomness). UAVs
-        that were spawned go, those that were deleted come back.
+        All that follows is what a fresh simulation does, but for the world: a grid map is the one
+        of the start again, terrain and trees stay as they are (a scenario's `world.seed` fixes them
+        apart from all other randomness). UAVs that were spawned go, deleted ones come back.
         """
         self._check_open()
         if seed is not None:

@@ -34,7 +34,7 @@ from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
-_TAKEN = ("volery", "tf", "tf_static", "clock", "events", "rosapi")
+_TAKEN = ("volery", "tf", "tf_static", "clock", "events", "rosapi", "map", "map_in", "things")
 """What else stands at the root of the graph."""
 
 

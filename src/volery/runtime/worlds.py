@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
+from volery.runtime.grid_map_building import starting_blocks
 from volery.scenario import wind as schema
-from volery.scenario.files import resolve
+from volery.scenario.files import SHIPPED_DATA, resolve
 from volery.scenario.schema import GridTerrain, InventoryForest, ProceduralForest, Scenario
 from volery.world.forest import Forest, forest_from_inventory, procedural_forest
 from volery.world.scene import Scene, Solid
 from volery.world.terrain import Terrain
 from volery.world.weather import W20_M_S, Gust, LogProfile, PowerProfile, Weather, WindField
-
-SHIPPED_DATA = Path(__file__).resolve().parent.parent / "world" / "data"
 
 
 def build_terrain(scenario: Scenario) -> Terrain:
@@ -77,8 +75,7 @@ def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
 
 def build_solids(scenario: Scenario, terrain: Terrain) -> tuple[Solid, ...]:
     """What stands in the scenario's world beside the trees, one kind after the other."""
-    del scenario, terrain
-    return ()
+    return (*starting_blocks(scenario, terrain),)  # last: they can change, others keep numbers
 
 
 def build_scene(

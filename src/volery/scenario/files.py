@@ -6,6 +6,9 @@ from pathlib import Path
 
 from volery.core.errors import DataFileError
 
+SHIPPED_DATA = Path(__file__).resolve().parent.parent / "world" / "data"
+"""Where the data files lie that come with Volery."""
+
 
 def resolve(name: str, folder: Path | None, shipped: Path) -> Path:
     """Path of `name`: beside the scenario, from the working folder, else among the shipped data.

@@ -25,6 +25,7 @@ from volery.scenario.base import (
 )
 from volery.scenario.camera import CameraSensor, Daylight
 from volery.scenario.faults import Fault
+from volery.scenario.grid_map import GridMapWorld
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
 from volery.scenario.wind import Wind
 
@@ -86,6 +87,7 @@ class World(Data):
     """Seed of the trees alone; None: the scenario's seed grows them too."""
     terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
     forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
+    grid_map: GridMapWorld | None = None
     wind: Wind = Wind()
     light: Daylight = Daylight()
     origin: Origin = Origin()

@@ -176,10 +176,13 @@ def _interval(model: LidarModel, batch: LidarBatch, history: PoseHistory) -> tup
 
 
 def move_bodies(scene: Scene, history: PoseHistory, start: int, end: int) -> int:
-    """Let the bodies move through the interval; how many there are."""
-    bodies = len(scene.handle.bodies.scene)
-    if bodies:
-        poses = np.empty((2, bodies, 3)), np.empty((2, bodies, 4))
+    """Let UAVs and things move through the interval; how many bodies there are."""
+    table = scene.handle.bodies
+    bodies = len(table.scene)
+    uavs = bodies - table.things
+    scene.move_things(start, end)
+    if uavs:
+        poses = np.empty((2, uavs, 3)), np.empty((2, uavs, 4))
         for i, time_ns in enumerate((start, end)):
             poses_at(history, time_ns, poses[0][i], poses[1][i])
         scene.move_bodies(poses[0][0], poses[1][0], poses[0][1], poses[1][1])

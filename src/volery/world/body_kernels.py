@@ -1,4 +1,4 @@
-"""Compiled ray casting at the UAVs' bodies, which move while rays are cast.
+"""Compiled ray casting at bodies that move while rays are cast: UAVs, then things.
 
 Bodies are few and move at every step, so they have no search tree over them: a packet is tested
 against each body's bounding sphere and, where it may touch, turned into the body's frame and cast
@@ -79,9 +79,11 @@ def near_bodies(
     uav: whose rays they are, -1 for rays of nobody or of several.
     """
     count = 0
+    uavs = bodies.scene.shape[0] - bodies.things
     first = 0 if uav < 0 else uav - uav % bodies.crew
-    last = bodies.scene.shape[0] if uav < 0 else first + bodies.crew
-    for i in range(first, last):
+    crew = uavs if uav < 0 else bodies.crew
+    for n in range(crew + bodies.things):
+        i = first + n if n < crew else uavs + n - crew
         if i == uav:
             continue
         squared = 0.0
@@ -135,8 +137,10 @@ def _rotation(
 
 @inner_kernel
 def _sees(bodies: BodyTable, uav: int, row: int) -> bool:
-    """Whether rays of `uav` (-1: of nobody) may meet the body of UAV `row`."""
-    return bool(uav < 0 or (uav != row and uav // bodies.crew == row // bodies.crew))
+    """Whether rays of `uav` (-1: of nobody) may meet body `row`."""
+    is_thing = row >= bodies.scene.shape[0] - bodies.things
+    own_copy = uav // bodies.crew == row // bodies.crew
+    return bool(uav < 0 or is_thing or (uav != row and own_copy))
 
 
 @inner_kernel

@@ -113,6 +113,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "rtcSetGeometryTransform": (None, (_P, _UINT, _INT, _P)),
     "rtcCommitGeometry": (None, (_P,)),
     "rtcAttachGeometryByID": (None, (_P, _P, _UINT)),
+    "rtcDetachGeometry": (None, (_P, _UINT)),
 }
 _SIGNATURES[_INTERSECT] = (None, (_P, _P, _P, _P))
 _CALLED_FROM_KERNELS = (_INTERSECT, _OCCLUDED, "rtcPointQuery")
@@ -266,6 +267,14 @@ class Device:
         for scene in scenes:
             self._library.rtcAttachGeometryByID(scene, geometry, number)
         self._library.rtcReleaseGeometry(geometry)  # the scene holds it now
+
+    def detach_mesh(self, scenes: Sequence[int], number: int, mesh: PaddedMesh) -> None:
+        """Take geometry `number`, which shows `mesh`, out of each of `scenes`, and let it go."""
+        for scene in scenes:
+            self._library.rtcDetachGeometry(scene, number)
+        self.check(f"taking mesh {number} out of a scene")
+        own = mesh.vertices, mesh.triangles
+        self._buffers = [b for b in self._buffers if not any(b is array for array in own)]
 
     def commit(self, scene: int) -> None:
         """Build the scene's search tree; it can be cast at from now on."""

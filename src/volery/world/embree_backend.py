@@ -11,7 +11,7 @@ from volery.core.workers import Workers, new_counter
 from volery.world import embree
 from volery.world.point_query import callback_address, nearest_points, new_query_memory
 from volery.world.scene_content import BodyShape, SceneContent
-from volery.world.scene_kernels import CHUNK, cast_rays, find_occluded
+from volery.world.scene_kernels import CHUNK, cast_rays, find_enclosing, find_occluded
 from volery.world.scene_memory import BodyTable, SceneHandle, thread_block
 
 FEW_RAYS = 5000
@@ -37,7 +37,7 @@ class EmbreeBackend:
         # Robust: no ray slips between two triangles of the ground, not even straight down at a grid
         # point. Trees do without, for speed: an edge of theirs meets a ray only by chance.
         self._static = device.new_scene(flags=embree.SCENE_ROBUST)
-        self._obstacles = device.new_scene()  # the same without the ground
+        self._obstacles = device.new_scene(flags=embree.SCENE_ROBUST)  # without the ground
         models = []
         for first in content.tree_parts:
             model = device.new_scene()
@@ -56,12 +56,29 @@ class EmbreeBackend:
             [models[i] for i in content.tree_model],
             content.tree_transforms,
         )
-        for number in range(1 + content.trees, content.instances):
-            part = content.parts[content.table.first_part[number]]
+        self._attach_solids(1 + content.trees)
+
+    def replace_solids(self, content: SceneContent, first: int) -> None:
+        """Go on with `content`, whose instances differ from `first` on, all of them solids.
+
+        The ground, the trees and the solids before `first` stay as they are.
+        """
+        both = [self._static, self._obstacles]
+        for number in range(first, self._content.instances):
+            part = self._content.solid_part(number)
             if len(part.triangles):
-                device.attach_mesh(both, number, part)
+                self._device.detach_mesh(both, number, part)
+        self._content = content
+        self._attach_solids(first)
+
+    def _attach_solids(self, first: int) -> None:
+        both = [self._static, self._obstacles]
+        for number in range(first, self._content.instances):
+            part = self._content.solid_part(number)
+            if len(part.triangles):
+                self._device.attach_mesh(both, number, part)
         for scene in both:
-            device.commit(scene)
+            self._device.commit(scene)
 
     def handle(self, bodies: BodyTable) -> SceneHandle:
         """What kernels need, with these bodies."""
@@ -137,6 +154,10 @@ class EmbreeBackend:
         scene = self._static if include_terrain else self._obstacles
         table, memory = self._content.table, new_query_memory()
         nearest_points(scene, callback_address(), table, points, reach, memory, *out)
+
+    def enclosing(self, points: NDArray[np.float64], out: NDArray[np.int32]) -> None:
+        """Fill `out` with the closed solid that each point lies in, -1 for none."""
+        find_enclosing(self._obstacles, points, thread_block(embree.LANES, 0), out)
 
     def close(self) -> None:
         """Give all handles back."""

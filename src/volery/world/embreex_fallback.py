@@ -21,6 +21,7 @@ from volery.world.scene_content import BodyShape, SceneContent
 from volery.world.scene_memory import BodyTable, SceneHandle
 
 _SHORT_OF_TARGET_M = 1e-4
+_FAR_M = 1e6
 
 
 class FlatScene:
@@ -61,6 +62,14 @@ class EmbreexBackend:
     """The same queries as `EmbreeBackend` through embreex's public call."""
 
     def __init__(self, content: SceneContent) -> None:
+        self._shapes: list[FlatScene] = []
+        self._flatten(content)
+
+    def replace_solids(self, content: SceneContent, first: int) -> None:  # noqa: ARG002
+        """Go on with `content`; everything is flattened anew."""
+        self._flatten(content)
+
+    def _flatten(self, content: SceneContent) -> None:
         self._content = content
         self._blocks: list[tuple[int, int]] = []  # (instance, part) of each flattened mesh
         table = content.table
@@ -72,7 +81,7 @@ class EmbreexBackend:
                 flat.append(Mesh(part.vertices[:-1], part.triangles).transformed(matrix))
                 self._blocks.append((instance, k))
         self._flat = FlatScene(flat)
-        self._shapes: list[FlatScene] = []
+        self._solids = FlatScene(flat[len(flat) - content.solids :])
 
     def handle(self, bodies: BodyTable) -> SceneHandle:
         """Tables as the main backend's, without an Embree scene: kernels cannot cast here."""
@@ -109,9 +118,11 @@ class EmbreexBackend:
         instance[hit] = blocks[:, 0]
         material[hit] = handle.material[blocks[:, 0], blocks[:, 1]]
         bodies = handle.bodies
+        uavs = len(bodies.scene) - bodies.things
         for row in range(len(bodies.scene)):
             own_copy = exclude // bodies.crew == row // bodies.crew
-            sees = np.broadcast_to((exclude < 0) | ((exclude != row) & own_copy), len(origins))
+            seen = (exclude < 0) | ((exclude != row) & own_copy) | (row >= uavs)
+            sees = np.broadcast_to(seen, len(origins))
             rows, o, d, turn = _in_body(bodies, row, sees, origins, directions, fraction, distance)
             hit, t, n, block = self._shapes[bodies.scene[row]].cast(o, d, distance[rows])
             rows = rows[hit]
@@ -158,6 +169,14 @@ class EmbreexBackend:
     ) -> None:
         """Fill distance, nearest, instance."""
         nearest_in_all(self._content.table, 0 if include_terrain else 1, points, reach, *out)
+
+    def enclosing(self, points: NDArray[np.float64], out: NDArray[np.int32]) -> None:
+        """Fill `out` with the closed solid that each point lies in, -1 for none."""
+        up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+        hit, _, normal, solid = self._solids.cast(points, up, np.full(len(points), _FAR_M))
+        out.fill(-1)
+        first = self._content.instances - self._content.solids
+        out[hit] = np.where(normal[:, 2] > 0.0, first + solid, -1)
 
     def close(self) -> None:
         """Forget the scenes."""

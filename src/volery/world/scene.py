@@ -1,13 +1,15 @@
 """The scene: everything a ray can hit, and the questions one can ask of it.
 
 Instances are numbered: -1 nothing, 0 the terrain, 1..T the trees in forest order, then the solids,
-then, from `moving_offset`, one moving body a UAV. Rays are cast by Embree (`embree_backend`), or,
-where its library cannot be used, through embreex's public call (`embreex_fallback`).
+then, from `moving_offset`, one moving body a UAV, then the things that move by themselves. Rays are
+cast by Embree (`embree_backend`), or, where its library cannot be used, through embreex's public
+call (`embreex_fallback`).
 """
 
 from __future__ import annotations
 
 import copy
+import itertools
 import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -19,9 +21,9 @@ from volery.core.workers import Workers
 from volery.world.embree import EmbreeUnavailableError
 from volery.world.embree_backend import EmbreeBackend
 from volery.world.embreex_fallback import EmbreexBackend
-from volery.world.materials import Material
-from volery.world.scene_content import BodyShape, SceneContent, Solid, collect
-from volery.world.scene_memory import BodyTable, SceneHandle
+from volery.world.moving_bodies import NO_ROWS, ThingsThatMove, body_rows, body_table
+from volery.world.scene_content import BodyShape, SceneContent, Solid, collect, with_solids
+from volery.world.scene_memory import SceneHandle
 from volery.world.terrain import Terrain
 from volery.world.trees.model import DetailLevel
 
@@ -50,26 +52,15 @@ class Clearance(NamedTuple):
     """Nearest surface points to P points."""
 
     distance: NDArray[np.float64]
-    """(P,) m; the reach where nothing is nearer."""
+    """(P,) m; the reach where nothing is nearer. Inside of a closed solid it is below zero."""
     nearest: NDArray[np.float64]
     """(P, 3) m, map; the point itself where nothing is nearer."""
     instance: NDArray[np.int32]
-    """(P,) -1 where nothing is nearer."""
-
-
-def _no_bodies() -> BodyTable:
-    return BodyTable(
-        scene=np.zeros(0, dtype=np.int64),
-        radius=np.zeros(0),
-        material=np.zeros((0, 1), dtype=np.uint8),
-        start=np.zeros((0, 7)),
-        end=np.zeros((0, 7)),
-        crew=1,
-    )
+    """(P,) -1 where nothing is nearer; inside of a closed solid that one."""
 
 
 class Scene:
-    """Static world plus moving UAV bodies.
+    """Static world, whose solids can be replaced, plus the moving bodies of UAVs and things.
 
     backend: "embree" (an error where it is unavailable), "embreex" (the plain fallback) or "auto"
     (the first if possible, else the second with a warning). `threads` share batches above 5,000
@@ -90,7 +81,10 @@ class Scene:
         self.solids = tuple(solids)
         self._content = collect(terrain, forest, detail, self.solids)
         self.backend: EmbreeBackend | EmbreexBackend = _make_backend(self._content, backend)
-        self._bodies = _no_bodies()
+        self.things: ThingsThatMove | None = None
+        """What moves by itself and is seen by all."""
+        self._uav_rows, self._thing_rows, self._crew = NO_ROWS, NO_ROWS, 1
+        self._bodies = body_table(NO_ROWS, NO_ROWS, 1)
         self._is_twin = False
 
     @property
@@ -109,13 +103,14 @@ class Scene:
         return self.backend.handle(self._bodies)
 
     def twin(self) -> Scene:
-        """The same static world with moving bodies of its own, for another thread.
+        """The same static world and things with UAVs of its own, for another thread.
 
         It lives as long as this scene, and casts on the thread that asks.
         """
         twin = copy.copy(self)
         twin.workers = Workers(1)
-        twin._bodies = _no_bodies()
+        twin._uav_rows = NO_ROWS
+        twin._bodies = body_table(NO_ROWS, self._thing_rows, 1)
         twin._is_twin = True
         return twin
 
@@ -125,8 +120,24 @@ class Scene:
         if not self._is_twin:
             self.backend.close()
 
+    def replace_solids(self, solids: Sequence[Solid]) -> int:
+        """Let `solids` stand in the place of those that stood so far, between two questions.
+
+        Solids at the beginning that are the same objects as before are not touched, nor are ground
+        and trees. Returns the instance number from which on instances are others than before.
+        """
+        if self._is_twin:
+            raise ValueError("a twin shows the static world of its scene, which alone can change")
+        pairs = zip(self.solids, solids, strict=False)
+        kept = sum(1 for _ in itertools.takewhile(lambda pair: pair[0] is pair[1], pairs))
+        first = 1 + self._content.trees + kept
+        self._content = with_solids(self._content, kept, solids[kept:])
+        self.solids = tuple(solids)
+        self.backend.replace_solids(self._content, first)
+        return first
+
     def instance_name(self, instance: int) -> str:
-        """What an instance number stands for: "ground", "tree 17", a solid's name, "uav3"."""
+        """What a number stands for: "ground", "tree 17", a solid's or thing's name, "uav3"."""
         if instance < 0:
             return "nothing"
         if instance == 0:
@@ -135,12 +146,15 @@ class Scene:
             return f"tree {instance}"
         if instance < self.moving_offset:
             return self.solids[instance - 1 - self._content.trees].name
-        return f"uav{instance - self.moving_offset + 1}"
+        row, uavs = instance - self.moving_offset, len(self._uav_rows.scene)
+        if self.things is not None and row >= uavs:
+            return self.things.names[row - uavs]
+        return f"uav{row + 1}"
 
     def set_bodies(
         self, shapes: Sequence[BodyShape], shape_index: ArrayLike, *, copies: int = 1
     ) -> None:
-        """Make one moving body for each entry of `shape_index` (N,); place them with move_bodies.
+        """Make one UAV's body for each entry of `shape_index` (N,); place them with move_bodies.
 
         Until then they are far below the map. `copies`: of how many independent copies of a
         scenario they are, one copy after the other; a UAV's rays see its own copy alone.
@@ -148,20 +162,16 @@ class Scene:
         index = np.asarray(shape_index, dtype=np.int64).reshape(-1)
         if index.size and (index.min() < 0 or index.max() >= len(shapes)):
             raise ValueError(f"shape_index must be in 0..{len(shapes) - 1}")
-        parts = max((len(shape.parts) for shape in shapes), default=1)
-        materials = np.zeros((len(shapes), parts), dtype=np.uint8)
-        for i, shape in enumerate(shapes):
-            for k, (_, material) in enumerate(shape.parts):
-                materials[i, k] = Material(material)
-        pose = np.tile([0.0, 0.0, -1e6, 0.0, 0.0, 0.0, 1.0], (len(index), 1))
-        self._bodies = BodyTable(
-            scene=self.backend.shape_scenes(shapes)[index],
-            radius=np.array([shape.radius for shape in shapes])[index],
-            material=np.ascontiguousarray(materials[index]),
-            start=pose,
-            end=pose.copy(),
-            crew=max(len(index) // copies, 1),
-        )
+        self._uav_rows = body_rows(shapes, index, self.backend.shape_scenes(shapes))
+        self._crew = max(len(index) // copies, 1)
+        self._bodies = body_table(self._uav_rows, self._thing_rows, self._crew)
+
+    def set_things(self, things: ThingsThatMove) -> None:
+        """Let `things` be seen by all; `move_things` places them."""
+        scenes = self.backend.shape_scenes(things.shapes)
+        self.things = things
+        self._thing_rows = body_rows(things.shapes, np.arange(len(scenes)), scenes)
+        self._bodies = body_table(self._uav_rows, self._thing_rows, self._crew)
 
     def move_bodies(
         self,
@@ -170,16 +180,26 @@ class Scene:
         end_position: ArrayLike | None = None,
         end_attitude: ArrayLike | None = None,
     ) -> None:
-        """Place the bodies: position (N, 3) m, attitude (N, 4) map from body.
+        """Place the UAVs' bodies: position (N, 3) m, attitude (N, 4) map from body.
 
         With a second pose the bodies move from the first to it, and a ray sees them at its own
         fraction of that interval.
         """
-        bodies = self._bodies
-        bodies.start[:, :3] = position
-        bodies.start[:, 3:] = attitude
-        bodies.end[:, :3] = position if end_position is None else end_position
-        bodies.end[:, 3:] = attitude if end_attitude is None else end_attitude
+        start, end = (table[: len(self._uav_rows.scene)] for table in self._poses)
+        start[:, :3] = position
+        start[:, 3:] = attitude
+        end[:, :3] = position if end_position is None else end_position
+        end[:, 3:] = attitude if end_attitude is None else end_attitude
+
+    def move_things(self, start_ns: int, end_ns: int) -> None:
+        """Place the things where they are at two simulated times, as `move_bodies` does UAVs."""
+        if self.things is not None:
+            for table, time_ns in zip(self._poses, (start_ns, end_ns), strict=True):
+                table[len(self._uav_rows.scene) :] = self.things.poses_at(time_ns)
+
+    @property
+    def _poses(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return self._bodies.start, self._bodies.end
 
     def cast(
         self,
@@ -236,7 +256,10 @@ class Scene:
     def clearance(
         self, points: ArrayLike, reach_m: float, include_terrain: bool = True
     ) -> Clearance:
-        """Nearest point of the static world (trees, solids, ground) to points (P, 3), m, map."""
+        """Nearest point of the static world (trees, solids, ground) to points (P, 3), m, map.
+
+        What is meant by inside of a solid, `Solid` says.
+        """
         p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         if not np.isfinite(p).all():
             raise ValueError("points must be finite")
@@ -246,6 +269,12 @@ class Scene:
             np.empty(len(p)), np.empty((len(p), 3)), np.empty(len(p), dtype=np.int32)
         )
         self.backend.clearance(p, float(reach_m), include_terrain, result)
+        if self.solids:
+            enclosing = np.empty(len(p), dtype=np.int32)
+            self.backend.enclosing(p, enclosing)
+            inside = enclosing >= 0
+            result.distance[inside] *= -1.0
+            result.instance[inside] = enclosing[inside]
         return result
 
 

@@ -7,7 +7,7 @@ or more parts; a part is a mesh with a material, shared by all instances of a tr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,7 +28,11 @@ _MOST_PARTS = 2
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A fixed thing in the map: a wall, a test cylinder; its mesh is in map coordinates."""
+    """A fixed thing in the map: a wall, a building; its mesh is in map coordinates.
+
+    What lies below an upper side of the mesh, seen from its back, counts as inside the solid: a
+    mesh is closed but for its underside, or has no upper side at all.
+    """
 
     mesh: Mesh
     material: Material
@@ -81,6 +85,10 @@ class SceneContent:
         """Number of static instances, the terrain's number counted even where there is none."""
         return 1 + self.trees + self.solids
 
+    def solid_part(self, instance: int) -> PaddedMesh:
+        """Mesh of a solid, by its instance number."""
+        return self.parts[int(self.table.first_part[instance])]
+
 
 def _part_bounds(part: PaddedMesh) -> NDArray[np.float64]:
     vertices = part.vertices[:-1]
@@ -107,6 +115,59 @@ def collect(
     terrain: Terrain | None, forest: Forest | None, detail: DetailLevel, solids: Sequence[Solid]
 ) -> SceneContent:
     """Tables of a world at one level of detail."""
+    return with_solids(_collect_land(terrain, forest, detail), 0, solids)
+
+
+def with_solids(content: SceneContent, kept: int, solids: Sequence[Solid]) -> SceneContent:
+    """`content` with `solids` in the place of its own solids after the first `kept`.
+
+    Meshes that stay lie where they lay in memory.
+    """
+    first, old = content.instances - content.solids + kept, content.table
+    staying = content.parts[: len(content.parts) - content.solids + kept]
+    new = tuple(padded(solid.mesh) for solid in solids)
+    count = len(solids)
+    transform = np.tile(np.eye(3, 4), (count, 1, 1))
+    upright = np.tile(np.eye(3, dtype=np.float32).reshape(1, 9), (count, 1))
+    boxes = np.array([_part_bounds(part) for part in new]).reshape(-1, 2, 3)
+    material = np.zeros((count, _MOST_PARTS), dtype=np.uint8)
+    material[:, 0] = [solid.material for solid in solids]
+    bounds = _instance_bounds(boxes[:, 0], boxes[:, 1], transform)
+    vertices, triangles, length = _memory_of(new)
+    places = len(staying) + np.arange(count)
+    return replace(
+        content,
+        parts=(*staying, *new),
+        table=TriangleTable(
+            vertices=np.concatenate([old.vertices[: len(staying)], vertices]),
+            triangles=np.concatenate([old.triangles[: len(staying)], triangles]),
+            length=np.concatenate([old.length[: len(staying)], length]),
+            first_part=np.concatenate([old.first_part[:first], places]),
+            part_count=np.concatenate([old.part_count[:first], np.ones(count, dtype=np.int64)]),
+            transform=np.concatenate([old.transform[:first], transform.reshape(count, 12)]),
+            bounds=np.concatenate([old.bounds[:first], bounds]),
+        ),
+        material=np.concatenate([content.material[:first], material]),
+        normal_matrix=np.concatenate([content.normal_matrix[:first], upright]),
+        solids=kept + count,
+    )
+
+
+def _memory_of(
+    parts: Sequence[PaddedMesh],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Where the parts' vertices and triangles lie in memory, and how many triangles they have."""
+    return (
+        np.array([p.vertices.ctypes.data for p in parts], dtype=np.int64),
+        np.array([p.triangles.ctypes.data for p in parts], dtype=np.int64),
+        np.array([len(p.triangles) for p in parts], dtype=np.int64),
+    )
+
+
+def _collect_land(
+    terrain: Terrain | None, forest: Forest | None, detail: DetailLevel
+) -> SceneContent:
+    """Tables of ground and trees alone."""
     models = forest.models if forest is not None else ()
     trees = len(forest.model_index) if forest is not None else 0
     meshes: list[Mesh] = []
@@ -117,11 +178,10 @@ def collect(
         tree_parts[i] = len(meshes)
         level = model.levels[detail]
         meshes.extend((level.wood, level.leaves))
-    solid_part = len(meshes)
-    meshes.extend(solid.mesh for solid in solids)
     parts = tuple(padded(mesh) for mesh in meshes)
+    vertices, triangles, length = _memory_of(parts)
 
-    count = 1 + trees + len(solids)
+    count = 1 + trees
     transforms = np.broadcast_to(np.eye(3, 4), (count, 3, 4)).copy()
     first = np.zeros(count, dtype=np.int64)
     parts_of = np.ones(count, dtype=np.int64)
@@ -133,13 +193,10 @@ def collect(
     if forest is not None:
         tree_transforms = np.ascontiguousarray(forest.tree_transforms(), dtype=np.float32)
         model_index = np.asarray(forest.model_index, dtype=np.int32)
-        transforms[1 : 1 + trees] = tree_transforms
-        first[1 : 1 + trees] = tree_parts[model_index]
-        parts_of[1 : 1 + trees] = 2
-        material[1 : 1 + trees] = (Material.WOOD, Material.LEAF)
-    first[1 + trees :] = solid_part + np.arange(len(solids))
-    for i, solid in enumerate(solids):
-        material[1 + trees + i] = solid.material
+        transforms[1:] = tree_transforms
+        first[1:] = tree_parts[model_index]
+        parts_of[1:] = 2
+        material[1:] = (Material.WOOD, Material.LEAF)
 
     boxes = np.array([_part_bounds(part) for part in parts]).reshape(-1, 2, 3)
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
@@ -151,9 +208,9 @@ def collect(
     return SceneContent(
         parts=parts,
         table=TriangleTable(
-            vertices=np.array([p.vertices.ctypes.data for p in parts], dtype=np.int64),
-            triangles=np.array([p.triangles.ctypes.data for p in parts], dtype=np.int64),
-            length=np.array([len(p.triangles) for p in parts], dtype=np.int64),
+            vertices=vertices,
+            triangles=triangles,
+            length=length,
             first_part=first,
             part_count=parts_of,
             transform=transforms.reshape(count, 12),
@@ -167,5 +224,5 @@ def collect(
         tree_model=model_index,
         tree_transforms=tree_transforms,
         has_terrain=terrain is not None,
-        solids=len(solids),
+        solids=0,
     )

@@ -1,4 +1,4 @@
-"""Compiled ray casting over a scene: static Embree scene first, then the UAVs' bodies."""
+"""Compiled ray casting over a scene: static Embree scene first, then the moving bodies."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ __all__ = [
     "SceneHandle",
     "cast_block",
     "cast_rays",
+    "find_enclosing",
     "find_occluded",
     "near_bodies",
     "new_block",
@@ -50,6 +51,8 @@ Embree's coherent traversal sorts rays by the signs of their directions, but tak
 a component below 1e-18 as positive: one beam at -90 degrees, whose cosine is a rounding error, then
 makes its neighbours miss.
 """
+_MOST_PASSED = 64
+"""Surfaces of trees through which a look upwards goes."""
 _SHORT_OF_TARGET_M = 1e-4
 """`occluded` looks this much less far than the target, so that the target's surface is no cover."""
 
@@ -282,3 +285,37 @@ def find_occluded(
                 hide_behind_body(scene, block, p, lanes, block.near[n])
             for k in range(lanes):
                 occluded[first + p * LANES + k] = rays[FAR, k] < 0.0
+
+
+@kernel
+def find_enclosing(
+    obstacles: int,
+    points: NDArray[np.float64],
+    block: RayBlock,
+    enclosing: NDArray[np.int32],
+) -> None:
+    """Which closed solid each point (P, 3) m lies in, -1 for none.
+
+    Straight up from inside, the first surface of a solid is met from its back; trees, which are
+    instances in the Embree scene `obstacles`, are passed.
+    """
+    rays, words, valid = block.rays, block.words, block.valid
+    for k in range(LANES):
+        valid[k] = -1 if k == 0 else 0
+    for i in range(points.shape[0]):
+        enclosing[i] = -1
+        for j in range(3):
+            rays[0, ORIGIN + j, 0] = points[i, j]
+            rays[0, DIRECTION + j, 0] = np.float32(1.0) if j == 2 else np.float32(0.0)
+        for _ in range(_MOST_PASSED):
+            rays[0, FAR, 0] = np.float32(np.inf)
+            words[0, GEOMETRY, 0] = _INVALID
+            words[0, INSTANCE, 0] = _INVALID
+            intersect_packet(valid.ctypes.data, obstacles, rays.ctypes.data, 0)
+            if words[0, GEOMETRY, 0] == _INVALID:
+                break
+            if words[0, INSTANCE, 0] == _INVALID:
+                if rays[0, NORMAL + 2, 0] > np.float32(0.0):
+                    enclosing[i] = words[0, GEOMETRY, 0]
+                break
+            rays[0, ORIGIN + 2, 0] += rays[0, FAR, 0] + np.float32(_SHORT_OF_TARGET_M)

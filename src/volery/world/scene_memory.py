@@ -17,7 +17,7 @@ _KEPT_BLOCKS = 8
 
 
 class BodyTable(NamedTuple):
-    """The moving bodies, one row a UAV."""
+    """The moving bodies, one row a UAV, then one a thing that moves by itself."""
 
     scene: NDArray[np.int64]
     """(N,) Embree scene of the shape, in the body frame."""
@@ -31,6 +31,8 @@ class BodyTable(NamedTuple):
     """(N, 7) the same at fraction 1: the newest pose."""
     crew: int
     """UAVs of one copy of a scenario: a UAV's rays see the others of its own copy alone."""
+    things: int
+    """How many of the last rows are things: people, vehicles, birds. Everybody sees them."""
 
 
 class SceneHandle(NamedTuple):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from volery.runtime.services.air_and_faults import offer_air_and_faults
 from volery.runtime.services.entities import Entities
 from volery.runtime.services.features import offer_features
+from volery.runtime.services.grid_maps import offer_grid_maps
 from volery.runtime.services.kept_states import KeptStates
 from volery.runtime.services.named_poses import offer_named_poses
 from volery.runtime.services.playing import Playing
@@ -48,6 +49,9 @@ def open_services(
     offer_worlds(simulation, on_load)
     offer_named_poses(graph, simulation.starts)
     offer_air_and_faults(simulation)
+    if simulation.scenario.world.grid_map is not None:
+        settings = simulation.scenario.world.grid_map
+        offer_grid_maps(graph, simulation.grid_world, settings, lambda: simulation.time_ns)
     KeptStates(simulation).offer()
     recording = Recording(graph, recordings)
     recording.offer()

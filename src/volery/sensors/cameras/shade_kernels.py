@@ -74,7 +74,7 @@ def shading_bodies(
     count: int,
     near: NDArray[np.int32],
 ) -> int:
-    """List the other UAVs whose shadows may fall on the hits; their number.
+    """List the other bodies whose shadows may fall on the hits; their number.
 
     Each is a sphere that moves away from the sun, the hits are a ball.
     """
@@ -84,9 +84,10 @@ def shading_bodies(
         return 0
     cx, cy, cz = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
     ball = np.sqrt((high[0] - cx) ** 2 + (high[1] - cy) ** 2 + (high[2] - cz) ** 2)
-    first = uav - uav % bodies.crew
+    first, uavs = uav - uav % bodies.crew, bodies.scene.shape[0] - bodies.things
     found = 0
-    for row in range(first, first + bodies.crew):
+    for n in range(bodies.crew + bodies.things):
+        row = first + n if n < bodies.crew else uavs + n - bodies.crew
         x, y, z, radius = body_sphere(bodies, row)
         dx, dy, dz = x - cx, y - cy, z - cz
         along = dx * light.sun[0] + dy * light.sun[1] + dz * light.sun[2]

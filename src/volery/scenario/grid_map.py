@@ -1,0 +1,67 @@
+"""Scenario data of grid maps: matrices of 0 and 1 whose cells become blocks."""
+
+from __future__ import annotations
+
+from pathlib import PurePosixPath
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from volery.scenario.base import Data, Vector2
+
+MapName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
+Side = Annotated[float, Field(ge=0.001, le=1000.0)]
+
+
+class GridMapFile(Data):
+    """A map in a file: .csv, .txt (0 and 1), .png (dark is blocked) or .map (movingai.com)."""
+
+    file: str
+    name: MapName | None = None
+    """What it is called; None: the file's name without its suffix."""
+    threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
+    """Darkness above which a pixel is blocked, from 0 (white) to 1 (black)."""
+
+    @model_validator(mode="after")
+    def _has_a_name(self) -> Self:
+        if not self.called:
+            raise ValueError("name is needed where the file's name has no letter to begin with")
+        return self
+
+    @property
+    def called(self) -> str:
+        """Its name."""
+        return self.name if self.name is not None else PurePosixPath(self.file).stem
+
+
+class GridMapWorld(Data):
+    """Maps to choose from, and how large the world is that is made of one."""
+
+    maps: tuple[GridMapFile, ...] = ()
+    """None: there are no blocks until a map comes over the graph."""
+    map: str | None = None
+    """The one at the start; None: the first."""
+    cell_size_m: Side = 1.0
+    block_height_m: Side = 5.0
+    origin_m: Vector2 = (0.0, 0.0)
+    """Lower left corner of a file's map."""
+    unknown_is_blocked: bool = False
+    """Whether cells of a `nav_msgs/OccupancyGrid` that are unknown (-1) become blocks."""
+
+    @model_validator(mode="after")
+    def _names_are_known(self) -> Self:
+        names = [each.called for each in self.maps]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"names of maps must differ; used twice: {', '.join(twice)}")
+        if self.map is not None and self.map not in names:
+            known = ", ".join(names) or "none"
+            raise ValueError(f"map '{self.map}' is not among the maps; known: {known}")
+        return self
+
+    @property
+    def starting(self) -> str | None:
+        """Name of the map at the start, None without maps."""
+        if self.map is None and self.maps:
+            return self.maps[0].called
+        return self.map

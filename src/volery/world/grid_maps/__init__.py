@@ -1,0 +1,9 @@
+"""Worlds from 0/1 matrices: grid maps, their files, and the blocks that they become."""
+
+from __future__ import annotations
+
+from volery.world.grid_maps.blocks import block_mesh
+from volery.world.grid_maps.grid_map import GridMap
+from volery.world.grid_maps.reading import read_cells
+
+__all__ = ["GridMap", "block_mesh", "read_cells"]

@@ -1,0 +1,78 @@
+"""Grid maps as text: a matrix of 0 (free) and 1 (blocked), a row a line."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.errors import DataFileError
+from volery.world.grid_maps.grid_map import MOST_CELLS
+
+_ZERO, _ONE, _COMMA = (ord(character) for character in "01,")
+_SHOWN = 20
+"""Characters of what was found that an error shows."""
+
+
+def parse_matrix(data: bytes, where: str) -> NDArray[np.bool_]:
+    """Blocked cells (rows, columns), row 0: the first line.
+
+    Entries are separated by commas, semicolons or blanks. Empty lines are passed over. Raises
+    `DataFileError` naming line and column.
+    """
+    rows: list[NDArray[np.bool_]] = []
+    cells = 0
+    for number, line in enumerate(_text(data, where).splitlines(), 1):
+        if not line.strip():
+            continue
+        row = _row(line, f"{where}, line {number}")
+        if rows and len(row) != len(rows[0]):
+            raise DataFileError(
+                f"{where}, line {number} has {len(row)} entries; the lines before it {len(rows[0])}"
+            )
+        cells += len(row)
+        if cells > MOST_CELLS:
+            raise DataFileError(f"{where}: more than {MOST_CELLS} entries")
+        rows.append(row)
+    if not rows:
+        raise DataFileError(f"{where}: there is no row in it; a matrix of 0 and 1 is needed")
+    return np.stack(rows)
+
+
+def _text(data: bytes, where: str) -> str:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise DataFileError(
+            f"{where}, line {line}: not text in UTF-8 (byte {data[error.start]:#04x})"
+        ) from None
+
+
+def _row(line: str, where: str) -> NDArray[np.bool_]:
+    """Entries of a line: at once where it is written as most are, else one by one."""
+    compact = line.replace(" ", "") if "," in line else line
+    if compact.isascii():
+        codes = np.frombuffer(compact.encode(), dtype=np.uint8)
+        entries, between = codes[0::2], codes[1::2]
+        plain = ((entries == _ZERO) | (entries == _ONE)).all() and (between == _COMMA).all()
+        if plain and len(entries) > len(between):
+            return np.asarray(entries == _ONE)
+    if "," in line or ";" in line:
+        words = line.replace(";", ",").split(",")
+        if not words[-1].strip():  # a separator ends the line
+            words.pop()
+    else:
+        words = line.split()
+    return np.array([_entry(word, where, k) for k, word in enumerate(words, 1)], dtype=np.bool_)
+
+
+def _entry(word: str, where: str, column: int) -> bool:
+    try:
+        value = float(word)
+    except ValueError:
+        value = -1.0
+    if value not in (0.0, 1.0):
+        raise DataFileError(
+            f"{where}, column {column}: '{word.strip()[:_SHOWN]}'; allowed are 0 and 1"
+        )
+    return value == 1.0

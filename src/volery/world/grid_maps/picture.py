@@ -1,0 +1,60 @@
+"""Grid maps as PNG pictures: a pixel a cell, dark ones are blocked."""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.errors import DataFileError
+from volery.world.grid_maps.grid_map import MOST_CELLS
+
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_HEAD = struct.Struct(">8sI4sII")
+"""Signature, then length, name, width and height of the chunk that comes first."""
+_LUMA = (0.299, 0.587, 0.114)
+"""Weights of red, green and blue: ITU-R BT.601."""
+
+
+def parse_picture(data: bytes, where: str, threshold: float = 0.5) -> NDArray[np.bool_]:
+    """Blocked cells (rows, columns), row 0: the top.
+
+    Blocked is what is darker than `threshold`, from 0 (white) to 1 (black); grey, colours, a
+    palette, 1 to 16 bits. What is more than half transparent is free. Raises `DataFileError`.
+    """
+    _check_size(data, where)
+    grey, alpha = _decode(data, where)
+    return np.asarray((1.0 - grey > threshold) & (alpha >= 0.5))
+
+
+def _check_size(data: bytes, where: str) -> None:
+    """Refuse what is no picture, or a large one, before memory is taken for it."""
+    if len(data) < _HEAD.size or data[: len(_SIGNATURE)] != _SIGNATURE:
+        raise DataFileError(f"{where}: not a PNG picture")
+    _, _, name, width, height = _HEAD.unpack_from(data)
+    if name != b"IHDR" or not 0 < width * height <= MOST_CELLS:
+        raise DataFileError(
+            f"{where}: a PNG picture of {width} x {height} pixels; allowed are 1 to {MOST_CELLS}"
+        )
+
+
+def _decode(data: bytes, where: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Grey and alpha (rows, columns), 0 to 1."""
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(data), formats=["PNG"]) as picture:
+            picture.load()
+            if picture.mode.startswith("I"):  # 16 bits of grey
+                grey = np.asarray(picture, dtype=np.float32) / 65535.0
+                return grey, np.ones_like(grey)
+            colours = np.asarray(picture.convert("RGBA"))
+    except (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error) as error:
+        raise DataFileError(f"{where}: the picture is damaged: {error}") from None
+    grey = np.zeros(colours.shape[:2], dtype=np.float32)
+    for channel, weight in enumerate(_LUMA):
+        grey += np.float32(weight / 255.0) * colours[:, :, channel]
+    return grey, colours[:, :, 3].astype(np.float32) / 255.0

@@ -1,0 +1,78 @@
+"""Tables of the bodies that move through a scene: shapes, materials, room for their poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.world.materials import Material
+from volery.world.scene_content import BodyShape
+from volery.world.scene_memory import BodyTable
+
+_NOWHERE = (0.0, 0.0, -1e6, 0.0, 0.0, 0.0, 1.0)
+"""Pose of a body that was not placed yet: far below the map."""
+
+
+class ThingsThatMove(Protocol):
+    """People, vehicles, birds: a shape and a name each, and where they are at any time."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of T things."""
+
+    @property
+    def shapes(self) -> tuple[BodyShape, ...]:
+        """What each looks like."""
+
+    def poses_at(self, time_ns: int) -> NDArray[np.float64]:
+        """(T, 7) x y z qx qy qz qw, map from body, of the present or a moment just past."""
+
+
+class BodyRows(NamedTuple):
+    """What bodies look like, one row each."""
+
+    scene: NDArray[np.int64]
+    radius: NDArray[np.float64]
+    material: NDArray[np.uint8]
+
+
+NO_ROWS = BodyRows(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 1), np.uint8))
+
+
+def body_rows(
+    shapes: Sequence[BodyShape], shape_index: ArrayLike, scenes: NDArray[np.int64]
+) -> BodyRows:
+    """Rows for the entries of `shape_index` (N,); `scenes` are the shapes' Embree scenes."""
+    index = np.asarray(shape_index, dtype=np.int64).reshape(-1)
+    parts = max((len(shape.parts) for shape in shapes), default=1)
+    materials = np.zeros((len(shapes), parts), dtype=np.uint8)
+    for i, shape in enumerate(shapes):
+        for k, (_, material) in enumerate(shape.parts):
+            materials[i, k] = Material(material)
+    radius = np.array([shape.radius for shape in shapes])
+    return BodyRows(scenes[index], radius[index], materials[index])
+
+
+def body_table(uavs: BodyRows, things: BodyRows, crew: int) -> BodyTable:
+    """UAVs, `crew` of them a copy, then things, all of them nowhere yet."""
+    both = uavs, things
+    widest = max(rows.material.shape[1] for rows in both)
+    count = sum(len(rows.scene) for rows in both)
+    material = np.zeros((count, widest), dtype=np.uint8)
+    first = 0
+    for rows in both:
+        material[first : first + len(rows.scene), : rows.material.shape[1]] = rows.material
+        first += len(rows.scene)
+    start = np.tile(_NOWHERE, (count, 1))
+    return BodyTable(
+        scene=np.concatenate([rows.scene for rows in both]),
+        radius=np.concatenate([rows.radius for rows in both]),
+        material=material,
+        start=start,
+        end=start.copy(),
+        crew=crew,
+        things=len(things.scene),
+    )
