@@ -45,6 +45,8 @@ class Flight:
     waypoints: Waypoints | None = None
     following: int = 0
     """Number of the next waypoint."""
+    told: int = -1
+    """Number of the waypoint that it was last told to go to."""
     nearest_m: float = math.inf
     """Least distance from it so far, and since when it has not become less."""
     since_ns: int = 0
@@ -57,7 +59,7 @@ class Flight:
 
     def send(self, waypoints: Waypoints, now_ns: int) -> None:
         """Follow other waypoints from now on."""
-        self.waypoints, self.following = waypoints, 0
+        self.waypoints, self.following, self.told = waypoints, 0, -1
         self._begin_leg(now_ns)
 
     @property

@@ -16,7 +16,12 @@ from volery.autonomy.coverage import reports
 from volery.autonomy.coverage.cells import Cells, Mask
 from volery.autonomy.coverage.field import Field
 from volery.autonomy.coverage.flight import Flight, Phase
-from volery.autonomy.coverage.plan import CoveragePlan, plan_coverage
+from volery.autonomy.coverage.plan import (
+    NOT_TO_VISIT,
+    UNREACHABLE,
+    CoveragePlan,
+    plan_coverage,
+)
 from volery.autonomy.coverage.waypoints import Heights, route_waypoints
 from volery.core import rotations
 from volery.core.errors import PlanError
@@ -169,7 +174,8 @@ class CoveragePlanner(Node):
             self._refuse(str(error))
             return
         numbers = [self._flights.index(flight) for flight in able]
-        owner = np.where(plan.owner >= 0, np.array(numbers, np.int16)[plan.owner], plan.owner)
+        # the last two answer for the owners -2 and -1, who are no UAVs
+        owner = np.array([*numbers, NOT_TO_VISIT, UNREACHABLE], np.int16)[plan.owner]
         self._plan, self._refused = plan, ""
         ways = Cells.of(free)
         for number, flight, tours in zip(numbers, able, plan.routes, strict=True):
@@ -234,13 +240,13 @@ class CoveragePlanner(Node):
         elif flight.phase is Phase.TAKE_OFF and self._ticks % _REPEAT == 0:
             self._ask_to_take_off(number, flight)
         elif flight.phase is Phase.COVER:
-            before = flight.following
             goal = flight.goal(self._arrival_m, now)
             if goal is None:
                 flight.phase = Phase.DONE
                 self._land[number].call_async()
                 self._tell_status()
-            elif flight.following != before or self._ticks % _REPEAT == 0:
+            elif flight.following != flight.told or self._ticks % _REPEAT == 0:
+                flight.told = flight.following
                 self._goals[number].publish(reports.goal_message(goal, now))
 
     def _ask_to_take_off(self, number: int, flight: Flight) -> None:

@@ -34,6 +34,10 @@ class Tour:
     sub_cells: Ints
     turns: int
 
+    def begun_at(self, number: int) -> Tour:
+        """The same tour from its sub-cell `number` on."""
+        return Tour(np.roll(self.sub_cells, -number, axis=0), self.turns)
+
     def corners(self) -> Ints:
         """The sub-cells (K, 2) where it turns, after its first one: what a UAV must be told."""
         way = self.sub_cells

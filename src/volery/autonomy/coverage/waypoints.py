@@ -62,7 +62,9 @@ def route_waypoints(
         places.append(np.column_stack([points, np.full(len(points), height)]))
         covering.extend([covers] * len(points))
 
-    for tour in tours:
+    for each in tours:
+        away = field.sub_centres(each.sub_cells) - at
+        tour = each.begun_at(int(np.argmin(np.hypot(away[:, 0], away[:, 1]))))
         corners = field.sub_centres(np.vstack([tour.corners(), tour.sub_cells[-1:]]))
         for points, height in _transit(field, ways, heights, uav, at, corners[0]):
             add(points, height, False)
