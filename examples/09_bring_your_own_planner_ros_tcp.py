@@ -23,9 +23,7 @@ stream = link.makefile("rb")
 
 def send(destination, payload):
     name = destination.encode()
-    link.sendall(
-        struct.pack("<I", len(name)) + name + struct.pack("<I", len(payload)) + payload
-    )
+    link.sendall(struct.pack("<I", len(name)) + name + struct.pack("<I", len(payload)) + payload)
 
 
 def command(name, **fields):

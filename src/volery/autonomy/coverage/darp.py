@@ -114,7 +114,9 @@ def _iterate(
                 _hops_from(neighbours, here, part, r, True, queue, hops[0])
                 _hops_from(neighbours, here, part, r, False, queue, hops[1])
             for k in range(count):
-                noise = 1.0 + _NOISE * (2.0 * uniform(key, (iteration * robots + r) * count + k) - 1)
+                noise = 1.0 + _NOISE * (
+                    2.0 * uniform(key, (iteration * robots + r) * count + k) - 1
+                )
                 scale = factor * noise
                 if lost[r]:
                     own, other = hops[0, k], hops[1, k]

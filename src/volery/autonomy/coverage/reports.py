@@ -48,7 +48,9 @@ def covered_message(field: Field, covered: Mask, now_ns: int) -> OccupancyGrid:
 def path_message(waypoints: Waypoints, now_ns: int) -> PathMessage:
     """The waypoints of one UAV."""
     stamp = header(now_ns, "map")
-    return PathMessage(stamp, [PoseStamped(stamp, Pose(Point(*p), _LEVEL)) for p in waypoints.places])
+    return PathMessage(
+        stamp, [PoseStamped(stamp, Pose(Point(*p), _LEVEL)) for p in waypoints.places]
+    )
 
 
 def goal_message(place: NDArray[np.float64], now_ns: int) -> PoseStamped:
