@@ -6,8 +6,12 @@ from pathlib import Path
 
 import pytest
 
-NEEDS_A_RUN = {"06_fly_from_outside"}
-"""Joins a simulation that runs already: test_run_with_doors.py flies it."""
+NEEDS_A_RUN = {
+    "06_fly_from_outside",
+    "09_bring_your_own_planner",
+    "09_bring_your_own_planner_ros_tcp",
+}
+"""They join a simulation that runs already: test_run_with_doors.py flies them."""
 EXAMPLES = sorted(
     path
     for path in (Path(__file__).parents[2] / "examples").glob("*.py")

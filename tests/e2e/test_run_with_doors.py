@@ -220,6 +220,27 @@ def test_the_example_flies_a_square(run):
     assert 0.8 < width < 2.5
 
 
+@pytest.mark.parametrize("door", ["rosbridge", "ros-tcp"])
+def test_a_planner_from_outside_gets_the_map_and_sends_waypoints(door):
+    name = {"rosbridge": "", "ros-tcp": "_ros_tcp"}[door]
+    program = ROOT / f"examples/09_bring_your_own_planner{name}.py"
+    run = Run(door, scenario="plug_in", seconds=300)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-I", program, str(run.ports[0]), "3"],
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=200,
+        )
+    finally:
+        run.close()
+    assert done.returncode == 0, done.stderr
+    assert "map of 32 x 32 cells, 922 free" in done.stdout
+    assert done.stdout.count("reached row") == 3
+    assert "import volery" not in program.read_text()
+
+
 @pytest.mark.parametrize(
     ("words", "reason"),
     [

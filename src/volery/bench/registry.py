@@ -193,6 +193,20 @@ BENCHES: dict[str, Bench] = {
             apart="latency_",
         ),
         Bench(
+            "coverage",
+            "Coverage: areas and tours of the reference cases of DARP; beside an open "
+            "implementation where there is one, see [coverage.md](coverage.md#figures)",
+            {
+                f"{case}_share_of_peer": Bound(0.5, at_most=True)
+                for case in (
+                    "10x10_3_uavs",
+                    "20x20_4_uavs",
+                    "50x50_4_uavs_in_a_corner",
+                    "50x50_5_uavs",
+                )
+            },
+        ),
+        Bench(
             "peers",
             "Peers: other simulators beside Volery, in turns on one core; what each includes is "
             "told in [peers.md](peers.md)",

@@ -67,3 +67,7 @@ class PartnerError(VoleryError):
 
 class EstimatorError(VoleryError):
     """An estimator is given what it cannot use: wrong shape, unknown row, wrong order."""
+
+
+class PlanError(VoleryError):
+    """A plan is refused: a start that cannot be, a map that is too large or has nothing free."""

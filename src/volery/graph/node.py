@@ -239,7 +239,7 @@ class Node:
         except Exception as error:
             at = f"{self._now_ns() / 1e9:.3f} s"
             raise NodeError(
-                f"node {self.get_namespace()}/{self._name} failed at {at} in its {occasion}: "
+                f"node {self.full_name} failed at {at} in its {occasion}: "
                 f"{type(error).__name__}: {error}"
             ) from error
 

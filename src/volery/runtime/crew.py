@@ -17,7 +17,7 @@ from volery.graph.node import Node
 from volery.graph.publishing import GraphPublisher
 from volery.runtime.assembly import Assembly, assemble
 from volery.runtime.command_door import open_commands
-from volery.runtime.graph_building import announce_sensors, start_nodes
+from volery.runtime.graph_building import announce_sensors, start_nodes, start_system_nodes
 from volery.runtime.outlet import Outlet
 from volery.runtime.placement import Start
 from volery.runtime.sensor_fitting import Fitted
@@ -25,6 +25,10 @@ from volery.runtime.services.offering import Close
 from volery.runtime.services.uav_services import offer_uav_services
 from volery.runtime.uav import Uav
 from volery.scenario.schema import Scenario
+
+
+_ROOT = "/"
+"""Namespace of the nodes of the whole system."""
 
 
 @dataclass
@@ -55,7 +59,7 @@ class Crew:
     fitted: list[Fitted] = field(default_factory=list)
     uavs: dict[str, Uav] = field(default_factory=dict)
     nodes: list[Node] = field(default_factory=list)
-    """In fleet order."""
+    """In fleet order, then those of the whole system."""
     beginnings: dict[str, Beginning] = field(default_factory=dict)
     _closes: dict[str, list[Close]] = field(default_factory=dict)
 
@@ -80,13 +84,15 @@ class Crew:
         self._take_over(parts, new, going_on)
 
     def start_nodes(self) -> None:
-        """Start the nodes of UAVs that have none yet."""
+        """Start the nodes of UAVs that have none yet, and those of the system if they do not run."""
         served = {node.get_namespace() for node in self.nodes}
         alone = [start for start in self.starts if f"/{start.name}" not in served]
         now_ns = self._now_ns
         self.nodes += start_nodes(self.scenario, alone, self.graph, self.engine, now_ns)
+        if _ROOT not in served:
+            self.nodes += start_system_nodes(self.scenario, self.graph, self.engine, now_ns)
         order = {f"/{start.name}": row for row, start in enumerate(self.starts)}
-        self.nodes.sort(key=lambda node: order[node.get_namespace()])
+        self.nodes.sort(key=lambda node: order.get(node.get_namespace(), len(order)))
 
     def take_off(self, names: Iterable[str]) -> None:
         """Let those of the UAVs take off that do so by themselves."""

@@ -54,6 +54,18 @@ def start_nodes(
     return nodes
 
 
+def start_system_nodes(
+    scenario: Scenario, graph: Graph, engine: Engine, now_ns: Callable[[], int]
+) -> list[Node]:
+    """The nodes of the whole system, in the order of the scenario."""
+    nodes = []
+    for k, entry in enumerate(scenario.nodes):
+        context = Context(graph, engine, now_ns, ns_from_s(entry.latency_s))
+        where = f"{scenario.name}: nodes[{k}]"
+        nodes.append(start_node(entry, context, "", where, scenario.folder))
+    return nodes
+
+
 def plan_faults(plan: FaultPlan, scenario: Scenario) -> None:
     """Plan the scenario's faults; `ScenarioError` names the one that cannot be."""
     for k, fault in enumerate(scenario.faults):

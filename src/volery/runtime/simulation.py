@@ -482,7 +482,7 @@ class Simulation:
 
     @property
     def nodes(self) -> tuple[Node, ...]:
-        """The nodes that run inside, in fleet order."""
+        """The nodes that run inside, in fleet order, then those of the whole system."""
         return tuple(self._crew.nodes)
 
     @property

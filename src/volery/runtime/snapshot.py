@@ -76,7 +76,7 @@ def check_nodes(nodes: Sequence[Node], what: str) -> None:
     for node in nodes:
         if not isinstance(node, KeepsState):
             raise SnapshotError(
-                f"{what} is not possible: node {node.get_namespace()}/{node.get_name()} offers no "
+                f"{what} is not possible: node {node.full_name} offers no "
                 "get_state() and set_state(state)"
             )
 

@@ -234,7 +234,7 @@ class Flight(Data):
 
 
 class NodeEntry(Data):
-    """A node that runs beside the UAV, inside the simulation, in lock step."""
+    """A node that runs inside the simulation, in lock step: beside a UAV, or for all of them."""
 
     node: Annotated[str, Field(pattern=r"^[\w.]+:\w+$")]
     """`module:Class` with the node contract of `volery.graph.node`."""
@@ -356,6 +356,8 @@ class Scenario(Data):
     world: World = World()
     types: Annotated[dict[Name, UavType], Field(min_length=1)]
     uavs: Annotated[tuple[UavGroup, ...], Field(min_length=1)]
+    nodes: tuple[NodeEntry, ...] = ()
+    """Nodes of the whole system, one of each; their relative names begin at the root."""
     faults: tuple[Fault, ...] = ()
 
     _folder: Path | None = PrivateAttr(default=None)

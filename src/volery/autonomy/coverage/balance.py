@@ -1,0 +1,284 @@
+"""Areas made connected and of exact size by cells that change hands across borders."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from volery.autonomy.coverage.cells import Ints
+from volery.core.compiled import inner_kernel, kernel
+
+_MOST_LOOKS_A_CELL, _MOST_LOOKS = 3_000, 200_000_000
+"""Cells looked at in one balancing, for each cell and in all: seconds at most. Modelling choice."""
+_WALK_LOOKS = 4
+"""Looks that a step of a walk through an area counts for: it jumps about in memory."""
+_MOST_TRIES_A_PAIR = 40
+"""Chains of exchanges tried for each pair of UAVs. Modelling choice: most maps need a handful."""
+
+
+@kernel
+def join_parts(neighbours: Ints, starts: Ints, targets: Any, owner: Ints) -> None:
+    """Give parts of areas that do not hang together with their start to areas beside them.
+
+    An area grows into them by one ring of cells at a time, the one that lacks most first.
+    """
+    count, robots = owner.shape[0], starts.shape[0]
+    queue = np.empty(count, np.int32)
+    kept = np.zeros(count, np.bool_)
+    sizes = np.zeros(robots, np.int64)
+    for r in range(robots):
+        kept[starts[r]] = True
+        queue[0], head, tail = starts[r], 0, 1
+        while head < tail:
+            k = queue[head]
+            head += 1
+            for side in range(4):
+                other = neighbours[k, side]
+                if other >= 0 and owner[other] == r and not kept[other]:
+                    kept[other] = True
+                    queue[tail] = other
+                    tail += 1
+        sizes[r] = tail
+    loose = count - sizes.sum()
+    stuck = np.zeros(robots, np.bool_)
+    while loose:
+        grower = -1
+        for r in range(robots):
+            if not stuck[r] and (
+                grower < 0 or sizes[r] - targets[r] < sizes[grower] - targets[grower]
+            ):
+                grower = r
+        if grower < 0:
+            return  # cells are one component, so nothing is loose when all are stuck
+        tail = 0
+        for k in range(count):
+            if kept[k]:
+                continue
+            for side in range(4):
+                other = neighbours[k, side]
+                if other >= 0 and kept[other] and owner[other] == grower:
+                    queue[tail] = k
+                    tail += 1
+                    break
+        for i in range(tail):
+            owner[queue[i]] = grower
+            kept[queue[i]] = True
+        sizes[grower] += tail
+        loose -= tail
+        stuck[grower] = tail == 0
+        if tail:
+            stuck[:] = False
+
+
+@kernel
+def balance(neighbours: Ints, starts: Ints, targets: Any, distances: Any, owner: Ints) -> None:
+    """Move cells from areas that are too large to those that are too small, area by area.
+
+    `owner` must hold connected areas; they stay so. Cells go along the shortest chain of areas that
+    touch. Of those at a border the ones that lie nearest to their new start, against their old
+    one, go first.
+    """
+    count, robots = owner.shape[0], starts.shape[0]
+    surplus = np.empty(robots, np.int64)
+    surplus[:] = -targets
+    for k in range(count):
+        surplus[owner[k]] += 1
+    closed = np.zeros((robots, robots), np.bool_)
+    touch = np.zeros((robots, robots), np.bool_)
+    chain = np.empty(robots, np.int32)
+    buffers = np.empty((2, count), np.int32)
+    gaps = np.empty(count, np.float32)
+    seen = np.zeros(count, np.bool_)
+    looks = np.full(1, min(_MOST_LOOKS_A_CELL * count, _MOST_LOOKS))
+    for _ in range(_MOST_TRIES_A_PAIR * robots * robots):
+        if (surplus == 0).all() or looks[0] < 0:
+            return
+        looks[0] -= count
+        _find_touching(neighbours, owner, touch)
+        links = _find_chain(touch, closed, surplus, chain)
+        if links < 2:
+            return
+        amount = min(surplus[chain[0]], -surplus[chain[links - 1]])
+        for i in range(links - 1):
+            giver, taker = chain[i], chain[i + 1]
+            amount = _hand_over(
+                neighbours,
+                starts[giver],
+                giver,
+                taker,
+                amount,
+                distances,
+                owner,
+                buffers,
+                gaps,
+                seen,
+                looks,
+            )
+            surplus[giver] -= amount
+            surplus[taker] += amount
+            if amount == 0:
+                closed[giver, taker] = True
+                break
+            if i == links - 2:
+                closed[:] = False
+
+
+@inner_kernel
+def _find_touching(neighbours: Ints, owner: Ints, touch: Any) -> None:
+    touch[:] = False
+    for k in range(owner.shape[0]):
+        for side in range(2):  # east and north: each border is met once
+            other = neighbours[k, side]
+            if other >= 0 and owner[other] != owner[k]:
+                touch[owner[k], owner[other]] = True
+                touch[owner[other], owner[k]] = True
+
+
+@inner_kernel
+def _find_chain(touch: Any, closed: Any, surplus: Any, chain: Ints) -> int:
+    """Areas from one that is too large to the nearest that is too small; how many, 0 for none.
+
+    The largest surplus goes first.
+    """
+    robots = surplus.shape[0]
+    before = np.empty(robots, np.int32)
+    queue = np.empty(robots, np.int32)
+    tried = np.zeros(robots, np.bool_)
+    while True:
+        first = -1
+        for r in range(robots):
+            if surplus[r] > 0 and not tried[r] and (first < 0 or surplus[r] > surplus[first]):
+                first = r
+        if first < 0:
+            return 0
+        tried[first] = True
+        before[:] = -1
+        before[first] = first
+        queue[0], head, tail = first, 0, 1
+        while head < tail:
+            giver = queue[head]
+            head += 1
+            for taker in range(robots):
+                if touch[giver, taker] and not closed[giver, taker] and before[taker] < 0:
+                    before[taker] = giver
+                    queue[tail] = taker
+                    tail += 1
+                    if surplus[taker] < 0:
+                        links = 1
+                        r = taker
+                        while r != first:
+                            r = before[r]
+                            links += 1
+                        r = taker
+                        for i in range(links - 1, -1, -1):
+                            chain[i] = r
+                            r = before[r]
+                        return links
+
+
+@inner_kernel
+def _hand_over(
+    neighbours: Ints,
+    start: int,
+    giver: int,
+    taker: int,
+    amount: int,
+    distances: Any,
+    owner: Ints,
+    buffers: Any,
+    gaps: Any,
+    seen: Any,
+    looks: Any,
+) -> int:
+    """Move about `amount` cells from `giver` to `taker`; how many went.
+
+    Single cells go while any can. Then a cell goes with all that it alone holds to its area: up to
+    what is wanted, or somewhat more where that still leaves the two areas nearer to their sizes.
+    """
+    moved = 0
+    border, queue = buffers[0], buffers[1]
+    while moved < amount and looks[0] >= 0:
+        tail = 0
+        looks[0] -= owner.shape[0]
+        for k in range(owner.shape[0]):
+            if owner[k] == giver and k != start and _touches(neighbours, owner, k, taker):
+                border[tail] = k
+                gaps[tail] = distances[taker, k] - distances[giver, k]
+                tail += 1
+        order = np.argsort(gaps[:tail], kind="mergesort")
+        before = moved
+        for i in order:
+            k = border[i]
+            if moved < amount and _is_loose(neighbours, owner, k):
+                owner[k] = taker
+                moved += 1
+        if moved > before:
+            continue
+        least, chosen = 2 * (amount - moved), -1
+        for i in order:
+            if looks[0] < 0:
+                break
+            size = _held_by(neighbours, start, owner, border[i], queue, seen)
+            looks[0] -= _WALK_LOOKS * owner.shape[0]
+            if size < least:
+                least, chosen = size, border[i]
+            if size <= amount - moved:
+                break
+        if chosen < 0:
+            break
+        _held_by(neighbours, start, owner, chosen, queue, seen)
+        for k in range(owner.shape[0]):
+            if owner[k] == giver and (k == chosen or not seen[k]):
+                owner[k] = taker
+        moved += least
+    return moved
+
+
+@inner_kernel
+def _touches(neighbours: Ints, owner: Ints, k: int, taker: int) -> bool:
+    for side in range(4):
+        other = neighbours[k, side]
+        if other >= 0 and owner[other] == taker:
+            return True
+    return False
+
+
+@inner_kernel
+def _is_loose(neighbours: Ints, owner: Ints, k: int) -> bool:
+    """Whether the area of k stays connected without it, by a look at the cells around it."""
+    own = owner[k]
+    sides, links = 0, 0
+    for side in range(4):
+        one, across = neighbours[k, side], neighbours[k, 4 + side]
+        if one < 0 or owner[one] != own:
+            continue
+        sides += 1
+        other = neighbours[k, (side + 1) % 4]
+        if other >= 0 and owner[other] == own and across >= 0 and owner[across] == own:
+            links += 1
+    return sides - links == 1
+
+
+@inner_kernel
+def _held_by(neighbours: Ints, start: int, owner: Ints, k: int, queue: Ints, seen: Any) -> int:
+    """How many cells its area loses with cell k, itself included; `seen` marks those that stay."""
+    own = owner[k]
+    size = 0
+    for other in range(owner.shape[0]):
+        seen[other] = False
+        if owner[other] == own:
+            size += 1
+    seen[k], seen[start] = True, True
+    queue[0] = start
+    head, tail = 0, 1
+    while head < tail:
+        at = queue[head]
+        head += 1
+        for side in range(4):
+            other = neighbours[at, side]
+            if other >= 0 and owner[other] == own and not seen[other]:
+                seen[other] = True
+                queue[tail] = other
+                tail += 1
+    return size - tail

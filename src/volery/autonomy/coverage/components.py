@@ -1,0 +1,125 @@
+"""Who visits which of the parts that do not hang together, and how many cells each UAV gets.
+
+UAVs share the part that they are in. A part without a UAV is visited as a whole by the UAV that is
+nearest to it, and so much less of its own part is left to that UAV, as far as that goes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.coverage.cells import FAR, Cells, Ints, Mask
+
+
+@dataclass(frozen=True)
+class Visit:
+    """A part that one UAV visits as a whole: the UAV, the part, the cell that it comes to first."""
+
+    uav: int
+    part: int
+    entry: int
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Who goes where.
+
+    entries: (R,) the cell in which each UAV begins, -1 for one that finds no work. visits: parts
+    without a UAV, in the order in which they are visited. lost: numbers of parts that nobody can
+    reach.
+    """
+
+    entries: Ints
+    visits: tuple[Visit, ...]
+    lost: Ints
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far UAVs have to the cells to visit.
+
+    ways: the cells through which they fly, which hold those to visit. flies_over: whether they may
+    also cross, in a straight line, what is blocked.
+    """
+
+    ways: Cells
+    to_visit: Cells
+    flies_over: bool
+
+    def of(self, start: int) -> NDArray[np.float32]:
+        """(n,) from cell `start` of the ways to each cell to visit, in cells; `FAR` for no way."""
+        along = self.ways.distances([start])[self.ways.index[self.to_visit.flat]]
+        if self.flies_over:
+            rows, columns = np.divmod(self.to_visit.flat, self.to_visit.shape[1])
+            row, column = divmod(int(self.ways.flat[start]), self.ways.shape[1])
+            straight = np.hypot(rows - row, columns - column).astype(np.float32)
+            along = np.where(along == FAR, straight, along)
+        return along
+
+
+def share_parts(reach: Reach, starts: Ints, labels: Ints, parts: int) -> Shares:
+    """Find an entry for every UAV and a UAV for every part.
+
+    starts: (R,) cells of `reach.ways`. labels: (n,) part of each cell to visit. A UAV that stands
+    in a cell to visit begins there, any other in the nearest one in which no UAV begins.
+    """
+    count = len(reach.to_visit)
+    entries = reach.to_visit.index[reach.ways.flat[starts]].copy()
+    taken = np.zeros(count, np.bool_)
+    taken[entries[entries >= 0]] = True
+    nearest = np.full(parts, FAR, np.float32)
+    uav_of, entry_of = np.full(parts, -1, np.int32), np.full(parts, -1, np.int32)
+    by_part = np.argsort(labels, kind="stable")
+    firsts = np.searchsorted(labels[by_part], np.arange(parts))
+    for uav, start in enumerate(starts):
+        away = reach.of(int(start))
+        if entries[uav] < 0:
+            free = np.where(taken, FAR, away)
+            best = int(np.argmin(free)) if count else -1
+            if best >= 0 and free[best] < FAR:
+                entries[uav] = best
+                taken[best] = True
+        least = np.minimum.reduceat(away[by_part], firsts) if parts else nearest
+        closer = least < nearest
+        if closer.any():
+            nearest[closer], uav_of[closer] = least[closer], uav
+            entry_of[closer] = _entries(away, labels, least, closer)
+    lived_in = np.unique(labels[entries[entries >= 0]])
+    empty = np.setdiff1d(np.arange(parts, dtype=np.int32), lived_in)
+    reached = empty[uav_of[empty] >= 0]
+    order = reached[np.argsort(nearest[reached], kind="stable")]
+    visits = tuple(Visit(int(uav_of[p]), int(p), int(entry_of[p])) for p in order)
+    return Shares(entries, visits, empty[uav_of[empty] < 0])
+
+
+def _entries(
+    away: NDArray[np.float32], labels: Ints, least: NDArray[np.float32], wanted: Mask
+) -> Ints:
+    """The first cell of each wanted part at the part's least distance."""
+    at_least = np.flatnonzero((away == least[labels]) & wanted[labels]).astype(np.int32)
+    _, first = np.unique(labels[at_least], return_index=True)
+    found: Ints = at_least[first]
+    return found
+
+
+def level_shares(cells: int, carried: NDArray[np.int64]) -> NDArray[np.int64]:
+    """How many of `cells` each of R UAVs gets so that all carry as alike as can be.
+
+    carried: (R,) cells that they visit elsewhere. Each gets one at least; those with the same load
+    differ by one at most, the first ones getting more.
+    """
+    robots = len(carried)
+    order = np.argsort(carried, kind="stable")
+    load = carried[order] + 1
+    left = cells - robots
+    for raised in range(robots, 0, -1):
+        level, more = divmod(int(load[:raised].sum()) + left, raised)
+        if level >= load[raised - 1]:
+            break
+    given = np.ones(robots, np.int64)
+    given[order[:raised]] += level - load[:raised]
+    given[np.sort(order[:raised])[:more]] += 1
+    return given

@@ -1,0 +1,86 @@
+"""A map of the graph as a field to cover: which cells are free, and where they lie."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.autonomy.coverage.cells import Mask
+from volery.core import rotations
+from volery.core.errors import PlanError
+
+Array = NDArray[np.float64]
+
+BLOCKED_FROM = 50
+"""Occupancy, in per cent, from which a cell is blocked; unknown cells (-1) are blocked as well."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """Free cells (rows, columns), the side of a cell in m, the lower left corner (2,) m, map.
+
+    The grid is turned by `yaw` rad about its corner.
+    """
+
+    free: Mask
+    cell_m: float
+    origin_map: tuple[float, float]
+    yaw: float = 0.0
+
+    @classmethod
+    def from_message(cls, message: Any) -> Field:
+        """The field that a nav_msgs/OccupancyGrid means. `PlanError` for one that is none."""
+        info, corner = message.info, message.info.origin.position
+        data: NDArray[np.int8] = np.asarray(message.data, dtype=np.int8)
+        rows, columns = int(info.height), int(info.width)
+        if not data.size or data.size != rows * columns:
+            raise PlanError(f"a map of {columns} x {rows} cells has {data.size} entries")
+        if not (info.resolution > 0.0 and math.isfinite(corner.x + corner.y + info.resolution)):
+            raise PlanError("origin and resolution of a map must be finite, resolution above 0")
+        turn = info.origin.orientation
+        q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=np.float64)
+        yaw = float(rotations.yaw_of(q)) if float(np.linalg.norm(q)) > 0.5 else 0.0
+        free = ((data >= 0) & (data < BLOCKED_FROM)).reshape(rows, columns)
+        return cls(free, float(info.resolution), (float(corner.x), float(corner.y)), yaw)
+
+    def lies_like(self, other: Field) -> bool:
+        """Whether cells are where they are in `other`."""
+        same = (self.cell_m, self.origin_map, self.yaw) == (
+            other.cell_m,
+            other.origin_map,
+            other.yaw,
+        )
+        return same and self.free.shape == other.free.shape
+
+    def cells_at(self, position_map: ArrayLike) -> NDArray[np.int64]:
+        """(K, 2) row, column of the cells at positions (K, 2 or 3), also outside of the map."""
+        return self._grid_at(position_map, self.cell_m)
+
+    def sub_cells_at(self, position_map: ArrayLike) -> NDArray[np.int64]:
+        """(K, 2) row, column on the grid twice as fine."""
+        return self._grid_at(position_map, 0.5 * self.cell_m)
+
+    def centres(self, cells: ArrayLike) -> Array:
+        """(K, 2) m, map: middles of cells (K, 2) row, column."""
+        return self._middles(cells, self.cell_m)
+
+    def sub_centres(self, sub_cells: ArrayLike) -> Array:
+        """(K, 2) m, map: middles of cells of the grid twice as fine."""
+        return self._middles(sub_cells, 0.5 * self.cell_m)
+
+    def _grid_at(self, position_map: ArrayLike, side_m: float) -> NDArray[np.int64]:
+        off = np.asarray(position_map, np.float64)[..., :2] - self.origin_map
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        right = cos * off[..., 0] + sin * off[..., 1]
+        up = cos * off[..., 1] - sin * off[..., 0]
+        return np.floor(np.stack([up, right], axis=-1) / side_m).astype(np.int64)
+
+    def _middles(self, cells: ArrayLike, side_m: float) -> Array:
+        up, right = np.moveaxis((np.asarray(cells, np.float64) + 0.5) * side_m, -1, 0)
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        x, y = self.origin_map
+        return np.stack([x + cos * right - sin * up, y + sin * right + cos * up], axis=-1)

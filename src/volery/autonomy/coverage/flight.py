@@ -1,0 +1,107 @@
+"""One UAV on its coverage flight: which waypoint is next, and whether it gets on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.coverage.waypoints import Waypoints
+
+Array = NDArray[np.float64]
+
+_PROGRESS_M = 0.2
+"""Nearer by this much counts as getting on. Modelling choice."""
+_CLIMBED_M, _STILL_M_S = 0.5, 0.2
+"""A take-off has ended when the UAV is so much higher and climbs no faster. Modelling choice."""
+
+
+class Phase(StrEnum):
+    """Where in its flight a UAV is."""
+
+    GROUND = "ground"
+    """Has not been asked to take off."""
+    TAKE_OFF = "take_off"
+    COVER = "cover"
+    DONE = "done"
+    """Has covered its area, or has none, and lands."""
+    FAILED = "failed"
+    """Is silent or gets nowhere; takes no further part."""
+
+
+@dataclass
+class Flight:
+    """State of one UAV. Times are ns of the node's clock."""
+
+    name: str
+    phase: Phase = Phase.GROUND
+    position_map: Array | None = None
+    climb_m_s: float = 0.0
+    heard_ns: int = 0
+    home_map: Array | None = None
+    waypoints: Waypoints | None = None
+    following: int = 0
+    """Number of the next waypoint."""
+    told: int = -1
+    """Number of the waypoint that it was last told to go to."""
+    nearest_m: float = math.inf
+    """Least distance from it so far, and since when it has not become less."""
+    since_ns: int = 0
+
+    def moved(self, position_map: Array, climb_m_s: float, now_ns: int) -> None:
+        """Take in where it is."""
+        self.position_map, self.climb_m_s, self.heard_ns = position_map, climb_m_s, now_ns
+        if self.home_map is None:
+            self.home_map = position_map.copy()
+
+    def send(self, waypoints: Waypoints, now_ns: int) -> None:
+        """Follow other waypoints from now on."""
+        self.waypoints, self.following, self.told = waypoints, 0, -1
+        self._begin_leg(now_ns)
+
+    @property
+    def has_climbed(self) -> bool:
+        """Whether a take-off has come to its end."""
+        assert self.position_map is not None
+        assert self.home_map is not None
+        risen = float(self.position_map[2] - self.home_map[2])
+        return risen > _CLIMBED_M and self.is_level
+
+    @property
+    def is_level(self) -> bool:
+        """Whether it neither climbs nor sinks to speak of."""
+        return abs(self.climb_m_s) < _STILL_M_S
+
+    @property
+    def covers(self) -> bool:
+        """Whether what it flies over now counts as covered."""
+        return (
+            self.phase is Phase.COVER
+            and self.waypoints is not None
+            and bool(self.waypoints.covering[min(self.following, len(self.waypoints.places) - 1)])
+        )
+
+    def goal(self, arrival_m: float, now_ns: int) -> Array | None:
+        """(3,) the waypoint to fly to, next ones as they are reached; None when all are flown."""
+        assert self.position_map is not None
+        assert self.waypoints is not None
+        while self.following < len(self.waypoints.places):
+            place: Array = self.waypoints.places[self.following]
+            away = float(np.linalg.norm(place - self.position_map))
+            if away > arrival_m:
+                if away < self.nearest_m - _PROGRESS_M:
+                    self.nearest_m, self.since_ns = away, now_ns
+                return place
+            self.following += 1
+            self._begin_leg(now_ns)
+        return None
+
+    def is_lost(self, patience_s: float, now_ns: int) -> bool:
+        """Whether it has been silent, or has not come nearer to its goal, for `patience_s`."""
+        return now_ns - min(self.heard_ns, self.since_ns) > patience_s * 1e9
+
+    def _begin_leg(self, now_ns: int) -> None:
+        self.nearest_m, self.since_ns = math.inf, now_ns

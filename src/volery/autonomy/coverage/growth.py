@@ -1,0 +1,54 @@
+"""Areas that grow from their starts all at once and are kept in balance while they are small.
+
+Where UAVs start side by side, an area that was hemmed in by its neighbours when all were large can
+hardly be freed. Here the map is taken in by and by, twice as much of it each time, nearest cells
+first: each area keeps its way out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.coverage.balance import balance, join_parts
+from volery.autonomy.coverage.cells import Cells, Ints
+
+
+def grow(
+    cells: Cells, starts: Ints, targets: NDArray[np.int64], distances: NDArray[np.float32]
+) -> Ints:
+    """(n,) the UAV of each cell; arguments as for `darp.divide`.
+
+    distances: (R, n) from each start.
+    """
+    count, robots = len(cells), len(starts)
+    owner = np.full(count, -1, np.int32)
+    owner[starts] = np.arange(robots, dtype=np.int32)
+    order = np.argsort(distances.min(axis=0), kind="stable").astype(np.int32)
+    size = robots
+    while size < count:
+        size = min(2 * size, count)
+        members = np.sort(order[:size])
+        part = cells.part(members)
+        begin = part.index[cells.flat[starts]]
+        present = _present_targets(part, begin, targets)
+        area = owner[members]
+        join_parts(part.neighbours, begin, present, area)
+        balance(part.neighbours, begin, present, distances[:, members], area)
+        owner[members] = area
+    return owner
+
+
+def _present_targets(part: Cells, begin: Ints, targets: NDArray[np.int64]) -> NDArray[np.int64]:
+    """What each UAV should have of the cells taken in so far: its share of where it is."""
+    labels, pieces = part.components()
+    sizes = np.bincount(labels, minlength=pieces)
+    home = labels[begin]
+    wanted = np.bincount(home, weights=targets, minlength=pieces)
+    present = np.maximum((targets * sizes[home] / wanted[home]).astype(np.int64), 1)
+    for piece in np.unique(home):
+        crew = np.flatnonzero(home == piece)
+        while (missing := int(sizes[piece] - present[crew].sum())) != 0:
+            fair = crew if missing > 0 else crew[present[crew] > 1]
+            present[fair[: abs(missing)]] += np.sign(missing)
+    return present

@@ -1,0 +1,307 @@
+"""Several UAVs cover a grid map together: one node that plans for all and streams waypoints.
+
+It waits for a map and for where its UAVs are, divides the free cells, lets the UAVs take off, sends
+each from corner to corner of its tour, and lands it where it began. When the map changes, or a UAV
+falls silent or gets nowhere, what is not yet covered is divided anew.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.coverage import reports
+from volery.autonomy.coverage.cells import Cells, Mask
+from volery.autonomy.coverage.field import Field
+from volery.autonomy.coverage.flight import Flight, Phase
+from volery.autonomy.coverage.plan import (
+    NOT_TO_VISIT,
+    UNREACHABLE,
+    CoveragePlan,
+    plan_coverage,
+)
+from volery.autonomy.coverage.waypoints import Heights, route_waypoints
+from volery.core import rotations
+from volery.core.errors import PlanError
+from volery.core.kept import keep, put_back
+from volery.graph.client import Answer
+from volery.graph.messages import (
+    Float32,
+    OccupancyGrid,
+    Odometry,
+    PathMessage,
+    PoseStamped,
+    String,
+)
+from volery.graph.node import Node
+
+_PERIOD_S = 0.1
+_REPEAT = 10
+"""A goal is sent again, and progress told, every so many periods: a UAV that takes off ignores
+goals."""
+_STATE = ("_field", "_flights", "_plan", "_covered", "_refused", "_ticks", "_told_covered")
+"""Everything that changes in flight."""
+
+
+class CoveragePlanner(Node):
+    """Plans on `/map` for `/uavN/odom`; commands `/uavN/goal_pose`, `take_off` and `land`.
+
+    Parameters
+    ----------
+    uavs: names of the UAVs.
+    height_m: z in the map at which they cover.
+    layer_m: how much higher each UAV flies in transit than the one before it.
+    over_m: z at which blocked cells may be crossed to reach parts without a UAV; 0: never.
+    arrival_m: how near to a waypoint counts as there.
+    patience_s: how long a UAV may be silent, or not come nearer to its waypoint.
+    seed: of the division's random numbers.
+
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("coverage", **options)
+        names = self.declare_parameter("uavs", ["uav1"]).value
+        self._heights = Heights(
+            float(self.declare_parameter("height_m", 2.5).value),
+            float(self.declare_parameter("layer_m", 1.5).value),
+            float(self.declare_parameter("over_m", 0.0).value),
+        )
+        self._arrival_m = float(self.declare_parameter("arrival_m", 0.3).value)
+        self._patience_s = float(self.declare_parameter("patience_s", 10.0).value)
+        self._seed = int(self.declare_parameter("seed", 1).value)
+
+        self._field: Field | None = None
+        self._flights = [Flight(name) for name in names]
+        self._plan: CoveragePlan | None = None
+        self._covered: Mask = np.zeros((0, 0), np.bool_)
+        """Sub-cells (2 * rows, 2 * columns) that a UAV has come through."""
+        self._refused = ""
+        self._ticks = 0
+        self._told_covered = -1
+
+        self._areas = self.create_publisher(OccupancyGrid, "~/areas", 1, latched=True)
+        self._covered_map = self.create_publisher(OccupancyGrid, "~/covered", 1, latched=True)
+        self._status = self.create_publisher(String, "~/status", 1, latched=True)
+        self._progress = self.create_publisher(Float32, "~/progress", 1)
+        self._paths, self._goals, self._take_off, self._land = [], [], [], []
+        for number, name in enumerate(names):
+            self._paths.append(
+                self.create_publisher(PathMessage, f"/{name}/coverage/path", 1, latched=True)
+            )
+            self._goals.append(self.create_publisher(PoseStamped, f"/{name}/goal_pose", 1))
+            self._take_off.append(self.create_client("std_srvs/srv/Trigger", f"/{name}/take_off"))
+            self._land.append(self.create_client("std_srvs/srv/Trigger", f"/{name}/land"))
+            self.create_subscription(Odometry, f"/{name}/odom", self._listener(number), 5)
+        self.create_subscription(OccupancyGrid, "/map", self._on_map, 1)
+        self.create_timer(_PERIOD_S, self._on_timer)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return keep(self, _STATE)
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self, state)
+
+    # ------------------------------------------------------------------------------ what it hears
+
+    def _listener(self, number: int) -> Any:
+        def on_odometry(message: Odometry) -> None:
+            pose, twist = message.pose.pose, message.twist.twist.linear
+            turn = pose.orientation
+            q = np.array([turn.x, turn.y, turn.z, turn.w])
+            climb = float(rotations.rotate(q, [twist.x, twist.y, twist.z])[2])
+            place = np.array([pose.position.x, pose.position.y, pose.position.z])
+            flight = self._flights[number]
+            flight.moved(place, climb, self.get_clock().now_ns())
+            if flight.covers:
+                self._mark(place)
+
+        return on_odometry
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        try:
+            found = Field.from_message(message)
+        except PlanError as error:
+            self._refuse(str(error))
+            return
+        before, self._field = self._field, found
+        if before is None or not found.lies_like(before):
+            rows, columns = found.free.shape
+            self._covered = np.zeros((2 * rows, 2 * columns), np.bool_)
+        elif np.array_equal(found.free, before.free):
+            return
+        if self._plan is not None:
+            self._plan_again()
+
+    def _mark(self, place: NDArray[np.float64]) -> None:
+        assert self._field is not None
+        row, column = self._field.sub_cells_at(place).tolist()
+        rows, columns = self._covered.shape
+        if 0 <= row < rows and 0 <= column < columns and self._field.free[row // 2, column // 2]:
+            self._covered[row, column] = True
+
+    # ------------------------------------------------------------------------------ what it plans
+
+    def _plan_first(self) -> None:
+        """Plan from where the UAVs stand, all of which must be in free cells of their own."""
+        assert self._field is not None
+        starts = self._field.cells_at(np.array([f.position_map for f in self._flights]))
+        self._take_plan(self._flights, starts, self._field.free)
+
+    def _plan_again(self) -> None:
+        """Divide what is left among those that can still fly, from wherever they are."""
+        assert self._field is not None
+        able = [f for f in self._flights if f.phase is not Phase.FAILED]
+        if not able:
+            self._refuse("no UAV is left that could go on")
+            return
+        rows, columns = self._field.free.shape
+        whole = self._covered.reshape(rows, 2, columns, 2).all(axis=(1, 3))
+        left = self._field.free & ~whole
+        places = self._field.cells_at(np.array([f.position_map for f in able]))
+        self._take_plan(able, _apart(places, self._field.free), left)
+
+    def _take_plan(self, able: list[Flight], starts: NDArray[np.int64], left: Mask) -> None:
+        assert self._field is not None
+        over = self._heights.over > 0.0
+        free, now = self._field.free, self.get_clock().now_ns()
+        try:
+            plan = plan_coverage(free, starts, to_visit=left, flies_over=over, seed=self._seed)
+        except PlanError as error:
+            self._refuse(str(error))
+            return
+        numbers = [self._flights.index(flight) for flight in able]
+        # the last two answer for the owners -2 and -1, who are no UAVs
+        owner = np.array([*numbers, NOT_TO_VISIT, UNREACHABLE], np.int16)[plan.owner]
+        self._plan, self._refused = plan, ""
+        ways = Cells.of(free)
+        for number, flight, tours in zip(numbers, able, plan.routes, strict=True):
+            assert flight.position_map is not None
+            assert flight.home_map is not None
+            if not tours and flight.phase in (Phase.GROUND, Phase.DONE):
+                continue
+            flight.send(
+                route_waypoints(
+                    self._field,
+                    ways,
+                    self._heights,
+                    number,
+                    flight.position_map,
+                    flight.home_map,
+                    tours,
+                ),
+                now,
+            )
+            if flight.phase is Phase.DONE:
+                flight.phase = Phase.GROUND
+            assert flight.waypoints is not None
+            self._paths[number].publish(reports.path_message(flight.waypoints, now))
+        self._areas.publish(reports.areas_message(self._field, owner, now))
+        self._tell_status()
+
+    def _refuse(self, reason: str) -> None:
+        if reason != self._refused:
+            self._refused = reason
+            self._tell_status()
+
+    # -------------------------------------------------------------------------------- what it does
+
+    def _on_timer(self) -> None:
+        self._ticks += 1
+        if self._field is None or any(f.position_map is None for f in self._flights):
+            return
+        if self._plan is None:
+            if not self._refused:
+                self._plan_first()
+            return
+        now = self.get_clock().now_ns()
+        for number, flight in enumerate(self._flights):
+            self._advance(number, flight, now)
+        lost = [f for f in self._flights if self._is_lost(f, now)]
+        for flight in lost:
+            flight.phase = Phase.FAILED
+        if lost:
+            self._plan_again()
+        if self._ticks % _REPEAT == 0:
+            self._tell_progress()
+
+    def _advance(self, number: int, flight: Flight, now: int) -> None:
+        if flight.waypoints is None:
+            return
+        if flight.phase is Phase.GROUND:
+            flight.phase = Phase.TAKE_OFF
+            flight.send(flight.waypoints, now)
+            self._ask_to_take_off(number, flight)
+        elif flight.phase is Phase.TAKE_OFF and flight.has_climbed:
+            self._begin(flight)
+        elif flight.phase is Phase.TAKE_OFF and self._ticks % _REPEAT == 0:
+            self._ask_to_take_off(number, flight)
+        elif flight.phase is Phase.COVER:
+            goal = flight.goal(self._arrival_m, now)
+            if goal is None:
+                flight.phase = Phase.DONE
+                self._land[number].call_async()
+                self._tell_status()
+            elif flight.following != flight.told or self._ticks % _REPEAT == 0:
+                flight.told = flight.following
+                self._goals[number].publish(reports.goal_message(goal, now))
+
+    def _ask_to_take_off(self, number: int, flight: Flight) -> None:
+        def on_answer(answer: Answer) -> None:
+            refused = answer.exception() is not None or not answer.result().success
+            if refused and flight.is_level and flight.phase is Phase.TAKE_OFF:
+                self._begin(flight)  # it is in the air already; else it will be lost in time
+
+        self._take_off[number].call_async().add_done_callback(on_answer)
+
+    def _begin(self, flight: Flight) -> None:
+        assert flight.waypoints is not None
+        flight.phase = Phase.COVER
+        flight.send(flight.waypoints, self.get_clock().now_ns())
+
+    def _is_lost(self, flight: Flight, now: int) -> bool:
+        flies = flight.phase in (Phase.TAKE_OFF, Phase.COVER)
+        return flies and flight.is_lost(self._patience_s, now)
+
+    # --------------------------------------------------------------------------------- what it tells
+
+    @property
+    def _share(self) -> float:
+        """Share of the free cells' quarters that are covered."""
+        assert self._field is not None
+        free = 4 * int(np.count_nonzero(self._field.free))
+        fine = np.kron(self._field.free, np.ones((2, 2), np.bool_))
+        return float(np.count_nonzero(self._covered & fine)) / max(free, 1)
+
+    def _tell_progress(self) -> None:
+        assert self._field is not None
+        self._progress.publish(Float32(float(np.float32(self._share))))
+        count = int(np.count_nonzero(self._covered))
+        if count != self._told_covered:
+            self._told_covered = count
+            now = self.get_clock().now_ns()
+            self._covered_map.publish(reports.covered_message(self._field, self._covered, now))
+            self._tell_status()
+
+    def _tell_status(self) -> None:
+        share = 0.0 if self._field is None else self._share
+        self._status.publish(
+            reports.status_message(self._flights, self._plan, share, self._refused)
+        )
+
+
+def _apart(places: NDArray[np.int64], free: Mask) -> NDArray[np.int64]:
+    """(R, 2) the nearest free cell to each place (R, 2), each another one."""
+    cells = np.argwhere(free)
+    taken = np.zeros(len(cells), np.bool_)
+    found = []
+    for place in places:
+        away = np.where(taken, np.inf, np.hypot(*(cells - place).T))
+        nearest = int(np.argmin(away)) if len(cells) else 0
+        if len(cells):
+            taken[nearest] = True
+        found.append(cells[nearest] if len(cells) else place)
+    return np.array(found)

@@ -1,0 +1,138 @@
+"""A closed tour of each area: around a spanning tree of its cells, on a grid twice as fine.
+
+Spanning-tree coverage (Gabriely and Rimon, "Spanning-tree based coverage of continuous areas by a
+mobile robot", Ann. Math. Artif. Intell. 31, 2001): each cell has four sub-cells; whoever keeps the
+tree at the left hand comes through each sub-cell of the area once and back to where it began.
+
+All edges are of one length, so any spanning tree is a minimum one; which of them is taken decides
+how often the tour turns. Four orders are tried: rows or columns first, what joins them at the one
+end or at the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.coverage.cells import EAST, NORTH, SOUTH, WEST, Cells, Ints
+from volery.core.compiled import inner_kernel, kernel
+
+ORDERS = 4
+
+
+@dataclass(frozen=True)
+class Tour:
+    """A closed way through every sub-cell of an area.
+
+    sub_cells: (4 * cells, 2) row and column on the grid twice as fine; each is beside the one
+    before it, the first beside the last. turns: corners of the tour, its closing included.
+    """
+
+    sub_cells: Ints
+    turns: int
+
+    def begun_at(self, number: int) -> Tour:
+        """The same tour from its sub-cell `number` on."""
+        return Tour(np.roll(self.sub_cells, -number, axis=0), self.turns)
+
+    def corners(self) -> Ints:
+        """The sub-cells (K, 2) where it turns, after its first one: what a UAV must be told."""
+        way = self.sub_cells
+        ahead = np.roll(way, -1, axis=0) - way
+        behind = way - np.roll(way, 1, axis=0)
+        turns = (ahead != behind).any(axis=1)
+        turns[0] = True
+        corners: Ints = way[turns]
+        return corners
+
+
+def tours(cells: Cells, owner: Ints, starts: Ints) -> list[Tour]:
+    """A tour of each area, from a sub-cell of its start; of the four the one with fewest turns.
+
+    owner: (n,) the area of each cell, -1 for none; all areas connected. starts: (R,) a cell of each.
+    """
+    best: list[Tour] = []
+    trees = np.empty((ORDERS, len(cells)), np.uint8)
+    for order in range(ORDERS):
+        _span(cells.neighbours, owner, order, trees[order])
+    sizes = np.bincount(owner + 1, minlength=len(starts) + 1)[1:]
+    for r, start in enumerate(starts):
+        found = []
+        for order in range(ORDERS):
+            way = np.empty((4 * sizes[r], 2), np.int32)
+            turns = _walk_around(cells.flat, cells.index, trees[order], cells.shape[1], start, way)
+            found.append(Tour(way, int(turns)))
+        best.append(min(found, key=lambda tour: tour.turns))
+    return best
+
+
+@kernel
+def _span(neighbours: Ints, owner: Ints, order: int, tree: NDArray[np.uint8]) -> None:
+    """A spanning tree of every area (Kruskal 1956): bit d of `tree[k]` for an edge to side d."""
+    count = owner.shape[0]
+    root = np.arange(count).astype(np.int32)
+    tree[:] = 0
+    along = EAST if order < 2 else NORTH
+    backwards = order % 2 == 1
+    for turn in range(2):
+        side = along if turn == 0 else (NORTH if along == EAST else EAST)
+        for i in range(count):
+            k = count - 1 - i if backwards else i
+            other = neighbours[k, side]
+            if other < 0 or owner[other] != owner[k]:
+                continue
+            one, two = _root_of(root, k), _root_of(root, other)
+            if one != two:
+                root[one] = two
+                tree[k] |= np.uint8(1 << side)
+                tree[other] |= np.uint8(1 << (side + 2))
+
+
+@inner_kernel
+def _root_of(root: Ints, k: int) -> int:
+    while root[k] != k:
+        root[k] = root[root[k]]
+        k = root[k]
+    return k
+
+
+@kernel
+def _walk_around(
+    flat: Ints, index: Ints, tree: NDArray[np.uint8], columns: int, start: int, way: Ints
+) -> int:
+    """Fill `way` with the tour around the tree from the south-west sub-cell of `start`; turns."""
+    row, column = 2 * (flat[start] // columns), 2 * (flat[start] % columns)
+    heading, turns, first = -1, 0, -1
+    for i in range(way.shape[0]):
+        way[i, 0], way[i, 1] = row, column
+        k = index[(row // 2) * columns + column // 2]
+        side = _side_ahead(row % 2, column % 2, tree[k])
+        if heading < 0:
+            first = side
+        elif side != heading:
+            turns += 1
+        heading = side
+        if side == EAST:
+            column += 1
+        elif side == NORTH:
+            row += 1
+        elif side == WEST:
+            column -= 1
+        else:
+            row -= 1
+    return turns + (1 if first != heading else 0)
+
+
+@inner_kernel
+def _side_ahead(north: int, east: int, edges: Any) -> int:
+    """Where the tour leaves a sub-cell: out of the cell along the tree, else around its middle."""
+    if north == 0 and east == 0:
+        return SOUTH if edges & (1 << SOUTH) else EAST
+    if north == 0:
+        return EAST if edges & (1 << EAST) else NORTH
+    if east == 1:
+        return NORTH if edges & (1 << NORTH) else WEST
+    return WEST if edges & (1 << WEST) else SOUTH

@@ -1,0 +1,102 @@
+"""From tours on the grid to waypoints in the map: transits, tours, the way home."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.coverage.cells import Cells
+from volery.autonomy.coverage.field import Field
+from volery.autonomy.coverage.spanning_tree import Tour
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Heights:
+    """Heights in the map, m.
+
+    cover: of the tours. layer: how much higher each UAV flies in transit than the one before it, so
+    that transits that cross do so apart. over: at which blocked cells may be crossed, 0: never.
+    """
+
+    cover: float
+    layer: float
+    over: float
+
+    def transit(self, uav: int, *, over: bool) -> float:
+        """Of UAV number `uav` on its way between areas, over blocked cells or not."""
+        return (self.over if over else self.cover) + (uav + 1) * self.layer
+
+
+@dataclass(frozen=True)
+class Waypoints:
+    """Where a UAV goes: (K, 3) m, map, and whether it covers on the way to each, (K,)."""
+
+    places: Array
+    covering: NDArray[np.bool_]
+
+
+def route_waypoints(
+    field: Field,
+    ways: Cells,
+    heights: Heights,
+    uav: int,
+    position_map: Array,
+    home_map: Array,
+    tours: Sequence[Tour],
+) -> Waypoints:
+    """The waypoints of one UAV: for each tour the transit and the tour, then home to land.
+
+    ways: the free cells of the field. position_map: (3,) where it is. home_map: (3,) where it
+    lands.
+    """
+    places: list[Array] = []
+    covering: list[bool] = []
+    at = position_map[:2]
+
+    def add(points: Array, height: float, covers: bool) -> None:
+        places.append(np.column_stack([points, np.full(len(points), height)]))
+        covering.extend([covers] * len(points))
+
+    for each in tours:
+        away = field.sub_centres(each.sub_cells) - at
+        tour = each.begun_at(int(np.argmin(np.hypot(away[:, 0], away[:, 1]))))
+        corners = field.sub_centres(np.vstack([tour.corners(), tour.sub_cells[-1:]]))
+        for points, height in _transit(field, ways, heights, uav, at, corners[0]):
+            add(points, height, False)
+        add(corners, heights.cover, True)
+        at = corners[-1]
+    for points, height in _transit(field, ways, heights, uav, at, home_map[:2]):
+        add(points, height, False)
+    add(home_map[None, :2], heights.cover, False)
+    return Waypoints(np.vstack(places), np.array(covering))
+
+
+def _transit(
+    field: Field, ways: Cells, heights: Heights, uav: int, start: Array, goal: Array
+) -> list[tuple[Array, float]]:
+    """Points (K, 2) and heights of the way between two areas; nothing within a cell or to the next.
+
+    Climb on the spot, fly there through free cells or over all, go down on the spot.
+    """
+    cells = field.cells_at(np.stack([start, goal]))
+    if int(np.abs(cells[0] - cells[1]).sum()) <= 1:
+        return []
+    numbers = [ways.number(row, column) for row, column in cells.tolist()]
+    way = ways.way(numbers[0], numbers[1]) if min(numbers) >= 0 else []
+    if not way and heights.over <= 0.0:
+        return []
+    height = heights.transit(uav, over=not way)
+    between = field.centres(_corners(ways.places()[way])) if way else np.empty((0, 2))
+    return [(np.vstack([start[None], between, goal[None]]), height)]
+
+
+def _corners(way: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The cells (K, 2) of a way at which it turns, ends excluded."""
+    steps = np.diff(way, axis=0)
+    turns = (steps[1:] != steps[:-1]).any(axis=1)
+    return way[1:-1][turns]

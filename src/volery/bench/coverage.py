@@ -1,0 +1,139 @@
+"""Planning a coverage flight: the published reference cases of DARP, beside an open implementation.
+
+Ours is measured always, the peer where VOLERY_COVERAGE_PEER names a folder with its modules: that
+of github.com/alice-st/DARP (Python), which also holds these four cases. It runs in a process of its
+own, with the interpreter that VOLERY_COVERAGE_PEER_PYTHON names (it needs numpy, numba, cv2, pygame,
+scikit-learn, PIL), in turns with ours on the same core. Both divide the map and plan all tours.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.coverage.plan import plan_coverage
+from volery.bench.peers.conversation import Conversation
+from volery.bench.peers.failure import PeerError
+from volery.bench.registry import Measured
+
+_ROUNDS = 5
+_SCRIPT = Path(__file__).parent / "peers" / "darp_plans.py"
+_FIRST_PLAN = """
+import time
+from volery.bench import coverage
+case = coverage.CASES[1]
+begin = time.perf_counter()
+coverage.plan(case)
+print(time.perf_counter() - begin)
+"""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A square map, cells in which UAVs start, blocked cells; cells are numbered row by row."""
+
+    name: str
+    side: int
+    starts: tuple[int, ...]
+    blocked: tuple[int, ...] = ()
+
+    def free(self) -> NDArray[np.bool_]:
+        """The free cells (side, side)."""
+        free = np.ones(self.side * self.side, np.bool_)
+        free[list(self.blocked)] = False
+        return free.reshape(self.side, self.side)
+
+    def start_cells(self) -> list[tuple[int, int]]:
+        """Row and column of each UAV."""
+        return [divmod(start, self.side) for start in self.starts]
+
+
+CASES = (
+    Case("10x10_3_uavs", 10, (1, 3, 9)),
+    Case("20x20_4_uavs", 20, (1, 50, 76, 83), (3, 4, 5, 6, 7, 8, 99, 100, 101, 102)),
+    Case("50x50_4_uavs_in_a_corner", 50, (1, 2, 3, 4)),
+    Case("50x50_5_uavs", 50, (500, 624, 1500, 2159, 2), tuple(range(2490, 2500))),
+)
+
+
+def plan(case: Case) -> None:
+    """Do ours."""
+    plan_coverage(case.free(), case.start_cells())
+
+
+def measure() -> Measured:
+    """Medians in ms; `*_share_of_peer` is ours divided by the peer's time."""
+    figures: dict[str, float] = {"first_plan_of_a_process_ms": 1e3 * _first_plan()}
+    failures: dict[str, str] = {}
+    versions: dict[str, str] = {}
+    folder = os.environ.get("VOLERY_COVERAGE_PEER")
+    if folder is None:
+        failures["peer"] = "VOLERY_COVERAGE_PEER names no folder with an implementation of DARP"
+    for case in CASES:
+        try:
+            if folder is not None:
+                figures.update(_beside(case, Path(folder), versions))
+                continue
+        except PeerError as failure:
+            failures[case.name] = str(failure)
+        (ours,) = _medians([lambda case=case: _timed(case)])  # type: ignore[misc]
+        figures[f"{case.name}_ms"] = 1e3 * ours
+    return Measured(figures, failures, versions)
+
+
+def _beside(case: Case, peer: Path, versions: dict[str, str]) -> dict[str, float]:
+    """Figures of one case with the peer's."""
+    python = Path(os.environ.get("VOLERY_COVERAGE_PEER_PYTHON", sys.executable))
+    request = {
+        "folder": str(peer),
+        "packages": ["numpy", "numba"],
+        "side": case.side,
+        "starts": case.starts,
+        "blocked": case.blocked,
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        with Conversation(python, _SCRIPT, request, Path(folder)) as conversation:
+            told = ", ".join(f"{k} {v}" for k, v in conversation.versions().items())
+            ours, theirs = _medians([lambda: _timed(case), conversation.round])
+            facts = conversation.facts()
+    versions["peer"] = told
+    if sum(facts["sub_cells"]) != 4 * int(case.free().sum()):
+        raise PeerError(f"its tours have {facts['sub_cells']} sub-cells, which is not all of them")
+    return {
+        f"{case.name}_ms": 1e3 * ours,
+        f"{case.name}_peer_ms": 1e3 * theirs,
+        f"{case.name}_share_of_peer": ours / theirs,
+    }
+
+
+def _medians(rounds: list[Callable[[], float]]) -> list[float]:
+    """Median seconds of each, in turns, after one round to warm up."""
+    for each in rounds:
+        each()
+    taken = [[each() for each in rounds] for _ in range(_ROUNDS)]
+    return [statistics.median(values) for values in zip(*taken, strict=True)]
+
+
+def _timed(case: Case) -> float:
+    begin = time.perf_counter()
+    plan(case)
+    return time.perf_counter() - begin
+
+
+def _first_plan() -> float:
+    """Seconds of the first plan of a new process that finds everything compiled on disk."""
+    plan(CASES[1])
+    told = subprocess.run(
+        [sys.executable, "-c", _FIRST_PLAN], capture_output=True, text=True, check=True
+    )
+    return float(told.stdout)
