@@ -99,6 +99,12 @@ class CameraModel(SensorModel):
             self.readout_ns,
         )
 
+    @cached_property
+    def widest(self) -> float:
+        """Largest distance to the side, and up or down, of what is seen, per metre ahead."""
+        ahead, aside = self.table.direction[:, 0], np.abs(self.table.direction[:, 1:])
+        return float((aside.max(axis=1) / ahead).max())
+
     def project(self, points: ArrayLike) -> Array:
         """Pixels (..., 2), column and row, of points (..., 3) in the optical frame, m.
 
