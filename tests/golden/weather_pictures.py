@@ -3,7 +3,7 @@
 `python tests/golden/weather_pictures.py` stores them anew. With a folder, and if need be a width,
 it writes large ones there to look at:
 
-    python tests/golden/weather_pictures.py /tmp/pictures 960
+    python tests/golden/weather_pictures.py pictures 960
 """
 
 import sys

@@ -58,7 +58,9 @@ class Daylight(Data):
 
     @model_validator(mode="after")
     def _sun_is_told_once(self) -> Self:
-        angles = {"sun_elevation_deg", "sun_azimuth_deg"} & self.model_fields_set
-        if self.hour_of_day is not None and angles:
+        usual = type(self).model_fields
+        angles = ("sun_elevation_deg", "sun_azimuth_deg")
+        told = any(getattr(self, name) != usual[name].default for name in angles)
+        if self.hour_of_day is not None and told:
             raise ValueError("hour_of_day takes the place of the sun's angles; leave them out")
         return self

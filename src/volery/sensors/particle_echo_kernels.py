@@ -57,13 +57,9 @@ def _weaken(
 
 
 @inner_kernel
-def _place_of(air: ParticleTable, kind: int, events: float) -> float:
-    """Index, with a fraction, at which so many events of a kind have come; < 0: never do."""
-    table = air.events[kind]
-    last = table.shape[0] - 1
-    if events >= table[last]:
-        return -1.0
-    low, high = 0, last
+def _place_of(table: NDArray[np.float64], events: float) -> float:
+    """Index, with a fraction, at which so many events have come, of a table that reaches them."""
+    low, high = 0, table.shape[0] - 1
     while high - low > 1:
         middle = (low + high) // 2
         if table[middle] <= events:
@@ -75,7 +71,7 @@ def _place_of(air: ParticleTable, kind: int, events: float) -> float:
 
 @inner_kernel
 def _between(values: NDArray[np.float64], place: float) -> float:
-    low = int(place)
+    low = min(int(place), values.shape[0] - 2)
     f = place - low
     return float((1.0 - f) * values[low] + f * values[low + 1])
 
@@ -124,9 +120,10 @@ def _see_particles(
         behind = (lidar.range_max / alike) ** 2
     for kind in range(KINDS):
         draw = counter + MOST_ECHOES + 3 * kind
-        place = _place_of(air, kind, -np.log(uniform(key, draw)))
-        if place < 0.0:
+        drawn = uniform(key, draw)
+        if drawn <= air.never[kind]:
             continue
+        place = _place_of(air.events[kind], -np.log(drawn))
         r = _between(air.range, place)
         if r > surface - lidar.pulse_length:
             continue

@@ -78,6 +78,8 @@ class ParticleTable(NamedTuple):
     """(K,) m, ascending: from the least range to where the reach ends."""
     events: Array
     """(KINDS, K) false echoes of a beam up to there, mean number."""
+    never: Array
+    """(KINDS,) probability that a beam in the open has none."""
     spread: Array
     """(KINDS, K) of the strength F of a false echo there: F = (1 + spread e)^2 of drops and flakes,
     1 + spread e of fog and dust, e exponentially distributed."""
@@ -104,7 +106,8 @@ def particle_table(model: LidarModel, particles: Particles) -> ParticleTable:
         rates[VOLUME], spread[VOLUME] = _volume(model, ranges, whole, backscatter)
     shine = model.intensity
     scale = 0.0 if shine is None else shine.scale * model.particles.threshold_reflectivity
-    return ParticleTable(whole, ranges, _summed(rates, ranges), spread, scale)
+    events = _summed(rates, ranges)
+    return ParticleTable(whole, ranges, events, np.exp(-events[:, -1]), spread, scale)
 
 
 def reach_m(clear_m: float, extinction_per_m: float) -> float:

@@ -119,14 +119,13 @@ def take(
 
 
 def _view_of(model: CameraModel) -> View:
-    seen = model.table.direction[~model.table.blind.all(axis=1)]
     return View(
         model.width,
         model.height,
         model.focal_px,
         model.centre_px,
         np.array(model.distortion),
-        float((np.abs(seen[:, 1:]).max(axis=1) / seen[:, 0]).max()),
+        model.widest,
         round(model.exposure_time_s * 1e9),
         model.exposure,
         _linear(),

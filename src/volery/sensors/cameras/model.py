@@ -120,6 +120,12 @@ class CameraModel(SensorModel):
         seen = (np.stack([u, v], axis=-1) - np.array(self.centre_px)) / self.focal_px
         return np.ascontiguousarray(undistort(seen, self.distortion), dtype=np.float32)
 
+    @cached_property
+    def widest(self) -> float:
+        """Largest distance to the side, and up or down, of what is seen, per metre ahead."""
+        ahead, aside = self.table.direction[:, 0], np.abs(self.table.direction[:, 1:])
+        return float((aside.max(axis=1) / ahead).max())
+
     def project(self, points: ArrayLike) -> Array:
         """Pixels (..., 2), column and row, of points (..., 3) in the optical frame, m.
 
