@@ -10,6 +10,8 @@ from pydantic import Field, model_validator
 from volery.scenario.base import Data, Vector2
 
 MapName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
+RECEIVED = "map_in"
+"""Name of the map that came over the graph last."""
 Side = Annotated[float, Field(ge=0.001, le=1000.0)]
 
 
@@ -54,6 +56,10 @@ class GridMapWorld(Data):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(f"names of maps must differ; used twice: {', '.join(twice)}")
+        if RECEIVED in names:
+            raise ValueError(
+                f"'{RECEIVED}' is the map that comes over the graph; name it otherwise"
+            )
         if self.map is not None and self.map not in names:
             known = ", ".join(names) or "none"
             raise ValueError(f"map '{self.map}' is not among the maps; known: {known}")

@@ -25,12 +25,10 @@ from volery.graph.messages import (
 )
 from volery.runtime.grid_world import GridWorld
 from volery.runtime.services.offering import Fields, offer_command
-from volery.scenario.grid_map import GridMapWorld
+from volery.scenario.grid_map import RECEIVED, GridMapWorld
 from volery.world.grid_maps import GridMap
 
 _OURS = "volery_interfaces/srv"
-RECEIVED = "map_in"
-"""Name of the map that came over the graph last."""
 _BLOCKED, _FREE = 100, 0
 _BLOCKED_FROM = 50
 """Occupancy, in per cent, from which a cell is blocked."""
