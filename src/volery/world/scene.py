@@ -20,7 +20,7 @@ from volery.world.embree import EmbreeUnavailableError
 from volery.world.embree_backend import EmbreeBackend
 from volery.world.embreex_fallback import EmbreexBackend
 from volery.world.materials import Material
-from volery.world.scene_content import BodyShape, SceneContent, Solid, collect
+from volery.world.scene_content import BodyShape, SceneContent, Solid, collect, rotor_table
 from volery.world.scene_memory import BodyTable, SceneHandle
 from volery.world.terrain import Terrain
 from volery.world.trees.model import DetailLevel
@@ -179,11 +179,7 @@ class Scene:
             rotors=np.zeros((len(index), 0, 10)),
             turn=np.zeros((len(index), 0, 2)),
         )
-        most = max((len(shape.rotors) for shape in shapes), default=0)
-        rotors = np.zeros((len(shapes), most, 10))
-        for i, shape in enumerate(shapes):
-            rotors[i, : len(shape.rotors)] = shape.rotors
-        self._rotors = rotors[index]
+        self._rotors = rotor_table(shapes)[index]
 
     def move_bodies(
         self,
