@@ -3,8 +3,8 @@
 Colour is `rgb8`; depth `32FC1`, metres along the optical axis, NaN where nothing is known, -inf too
 near, inf too far, or `16UC1`, millimetres, 0 where nothing is known; labels `32SC1` (instance of
 the scene, -1 for none) and `mono8` (`Material`). The frame is the optical one: z forward, x right,
-y down. Colour and intrinsics of a stereo pair are both in that of the left camera, as
-image_geometry's StereoCameraModel demands; what has a place in space is in the own one.
+y down. Colour and intrinsics of both cameras of a stereo pair are in that of the left one, as
+image_geometry's StereoCameraModel demands; depth, points and labels are in the camera's own.
 """
 
 from __future__ import annotations

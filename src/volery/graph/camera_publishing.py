@@ -61,39 +61,51 @@ _CHANNELS = (
 )
 
 
+class _Outlet(NamedTuple):
+    """A topic that a camera offers."""
+
+    publisher: Publisher
+    message: Callable[[CameraFrames, int, Camera], Any]
+    parts: tuple[Part, ...]
+
+
 class CameraPublisher:
     """Publishes the pictures of all cameras."""
 
     def __init__(self, graph: Graph) -> None:
         self._graph = graph
         self._cameras: dict[str, Camera] = {}
-        self._publishers: dict[str, dict[_Channel, Publisher]] = {}
+        self._outlets: dict[str, list[_Outlet]] = {}
 
     def announce(self, camera: Camera) -> None:
         """Advertise what a camera publishes."""
         sensor = camera.sensor
         self._cameras[sensor.path] = camera
-        self._publishers[sensor.path] = {
-            channel: self._graph.advertise(f"/{sensor.path}{channel.suffix}", channel.message_class)
+        self._outlets[sensor.path] = [
+            _Outlet(
+                self._graph.advertise(f"/{sensor.path}{channel.suffix}", channel.message_class),
+                channel.message,
+                parts,
+            )
             for channel in _CHANNELS
-            if channel.parts(camera.settings)
-        }
+            if (parts := channel.parts(camera.settings))
+        ]
 
     def retire(self, uav_name: str) -> None:
         """Publish no more for the cameras of a UAV."""
         for path in [path for path in self._cameras if path.startswith(f"{uav_name}/")]:
             del self._cameras[path]
-            for publisher in self._publishers.pop(path).values():
-                publisher.cancel()
+            for outlet in self._outlets.pop(path):
+                outlet.publisher.cancel()
 
     def wanted_parts(self, cameras: Sequence[SensorId]) -> set[Part]:
         """What of the pictures of these cameras somebody would receive."""
         return {
             part
             for sensor in cameras
-            for channel, publisher in self._publishers[sensor.path].items()
-            if publisher.wanted
-            for part in channel.parts(self._cameras[sensor.path].settings)
+            for outlet in self._outlets[sensor.path]
+            if outlet.publisher.wanted
+            for part in outlet.parts
         }
 
     def publish(self, frames: CameraFrames) -> None:
@@ -108,7 +120,6 @@ class CameraPublisher:
         }
         for row, sensor in enumerate(frames.sensors):
             camera = self._cameras[sensor.path]
-            for channel, publisher in self._publishers[sensor.path].items():
-                parts = channel.parts(camera.settings)
-                if publisher.wanted and all(made[part] for part in parts):
-                    publisher.publish(channel.message(frames, row, camera))
+            for outlet in self._outlets[sensor.path]:
+                if outlet.publisher.wanted and all(made[part] for part in outlet.parts):
+                    outlet.publisher.publish(outlet.message(frames, row, camera))

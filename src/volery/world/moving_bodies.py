@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.world.materials import Material
-from volery.world.scene_content import BodyShape
+from volery.world.scene_content import BodyShape, rotor_table
 from volery.world.scene_memory import BodyTable
 
 _NOWHERE = (0.0, 0.0, -1e6, 0.0, 0.0, 0.0, 1.0)
@@ -42,10 +42,7 @@ def body_rows(
         for k, (_, material) in enumerate(shape.parts):
             materials[i, k] = Material(material)
     radius = np.array([shape.radius for shape in shapes])
-    most = max((len(shape.rotors) for shape in shapes), default=0)
-    rotors = np.zeros((len(shapes), most, 10))
-    for i, shape in enumerate(shapes):
-        rotors[i, : len(shape.rotors)] = shape.rotors
+    rotors = rotor_table(shapes)
     return BodyRows(scenes[index], radius[index], materials[index], rotors[index])
 
 

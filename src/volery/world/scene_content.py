@@ -124,6 +124,15 @@ class SceneContent:
         return self.parts[int(self.table.first_part[instance])]
 
 
+def rotor_table(shapes: Sequence[BodyShape]) -> NDArray[np.float64]:
+    """Rotors (shapes, R, 10) of body shapes, zero beyond those that a shape has."""
+    most = max((len(shape.rotors) for shape in shapes), default=0)
+    table = np.zeros((len(shapes), most, 10))
+    for row, shape in zip(table, shapes, strict=True):
+        row[: len(shape.rotors)] = shape.rotors
+    return table
+
+
 def _part_bounds(part: PaddedMesh) -> NDArray[np.float64]:
     vertices = part.vertices[:-1]
     if not len(vertices):

@@ -83,7 +83,7 @@ class CameraModel(SensorModel):
     ) -> CameraModel:
         """Copy with other numbers; what was worked out from the old ones stays behind."""
         copy = super().model_copy(update=update, deep=deep)
-        for name in ("table", "ideal"):
+        for name in ("table", "ideal", "widest"):
             copy.__dict__.pop(name, None)
         return copy
 

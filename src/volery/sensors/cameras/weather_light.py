@@ -43,7 +43,15 @@ _DUSTY = np.array([1.15, 0.98, 0.68])
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Of linear sRGB (IEC 61966-2-1)."""
 _WET = 2.0 / 3.0
-_ABSORBENT = (Material.GROUND, Material.WOOD, Material.WALL)
+_ABSORBENT = (
+    Material.GROUND,
+    Material.WOOD,
+    Material.WALL,
+    Material.FACADE,
+    Material.ASPHALT,
+    Material.PAVING,
+    Material.CLOTHES,
+)
 
 Array = NDArray[np.floating[Any]]
 
