@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from volery.report.flight_data import Structures
 from volery.world.mesh import Mesh
@@ -24,7 +25,7 @@ def seen_from_above(meshes: Iterable[Mesh]) -> Structures | None:
     return Structures(np.concatenate(tops), np.concatenate(edges)) if tops else None
 
 
-def _rim(triangles: np.ndarray) -> np.ndarray:
+def _rim(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Edges (E, 2, 2) that only one of the triangles (K, 3, 3) has."""
     _, number = np.unique(
         np.round(triangles.reshape(-1, 3) / _CORNER_M).astype(np.int64), axis=0, return_inverse=True

@@ -25,6 +25,8 @@ MOST_TRIANGLES = 5_000_000
 """Larger meshes are refused: 5 million triangles take about 1 GB in the ray caster."""
 FARTHEST_M = 100_000.0
 """Vertices beyond this are slips of scale; 32-bit numbers are then coarser than 4 mm."""
+_LARGEST = 1e15
+"""Of a coordinate in a file's own units; products of three of them fit 64-bit numbers well."""
 FORMATS = (".glb", ".gltf", ".obj", ".stl")
 _GREY = (0.5, 0.5, 0.5)
 
@@ -81,8 +83,12 @@ def _load(path: Path) -> list[Any]:
             drawn = (scene.graph[node][1] for node in scene.graph.nodes_geometry)
             count = sum(len(getattr(scene.geometry[name], "faces", ())) for name in drawn)
             if count > MOST_TRIANGLES:
-                raise ValueError(f"{count:,} triangles; at most {MOST_TRIANGLES:,} are read")
+                raise DataFileError(
+                    f"{path} has {count:,} triangles; at most {MOST_TRIANGLES:,} are read"
+                )
             return [part for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
+    except DataFileError:
+        raise
     except Exception as error:  # the parsers raise whatever a broken file makes them stumble over
         told = " ".join(str(error).split())[:200] or type(error).__name__
         raise DataFileError(f"{path} is no sound {path.suffix[1:]} file: {told}") from None
@@ -114,11 +120,11 @@ def _joined(path: Path, parts: list[Any]) -> tuple[NDArray[np.float64], NDArray[
         triangles.append(faces + first)
         first += len(corners)
     corners = np.concatenate(points)
-    wrong = np.flatnonzero(~np.isfinite(corners).all(axis=1))
+    wrong = np.flatnonzero(~(np.abs(corners) < _LARGEST).all(axis=1))
     if len(wrong):
         raise DataFileError(
-            f"{path}: {len(wrong)} of its {len(corners)} vertices are not finite numbers; "
-            f"vertex {wrong[0]} is the first"
+            f"{path}: {len(wrong)} of its {len(corners)} vertices are not finite numbers below "
+            f"{_LARGEST:g}; vertex {wrong[0]} is the first"
         )
     return corners, np.concatenate(triangles).astype(np.uint32)
 

@@ -80,24 +80,6 @@ def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], p: int, re
 
 
 @inner_kernel
-def _ground_of(scene: SceneHandle, rays: NDArray[np.float32], p: int, k: int) -> int:
-    """`Material` of the ground that ray `k` of packet `p` hits."""
-    if scene.cover.material.shape[0] == 0:
-        return int(scene.material[0, 0])
-    far = rays[p, FAR, k]
-    x = rays[p, ORIGIN, k] + far * rays[p, DIRECTION, k]
-    y = rays[p, ORIGIN + 1, k] + far * rays[p, DIRECTION + 1, k]
-    return int(ground_material(scene.cover, x, y))
-
-
-@inner_kernel
-def _looks_up(rays: NDArray[np.float32], p: int, k: int) -> bool:
-    """Whether what ray `k` of packet `p` hits looks up more than sideways."""
-    x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
-    return bool(z > np.float32(0.0) and z * z > x * x + y * y)
-
-
-@inner_kernel
 def run_together(rays: NDArray[np.float32], p: int, lanes: int) -> bool:
     """Whether first and last ray of packet `p` run close together."""
     last = lanes - 1
@@ -122,6 +104,8 @@ def cast_block(
     coherent_address = block.coherent.ctypes.data
     static, material_of, matrix_of = scene.static, scene.material, scene.normal_matrix
     trees = np.uint32(scene.trees)
+    cover = scene.cover
+    is_covered = cover.material.shape[0] > 0
     packets = (count + LANES - 1) // LANES
     limit: Any = np.float32(reach)
     for k in range(LANES):
@@ -145,10 +129,14 @@ def cast_block(
             elif number == _INVALID:  # terrain and solids are geometry of the top level
                 row = instance_of(part, trees)
                 instance[p, k] = row
-                if row == 0:
-                    material[p, k] = _ground_of(scene, rays, p, k)
-                else:
-                    material[p, k] = material_of[row, 1 if _looks_up(rays, p, k) else 0]
+                x, y, z = rays[p, NORMAL, k], rays[p, NORMAL + 1, k], rays[p, NORMAL + 2, k]
+                looks_up = z > np.float32(0.0) and z * z > x * x + y * y
+                material[p, k] = material_of[row, 1 if looks_up else 0]
+                if row == 0 and is_covered:
+                    far = rays[p, FAR, k]
+                    x = rays[p, ORIGIN, k] + far * rays[p, DIRECTION, k]
+                    y = rays[p, ORIGIN + 1, k] + far * rays[p, DIRECTION + 1, k]
+                    material[p, k] = ground_material(cover, x, y)
             else:
                 row = instance_of(number, trees)
                 instance[p, k] = row

@@ -116,6 +116,7 @@ def ascii_stl(corner):
         ("a.ply", b"ply", "meshes are read from"),
         ("a.stl", b"", "is no sound stl file|no triangle"),
         ("a.stl", ascii_stl("nan"), "vertices are not finite numbers"),
+        ("a.stl", ascii_stl("1e300"), "vertices are not finite numbers below 1e"),
         ("a.stl", ascii_stl("0"), "has an area"),
         (
             "a.stl",

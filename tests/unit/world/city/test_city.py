@@ -143,6 +143,9 @@ def test_lamps_and_trees_stand_apart_in_streets(helsinki):
     assert min(len(lamps), len(trees)) > 300
     assert shapely.distance(walls, shapely.points(lamps)).min() > 2.0
     assert shapely.distance(walls, shapely.points(trees)).min() > 4.0
+    way = 1.5 * helsinki.lamps[:, 2:]  # of the arm: over the street, off the walls
+    ahead, behind = (shapely.distance(walls, shapely.points(lamps + k * way)) for k in (1, -1))
+    assert (ahead > behind).all()
     for places, least in ((lamps, 0.6 * 28.0), (trees, 0.35 * 11.0)):
         apart = np.linalg.norm(places[:, None] - places[None], axis=2)
         assert apart[np.triu_indices(len(places), 1)].min() >= least - 1e-9
