@@ -110,8 +110,13 @@ def inner_kernel(function: F, **options: Any) -> F:
     Without an entry from Python, whose code for a few dozen arrays outweighs a small function, it
     compiles in a fraction of the time. Numbers that a caller writes out count as any others: numba
     would compile the part anew for each of them.
+
+    Its arrays are those of its caller, or views of them: their references are not counted (numba's
+    option `_nrt`), for the counts lie in memory that all threads share, and each change of one
+    is an atomic instruction. For a part that makes arrays: `owning_kernel`.
     """
-    part: Any = _decorate(function, no_cpython_wrapper=True, **options)
+    choices = {"no_cpython_wrapper": True, "_nrt": False, **options}
+    part: Any = _decorate(function, **choices)
 
     def refuse(*_arguments: Any, **_keywords: Any) -> None:
         raise TypeError(f"{function.__name__} is a part of a kernel; only kernels can call it")
@@ -127,6 +132,11 @@ def inner_kernel(function: F, **options: Any) -> F:
     part._compile_for_args = refuse
     part._insert = _ignore  # the entry point that numba would register is null
     return part  # type: ignore[no-any-return]
+
+
+def owning_kernel(function: F) -> F:
+    """Compile an `inner_kernel` that makes arrays of its own."""
+    return inner_kernel(function, _nrt=True)
 
 
 def _ignore(*_arguments: Any, **_keywords: Any) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.compiled import inner_kernel, kernel
+from volery.core.compiled import inner_kernel, kernel, owning_kernel
 from volery.core.rng import random_bits, uniform
 from volery.sensors.echo_kernels import (
     DRAWS,
@@ -117,7 +117,7 @@ def _merge(
     return count
 
 
-@inner_kernel
+@owning_kernel
 def _measure_several(
     lidar: LidarConstants,
     key: np.uint64,

@@ -17,7 +17,7 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from volery.core.compiled import cache_dir, inner_kernel, kernel
+from volery.core.compiled import cache_dir, inner_kernel, kernel, owning_kernel
 from volery.world.embree import (
     CONTEXT_INSTANCE,
     CONTEXT_INSTANCE_PRIMITIVE,
@@ -163,7 +163,7 @@ def _corner(
     )
 
 
-@inner_kernel
+@owning_kernel
 def _try_triangle(
     state: NDArray[np.float64],
     vertices_address: int,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from volery.core.errors import DataFileError
-from volery.sensors.beam_table import LANES
+from volery.sensors.beam_table import KNOTS_APART_NS, LANES
 from volery.sensors.lidar_model import load_lidar
 
 RINGS = {"vlp_16": 16, "hdl_32e": 32, "os1_64": 64, "os1_128": 128}
@@ -35,6 +35,15 @@ def test_every_table_casts_every_beam_once_at_its_own_time(name):
     assert model.sweep_duration_ns <= 1e9 / pattern.rate_hz
     # A pose is looked up at least every 2 ms, so that the straight line between two is exact.
     assert (table.knot_ns[:, 1] - table.knot_ns[:, 0]).max() <= 2_000_000
+
+
+def test_packets_of_a_planar_sweep_share_knots_within_a_millisecond():
+    knots = load_lidar().scan.table(0).knot_ns
+    start = np.unique(knots[:, 0])
+    assert (knots[:, 1] - knots[:, 0]).max() <= KNOTS_APART_NS
+    assert len(start) <= len(knots) / 3 + 1
+    assert (np.diff(start) > 0.5 * KNOTS_APART_NS).all()
+    np.testing.assert_array_equal(np.unique(knots[:, 1])[:-1], start[1:])
 
 
 @pytest.mark.parametrize(("name", "rings"), RINGS.items())
