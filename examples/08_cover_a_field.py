@@ -36,12 +36,11 @@ def scenario_of(folder):
 
 
 told = {}
-with tempfile.TemporaryDirectory() as name:
-    with Simulation(scenario_of(Path(name))) as simulation:
-        simulation.graph.subscribe(
-            "/coverage/status", lambda published: told.update(json.loads(published.message.data))
-        )
-        while not simulation.finished:
-            simulation.run(20.0)
-            print(f"{simulation.time_s:5.1f} s  {told['covered']:4.0%} covered")
-        print("cells of each UAV:", told["cells"])
+with tempfile.TemporaryDirectory() as name, Simulation(scenario_of(Path(name))) as simulation:
+    simulation.graph.subscribe(
+        "/coverage/status", lambda published: told.update(json.loads(published.message.data))
+    )
+    while not simulation.finished:
+        simulation.run(20.0)
+        print(f"{simulation.time_s:5.1f} s  {told['covered']:4.0%} covered")
+    print("cells of each UAV:", told["cells"])

@@ -1,9 +1,9 @@
 """Planning a coverage flight: the published reference cases of DARP, beside an open implementation.
 
 Ours is measured always, the peer where VOLERY_COVERAGE_PEER names a folder with its modules: that
-of github.com/alice-st/DARP (Python), which also holds these four cases. It runs in a process of its
-own, with the interpreter that VOLERY_COVERAGE_PEER_PYTHON names (it needs numpy, numba, cv2, pygame,
-scikit-learn, PIL), in turns with ours on the same core. Both divide the map and plan all tours.
+of github.com/alice-st/DARP (Python), whose own tests hold these four cases. It runs in a process of
+its own, with the interpreter that VOLERY_COVERAGE_PEER_PYTHON names (it needs numpy, numba, cv2,
+pygame, scikit-learn and PIL), in turns with ours. Both divide the map and plan all tours.
 """
 
 from __future__ import annotations
@@ -101,11 +101,13 @@ def _beside(case: Case, peer: Path, versions: dict[str, str]) -> dict[str, float
         "starts": case.starts,
         "blocked": case.blocked,
     }
-    with tempfile.TemporaryDirectory() as folder:
-        with Conversation(python, _SCRIPT, request, Path(folder)) as conversation:
-            told = ", ".join(f"{k} {v}" for k, v in conversation.versions().items())
-            ours, theirs = _medians([lambda: _timed(case), conversation.round])
-            facts = conversation.facts()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Conversation(python, _SCRIPT, request, Path(folder)) as conversation,
+    ):
+        told = ", ".join(f"{k} {v}" for k, v in conversation.versions().items())
+        ours, theirs = _medians([lambda: _timed(case), conversation.round])
+        facts = conversation.facts()
     versions["peer"] = told
     if sum(facts["sub_cells"]) != 4 * int(case.free().sum()):
         raise PeerError(f"its tours have {facts['sub_cells']} sub-cells, which is not all of them")

@@ -26,7 +26,6 @@ from volery.runtime.services.uav_services import offer_uav_services
 from volery.runtime.uav import Uav
 from volery.scenario.schema import Scenario
 
-
 _ROOT = "/"
 """Namespace of the nodes of the whole system."""
 
@@ -84,7 +83,7 @@ class Crew:
         self._take_over(parts, new, going_on)
 
     def start_nodes(self) -> None:
-        """Start the nodes of UAVs that have none yet, and those of the system if they do not run."""
+        """Start the nodes of UAVs that have none yet, and those of the system if none runs."""
         served = {node.get_namespace() for node in self.nodes}
         alone = [start for start in self.starts if f"/{start.name}" not in served]
         now_ns = self._now_ns

@@ -1,4 +1,4 @@
-"""Areas made connected and of exact size by cells that change hands across borders."""
+"""Areas made of exact size by cells that change hands across borders."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from volery.autonomy.coverage.cells import Ints
+from volery.autonomy.coverage.joining import walk_part
 from volery.core.compiled import inner_kernel, kernel
 
 _MOST_LOOKS_A_CELL, _MOST_LOOKS = 3_000, 200_000_000
@@ -15,60 +16,6 @@ _WALK_LOOKS = 4
 """Looks that a step of a walk through an area counts for: it jumps about in memory."""
 _MOST_TRIES_A_PAIR = 40
 """Chains of exchanges tried for each pair of UAVs. Modelling choice: most maps need a handful."""
-
-
-@kernel
-def join_parts(neighbours: Ints, starts: Ints, targets: Any, owner: Ints) -> None:
-    """Give parts of areas that do not hang together with their start to areas beside them.
-
-    An area grows into them by one ring of cells at a time, the one that lacks most first.
-    """
-    count, robots = owner.shape[0], starts.shape[0]
-    queue = np.empty(count, np.int32)
-    kept = np.zeros(count, np.bool_)
-    sizes = np.zeros(robots, np.int64)
-    for r in range(robots):
-        kept[starts[r]] = True
-        queue[0], head, tail = starts[r], 0, 1
-        while head < tail:
-            k = queue[head]
-            head += 1
-            for side in range(4):
-                other = neighbours[k, side]
-                if other >= 0 and owner[other] == r and not kept[other]:
-                    kept[other] = True
-                    queue[tail] = other
-                    tail += 1
-        sizes[r] = tail
-    loose = count - sizes.sum()
-    stuck = np.zeros(robots, np.bool_)
-    while loose:
-        grower = -1
-        for r in range(robots):
-            if not stuck[r] and (
-                grower < 0 or sizes[r] - targets[r] < sizes[grower] - targets[grower]
-            ):
-                grower = r
-        if grower < 0:
-            return  # cells are one component, so nothing is loose when all are stuck
-        tail = 0
-        for k in range(count):
-            if kept[k]:
-                continue
-            for side in range(4):
-                other = neighbours[k, side]
-                if other >= 0 and kept[other] and owner[other] == grower:
-                    queue[tail] = k
-                    tail += 1
-                    break
-        for i in range(tail):
-            owner[queue[i]] = grower
-            kept[queue[i]] = True
-        sizes[grower] += tail
-        loose -= tail
-        stuck[grower] = tail == 0
-        if tail:
-            stuck[:] = False
 
 
 @kernel
@@ -197,15 +144,10 @@ def _hand_over(
     what is wanted, or somewhat more where that still leaves the two areas nearer to their sizes.
     """
     moved = 0
-    border, queue = buffers[0], buffers[1]
+    border = buffers[0]
     while moved < amount and looks[0] >= 0:
-        tail = 0
         looks[0] -= owner.shape[0]
-        for k in range(owner.shape[0]):
-            if owner[k] == giver and k != start and _touches(neighbours, owner, k, taker):
-                border[tail] = k
-                gaps[tail] = distances[taker, k] - distances[giver, k]
-                tail += 1
+        tail = _find_border(neighbours, start, giver, taker, distances, owner, border, gaps)
         order = np.argsort(gaps[:tail], kind="mergesort")
         before = moved
         for i in order:
@@ -213,26 +155,78 @@ def _hand_over(
             if moved < amount and _is_loose(neighbours, owner, k):
                 owner[k] = taker
                 moved += 1
-        if moved > before:
-            continue
-        least, chosen = 2 * (amount - moved), -1
-        for i in order:
-            if looks[0] < 0:
-                break
-            size = _held_by(neighbours, start, owner, border[i], queue, seen)
-            looks[0] -= _WALK_LOOKS * owner.shape[0]
-            if size < least:
-                least, chosen = size, border[i]
-            if size <= amount - moved:
-                break
-        if chosen < 0:
+        if moved == before:
+            moved += _hand_over_held(
+                neighbours,
+                start,
+                taker,
+                amount - moved,
+                owner,
+                border[order],
+                buffers[1],
+                seen,
+                looks,
+            )
+        if moved == before:
             break
-        _held_by(neighbours, start, owner, chosen, queue, seen)
-        for k in range(owner.shape[0]):
-            if owner[k] == giver and (k == chosen or not seen[k]):
-                owner[k] = taker
-        moved += least
     return moved
+
+
+@inner_kernel
+def _find_border(
+    neighbours: Ints,
+    start: int,
+    giver: int,
+    taker: int,
+    distances: Any,
+    owner: Ints,
+    border: Ints,
+    gaps: Any,
+) -> int:
+    """Cells of `giver` beside `taker`, and how much nearer the giver's start is; how many."""
+    found = 0
+    for k in range(owner.shape[0]):
+        if owner[k] == giver and k != start and _touches(neighbours, owner, k, taker):
+            border[found] = k
+            gaps[found] = distances[taker, k] - distances[giver, k]
+            found += 1
+    return found
+
+
+@inner_kernel
+def _hand_over_held(
+    neighbours: Ints,
+    start: int,
+    taker: int,
+    amount: int,
+    owner: Ints,
+    border: Ints,
+    queue: Ints,
+    seen: Any,
+    looks: Any,
+) -> int:
+    """Move one cell of `border` with all that it alone holds to its area; how many cells went.
+
+    The first that takes `amount` at most along, else the one that takes least, below twice that.
+    """
+    least, chosen = 2 * amount, -1
+    for k in border:
+        if looks[0] < 0:
+            break
+        size = _held_by(neighbours, start, owner, k, queue, seen)
+        looks[0] -= _WALK_LOOKS * owner.shape[0]
+        if size < least:
+            least, chosen = size, k
+        if size <= amount:
+            break
+    if chosen < 0:
+        return 0
+    giver = owner[chosen]
+    _held_by(neighbours, start, owner, chosen, queue, seen)
+    for k in range(owner.shape[0]):
+        if owner[k] == giver and (k == chosen or not seen[k]):
+            owner[k] = taker
+    return least
 
 
 @inner_kernel
@@ -269,16 +263,5 @@ def _held_by(neighbours: Ints, start: int, owner: Ints, k: int, queue: Ints, see
         seen[other] = False
         if owner[other] == own:
             size += 1
-    seen[k], seen[start] = True, True
-    queue[0] = start
-    head, tail = 0, 1
-    while head < tail:
-        at = queue[head]
-        head += 1
-        for side in range(4):
-            other = neighbours[at, side]
-            if other >= 0 and owner[other] == own and not seen[other]:
-                seen[other] = True
-                queue[tail] = other
-                tail += 1
-    return size - tail
+    seen[k] = True
+    return size - walk_part(neighbours, owner, start, queue, seen)

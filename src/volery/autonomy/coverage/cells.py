@@ -38,8 +38,8 @@ class Cells:
     """The n cells of a grid that count, numbered row by row.
 
     shape: rows, columns of the grid. flat: (n,) row * columns + column. index: (rows * columns,)
-    number of a cell, -1 for those that do not count. neighbours: (n, 8) numbers of the cells around,
-    -1 where there is none.
+    number of a cell, -1 for those that do not count. neighbours: (n, 8) numbers of the cells
+    around, -1 where there is none.
     """
 
     shape: tuple[int, int]
@@ -63,8 +63,8 @@ class Cells:
         count = int(np.count_nonzero(mask))
         if count > MOST_CELLS:
             raise PlanError(
-                f"the map has {count:,} free cells; at most {MOST_CELLS:,} can be planned: make its "
-                "cells larger"
+                f"the map has {count:,} free cells; at most {MOST_CELLS:,} can be planned: make "
+                "its cells larger"
             )
         flat = np.flatnonzero(mask).astype(np.int32)
         index = np.full(mask.size, -1, np.int32)

@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.coverage.balance import balance, join_parts
+from volery.autonomy.coverage.balance import balance
 from volery.autonomy.coverage.cells import Cells, Ints
 from volery.autonomy.coverage.growth import grow
+from volery.autonomy.coverage.joining import join_parts, walk_part
 from volery.core.compiled import inner_kernel, kernel
 from volery.core.rng import stream_key, uniform
 
@@ -97,7 +98,7 @@ def _iterate(
         part[:] = False
         wrong = 0
         for r in range(robots):
-            lost[r] = sizes[r] - _mark_part(neighbours, here, starts[r], queue, part)
+            lost[r] = sizes[r] - walk_part(neighbours, here, starts[r], queue, part)
             wrong += lost[r] + abs(sizes[r] - targets[r])
         if wrong < best:
             best = wrong
@@ -141,25 +142,6 @@ def _assign(fields: Any, starts: Ints, here: Ints, sizes: Any) -> None:
     sizes[:] = 0
     for k in range(count):
         sizes[here[k]] += 1
-
-
-@inner_kernel
-def _mark_part(neighbours: Ints, here: Ints, start: int, queue: Ints, part: Any) -> int:
-    """Mark the cells of a UAV that hang together with its start; how many there are."""
-    robot = here[start]
-    part[start] = True
-    queue[0] = start
-    head, tail = 0, 1
-    while head < tail:
-        k = queue[head]
-        head += 1
-        for side in range(4):
-            other = neighbours[k, side]
-            if other >= 0 and here[other] == robot and not part[other]:
-                part[other] = True
-                queue[tail] = other
-                tail += 1
-    return tail
 
 
 @inner_kernel

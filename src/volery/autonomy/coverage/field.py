@@ -72,6 +72,16 @@ class Field:
         """(K, 2) m, map: middles of cells of the grid twice as fine."""
         return self._middles(sub_cells, 0.5 * self.cell_m)
 
+    def apart(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(R, 2) the nearest free cell to each of `cells` (R, 2), each another one while any is."""
+        free = np.argwhere(self.free)
+        found = cells.copy()
+        for number, cell in enumerate(cells[: len(free)]):
+            nearest = int(np.argmin(np.hypot(*(free - cell).T)))
+            found[number] = free[nearest]
+            free = np.delete(free, nearest, axis=0)
+        return found
+
     def _grid_at(self, position_map: ArrayLike, side_m: float) -> NDArray[np.int64]:
         off = np.asarray(position_map, np.float64)[..., :2] - self.origin_map
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.coverage.balance import balance, join_parts
+from volery.autonomy.coverage.balance import balance
 from volery.autonomy.coverage.cells import Cells, Ints
+from volery.autonomy.coverage.joining import join_parts
 
 
 def grow(

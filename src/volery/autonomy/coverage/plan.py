@@ -65,12 +65,9 @@ def plan_coverage(
 ) -> CoveragePlan:
     """Divide a grid map among UAVs and plan a closed tour through each area.
 
-    Parameters
-    ----------
-    free: (rows, columns) where a UAV may be, at flying height.
-    starts: (R, 2) row and column of each UAV; free, and no two the same.
-    to_visit: the free cells that need a visit; None: all of them.
-    flies_over: whether a UAV may cross what is blocked, above it, to reach other parts.
+    free: (rows, columns) where a UAV may be, at flying height. starts: (R, 2) row and column of
+    each UAV; free, and no two the same. to_visit: the free cells that need a visit; None: all of
+    them. flies_over: whether a UAV may cross what is blocked, above it, to reach other parts.
     seed: of the method's random numbers; the same seed gives the same plan.
 
     Raises

@@ -162,7 +162,7 @@ class CoveragePlanner(Node):
         whole = self._covered.reshape(rows, 2, columns, 2).all(axis=(1, 3))
         left = self._field.free & ~whole
         places = self._field.cells_at(np.array([f.position_map for f in able]))
-        self._take_plan(able, _apart(places, self._field.free), left)
+        self._take_plan(able, self._field.apart(places), left)
 
     def _take_plan(self, able: list[Flight], starts: NDArray[np.int64], left: Mask) -> None:
         assert self._field is not None
@@ -207,7 +207,7 @@ class CoveragePlanner(Node):
             self._refused = reason
             self._tell_status()
 
-    # -------------------------------------------------------------------------------- what it does
+    # ------------------------------------------------------------------------------- what it does
 
     def _on_timer(self) -> None:
         self._ticks += 1
@@ -266,7 +266,7 @@ class CoveragePlanner(Node):
         flies = flight.phase in (Phase.TAKE_OFF, Phase.COVER)
         return flies and flight.is_lost(self._patience_s, now)
 
-    # --------------------------------------------------------------------------------- what it tells
+    # ------------------------------------------------------------------------------ what it tells
 
     @property
     def _share(self) -> float:
@@ -291,17 +291,3 @@ class CoveragePlanner(Node):
         self._status.publish(
             reports.status_message(self._flights, self._plan, share, self._refused)
         )
-
-
-def _apart(places: NDArray[np.int64], free: Mask) -> NDArray[np.int64]:
-    """(R, 2) the nearest free cell to each place (R, 2), each another one."""
-    cells = np.argwhere(free)
-    taken = np.zeros(len(cells), np.bool_)
-    found = []
-    for place in places:
-        away = np.where(taken, np.inf, np.hypot(*(cells - place).T))
-        nearest = int(np.argmin(away)) if len(cells) else 0
-        if len(cells):
-            taken[nearest] = True
-        found.append(cells[nearest] if len(cells) else place)
-    return np.array(found)

@@ -52,7 +52,8 @@ class Tour:
 def tours(cells: Cells, owner: Ints, starts: Ints) -> list[Tour]:
     """A tour of each area, from a sub-cell of its start; of the four the one with fewest turns.
 
-    owner: (n,) the area of each cell, -1 for none; all areas connected. starts: (R,) a cell of each.
+    owner: (n,) the area of each cell, -1 for none; all areas connected. starts: (R,) a cell of
+    each.
     """
     best: list[Tour] = []
     trees = np.empty((ORDERS, len(cells)), np.uint8)

@@ -99,4 +99,5 @@ def _corners(way: NDArray[np.int64]) -> NDArray[np.int64]:
     """The cells (K, 2) of a way at which it turns, ends excluded."""
     steps = np.diff(way, axis=0)
     turns = (steps[1:] != steps[:-1]).any(axis=1)
-    return way[1:-1][turns]
+    corners: NDArray[np.int64] = way[1:-1][turns]
+    return corners
