@@ -10,8 +10,6 @@ from volery.autonomy.coverage.cells import Ints
 from volery.autonomy.coverage.joining import walk_part
 from volery.core.compiled import inner_kernel, kernel
 
-_MOST_LOOKS_A_CELL, _MOST_LOOKS = 3_000, 200_000_000
-"""Cells looked at in one balancing, for each cell and in all: seconds at most. Modelling choice."""
 _WALK_LOOKS = 4
 """Looks that a step of a walk through an area counts for: it jumps about in memory."""
 _MOST_TRIES_A_PAIR = 40
@@ -19,12 +17,14 @@ _MOST_TRIES_A_PAIR = 40
 
 
 @kernel
-def balance(neighbours: Ints, starts: Ints, targets: Any, distances: Any, owner: Ints) -> None:
+def balance(
+    neighbours: Ints, starts: Ints, targets: Any, distances: Any, owner: Ints, most_looks: int
+) -> None:
     """Move cells from areas that are too large to those that are too small, area by area.
 
     `owner` must hold connected areas; they stay so. Cells go along the shortest chain of areas that
     touch. Of those at a border the ones that lie nearest to their new start, against their old
-    one, go first.
+    one, go first. It gives up after `most_looks` looks at cells.
     """
     count, robots = owner.shape[0], starts.shape[0]
     surplus = np.empty(robots, np.int64)
@@ -37,7 +37,7 @@ def balance(neighbours: Ints, starts: Ints, targets: Any, distances: Any, owner:
     buffers = np.empty((2, count), np.int32)
     gaps = np.empty(count, np.float32)
     seen = np.zeros(count, np.bool_)
-    looks = np.full(1, min(_MOST_LOOKS_A_CELL * count, _MOST_LOOKS))
+    looks = np.full(1, most_looks)
     for _ in range(_MOST_TRIES_A_PAIR * robots * robots):
         if (surplus == 0).all() or looks[0] < 0:
             return

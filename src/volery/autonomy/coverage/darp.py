@@ -30,6 +30,8 @@ MOST_UPDATES = 300_000_000
 """Cell updates of one division, some seconds on one core. Modelling choice."""
 _NEAR_ENOUGH = 0.02
 """Share of the cells that `balance` may still have to move. Modelling choice."""
+_LOOKS_A_CELL, _MOST_LOOKS = 3_000, 200_000_000
+"""Patience of `balance`, a few seconds at most. Modelling choice."""
 _GAIN = 0.25
 """Of the correction factors, against the relative error of a share. Modelling choice ..."""
 _LEAST_GAIN = 0.01
@@ -57,7 +59,8 @@ def divide(cells: Cells, starts: Ints, targets: NDArray[np.int64], *, seed: int 
     key = stream_key(seed, "coverage/darp")
     _iterate(cells.neighbours, starts, targets, fields, key, iterations, owner)
     join_parts(cells.neighbours, starts, targets, owner)
-    balance(cells.neighbours, starts, targets, distances, owner)
+    looks = min(_LOOKS_A_CELL * len(cells), _MOST_LOOKS)
+    balance(cells.neighbours, starts, targets, distances, owner, looks)
     if _missing(owner, targets):
         grown = grow(cells, starts, targets, distances)
         if _missing(grown, targets) < _missing(owner, targets):

@@ -14,6 +14,9 @@ from volery.autonomy.coverage.balance import balance
 from volery.autonomy.coverage.cells import Cells, Ints
 from volery.autonomy.coverage.joining import join_parts
 
+_LOOKS_A_CELL, _MOST_LOOKS = 10_000, 600_000_000
+"""Patience of `balance`, some seconds at most for each doubling. Modelling choice."""
+
 
 def grow(
     cells: Cells, starts: Ints, targets: NDArray[np.int64], distances: NDArray[np.float32]
@@ -35,7 +38,8 @@ def grow(
         present = _present_targets(part, begin, targets)
         area = owner[members]
         join_parts(part.neighbours, begin, present, area)
-        balance(part.neighbours, begin, present, distances[:, members], area)
+        looks = min(_LOOKS_A_CELL * size, _MOST_LOOKS)
+        balance(part.neighbours, begin, present, distances[:, members], area, looks)
         owner[members] = area
     return owner
 
