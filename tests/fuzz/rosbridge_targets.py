@@ -217,8 +217,8 @@ def client(mutator):
         calls.append(Reply(lambda _: None, lambda _: None))
         return calls[-1]
 
-    state.subscribe("/out", STRING, 2, lambda: None)
-    state.subscribe("/head", "std_msgs/msg/Header", 2, lambda: None)
+    state.subscribe("/out", STRING, 2, False, lambda: None)
+    state.subscribe("/head", "std_msgs/msg/Header", 2, False, lambda: None)
     state.advertise("/in", STRING, latched=True)
     answer = message_type(f"{TRIGGER}_Response")
     state.offer("/mine", TRIGGER, lambda _, reply: reply.answer(answer(True, "x")))

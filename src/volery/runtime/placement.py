@@ -172,6 +172,9 @@ def check_place(
             f"{where}: {at} lies {standing - place[2]:.2f} m under the ground or with its feet in "
             f"it; z must be at least {standing:.2f} there"
         )
+    around = int(scene.enclosing(place[None])[0])
+    if around >= 0:
+        raise PlacementError(f"{where}: {at} lies inside {scene.instance_name(around)}{hint}")
     radius = airframe.body.collision_radius_m
     look = scene.clearance(place[None], radius, include_terrain=False)
     if look.instance[0] >= 0:
@@ -179,9 +182,6 @@ def check_place(
             f"{where}: {at} lies in {scene.instance_name(int(look.instance[0]))}, "
             f"{look.distance[0]:.2f} m from it; at least {radius:.2f} m is needed{hint}"
         )
-    around = int(scene.enclosing(place[None])[0])
-    if around >= 0:
-        raise PlacementError(f"{where}: {at} lies inside {scene.instance_name(around)}{hint}")
     for other in others:
         distance = float(np.linalg.norm(place - other.position_map))
         needed = radius + other.airframe.body.collision_radius_m

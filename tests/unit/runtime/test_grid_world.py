@@ -264,7 +264,7 @@ def test_uavs_are_not_placed_in_blocks(simulate, blocks_data):
     blocks_data["uavs"][0]["position_m"] = [7.5, 0.0, 3.0]  # in the middle, far from all walls
     blocks_data["world"]["grid_map"]["cell_size_m"] = 20.0
     blocks_data["uavs"][0]["position_m"] = [50.0, 0.0, 3.0]
-    with pytest.raises(PlacementError, match="lies in block"):
+    with pytest.raises(PlacementError, match="lies inside block"):
         simulate(blocks_data)
     blocks_data["world"]["grid_map"]["cell_size_m"] = 3.0
     blocks_data["uavs"] = [

@@ -8,7 +8,7 @@ import numpy as np
 
 from volery.autonomy.coverage.cells import Ints
 from volery.autonomy.coverage.joining import walk_part
-from volery.core.compiled import inner_kernel, kernel
+from volery.core.compiled import inner_kernel, kernel, owning_kernel
 
 _WALK_LOOKS = 4
 """Looks that a step of a walk through an area counts for: it jumps about in memory."""
@@ -82,7 +82,7 @@ def _find_touching(neighbours: Ints, owner: Ints, touch: Any) -> None:
                 touch[owner[other], owner[k]] = True
 
 
-@inner_kernel
+@owning_kernel
 def _find_chain(touch: Any, closed: Any, surplus: Any, chain: Ints) -> int:
     """Areas from one that is too large to the nearest that is too small; how many, 0 for none.
 
@@ -124,7 +124,7 @@ def _find_chain(touch: Any, closed: Any, surplus: Any, chain: Ints) -> int:
                         return links
 
 
-@inner_kernel
+@owning_kernel
 def _hand_over(
     neighbours: Ints,
     start: int,

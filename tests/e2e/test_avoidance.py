@@ -1,0 +1,87 @@
+"""Avoidance by depth camera: past one block, two ways; and the numbers of a bench."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from volery.bench.avoidance import FIELDS, WAYS, Flight, field_scenario, figures_of
+from volery.control.flight_modes import FlightMode
+from volery.scenario.load import load_scenario
+
+
+@pytest.fixture
+def past_a_block(tmp_path):
+    """A course of 24 m with a block of 2 m in its middle."""
+
+    def scenario(way):
+        data = load_scenario("obstacle_field").model_dump()
+        (tmp_path / "block.csv").write_text("1\n")
+        data["world"]["forest"] = None
+        data["world"]["grid_map"] = {
+            "maps": [{"file": str(tmp_path / "block.csv")}],
+            "cell_size_m": 2.0,
+            "origin_m": [11.0, -1.3],
+        }
+        node = data["types"]["scout"]["nodes"][0]
+        node["node"] = WAYS[way]
+        node["parameters"]["distance_m"] = 24.0
+        data["duration_s"] = 60.0
+        return data
+
+    return scenario
+
+
+def fly(simulate, scenario):
+    simulation = simulate(scenario)
+    phases = []
+    for name in ("region_avoidance", "depth_avoidance"):
+        topic = f"/uav1/{name}/phase"
+        simulation.graph.subscribe(
+            topic, lambda p: phases.append(p.message.data), "std_msgs/msg/String"
+        )
+    simulation.run()
+    assert [e for e in simulation.events if str(e.kind) in ("impact", "collision")] == []
+    uav = simulation.uavs["uav1"]
+    assert uav.mode is FlightMode.LANDED
+    assert uav.position_map[0] > 23.0
+    return simulation, [phase for phase, _ in itertools.groupby(phases)]
+
+
+def test_the_machine_goes_through_its_states(simulate, past_a_block):
+    _, phases = fly(simulate, past_a_block("region"))
+    assert phases[:2] == ["start", "climb"]
+    flown = phases[2:]
+    begin = flown.index("stopped") - 1
+    assert flown[begin : begin + 4] == ["forward", "stopped", "avoid", "return"]
+    assert flown[-2:] == ["forward", "land"]
+
+
+def test_the_whole_picture_leads_around(simulate, past_a_block):
+    simulation, phases = fly(simulate, past_a_block("whole"))
+    assert phases == ["start", "climb", "fly", "land"]
+    assert simulation.time_s < 40.0
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_fields_differ_by_seed_alone(tmp_path, field):
+    first, again, other = (field_scenario("whole", field, seed, tmp_path) for seed in (1, 1, 2))
+    assert first == again
+    assert first.seed != other.seed
+
+
+def test_the_benchs_figures():
+    flights = [
+        Flight("region", "trees", 1, True, False, 9.0, 10.0),
+        Flight("region", "trees", 2, False, True, 70.0, 60.0),
+        Flight("region", "trees", 3, False, True, 80.0, 50.0),
+        Flight("whole", "trees", 1, False, True, 66.0, 40.0),
+    ]
+    figures = figures_of(flights)
+    assert figures["trees_region_collisions"] == 1
+    assert figures["trees_region_arrivals"] == 2
+    assert figures["trees_region_metres"] == 75.0
+    assert figures["trees_whole_seconds"] == 40.0
+    assert figures["blocks_whole_arrivals"] == 0
+    assert "blocks_whole_metres" not in figures
