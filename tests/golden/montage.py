@@ -4,13 +4,13 @@ import sys
 
 import numpy as np
 from matplotlib import image
-from weather_pictures import WEATHERS, Studio
+from studio import WEATHERS, Studio
 
 COLUMNS = 3
 
 
 def main(path):
-    studio = Studio()
+    studio = Studio("forest")
     seen = [studio.shoot(weather, 300, parts=("colour",)).colour[0] for weather in WEATHERS]
     studio.close()
     rows = [np.hstack(seen[k : k + COLUMNS]) for k in range(0, len(seen), COLUMNS)]
