@@ -152,7 +152,7 @@ class DepthCourse(Node):
         elif self.phase is Phase.FLY:
             self._fly(pose)
         if self._status.wanted:
-            self._status.publish(String(self.doing if self.phase is Phase.FLY else self.phase))
+            self._status.publish(String(self.doing if self.phase is Phase.FLY else str(self.phase)))
 
     def _fly(self, pose: Pose) -> None:
         if float(self.to_goal(pose) @ self._ahead) < 0.0:

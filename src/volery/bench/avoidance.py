@@ -36,7 +36,7 @@ FIELDS = ("trees", "blocks")
 
 _COURSE_M = 66.0
 _FIELD_M = (8.0, -14.0, 58.0, 14.0)
-_BLOCKS = 70
+_BLOCKS = 40
 _APART_M = 4.0
 """Least distance of the middles of two blocks."""
 _SLICE_S = 0.25

@@ -207,6 +207,16 @@ BENCHES: dict[str, Bench] = {
             },
         ),
         Bench(
+            "avoidance",
+            "Avoidance by depth camera: 50 fields of trees and 50 of blocks, a course of 66 m at "
+            "2 m/s; `region`: mean depth of one region, `whole`: every pixel",
+            {
+                "trees_whole_collisions": Bound(2.0, at_most=True),
+                "blocks_whole_collisions": Bound(2.0, at_most=True),
+            },
+            in_all=False,  # it takes a quarter of an hour
+        ),
+        Bench(
             "peers",
             "Peers: other simulators beside Volery, in turns on one core; what each includes is "
             "told in [peers.md](peers.md)",
