@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.scan_points import Pose
-from volery.autonomy.search.colour_blob import NO_DISCS, Blob, colour_mask, largest_blob, pixels_of
-from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
+from volery.autonomy.search.ground_view import Intrinsics
 from volery.autonomy.search.places import check_room, places_around, random_waypoint
+from volery.autonomy.search.sight import place_seen
 from volery.autonomy.search.steering import is_at
 from volery.autonomy.search.team import CAN_COME, ON_THE_WAY, RISING, Call, Claim, Phase
 from volery.autonomy.search.team_flight import TeamFlight
@@ -41,8 +41,6 @@ _BLIND_S = 2.0
 """Without a picture for so long it stops."""
 _CALL_PERIOD_S, _CALLS = 1.0, 10
 """How often, and how many times, a teammate is called."""
-_TEAMMATE_M = 0.7
-"""Radius of the ball in which a teammate is: it may be red itself."""
 _SEARCHING = frozenset({Phase.SEARCH, Phase.LOOK})
 """All modelling choices."""
 
@@ -146,28 +144,14 @@ class CooperativeSearch(TeamFlight):
         self._image_ns = self.now_ns
         if self.phase not in _SEARCHING or self.pose is None or self._intrinsics is None:
             return
-        pose = pose_at(self.pose, stamp_of(image))
-        view = GroundView(self._intrinsics, self.settings.mount_m, self.settings.mount_rpy_deg)
-        blob = self._blob_in(image, view, pose)
-        if blob is None:
-            return
-        place = view.place_of(blob.u, blob.v, pose, self.settings.object_m)
-        if place is None or not self.settings.area.holds(place[0], place[1]):
+        mates = [m.position for m in self.teammates.values() if m.phase is not None]
+        place = place_seen(image, self._intrinsics, self.settings, self.pose, mates)
+        if place is None:
             return
         if self.phase is Phase.SEARCH:
             self._see(stamp_of(image), place)
         elif is_at(self.pose, self._look_from, _NEAR_M, _REST_M_S):
             self._looks.append(place)
-
-    def _blob_in(self, image: Image, view: GroundView, pose: Pose) -> Blob | None:
-        mates = self.teammates.values()
-        discs = [view.disc_of(m.position, _TEAMMATE_M, pose) for m in mates if m.phase is not None]
-        hidden = [disc for disc in discs if disc is not None]
-        mask = colour_mask(
-            pixels_of(image), self.settings.colours, np.array(hidden) if hidden else NO_DISCS
-        )
-        blob = largest_blob(mask)
-        return blob if blob is not None and blob.share >= self.settings.least_share else None
 
     def _see(self, stamp_ns: int, place: Array) -> None:
         """Break off, stop over it and look again: from there its height matters little."""
