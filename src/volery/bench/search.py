@@ -1,8 +1,8 @@
 """The bench `search`: how long a UAV's call to another one takes, over each transport.
 
 The called node is that of a cooperative search, which goes on all the while: pictures, odometry and
-commands go over the same transport. One way is from the call in the caller's process to its handler in the
-other process, by the computer's monotonic clock, which both share.
+commands go over the same transport. One way is from the call in the caller's process to its handler
+in the other process, by the computer's monotonic clock, which both share.
 """
 
 from __future__ import annotations
