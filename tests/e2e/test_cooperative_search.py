@@ -9,8 +9,10 @@ import time
 
 import numpy as np
 import pytest
+from ros1_bench import missing_of_ros1, shared_master
 
 from volery.bridges.doors import Doors
+from volery.bridges.ros1.door import Ros1Door
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.engine.events import EventKind
@@ -141,33 +143,37 @@ def test_it_goes_on_from_a_snapshot_as_it_did(tmp_path, simulate):
     np.testing.assert_array_equal([uav.position_map for uav in simulation.uavs.values()], once)
 
 
-DOORS = {
-    "rosbridge": lambda: RosbridgeServer(port=0),
-    "ros-tcp": lambda: RosTcpEndpoint(port=0),
-}
+def open_rosbridge(doors):
+    door = RosbridgeServer(port=0)
+    doors.open(door)
+    return f"rosbridge://127.0.0.1:{door.port}"
 
 
-@pytest.mark.parametrize("way", DOORS)
-def test_each_node_in_a_process_of_its_own(way, tmp_path, simulate):
+def open_ros_tcp(doors):
+    door = RosTcpEndpoint(port=0)
+    doors.open(door)
+    return f"ros-tcp://127.0.0.1:{door.port}"
+
+
+def open_ros1(doors):
+    if missing_of_ros1():
+        pytest.skip(f"no {', '.join(missing_of_ros1())}: see .ci/install_ros1")
+    shared_master()
+    doors.open(Ros1Door())
+    return "ros1"
+
+
+# rospy uses what is deprecated and forgets to close sockets
+@pytest.mark.filterwarnings("ignore:notifyAll:DeprecationWarning")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("open_door", [open_rosbridge, open_ros_tcp, open_ros1])
+def test_each_node_in_a_process_of_its_own(open_door, tmp_path, simulate):
     simulation = simulate(meadow(tmp_path, 2, with_nodes=False))
     watch = Watch(simulation)
     simulation.step(1)
-    door = DOORS[way]()
-    nodes = []
     with Doors(simulation.gateway) as doors:
-        doors.open(door)
-        for name in simulation.uavs:
-            words = [f"{key}={value}" for key, value in parameters(2).items()]
-            nodes.append(
-                subprocess.Popen(
-                    [
-                        *(sys.executable, "-m", "volery.cli", "node", NODE),
-                        *("--via", f"{way}://127.0.0.1:{door.port}", "--namespace", f"/{name}"),
-                        *(word for given in words for word in ("-p", given)),
-                    ],
-                    stderr=subprocess.DEVNULL,
-                )
-            )
+        via = open_door(doors)
+        nodes = [start_node(via, name) for name in simulation.uavs]
         try:
             end = time.monotonic() + 180.0
             while not simulation.finished and time.monotonic() < end:
@@ -178,3 +184,15 @@ def test_each_node_in_a_process_of_its_own(way, tmp_path, simulate):
                 node.terminate()
                 node.wait(20.0)
     watch.check()
+
+
+def start_node(via, name):
+    given = [f"{key}={value}" for key, value in parameters(2).items()]
+    words = [word for one in given for word in ("-p", one)]
+    return subprocess.Popen(
+        [
+            *(sys.executable, "-m", "volery.cli", "node", NODE),
+            *("--via", via, "--namespace", f"/{name}", *words),
+        ],
+        stderr=subprocess.DEVNULL,
+    )

@@ -94,7 +94,7 @@ def draw(search: Search, scenario: Scenario) -> Figure:
     axes.set_ylabel("y, m")
     axes.set_aspect("equal")
     axes.margins(0.02)
-    figure.legend(loc="outside lower center", ncols=5, frameon=False)
+    figure.legend(loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 
