@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.scan_points import Pose
+from volery.autonomy.search.calls import JOIN, Calls, Claim
 from volery.autonomy.search.ground_view import Intrinsics
 from volery.autonomy.search.places import check_room, places_around, random_waypoint
 from volery.autonomy.search.sight import place_seen
 from volery.autonomy.search.steering import is_at
-from volery.autonomy.search.team import CAN_COME, ON_THE_WAY, RISING, Call, Claim, Phase
+from volery.autonomy.search.team import CAN_COME, GOING_HOME, ON_THE_WAY, RISING, Phase
 from volery.autonomy.search.team_flight import TeamFlight
 from volery.core import rng
 from volery.core.clock import NS_PER_S
@@ -22,14 +23,11 @@ from volery.graph.messages import (
     Point,
     PointStamped,
     header,
-    message_type,
     stamp_of,
-    time_from_ns,
 )
 
 Array = NDArray[np.float64]
 
-JOIN = "volery_interfaces/srv/JoinSearch"
 _BORDER_M = 1.0
 """Waypoints and places keep so far inside the area: more than a UAV strays from its way."""
 _NEAR_M = 1.0
@@ -39,8 +37,6 @@ _LOOKS, _LOOK_S = 5, 8.0
 _REST_M_S = 0.3
 _BLIND_S = 2.0
 """Without a picture for so long it stops."""
-_CALL_PERIOD_S, _CALLS = 1.0, 10
-"""How often, and how many times, a teammate is called."""
 _SEARCHING = frozenset({Phase.SEARCH, Phase.LOOK})
 """All modelling choices."""
 
@@ -75,6 +71,7 @@ class CooperativeSearch(TeamFlight):
         "calls",
         "_intrinsics",
         "_waypoint",
+        "_began_ns",
         "_image_ns",
         "_look_from",
         "_look_s",
@@ -93,10 +90,12 @@ class CooperativeSearch(TeamFlight):
 
         self.claim: Claim | None = None
         """What is gone by: found by this UAV or another one."""
-        self.calls: dict[str, Call] = {}
+        self.calls = Calls()
         """Of an own find."""
         self._intrinsics: Intrinsics | None = None
         self._waypoint = 0
+        self._began_ns: int | None = None
+        """When the search began."""
         self._image_ns = 0
         self._look_from = np.zeros(3)
         self._look_s = 0.0
@@ -167,6 +166,8 @@ class CooperativeSearch(TeamFlight):
 
     def act(self, pose: Pose) -> None:
         """Search, look, come, hold."""
+        if self.phase in CAN_COME - {Phase.READY} and self.team_in(GOING_HOME):
+            self._finish()
         if self._finishing and self.phase in CAN_COME - RISING:
             self.enter(Phase.HOME)
         if self.phase is Phase.SEARCH:
@@ -188,10 +189,12 @@ class CooperativeSearch(TeamFlight):
         if self.claim is not None:  # called while it climbed
             self.enter(Phase.COME)
             return
-        if self.settings.search_s and self.phase_s > self.settings.search_s:
+        if self._began_ns is None:
+            self._began_ns = self.now_ns
+        if 0.0 < self.settings.search_s * NS_PER_S < self.now_ns - self._began_ns:
             self._finish()
             return
-        if self.now_ns - self._image_ns > _BLIND_S * NS_PER_S:
+        if not 0 <= self.now_ns - self._image_ns <= _BLIND_S * NS_PER_S:
             self.fly_to(pose.position)
             return
         goal = self.in_layer(random_waypoint(self._inner, self._key, self._waypoint))
@@ -205,7 +208,7 @@ class CooperativeSearch(TeamFlight):
         if len(self._looks) >= _LOOKS:
             place = np.median(self._looks, axis=0)
             self.claim = self.claim._replace(place=_plain(place))
-            self.calls = {name: Call() for name in self.mates}
+            self.calls = Calls.of(self.mates)
             stamp = header(self.claim.stamp_ns, "map")
             self._found.publish(PointStamped(stamp, Point(*self.claim.place)))
             self._begin_to_come()
@@ -234,7 +237,7 @@ class CooperativeSearch(TeamFlight):
         if finder is not None and finder.is_heard(self.now_ns, patience):
             waits = finder.phase in CAN_COME
         else:
-            waits = self.team_in(ON_THE_WAY) or not self._calls_are_settled()
+            waits = self.team_in(ON_THE_WAY) or not self.calls.are_settled(self.now_ns)
         if waits:
             self._waiting_ns = None
         elif self._waiting_ns is None:
@@ -246,33 +249,16 @@ class CooperativeSearch(TeamFlight):
 
     def _call_teammates(self) -> None:
         assert self.claim is not None
-        claim = self.claim
-        for name, call in self.calls.items():
-            if self._is_out(name) or not call.is_due(self.now_ns, _CALL_PERIOD_S, _CALLS):
-                continue
-            call.tries, call.asked_ns = call.tries + 1, self.now_ns
-
-            def note(response: Any, call: Call = call) -> None:
-                call.accepted = call.accepted or bool(response.accepted)
-
-            self.ask(self._come_clients[name], _invitation(claim), note)
-
-    def _calls_are_settled(self) -> bool:
-        return all(
-            self._is_out(name) or call.is_settled(self.now_ns, _CALL_PERIOD_S, _CALLS)
-            for name, call in self.calls.items()
-        )
-
-    def _is_out(self, name: str) -> bool:
-        """Whether a teammate has said that it takes no part any more."""
-        phase = self.teammates[name].phase
-        return phase is not None and phase not in CAN_COME
+        for name in self.mates:
+            phase = self.teammates[name].phase
+            if phase is not None and phase not in CAN_COME:
+                self.calls.drop(name)
+        for name, call in self.calls.begin_due(self.now_ns):
+            self.ask(self._come_clients[name], self.claim.request(), call.note)
 
     def on_call(self, request: Any, response: Any) -> Any:
         """A teammate calls: the earlier of two finds counts, of one instant the first name's."""
-        place = request.place.x, request.place.y, request.place.z
-        stamp_ns = request.stamp.sec * NS_PER_S + request.stamp.nanosec
-        response.message = self._why_not(Claim(stamp_ns, request.finder, place))
+        response.message = self._why_not(Claim.from_request(request))
         response.accepted = not response.message
         return response
 
@@ -288,7 +274,7 @@ class CooperativeSearch(TeamFlight):
         if self.claim is not None and self.claim.key < called.key:
             return f"{self.claim.finder} saw something earlier"
         if self.claim is None or self.claim.key != called.key:
-            self.claim, self.calls = called, {}
+            self.claim, self.calls = called, Calls()
             if self.phase in CAN_COME - RISING - {Phase.ALOFT}:
                 self._begin_to_come()
         return ""
@@ -309,9 +295,3 @@ class CooperativeSearch(TeamFlight):
 def _plain(place: Array) -> tuple[float, float, float]:
     x, y, z = map(float, place)
     return x, y, z
-
-
-def _invitation(claim: Claim) -> Any:
-    return message_type(f"{JOIN}_Request")(
-        time_from_ns(claim.stamp_ns), claim.finder, Point(*claim.place)
-    )

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.autonomy.cooperative_search import JOIN
+from volery.autonomy.search.calls import JOIN
 from volery.bench.bridge.native_ros1 import ros1_master
 from volery.bench.registry import Measured
 from volery.bench.search_peer import CALLED, CALLING, Called, Calling
@@ -47,8 +47,7 @@ def measure() -> Measured:
     for name, door in (("rosbridge", RosbridgeServer(port=0)), ("ros_tcp", RosTcpEndpoint(port=0))):
         with _flying() as (_, doors):
             doors.open(door)
-            way = f"{name.replace('_', '-')}://127.0.0.1:{door.port}"
-            figures.update(_figures(name, _exchange(way)))
+            figures.update(_figures(name, _exchange(name, door.port)))
     try:
         figures.update(_ros1_figures())
     except VoleryError as error:
@@ -62,7 +61,7 @@ def _ros1_figures() -> dict[str, float]:
         raise VoleryError("ROS 1 is not installed; .ci/install_ros1 does it on Debian")
     with ros1_master(), _flying() as (_, doors):
         doors.open(Ros1Door())
-        return _figures("ros1", _exchange("ros1"))
+        return _figures("ros1", _exchange("ros1", 0))
 
 
 def _lock_step_figures() -> dict[str, float]:
@@ -147,13 +146,13 @@ def _flying() -> Iterator[tuple[Simulation, Doors]]:
                 thread.join()
 
 
-def _exchange(via: str) -> list[list[int]]:
+def _exchange(via: str, port: int) -> list[list[int]]:
     """(one way, round trip) in ns of each call between two processes."""
-    with _peer(via, "called") as called:
+    with _peer(via, port, "called") as called:
         if not called.stdout or "ready" not in called.stdout.readline():
             raise VoleryError(f"the called node ended early on {via}")
         time.sleep(_START_S)
-        with _peer(via, "calling") as calling:
+        with _peer(via, port, "calling") as calling:
             out, _ = calling.communicate(timeout=_TIMEOUT_S)
     told = json.loads(out.splitlines()[-1]) if out else {"took": [], "trouble": "it ended early"}
     if len(told["took"]) < _WARM_UP + _CALLS:
@@ -162,8 +161,8 @@ def _exchange(via: str) -> list[list[int]]:
 
 
 @contextlib.contextmanager
-def _peer(via: str, what: str) -> Iterator[subprocess.Popen[str]]:
-    words = [via, what, str(_WARM_UP + _CALLS)]
+def _peer(via: str, port: int, what: str) -> Iterator[subprocess.Popen[str]]:
+    words = [via, str(port), what, str(_WARM_UP + _CALLS)]
     process = subprocess.Popen(
         [sys.executable, "-m", "volery.bench.search_peer", *words],
         stdin=subprocess.PIPE,

@@ -1,9 +1,10 @@
 """One node of the bench `search`, in a process of its own.
 
-    python -m volery.bench.search_peer VIA called|calling CALLS
+    python -m volery.bench.search_peer rosbridge|ros_tcp|ros1 PORT called|calling CALLS
 
-`called` is the node of a cooperative search, which tells when its handler ran and ends with its
-input; `calling` calls it CALLS times. Both print JSON.
+PORT is that of the door on this computer, 0 with ros1, whose master the environment names. `called`
+is the node of a cooperative search, which tells when its handler ran, and ends with its input;
+`calling` calls it CALLS times. Both print JSON.
 """
 
 from __future__ import annotations
@@ -14,10 +15,11 @@ import threading
 import time
 from typing import Any
 
-from volery.autonomy.cooperative_search import JOIN, CooperativeSearch
+from volery.autonomy.cooperative_search import CooperativeSearch
+from volery.autonomy.search.calls import JOIN
 from volery.bridges.nodes.host import NodeHost
-from volery.cli.links import open_link
 from volery.graph.client import Answer
+from volery.graph.link import Link
 from volery.graph.messages import Point, message_type, time_from_ns
 from volery.graph.node import Node
 
@@ -104,10 +106,24 @@ def _say(value: Any) -> None:
     sys.stdout.flush()
 
 
+def _open_link(via: str, port: int, name: str) -> Link:
+    if via == "rosbridge":
+        from volery.bridges.rosbridge.client import RosbridgeClient
+
+        return RosbridgeClient(f"ws://127.0.0.1:{port}", name=name)
+    if via == "ros_tcp":
+        from volery.bridges.ros_tcp.client import RosTcpClient
+
+        return RosTcpClient(port=port, name=name)
+    from volery.bridges.ros1.client import Ros1Client
+
+    return Ros1Client(node_name=f"bench_{name}")
+
+
 def main() -> None:
     """Do what the command line says."""
-    via, what, calls = sys.argv[1:]
-    link = open_link(via, what)
+    via, port, what, calls = sys.argv[1:]
+    link = _open_link(via, int(port), what)
     host = NodeHost(link)
     if what == "calling":
         make_calls(host, int(calls))

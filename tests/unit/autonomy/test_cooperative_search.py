@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volery.autonomy.cooperative_search import JOIN, CooperativeSearch
+from volery.autonomy.cooperative_search import CooperativeSearch
+from volery.autonomy.search.calls import JOIN
 from volery.autonomy.search.places import Area, check_room, places_around, random_waypoint
 from volery.autonomy.search.team import Phase
 from volery.core import rng
@@ -56,6 +57,7 @@ class Bodies:
         self.graph = Graph(lambda: self.now_ns)
         self.timers = []
         self.object = OBJECT
+        self.rotors_turn = True
         self.place = {n: np.array([2.0 + 4.0 * k, 2.0, 0.0]) for k, n in enumerate(team)}
         self.velocity = {n: np.zeros(3) for n in team}
         self.climb_to = dict.fromkeys(team)
@@ -108,7 +110,8 @@ class Bodies:
         )
 
     def take_off(self, name, request):
-        self.climb_to[name] = self.place[name][2] + request.altitude
+        if self.rotors_turn:
+            self.climb_to[name] = self.place[name][2] + request.altitude
 
     def land(self, name, _request):
         self.climb_to[name] = 0.0
@@ -357,6 +360,29 @@ def test_finish_at_one_ends_it_for_all():
     assert bodies.graph.call("/uav2/search/finish").success
     bodies.run_until(bodies.all_in(Phase.DONE), 60.0)
     assert "no part" in bodies.call("uav1", "uav2").message
+
+
+def test_who_cannot_be_told_sees_the_others_go_home():
+    bodies = searching()
+    bodies.sees.clear()
+    for name in ("uav1", "uav3"):
+        bodies.graph.withdraw(f"/{name}/search/finish")
+    bodies.graph.call("/uav2/search/finish")
+    bodies.run_until(bodies.all_in(Phase.DONE), 60.0)
+
+
+def test_finish_before_the_take_off_keeps_all_on_the_ground():
+    bodies = Bodies()
+    bodies.run(0.5)
+    bodies.graph.call("/uav2/search/finish")
+    bodies.run(0.2)
+    assert bodies.all_in(Phase.DONE)()
+
+
+def test_a_climb_that_fails_is_given_up():
+    bodies = Bodies()
+    bodies.rotors_turn = False
+    bodies.run_until(bodies.all_in(Phase.DOWN), 60.0)
 
 
 def test_finish_while_they_climb_brings_them_down_again():

@@ -1,10 +1,9 @@
-"""What the UAVs of a search know of each other: phases, claims to a find, calls."""
+"""What the UAVs of a search know of each other: phases and places."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +41,8 @@ class Phase(StrEnum):
 
 UNDER_WAY = frozenset({Phase.SEARCH, Phase.LOOK, Phase.COME, Phase.HOLD, Phase.HOME})
 """Between the two vertical legs: nobody climbs or sinks while a teammate is here."""
+GOING_HOME = frozenset({Phase.HOME, Phase.OVER_HOME, Phase.LAND})
+"""The search is over."""
 RISING = frozenset({Phase.READY, Phase.CLIMB})
 ALOFT = UNDER_WAY | {Phase.ALOFT, Phase.OVER_HOME}
 """Flies by the node's own velocity commands."""
@@ -49,19 +50,6 @@ CAN_COME = RISING | {Phase.ALOFT, Phase.SEARCH, Phase.LOOK, Phase.COME, Phase.HO
 """A call is heeded."""
 ON_THE_WAY = RISING | {Phase.ALOFT, Phase.LOOK, Phase.COME}
 """Will be at its place, or back in the search, some time."""
-
-
-class Claim(NamedTuple):
-    """Who has found something, when and where. The least one counts: earlier, then by name."""
-
-    stamp_ns: int
-    finder: str
-    place: tuple[float, float, float]
-
-    @property
-    def key(self) -> tuple[int, str]:
-        """What claims are told apart by, and put in order."""
-        return self.stamp_ns, self.finder
 
 
 @dataclass
@@ -75,23 +63,4 @@ class Teammate:
 
     def is_heard(self, now_ns: int, patience_s: float) -> bool:
         """Whether it has told something lately."""
-        return self.phase is not None and now_ns - self.heard_ns <= patience_s * 1e9
-
-
-@dataclass
-class Call:
-    """A teammate that is called to what was found."""
-
-    tries: int = 0
-    asked_ns: int = 0
-    accepted: bool = False
-
-    def is_due(self, now_ns: int, period_s: float, most: int) -> bool:
-        """Whether to call (again)."""
-        waited = self.tries == 0 or now_ns - self.asked_ns >= period_s * 1e9
-        return not self.accepted and self.tries < most and waited
-
-    def is_settled(self, now_ns: int, period_s: float, most: int) -> bool:
-        """Whether it comes, or has been given up."""
-        given_up = self.tries >= most and now_ns - self.asked_ns >= period_s * 1e9
-        return self.accepted or given_up
+        return self.phase is not None and 0 <= now_ns - self.heard_ns <= patience_s * 1e9

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from volery.autonomy.scan_points import Pose
 from volery.autonomy.search.settings import Settings
 from volery.autonomy.search.steering import is_at, towards
-from volery.autonomy.search.team import ALOFT, RISING, UNDER_WAY, Phase, Teammate
+from volery.autonomy.search.team import ALOFT, GOING_HOME, RISING, UNDER_WAY, Phase, Teammate
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
 from volery.core.kept import keep, put_back
@@ -179,7 +179,7 @@ class TeamFlight(Node):
         elif self._since_ns > self.now_ns:  # the computer's clock until the graph's was heard
             self._since_ns = self.now_ns
         if self.phase in ALOFT and pose.position[2] < self._home[2] + _FALLEN_M:
-            self.enter(Phase.DOWN)
+            self._give_up()
         on_a_leg = self._legs.get(self.phase)
         if on_a_leg is not None:
             on_a_leg(pose)
@@ -198,7 +198,7 @@ class TeamFlight(Node):
             self.enter(Phase.LAND)
 
     def _wait_for_team(self, _pose: Pose) -> None:
-        if any(m.phase in UNDER_WAY for m in self.teammates.values()):
+        if any(m.phase in UNDER_WAY | GOING_HOME for m in self.teammates.values()):
             self.enter(Phase.LATE)
             return
         heard = all(m.phase is not None for m in self.teammates.values())
@@ -211,7 +211,7 @@ class TeamFlight(Node):
         if at_rest and abs(self.settings.layer_z - pose.position[2]) < _ARRIVED_M:
             self.enter(Phase.ALOFT)
         elif self.phase_s > _CLIMB_S + _CLIMB_S_PER_M * height:
-            self.enter(Phase.DOWN)
+            self._give_up()
         elif pose.position[2] < self._home[2] + _LANDED_M and self._may_ask():
             request = message_type("volery_interfaces/srv/TakeOffTo_Request")
             self.ask(self._take_off, request(float(height)))
@@ -223,6 +223,11 @@ class TeamFlight(Node):
             self.enter(Phase.DONE)
         elif self._may_ask():
             self.ask(self._land)
+
+    def _give_up(self) -> None:
+        """Take no further part; come down, if it is not down already."""
+        self.enter(Phase.DOWN)
+        self.ask(self._land)
 
     def _may_ask(self) -> bool:
         """Whether it has not asked for a flight mode lately."""
