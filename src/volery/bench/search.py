@@ -45,9 +45,9 @@ def measure() -> Measured:
     figures = _lock_step_figures()
     failures: dict[str, str] = {}
     for name, door in (("rosbridge", RosbridgeServer(port=0)), ("ros_tcp", RosTcpEndpoint(port=0))):
-        with _flying() as (_, doors):
+        with flying() as doors:
             doors.open(door)
-            figures.update(_figures(name, _exchange(name, door.port)))
+            figures.update(call_figures(name, exchange(name, door.port)))
     try:
         figures.update(_ros1_figures())
     except VoleryError as error:
@@ -59,9 +59,9 @@ def _ros1_figures() -> dict[str, float]:
     """Those over a roscore. `VoleryError` where ROS 1 is not installed."""
     if shutil.which("rosmaster") is None or not rospy_is_installed():
         raise VoleryError("ROS 1 is not installed; .ci/install_ros1 does it on Debian")
-    with ros1_master(), _flying() as (_, doors):
+    with ros1_master(), flying() as doors:
         doors.open(Ros1Door())
-        return _figures("ros1", _exchange("ros1", 0))
+        return call_figures("ros1", exchange("ros1", 0))
 
 
 def _lock_step_figures() -> dict[str, float]:
@@ -72,7 +72,7 @@ def _lock_step_figures() -> dict[str, float]:
         node = Calling(context=context, namespace=f"/{CALLING}")
         for _ in range(_WARM_UP + _CALLS):
             node.call()
-    return _figures("lock_step", node.took)
+    return call_figures("lock_step", node.took)
 
 
 class _NoTimers:
@@ -85,7 +85,7 @@ class _NoTimers:
         """Never act."""
 
 
-def _figures(name: str, took: Sequence[Sequence[int]]) -> dict[str, float]:
+def call_figures(name: str, took: Sequence[Sequence[int]]) -> dict[str, float]:
     """Of (one way, round trip) in ns, without the first ones."""
     found: dict[str, float] = {}
     milliseconds = 1e-6 * np.array(took[_WARM_UP:])
@@ -125,8 +125,8 @@ def _scenario() -> Any:
 
 
 @contextlib.contextmanager
-def _flying() -> Iterator[tuple[Simulation, Doors]]:
-    """The two UAVs in real time, until the block ends."""
+def flying() -> Iterator[Doors]:
+    """Doors of a simulation of two UAVs that runs in real time until the block ends."""
     with Simulation(_scenario()) as simulation:
         simulation.step(1)
         with Doors(simulation.gateway) as doors:
@@ -140,13 +140,13 @@ def _flying() -> Iterator[tuple[Simulation, Doors]]:
             thread = threading.Thread(target=run)
             thread.start()
             try:
-                yield simulation, doors
+                yield doors
             finally:
                 over.set()
                 thread.join()
 
 
-def _exchange(via: str, port: int) -> list[list[int]]:
+def exchange(via: str, port: int) -> list[list[int]]:
     """(one way, round trip) in ns of each call between two processes."""
     with _peer(via, port, "called") as called:
         if not called.stdout or "ready" not in called.stdout.readline():

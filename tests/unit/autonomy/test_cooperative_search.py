@@ -334,7 +334,7 @@ def test_a_service_that_never_answers_is_called_again_and_given_up():
     bodies.graph.withdraw("/uav3/search/come")
     bodies.graph.offer_async("/uav3/search/come", JOIN, lambda q, _: asked.append(q.finder))
     bodies.run_until(lambda: bodies.nodes["uav1"].phase is Phase.HOME)
-    assert asked == ["uav1"] * 10
+    assert asked == ["uav1"] * 20
     assert bodies.nodes["uav2"].phase is Phase.HOME
     bodies.run_until(bodies.all_in(Phase.DONE))
 

@@ -11,7 +11,7 @@ from volery.graph.messages import Point, message_type, time_from_ns
 
 JOIN = "volery_interfaces/srv/JoinSearch"
 """Type of the service by which a teammate is called."""
-_PERIOD_NS, _MOST = NS_PER_S, 10
+_PERIOD_NS, _MOST = NS_PER_S, 20
 """How often, and how many times, a teammate is called. Modelling choice."""
 
 
