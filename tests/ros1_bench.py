@@ -30,11 +30,15 @@ SYSTEM_PYTHON = "/usr/bin/python3"
 _TOOLS = ("rosmaster", "rostopic", "rosservice", "rosbag")
 
 
+def missing_of_ros1():
+    """What of ROS 1 is not installed."""
+    missing = [tool for tool in _TOOLS if shutil.which(tool) is None]
+    return missing if rospy_is_installed() else ["rospy", *missing]
+
+
 def require_ros1():
     """Skip the tests of a module where ROS 1 is not installed."""
-    missing = [tool for tool in _TOOLS if shutil.which(tool) is None]
-    if not rospy_is_installed():
-        missing.insert(0, "rospy")
+    missing = missing_of_ros1()
     if missing:
         pytest.skip(f"no {', '.join(missing)}: see .ci/install_ros1", allow_module_level=True)
 

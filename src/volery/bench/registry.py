@@ -217,6 +217,15 @@ BENCHES: dict[str, Bench] = {
             in_all=False,  # it takes a quarter of an hour
         ),
         Bench(
+            "search",
+            "Search: a UAV's call to another one, from the caller to the handler, and back; each "
+            "node in a process of its own, or both in lock step",
+            {
+                f"{way}_one_way_ms": Bound(10.0, at_most=True)
+                for way in ("lock_step", "rosbridge", "ros_tcp", "ros1")
+            },
+        ),
+        Bench(
             "peers",
             "Peers: other simulators beside Volery, in turns on one core; what each includes is "
             "told in [peers.md](peers.md)",

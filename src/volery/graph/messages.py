@@ -20,6 +20,7 @@ from volery.graph.definition_store import DefinitionStore
 
 Time = _ros2.builtin_interfaces__msg__Time
 Point = _ros2.geometry_msgs__msg__Point
+PointStamped = _ros2.geometry_msgs__msg__PointStamped
 Pose = _ros2.geometry_msgs__msg__Pose
 PoseStamped = _ros2.geometry_msgs__msg__PoseStamped
 PoseWithCovariance = _ros2.geometry_msgs__msg__PoseWithCovariance

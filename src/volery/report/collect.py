@@ -149,7 +149,7 @@ class FlightCollector:
             wall_s=wall_s,
             uavs=tuple(self._finished(name, uav) for name, uav in self._uavs.items()),
             ground=Ground(np.asarray(grid.heights), (grid.origin_x, grid.origin_y), grid.spacing),
-            trees=_trees(simulation.forest),
+            trees=trees_of(simulation.forest),
             structures=seen_from_above(solid.mesh for solid in simulation.scene.solids),
             lidar=self._lidar_map(),
             events=tuple(_event(event) for event in simulation.events),
@@ -206,7 +206,8 @@ def _event(event: Any) -> FlightEvent:
     return FlightEvent(event.time_ns / NS_PER_S, kind, event.describe(), (x, y, z))
 
 
-def _trees(forest: Any) -> Trees | None:
+def trees_of(forest: Any) -> Trees | None:
+    """What is drawn of a forest; None without trees."""
     if forest is None or not len(forest.position_map):
         return None
     crowns = np.array([_crown_radius(model) for model in forest.models])

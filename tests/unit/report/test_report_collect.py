@@ -197,7 +197,7 @@ def test_collects_a_flight(tmp_path: Path) -> None:
 
 
 def test_trees_are_sized_by_their_crowns() -> None:
-    from volery.report.collect import _trees
+    from volery.report.collect import trees_of
 
     ring = np.array([[2.0, 0, 3], [0, 2.0, 3], [-2.0, 0, 3]], np.float32)
     leaves = SimpleNamespace(vertices=ring)
@@ -212,7 +212,7 @@ def test_trees_are_sized_by_their_crowns() -> None:
         scale=np.array([[1.0, 1, 1], [1, 1, 1], [2, 2, 1]]),
         dbh_m=np.array([0.1, 0.2, 0.3]),
     )
-    trees = _trees(forest)
+    trees = trees_of(forest)
     assert trees is not None
     np.testing.assert_allclose(trees.crown_radius_m, [0.2, 2.0, 4.0], rtol=1e-6)
-    assert _trees(None) is None
+    assert trees_of(None) is None

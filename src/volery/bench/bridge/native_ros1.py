@@ -40,7 +40,7 @@ def one_way_figures(simulation: Simulation, doors: Doors) -> dict[str, float]:
     """
     if shutil.which("rosmaster") is None or not rospy_is_installed():
         raise VoleryError("ROS 1 is not installed; .ci/install_ros1 does it on Debian")
-    with _master(), _Program("subscribe") as subscriber, _Program("publish") as plain:
+    with ros1_master(), _Program("subscribe") as subscriber, _Program("publish") as plain:
         doors.open(Ros1Door(topics=("/one_way/*",)))
         _exchange(simulation, plain)
         taken = subscriber.ask()
@@ -83,7 +83,7 @@ def _summarize(taken: list[tuple[str, int, float]]) -> dict[str, float]:
 
 
 @contextlib.contextmanager
-def _master() -> Iterator[None]:
+def ros1_master() -> Iterator[None]:
     """A rosmaster on a free port of loopback, which this process's environment names."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

@@ -1,0 +1,89 @@
+"""From a pixel of a camera to the place on a level plane that it shows, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.scan_points import Pose
+from volery.core import rotations
+from volery.core.errors import GraphError
+from volery.graph.messages import CameraInfo
+
+Array = NDArray[np.float64]
+Disc = tuple[float, float, float]
+
+_STEEP = 0.17
+"""A ray must point down by so much of its length, 10 degrees: flatter ones end anywhere."""
+_NEAR_M = 0.05
+_BODY_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""Axes of a mount (x ahead, y left, z up) from optical ones (z ahead, x right, y down)."""
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """Focal lengths and principal point, pixels; distortion is not undone."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+    @classmethod
+    def from_message(cls, info: CameraInfo) -> Intrinsics:
+        """Those of a camera's `camera_info`. `GraphError` for a camera that is not calibrated."""
+        k = info.k
+        if not (k[0] > 0.0 and k[4] > 0.0):
+            raise GraphError("camera_info holds no focal length: the camera is not calibrated")
+        return cls(float(k[0]), float(k[4]), float(k[2]), float(k[5]))
+
+
+class GroundView:
+    """A camera at `mount_m` (3,) in the body, turned by `mount_rpy_deg` (3,)."""
+
+    def __init__(
+        self, intrinsics: Intrinsics, mount_m: Sequence[float], mount_rpy_deg: Sequence[float]
+    ) -> None:
+        self._k = intrinsics
+        self._mount = np.array(mount_m, dtype=np.float64)
+        turn = rotations.matrix(rotations.from_rpy(*np.radians(mount_rpy_deg)))
+        self._body_from_optical: Array = turn @ _BODY_FROM_OPTICAL
+
+    def place_of(self, u: float, v: float, pose: Pose, plane_z: float) -> Array | None:
+        """(3,) where the ray of a pixel meets the plane at height `plane_z`, map frame.
+
+        None where it points up, or down by less than 10 degrees. A thing whose seen part lies dz
+        above the plane is placed too far from the camera's foot by dz tan(angle off the vertical),
+        an error of the attitude by e turns into about e times the distance.
+        """
+        optical = np.array([(u - self._k.cx) / self._k.fx, (v - self._k.cy) / self._k.fy, 1.0])
+        ray = rotations.rotate(pose.attitude, self._body_from_optical @ optical)
+        if ray[2] > -_STEEP * np.linalg.norm(ray):
+            return None
+        eye = pose.position + rotations.rotate(pose.attitude, self._mount)
+        place: Array = eye + (plane_z - eye[2]) / ray[2] * ray
+        return place if eye[2] > plane_z else None
+
+    def disc_of(
+        self, place: Array, radius_m: float, pose: Pose
+    ) -> tuple[float, float, float] | None:
+        """Column, row and radius, pixels, of a ball at `place` (3,); None behind the camera."""
+        body = rotations.rotate(rotations.conjugate(pose.attitude), place - pose.position)
+        x, y, z = self._body_from_optical.T @ (body - self._mount)
+        if z < _NEAR_M:
+            return None
+        return (
+            float(self._k.fx * x / z + self._k.cx),
+            float(self._k.fy * y / z + self._k.cy),
+            float(self._k.fx * radius_m / z),
+        )
+
+
+def pose_at(pose: Pose, time_ns: int) -> Pose:
+    """A pose carried on to another time by its velocity and turn rate."""
+    dt = (time_ns - pose.time_ns) * 1e-9
+    turned = rotations.multiply(pose.attitude, rotations.exponential(pose.omega_body * dt))
+    return Pose(time_ns, pose.position + pose.velocity * dt, turned, pose.velocity, pose.omega_body)

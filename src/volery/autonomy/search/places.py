@@ -1,0 +1,92 @@
+"""Where UAVs of a search fly: random waypoints in an area, and places around what was found."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core import rng
+from volery.core.errors import GraphError
+
+Array = NDArray[np.float64]
+
+
+class Area(NamedTuple):
+    """A rectangle along the axes of the map, m."""
+
+    x_min: float
+    y_min: float
+    x_max: float
+    y_max: float
+
+    def holds(self, x: float, y: float) -> bool:
+        """Whether a place lies in it or on its border."""
+        return self.x_min <= x <= self.x_max and self.y_min <= y <= self.y_max
+
+    def without_border(self, width_m: float) -> Area:
+        """What is left of it inside a border. `GraphError` where nothing is."""
+        inner = Area(
+            self.x_min + width_m, self.y_min + width_m, self.x_max - width_m, self.y_max - width_m
+        )
+        if not (inner.x_min <= inner.x_max and inner.y_min <= inner.y_max):
+            raise GraphError(
+                f"search: area {list(self)} m must be wider than its borders of {width_m} m"
+            )
+        return inner
+
+
+def random_waypoint(area: Area, key: np.uint64, number: int) -> Array:
+    """(2,) waypoint `number` of the random stream `key`, uniform in the area."""
+    across, along = (float(rng.uniform(key, 2 * number + k)) for k in range(2))
+    return np.array(
+        [
+            area.x_min + across * (area.x_max - area.x_min),
+            area.y_min + along * (area.y_max - area.y_min),
+        ]
+    )
+
+
+def places_around(place: Array, count: int, apart_m: float, area: Area) -> Array:
+    """(count, 2) places in the area, `apart_m` or more from each other and from `place` (2,).
+
+    They lie on rings around it, the nearest ones first: the same for everyone who asks. Of a
+    `place` outside the area the nearest one inside counts. `GraphError` where there is no room,
+    which `check_room` tells for all places of an area at once.
+    """
+    middle = np.clip(place[:2], area[:2], area[2:])
+    found: list[Array] = []
+    widest = math.hypot(area.x_max - area.x_min, area.y_max - area.y_min)
+    for ring in range(1, math.ceil(widest / apart_m) + 1):
+        # six places on a circle are its radius apart, and 6 k on one k times as wide a little more
+        steps = min(count, 6) if ring == 1 else 6 * ring
+        found += _on_ring(middle, apart_m * ring, steps, area)
+        if len(found) >= count:
+            return np.array(found[:count])
+    raise GraphError(f"search: area {list(area)} m has no {count} places {apart_m} m apart")
+
+
+def check_room(count: int, apart_m: float, area: Area) -> None:
+    """`GraphError` unless `places_around` finds room around every place of the area.
+
+    Around each there is a quarter circle with a radius of half the shorter side, and on it every
+    ring k but the first has 1.5 k places or more.
+    """
+    rings, sure = 1, 0
+    while sure < count:
+        rings += 1
+        sure += 3 * rings // 2
+    least = 2.0 * rings * apart_m
+    if min(area.x_max - area.x_min, area.y_max - area.y_min) < least:
+        raise GraphError(
+            f"search: {count} UAVs {apart_m} m apart need an area of {least:g} m a side at least, "
+            f"without its borders, not {list(area)} m"
+        )
+
+
+def _on_ring(middle: Array, radius: float, steps: int, area: Area) -> list[Array]:
+    angles = [2.0 * math.pi * step / steps for step in range(steps)]
+    ring = [middle + radius * np.array([math.cos(a), math.sin(a)]) for a in angles]
+    return [spot for spot in ring if area.holds(*spot)]

@@ -1,0 +1,95 @@
+"""The parameters of a cooperative search."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from volery.autonomy.search.colour_blob import ColourRange
+from volery.autonomy.search.places import Area
+from volery.core.errors import GraphError
+from volery.graph.node import Node
+
+
+@dataclass(frozen=True)
+class Settings:
+    """See `cooperative_search.CooperativeSearch`."""
+
+    name: str
+    """Of this UAV, from the node's namespace."""
+    team: tuple[str, ...]
+    area: Area
+    altitude_m: float
+    layer_m: float
+    speed_m_s: float
+    apart_m: float
+    camera: str
+    mount_m: tuple[float, ...]
+    mount_rpy_deg: tuple[float, ...]
+    object_m: float
+    colours: ColourRange
+    least_share: float
+    gather_s: float
+    patience_s: float
+    hold_s: float
+    search_s: float
+    seed: int
+
+    @property
+    def rank(self) -> int:
+        """Number of this UAV in its team, from 0."""
+        return self.team.index(self.name)
+
+    @property
+    def teammates(self) -> tuple[str, ...]:
+        """All but this one."""
+        return tuple(name for name in self.team if name != self.name)
+
+    @property
+    def layer_z(self) -> float:
+        """Height in the map at which this UAV flies."""
+        return self.altitude_m + self.rank * self.layer_m
+
+    @classmethod
+    def declare(cls, node: Node) -> Settings:
+        """Declare the parameters of a node and read them. `GraphError` for what makes no sense."""
+
+        def number(name: str, default: float, least: float = -math.inf) -> float:
+            value = float(node.declare_parameter(name, default).value)
+            if not (math.isfinite(value) and value >= least):
+                raise GraphError(f"search: {name} must be a number from {least:g}, not {value}")
+            return value
+
+        def numbers(name: str, default: Sequence[float]) -> tuple[float, ...]:
+            values = tuple(float(v) for v in node.declare_parameter(name, list(default)).value)
+            if len(values) != len(default) or not all(map(math.isfinite, values)):
+                raise GraphError(f"search: {name} must be {len(default)} numbers, not {values}")
+            return values
+
+        name = node.get_namespace().strip("/")
+        team = tuple(node.declare_parameter("team", [name]).value)
+        if name not in team or len(set(team)) != len(team):
+            raise GraphError(f"search: team must name '{name}' itself, each UAV once, not {team}")
+        first_hue, last_hue = numbers("hue_deg", ColourRange()[:2])
+        least = number("saturation", 0.5, 0.0), number("value", 0.2, 0.0)
+        return cls(
+            name=name,
+            team=team,
+            area=Area(*numbers("area_m", (0.0, 0.0, 50.0, 50.0))),
+            altitude_m=number("altitude_m", 8.0),
+            layer_m=number("layer_m", 2.0, 0.5),
+            speed_m_s=number("speed_m_s", 3.0, 0.1),
+            apart_m=number("apart_m", 3.0, 0.5),
+            camera=str(node.declare_parameter("camera", "down").value),
+            mount_m=numbers("mount_m", (0.0, 0.0, 0.0)),
+            mount_rpy_deg=numbers("mount_rpy_deg", (0.0, 90.0, 0.0)),
+            object_m=number("object_m", 0.5),
+            colours=ColourRange(first_hue, last_hue, *least),
+            least_share=number("share", 0.001, 0.0),
+            gather_s=number("gather_s", 20.0, 0.0),
+            patience_s=number("patience_s", 5.0, 0.0),
+            hold_s=number("hold_s", 5.0, 0.0),
+            search_s=number("search_s", 0.0, 0.0),
+            seed=int(node.declare_parameter("seed", 1).value),
+        )

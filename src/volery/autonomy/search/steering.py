@@ -1,0 +1,38 @@
+"""Velocity commands that bring a UAV to a place and stop it there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.scan_points import Pose
+from volery.graph.messages import Twist, Vector3
+
+Array = NDArray[np.float64]
+
+_GAIN_PER_S = 0.8
+_BRAKE_M_S2 = 1.0
+_CLIMB_GAIN_PER_S, _CLIMB_M_S = 1.2, 1.0
+"""All modelling choices: gentle enough for every airframe that ships."""
+
+
+def towards(pose: Pose, place: Array, speed_m_s: float) -> Twist:
+    """Fly to `place` (3,), the heading as it is: no faster than it can brake in time."""
+    offset = place - pose.position
+    away = math.hypot(offset[0], offset[1])
+    speed = min(speed_m_s, _GAIN_PER_S * away, math.sqrt(2.0 * _BRAKE_M_S2 * away))
+    ahead = offset[:2] / max(away, 1e-9) * speed
+    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+    climb = max(-_CLIMB_M_S, min(_CLIMB_M_S, _CLIMB_GAIN_PER_S * float(offset[2])))
+    linear = Vector3(
+        float(c * ahead[0] + s * ahead[1]), float(c * ahead[1] - s * ahead[0]), float(climb)
+    )
+    return Twist(linear, Vector3(0.0, 0.0, 0.0))
+
+
+def is_at(pose: Pose, place: Array, within_m: float, still_m_s: float) -> bool:
+    """Whether a UAV is at a place and no faster than `still_m_s`."""
+    away = float(np.linalg.norm(place - pose.position))
+    return away <= within_m and float(np.linalg.norm(pose.velocity)) <= still_m_s

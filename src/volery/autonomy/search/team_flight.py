@@ -1,0 +1,237 @@
+"""One UAV's flight in a search: its pose, what it tells its team, what it hears, how it moves.
+
+`cooperative_search.CooperativeSearch` decides on top of it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.scan_points import Pose
+from volery.autonomy.search.settings import Settings
+from volery.autonomy.search.steering import is_at, towards
+from volery.autonomy.search.team import ALOFT, GOING_HOME, RISING, UNDER_WAY, Phase, Teammate
+from volery.core.clock import NS_PER_S
+from volery.core.errors import GraphError
+from volery.core.kept import keep, put_back
+from volery.graph.client import Answer, Client
+from volery.graph.messages import Odometry, Point, Twist, header, message_type
+from volery.graph.node import Node
+
+Array = NDArray[np.float64]
+
+_PHASES = frozenset(map(str, Phase))
+_STILL_UP = frozenset({Phase.CLIMB, Phase.ALOFT})
+_PERIOD_S = 0.1
+_SETTLE_S = 1.0
+"""So long it tells that it is ready before it climbs, for others to hear and wait."""
+_REPEAT_S = 2.0
+"""A take-off or landing that has not begun is asked for again."""
+_CLIMB_S, _CLIMB_S_PER_M = 15.0, 2.0
+"""Longer than this a climb takes only if it fails."""
+_FALLEN_M = 1.0
+"""Nearer than this to its place of take-off, while it should fly, it has come down."""
+_LANDED_M, _STILL_M_S = 0.3, 0.2
+_ARRIVED_M, _ARRIVED_M_S = 0.5, 0.4
+"""All modelling choices."""
+
+
+class TeamFlight(Node):
+    """Takes off, keeps to its layer, lands where it took off; tells and hears `search/state`.
+
+    Nobody leaves the column of air over its place of take-off while a teammate climbs, and nobody
+    sinks while one is under way; on the way each flies at a height of its own.
+    """
+
+    STATE: tuple[str, ...] = (
+        "phase",
+        "pose",
+        "teammates",
+        "_home",
+        "_since_ns",
+        "_asked_ns",
+    )
+    """Everything that changes."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("search", **options)
+        self.settings = Settings.declare(self)
+        self.phase = Phase.READY
+        self.pose: Pose | None = None
+        self.teammates = {name: Teammate() for name in self.settings.teammates}
+        self._home = np.zeros(3)
+        self._since_ns: int | None = None
+        """When the phase began."""
+        self._asked_ns = -1 << 62
+
+        self._legs = {
+            Phase.READY: self._wait_for_team,
+            Phase.CLIMB: self._climb,
+            Phase.ALOFT: self._wait_aloft,
+            Phase.HOME: self._go_home,
+            Phase.OVER_HOME: self._wait_aloft,
+            Phase.LAND: self._sink,
+        }
+        self._state_type = message_type("volery_interfaces/msg/SearchState")
+        self._command = self.create_publisher(Twist, "cmd_vel", 1)
+        self._state = self.create_publisher(self._state_type, "~/state", 1, latched=True)
+        self._take_off = self.create_client("volery_interfaces/srv/TakeOffTo", "take_off_to")
+        self._land = self.create_client("std_srvs/srv/Trigger", "land")
+        self.create_subscription(Odometry, "odom", self._on_odometry, 5)
+        for name in self.settings.teammates:
+            topic = self._of(name, "state")
+            self.create_subscription(self._state_type, topic, self._listener(name), 5)
+        self.create_timer(_PERIOD_S, self._on_timer)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return keep(self, self.STATE)
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self, state)
+
+    def act(self, pose: Pose) -> None:
+        """Do what the phase asks for between climb and landing; in a subclass."""
+
+    # ------------------------------------------------------------------------------- for subclasses
+
+    @property
+    def now_ns(self) -> int:
+        """Time of the node's clock."""
+        return self.get_clock().now_ns()
+
+    @property
+    def phase_s(self) -> float:
+        """How long the phase has lasted."""
+        return 0.0 if self._since_ns is None else (self.now_ns - self._since_ns) * 1e-9
+
+    def enter(self, phase: Phase) -> None:
+        """Go on to another phase, and tell so."""
+        self.phase, self._since_ns = phase, self.now_ns
+        self._tell()
+
+    def in_layer(self, place: Array) -> Array:
+        """(3,) over or under `place`, at this UAV's own height."""
+        return np.array([place[0], place[1], self.settings.layer_z])
+
+    def fly_to(self, place: Array, within_m: float = _ARRIVED_M) -> bool:
+        """Command the next moment of a flight to `place` (3,); whether it hovers there."""
+        assert self.pose is not None
+        self._command.publish(towards(self.pose, place, self.settings.speed_m_s))
+        return is_at(self.pose, place, within_m, _ARRIVED_M_S)
+
+    def team_in(self, phases: frozenset[Phase]) -> bool:
+        """Whether a teammate that can be heard is in one of these phases."""
+        now, patience = self.now_ns, self.settings.patience_s
+        return any(m.phase in phases and m.is_heard(now, patience) for m in self.teammates.values())
+
+    def ask(self, client: Client, request: Any | None = None, then: Any = None) -> None:
+        """Call a service; `then(response)` is called with an answer, if one ever comes."""
+
+        def on_answer(answer: Answer) -> None:
+            if then is not None and answer.exception() is None:
+                then(answer.result())
+
+        try:
+            client.call_async(request).add_done_callback(on_answer)
+        except GraphError:
+            return  # nobody offers it now; who needs an answer asks again
+
+    # -------------------------------------------------------------------------------- what it hears
+
+    def _of(self, uav: str, name: str) -> str:
+        """A teammate's name for one of the search's topics or services."""
+        return f"/{uav}/search/{name}"
+
+    def _on_odometry(self, message: Odometry) -> None:
+        self.pose = Pose.from_odometry(message)
+
+    def _listener(self, name: str) -> Any:
+        def on_state(message: Any) -> None:
+            mate = self.teammates[name]
+            if message.phase not in _PHASES:
+                return  # of a newer search than this one
+            mate.phase = Phase(message.phase)
+            p = message.position
+            mate.position, mate.heard_ns = np.array([p.x, p.y, p.z]), self.now_ns
+
+        return on_state
+
+    def _tell(self) -> None:
+        place = np.zeros(3) if self.pose is None else self.pose.position
+        self._state.publish(
+            self._state_type(header(self.now_ns, "map"), str(self.phase), Point(*place.tolist()))
+        )
+
+    # --------------------------------------------------------------------------------- what it does
+
+    def _on_timer(self) -> None:
+        pose = self.pose
+        if pose is None:
+            return
+        if self._since_ns is None:
+            self._home = pose.position.copy()
+            self.enter(Phase.READY)
+        elif self._since_ns > self.now_ns:  # the computer's clock until the graph's was heard
+            self._since_ns = self.now_ns
+        if self.phase in ALOFT and pose.position[2] < self._home[2] + _FALLEN_M:
+            self._give_up()
+        on_a_leg = self._legs.get(self.phase)
+        if on_a_leg is not None:
+            on_a_leg(pose)
+        self.act(pose)
+        self._tell()
+
+    def _go_home(self, _pose: Pose) -> None:
+        if self.fly_to(self.in_layer(self._home)):
+            self.enter(Phase.OVER_HOME)
+
+    def _wait_aloft(self, _pose: Pose) -> None:
+        self.fly_to(self.in_layer(self._home))
+        if self.phase is Phase.ALOFT and not self.team_in(RISING):
+            self.enter(Phase.SEARCH)
+        elif self.phase is Phase.OVER_HOME and not self.team_in(UNDER_WAY | _STILL_UP):
+            self.enter(Phase.LAND)
+
+    def _wait_for_team(self, _pose: Pose) -> None:
+        if any(m.phase in UNDER_WAY | GOING_HOME for m in self.teammates.values()):
+            self.enter(Phase.LATE)
+            return
+        heard = all(m.phase is not None for m in self.teammates.values())
+        if self.phase_s >= _SETTLE_S and (heard or self.phase_s >= self.settings.gather_s):
+            self.enter(Phase.CLIMB)
+
+    def _climb(self, pose: Pose) -> None:
+        height = self.settings.layer_z - self._home[2]
+        at_rest = abs(pose.velocity[2]) < _STILL_M_S
+        if at_rest and abs(self.settings.layer_z - pose.position[2]) < _ARRIVED_M:
+            self.enter(Phase.ALOFT)
+        elif self.phase_s > _CLIMB_S + _CLIMB_S_PER_M * height:
+            self._give_up()
+        elif pose.position[2] < self._home[2] + _LANDED_M and self._may_ask():
+            request = message_type("volery_interfaces/srv/TakeOffTo_Request")
+            self.ask(self._take_off, request(float(height)))
+
+    def _sink(self, pose: Pose) -> None:
+        if pose.position[2] < self._home[2] + _LANDED_M and (
+            float(np.linalg.norm(pose.velocity)) < _STILL_M_S
+        ):
+            self.enter(Phase.DONE)
+        elif self._may_ask():
+            self.ask(self._land)
+
+    def _give_up(self) -> None:
+        """Take no further part; come down, if it is not down already."""
+        self.enter(Phase.DOWN)
+        self.ask(self._land)
+
+    def _may_ask(self) -> bool:
+        """Whether it has not asked for a flight mode lately."""
+        if 0 <= self.now_ns - self._asked_ns <= _REPEAT_S * NS_PER_S:
+            return False
+        self._asked_ns = self.now_ns
+        return True

@@ -1,0 +1,32 @@
+"""Calls between UAVs, measured over one of the transports, and the figures made of them."""
+
+from __future__ import annotations
+
+import statistics
+
+from volery.bench import search
+from volery.bench.registry import BENCHES
+from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
+
+
+def test_figures_leave_the_first_calls_out():
+    took = [(9_000_000, 9_000_000)] * 20 + [(1_000_000 * k, 2_000_000 * k) for k in range(1, 12)]
+    figures = search.call_figures("way", took)
+    assert figures["way_one_way_ms"] == 6.0
+    assert figures["way_round_trip_ms"] == 12.0
+    assert figures["way_one_way_p95_ms"] == 10.5
+    assert {f"{way}_one_way_ms" for way in ("lock_step", "rosbridge", "ros_tcp", "ros1")} == set(
+        BENCHES["search"].bounds
+    )
+
+
+def test_calls_over_a_door_are_timed_in_both_processes(monkeypatch):
+    monkeypatch.setattr(search, "_START_S", 0.5)
+    monkeypatch.setattr(search, "_CALLS", 10)
+    door = RosTcpEndpoint(port=0)
+    with search.flying() as doors:
+        doors.open(door)
+        took = search.exchange("ros_tcp", door.port)
+    assert len(took) == 30
+    assert all(0 < one_way < round_trip for one_way, round_trip in took)
+    assert statistics.median(round_trip for _, round_trip in took) < 1e9
