@@ -3,7 +3,7 @@
 As the ROS + Unity3D platform of 2025 describes it: fly FORWARD until the mean depth of the region
 of interest falls below a threshold, be STOPPED, AVOID until the way is free, RETURN to the course.
 Its example threshold, .03, is of normalised depth, and its far plane is not told. Here depth is
-normalised by `far_m`; the defaults are those with which the machine fared best, see
+normalised by `far_m`; the defaults are those of five with which it fared best, see
 docs/avoidance.md.
 """
 
@@ -58,8 +58,8 @@ class RegionAvoidance(DepthCourse):
     def __init__(self, **options: Any) -> None:
         super().__init__("region_avoidance", **options)
         self._far = float(self.declare_parameter("far_m", 10.0).value)
-        self._threshold = float(self.declare_parameter("threshold", 0.5).value)
-        self._region = self.declare_parameter("region", [0.4, 0.4]).value
+        self._threshold = float(self.declare_parameter("threshold", 0.6).value)
+        self._region = self.declare_parameter("region", [0.3, 0.2]).value
         self._sidestep = float(self.declare_parameter("sidestep_m_s", 0.8).value)
         self._margin_ns = round(1e9 * self.declare_parameter("margin_s", 1.0).value)
         self._state = State.FORWARD

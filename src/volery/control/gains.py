@@ -38,9 +38,13 @@ GAINS = np.dtype(
         ("rotors", "i8"),
         ("mass", "f8"),
         ("weight", "f8"),
-        ("inertia", "f8", 3),
-        ("allocation", "f8", (MAX_ROTORS, 4)),
+        ("gyroscopic", "f8", 3),  # (Izz - Iyy) / Ixx and so on around
+        ("by_thrust", "f8", MAX_ROTORS),  # each rotor's thrust for one newton of the whole ...
+        ("by_roll", "f8", MAX_ROTORS),  # ... and for 1 rad/s^2 about x, y, z
+        ("by_pitch", "f8", MAX_ROTORS),
+        ("by_yaw", "f8", MAX_ROTORS),
         ("idle_thrust", "f8"),
+        ("least_thrusts", "f8", MAX_ROTORS),  # idle_thrust; below zero where there is no rotor
         ("inverse_thrust_constant", "f8"),
         ("rate", "f8", 3),
         ("rate_drag", "f8", 3),
@@ -139,9 +143,11 @@ def gains_of(  # noqa: PLR0915
     row["rotors"] = count
     row["mass"] = airframe.body.mass_kg
     row["weight"] = airframe.weight
-    row["inertia"] = inertia
-    row["allocation"][0, :count] = allocation
+    row["gyroscopic"] = (np.roll(inertia, 1) - np.roll(inertia, -1)) / inertia
+    for k, name in enumerate(("by_thrust", "by_roll", "by_pitch", "by_yaw")):
+        row[name][0, :count] = allocation[:, k] * (1.0, *inertia)[k]
     row["idle_thrust"] = _IDLE_SPEED**2 * trim.min()
+    row["least_thrusts"] = np.where(np.arange(MAX_ROTORS) < count, row["idle_thrust"], -1.0)
     row["inverse_thrust_constant"] = 1.0 / rotors.thrust_n_s2
     bandwidths = np.array([rate, rate, yaw_rate])
     row["rate"] = bandwidths

@@ -1,8 +1,9 @@
-"""From thrust and torque to rotor speeds, and what gives way when a rotor has no more to give.
+"""From thrust and angular acceleration to rotor speeds; what gives way at the rotors' limits.
 
-Thrusts are `allocation_matrix` times (thrust, torques). Where that leaves a rotor's range, the
-vehicle keeps its attitude first: roll and pitch are scaled only where they alone exceed the range,
-thrust then moves to where roll and pitch fit, and yaw gets what room is left.
+Thrusts are `allocation_matrix` times (thrust, torques); the gains' `by_thrust` and so on hold it
+with the inertia multiplied in. Where that leaves a rotor's range, the vehicle keeps its attitude
+first: roll and pitch are scaled only where they alone exceed the range, thrust then moves to where
+roll and pitch fit, and yaw gets what room is left.
 A battery that sags leaves the rotors less: the mixer shares out `pilot.full_thrust`, as an
 autopilot does whose outputs are shares of the present full throttle.
 """
@@ -12,40 +13,44 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from volery.core.lanes import LANES, any_outside, lanes_at, magnitudes, put_lanes, roots
 from volery.vehicle.compiled import inner_kernel
 
 
 @inner_kernel
-def mix(gains: Any, thrust: float, tx: float, ty: float, tz: float, pilot: Any) -> None:
-    """Rotor speeds into `pilot.rotor_reference`, rad/s, for a thrust (N) and torques (N m), FLU."""
-    lowest, highest = math.inf, -math.inf
-    k = gains.inverse_thrust_constant
-    for r in range(gains.rotors):
+def mix(gains: Any, thrust: float, ax: float, ay: float, az: float, pilot: Any) -> None:
+    """Rotor speeds into `pilot.rotor_reference`, rad/s.
+
+    thrust: N. (ax, ay, az): angular acceleration by the rotors' torque, rad/s^2, FLU.
+    """
+    beyond = False
+    for first in range(0, gains.rotors, LANES):
         f = (
-            gains.allocation[r, 0] * thrust
-            + gains.allocation[r, 1] * tx
-            + gains.allocation[r, 2] * ty
-            + gains.allocation[r, 3] * tz
+            lanes_at(gains.by_thrust, first) * thrust
+            + lanes_at(gains.by_roll, first) * ax
+            + lanes_at(gains.by_pitch, first) * ay
+            + lanes_at(gains.by_yaw, first) * az
         )
-        pilot.rotor_reference[r] = math.sqrt(abs(f) * k)  # below zero: done again below
-        lowest = min(lowest, f)
-        highest = max(highest, f)
-    pilot.saturated = not (gains.idle_thrust <= lowest and highest <= pilot.full_thrust)
+        # where a thrust is below zero it is done again below
+        speed = roots(magnitudes(f) * gains.inverse_thrust_constant)
+        put_lanes(pilot.rotor_reference, first, speed)
+        beyond |= any_outside(f, lanes_at(gains.least_thrusts, first), pilot.full_thrust)
+    pilot.saturated = beyond
     if pilot.saturated:
-        _share(gains, thrust, tx, ty, tz, pilot)
+        _share(gains, thrust, ax, ay, az, pilot)
 
 
 @inner_kernel
-def _share(gains: Any, thrust: float, tx: float, ty: float, tz: float, pilot: Any) -> None:
+def _share(gains: Any, thrust: float, ax: float, ay: float, az: float, pilot: Any) -> None:
     """Like `mix` where a rotor's range is exceeded."""
     low, high = gains.idle_thrust, pilot.full_thrust
     # the largest share of roll and pitch for which some collective thrust keeps all rotors in range
     share = 1.0
     for a in range(gains.rotors):
         for b in range(gains.rotors):
-            ca, cb = gains.allocation[a, 0], gains.allocation[b, 0]
-            ua = gains.allocation[a, 1] * tx + gains.allocation[a, 2] * ty
-            ub = gains.allocation[b, 1] * tx + gains.allocation[b, 2] * ty
+            ca, cb = gains.by_thrust[a], gains.by_thrust[b]
+            ua = gains.by_roll[a] * ax + gains.by_pitch[a] * ay
+            ub = gains.by_roll[b] * ax + gains.by_pitch[b] * ay
             # low <= ca T + s ua and cb T + s ub <= high
             need = ub / cb - ua / ca
             room = high / cb - low / ca
@@ -53,23 +58,21 @@ def _share(gains: Any, thrust: float, tx: float, ty: float, tz: float, pilot: An
                 share = min(share, max(room, 0.0) / need)
     least, most = -math.inf, math.inf
     for r in range(gains.rotors):
-        c = gains.allocation[r, 0]
-        u = share * (gains.allocation[r, 1] * tx + gains.allocation[r, 2] * ty)
+        c = gains.by_thrust[r]
+        u = share * (gains.by_roll[r] * ax + gains.by_pitch[r] * ay)
         least = max(least, (low - u) / c)
         most = min(most, (high - u) / c)
     total = min(max(thrust, least), most)
     turn = 1.0
     for r in range(gains.rotors):
-        f = gains.allocation[r, 0] * total + share * (
-            gains.allocation[r, 1] * tx + gains.allocation[r, 2] * ty
-        )
+        f = gains.by_thrust[r] * total + share * (gains.by_roll[r] * ax + gains.by_pitch[r] * ay)
         pilot.rotor_reference[r] = f
-        y = gains.allocation[r, 3] * tz
+        y = gains.by_yaw[r] * az
         if y > 0.0:
             turn = min(turn, max(high - f, 0.0) / y)
         elif y < 0.0:
             turn = min(turn, max(f - low, 0.0) / -y)
     for r in range(gains.rotors):
-        f = pilot.rotor_reference[r] + turn * gains.allocation[r, 3] * tz
+        f = pilot.rotor_reference[r] + turn * gains.by_yaw[r] * az
         f = min(max(f, low), high)
         pilot.rotor_reference[r] = math.sqrt(f * gains.inverse_thrust_constant)

@@ -30,11 +30,11 @@ def hold_rates(pilot: Any, ox: float, oy: float, oz: float, gains: Any, dt: floa
         for r in range(gains.rotors):
             pilot.rotor_reference[r] = min(pilot.rotor_target[r], most)
         return
-    ix, iy, iz = three(gains.inertia)
-    tx = ix * _angular_acceleration(pilot, gains, 0, ox, dt) + (iz - iy) * oy * oz
-    ty = iy * _angular_acceleration(pilot, gains, 1, oy, dt) + (ix - iz) * oz * ox
-    tz = iz * _angular_acceleration(pilot, gains, 2, oz, dt) + (iy - ix) * ox * oy
-    mix(gains, pilot.thrust, tx, ty, tz, pilot)
+    gx, gy, gz = three(gains.gyroscopic)
+    ax = _angular_acceleration(pilot, gains, 0, ox, dt) + gx * oy * oz
+    ay = _angular_acceleration(pilot, gains, 1, oy, dt) + gy * oz * ox
+    az = _angular_acceleration(pilot, gains, 2, oz, dt) + gz * ox * oy
+    mix(gains, pilot.thrust, ax, ay, az, pilot)
 
 
 @inner_kernel
@@ -52,7 +52,7 @@ def _angular_acceleration(pilot: Any, gains: Any, axis: int, rate: float, dt: fl
         integral += gains.rate_integral[axis] * error * dt
         integral = min(max(integral, -limit), limit)
         pilot.rate_integral[axis] = integral
-    wanted: float = gains.rate[axis] * error + integral + gains.rate_drag[axis] * pilot.rates[axis]
+    wanted: float = gains.rate_drag[axis] * pilot.rates[axis] + gains.rate[axis] * error + integral
     return wanted
 
 

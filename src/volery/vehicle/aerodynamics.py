@@ -21,6 +21,16 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from volery.core.lanes import (
+    LANES,
+    lanes_at,
+    magnitudes,
+    no_lanes,
+    not_negative,
+    put_lanes,
+    totals,
+    where_negative,
+)
 from volery.vehicle.compiled import inner_kernel
 
 INFLOW_SPEED = 25.0
@@ -66,6 +76,17 @@ def _speed_at_mid_step(body: Any, plant: Any, wanted: float, r: int) -> float:
     body.rotor_speed[r] = wanted + lead * (plant.rise[r] if rising else plant.fall[r])
     half: float = wanted + lead * (plant.rise_half[r] if rising else plant.fall_half[r])
     return half
+
+
+@inner_kernel
+def _speeds_at_mid_step(body: Any, plant: Any, command: Any, first: int) -> Any:
+    """`_speed_at_mid_step` of the rotors of `lanes_at(..., first)`, none of them lost."""
+    wanted = lanes_at(command.rotor_reference, first)
+    lead = lanes_at(body.rotor_speed, first) - wanted
+    rise, fall = lanes_at(plant.rise, first), lanes_at(plant.fall, first)
+    rise_half, fall_half = lanes_at(plant.rise_half, first), lanes_at(plant.fall_half, first)
+    put_lanes(body.rotor_speed, first, wanted + lead * where_negative(lead, rise, fall))
+    return wanted + lead * where_negative(lead, rise_half, fall_half)
 
 
 @inner_kernel
@@ -125,34 +146,35 @@ def upright_rotors(
 ) -> tuple[float, float, float, float, float, float]:
     """`leaning_rotors` for axes along the body's z, hubs at one height and thrusts unaltered.
 
-    Drag and rolling moment are linear in the hubs' velocities, so their sums need only the moments
-    of the speeds over the rotors: w, w x, w y, w (x^2 + y^2), and with the spins s w, s w x, s w y.
+    Two rotors at once; one that there is not stands still at the origin.
     """
-    constant = plant.thrust_constant
-    w0 = wx = wy = wrr = q0 = qx = qy = 0.0
-    lift = lift_x = lift_y = twist = 0.0
-    for r in range(plant.rotors):
-        w = _speed_at_mid_step(body, plant, command.rotor_reference[r], r)
-        px, py = plant.rotor_x[r], plant.rotor_y[r]
-        along = vz + ox * py - oy * px
-        thrust = constant * w * w * max(1.0 - abs(along) * _INVERSE_INFLOW, 0.0)
-        q = plant.spin[r] * w
-        w0 += w
-        wx += w * px
-        wy += w * py
-        wrr += w * plant.rotor_arm_square[r]
-        q0 += q
-        qx += q * px
-        qy += q * py
-        lift += thrust
-        lift_x += thrust * px
-        lift_y += thrust * py
-        twist += thrust * plant.reaction[r]
-    loss, roll, pz = plant.rotor_drag, plant.rolling, plant.rotor_z[0]
+    constant, loss, roll = plant.thrust_constant, plant.rotor_drag, plant.rolling
+    pz = plant.rotor_z[0]
     ux, uy = vx + oy * pz, vy - ox * pz  # across, at the middle of the rotors' plane
-    fx = -loss * (ux * w0 - oz * wy)
-    fy = -loss * (uy * w0 + oz * wx)
-    tx = lift_y - pz * fy - roll * (ux * q0 - oz * qy)
-    ty = pz * fx - lift_x - roll * (uy * q0 + oz * qx)
-    tz = -loss * (uy * wx + oz * wrr - ux * wy) - twist
-    return fx, fy, lift, tx, ty, tz
+    fx = fy = lift = tx = ty = tz = no_lanes()
+    for first in range(0, plant.rotors, LANES):
+        w = _speeds_at_mid_step(body, plant, command, first)
+        px, py = lanes_at(plant.rotor_x, first), lanes_at(plant.rotor_y, first)
+        along = (py * ox - px * oy) + vz
+        thrust = constant * w * w * not_negative(1.0 - magnitudes(along) * _INVERSE_INFLOW)
+        hx, hy = ux - py * oz, uy + px * oz
+        drag = loss * w
+        gx, gy = drag * hx, drag * hy
+        rolling = lanes_at(plant.spin, first) * (roll * w)
+        fx -= gx
+        fy -= gy
+        lift += thrust
+        tx += py * thrust - rolling * hx
+        ty -= px * thrust + rolling * hy
+        tz += py * gx - px * gy - lanes_at(plant.reaction, first) * thrust
+    force_x, force_y = totals(fx, fy)
+    force_z, torque_z = totals(lift, tz)
+    torque_x, torque_y = totals(tx, ty)
+    return (
+        force_x,
+        force_y,
+        force_z,
+        torque_x - pz * force_y,
+        torque_y + pz * force_x,
+        torque_z,
+    )

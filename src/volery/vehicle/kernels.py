@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.lanes import LANES, lanes_at, put_lanes
 from volery.vehicle.aerodynamics import air_wrench
 from volery.vehicle.airframe import GRAVITY
 from volery.vehicle.compiled import apart_kernel, inner_kernel
@@ -98,8 +99,9 @@ def turn_rotors(body: Any, plant: Any, seconds: float) -> None:
     Cameras see by it where the blades are; nothing of the motion depends on it, so the speed at the
     start of the tick will do.
     """
-    for r in range(plant.rotors):
-        body.rotor_angle[r] += body.rotor_speed[r] * seconds
+    for first in range(0, plant.rotors, LANES):
+        angle = lanes_at(body.rotor_angle, first) + lanes_at(body.rotor_speed, first) * seconds
+        put_lanes(body.rotor_angle, first, angle)
 
 
 @inner_kernel

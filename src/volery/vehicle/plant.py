@@ -32,7 +32,6 @@ PLANT = np.dtype(
         ("rotor_x", "f8", MAX_ROTORS),
         ("rotor_y", "f8", MAX_ROTORS),
         ("rotor_z", "f8", MAX_ROTORS),
-        ("rotor_arm_square", "f8", MAX_ROTORS),  # x^2 + y^2
         ("rotor_axis", "f8", (MAX_ROTORS, 3)),
         ("spin", "f8", MAX_ROTORS),  # 1 counter-clockwise seen from above, -1 clockwise
         ("reaction", "f8", MAX_ROTORS),  # spin times torque over thrust, m
@@ -106,7 +105,6 @@ def _fill_rotors(row: np.void, airframe: Airframe, dt: float, wear: Sequence[Rot
     row["upright"] = level and bool((axis == (0.0, 0.0, 1.0)).all())
     for k, name in enumerate(("rotor_x", "rotor_y", "rotor_z")):
         row[name][:count] = position[:, k]
-    row["rotor_arm_square"][:count] = (position[:, :2] ** 2).sum(axis=1)
     row["rotor_axis"][:count] = axis
     row["spin"][:count] = spin
     row["reaction"][:count] = spin * rotors.torque_m * torque

@@ -15,15 +15,16 @@ GAINS = {name: gains_of(frame, 1e-3) for name, frame in FRAMES.items()}
 
 
 @fused_kernel
-def _mix(gains, pilots, thrust, tx, ty, tz):
-    mix(gains[0], thrust, tx, ty, tz, pilots[0])
+def _mix(gains, pilots, thrust, ax, ay, az):
+    mix(gains[0], thrust, ax, ay, az, pilots[0])
 
 
 def mixed(name, thrust, torque):
     """Rotor thrusts, and the thrust and torque (4,) that they make."""
     frame, pilots = FRAMES[name], new_pilots(np.array([[0.0, 0.0, 0.0, 1.0]]))
     pilots["full_thrust"] = frame.max_rotor_thrust
-    _mix(GAINS[name], pilots, float(thrust), *map(float, torque))
+    acceleration = np.array(torque) / frame.body.inertia_kg_m2
+    _mix(GAINS[name], pilots, float(thrust), *map(float, acceleration))
     speeds = pilots["rotor_reference"][0, : len(frame.rotors.places)]
     assert not pilots["rotor_reference"][0, len(frame.rotors.places) :].any()
     forces = frame.rotors.thrust_n_s2 * speeds**2
