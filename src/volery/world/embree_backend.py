@@ -93,6 +93,8 @@ class EmbreeBackend:
         content = self._content
         return SceneHandle(
             static=self._static,
+            obstacles=self._obstacles,
+            steepest=content.steepest,
             moving_offset=content.instances,
             trees=content.trees,
             normal_matrix=content.normal_matrix,

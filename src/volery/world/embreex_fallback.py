@@ -89,6 +89,8 @@ class EmbreexBackend:
         content = self._content
         return SceneHandle(
             static=0,
+            obstacles=0,
+            steepest=content.steepest,
             moving_offset=content.instances,
             trees=content.trees,
             normal_matrix=content.normal_matrix,

@@ -104,6 +104,8 @@ class SceneContent:
     tree_transforms: NDArray[np.float32]
     """(trees, 3, 4) map from tree."""
     has_terrain: bool
+    steepest: float
+    """Largest slope of the terrain, height by distance; 0 without one."""
     solids: int
     look: NDArray[np.float32]
     """(instances, 6) rows of `Look`."""
@@ -282,6 +284,7 @@ def _collect_land(
         tree_model=model_index,
         tree_transforms=tree_transforms,
         has_terrain=terrain is not None,
+        steepest=0.0 if terrain is None else terrain.steepest,
         solids=0,
         look=_looks(1 + trees, ()),
         cover=cover,

@@ -46,6 +46,10 @@ class SceneHandle(NamedTuple):
 
     static: int
     """Embree scene of terrain, trees and solids."""
+    obstacles: int
+    """The same without the terrain."""
+    steepest: float
+    """Largest slope of the terrain, height by distance; 0 without one."""
     moving_offset: int
     """Instance number of the first body."""
     trees: int

@@ -160,6 +160,17 @@ class Terrain:
         rows, columns = heights.shape
         return x0, y0, x0 + (columns - 1) * spacing, y0 + (rows - 1) * spacing
 
+    @property
+    def steepest(self) -> float:
+        """Largest slope of the surface, height by level distance.
+
+        Each triangle of `mesh` has one side along x and one along y: two rises make its slope.
+        """
+        along_x, along_y = np.diff(self.grid.heights, axis=1), np.diff(self.grid.heights, axis=0)
+        upper = along_x[1:] ** 2 + along_y[:, :-1] ** 2
+        lower = along_x[:-1] ** 2 + along_y[:, 1:] ** 2
+        return math.sqrt(max(upper.max(), lower.max())) / self.grid.spacing
+
     def height(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
         """Heights at map positions; x and y broadcast, the result has their shape, m."""
         x, y = _broadcast(x, y)

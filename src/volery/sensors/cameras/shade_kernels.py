@@ -17,6 +17,8 @@ from volery.world.scene_kernels import RayBlock, SceneHandle, run_together
 
 SHADOW_REACH_M = 80.0
 """Farther away nothing throws a shadow: trees and houses are lower."""
+_SUN_ABOVE = 0.01
+"""The sun counts as above a slope when its sine is by this much larger (modelling choice)."""
 _MASK = GRAIN - 1
 _FACADE, _PAINTED = int(Material.FACADE), int(Material.PAINTED)
 # Rows of a packet's scratch memory.
@@ -121,6 +123,17 @@ def _box(
 
 
 @inner_kernel
+def _casters(scene: SceneHandle, light: Light) -> int:
+    """Embree scene of what may stand between a hit and the sun.
+
+    Nothing that stands on the ground has it there while the sun is higher than its steepest slope.
+    """
+    sx, sy, sz = float(light.sun[0]), float(light.sun[1]), float(light.sun[2])
+    level = np.sqrt(sx * sx + sy * sy)
+    return scene.obstacles if sz > scene.steepest * level + _SUN_ABOVE else scene.static
+
+
+@inner_kernel
 def find_shadows(
     scene: SceneHandle,
     block: RayBlock,
@@ -133,7 +146,7 @@ def find_shadows(
 
     The block's rays are replaced by those towards the sun.
     """
-    valid, surface = block.valid, light.surface
+    valid, surface, casters = block.valid, light.surface, _casters(scene, light)
     sx, sy, sz = light.sun[0], light.sun[1], light.sun[2]
     is_day = sz > f4(0.0)
     for p in range(count):
@@ -159,7 +172,7 @@ def find_shadows(
         if not wanted:
             continue
         arguments = block.coherent.ctypes.data if run_together(block.rays, p, LANES) else 0
-        occluded_packet(valid.ctypes.data, scene.static, rays.ctypes.data, arguments)
+        occluded_packet(valid.ctypes.data, casters, rays.ctypes.data, arguments)
         for n in range(near_count):
             hide_behind_body(scene, block, p, LANES, block.near[n])
         for k in range(LANES):
