@@ -186,12 +186,15 @@ def where_negative(_typing: Any, lanes: Any, then: Any, other: Any) -> Any:
 
 @_word
 def any_outside(_typing: Any, lanes: Any, least: Any, most: Any) -> Any:
-    """Whether some number lies below that of `least` (lanes) or above `most` (one number)."""
+    """Whether some number lies below that of `least` (lanes) or above `most` (one number).
+
+    What is not a number counts as outside.
+    """
 
     def generate(_context: Any, builder: Any, _sig: Any, arguments: Any) -> Any:
         lanes, least, most = arguments
-        below = builder.fcmp_ordered("<", lanes, least)
-        above = builder.fcmp_ordered(">", lanes, _spread(builder, most, _FLOAT))
+        below = builder.fcmp_unordered("<", lanes, least)
+        above = builder.fcmp_unordered(">", lanes, _spread(builder, most, _FLOAT))
         bits = builder.bitcast(builder.or_(below, above), ir.IntType(LANES))
         return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 

@@ -66,6 +66,6 @@ def test_one_lane_outside_is_enough(lane):
     values = np.zeros(LANES)
     least = np.full(LANES, -1.0)
     assert not _is_outside(values, least, 1.0)
-    for beyond in (-1.5, 1.5):
+    for beyond in (-1.5, 1.5, np.nan):
         values[lane] = beyond
         assert _is_outside(values, least, 1.0)
