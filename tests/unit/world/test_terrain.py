@@ -40,6 +40,15 @@ def test_mesh_carries_the_same_surface(terrain):
     assert (mesh.face_normals[:, 2] > 0).all()
 
 
+def test_the_steepest_slope_is_that_of_a_triangle(terrain):
+    mesh = terrain.mesh()
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles].astype(float), 1, 0)
+    normals = np.cross(b - a, c - a)
+    slopes = np.hypot(normals[:, 0], normals[:, 1]) / normals[:, 2]
+    assert terrain.steepest == pytest.approx(slopes.max(), rel=1e-5)
+    assert Terrain.flat(10.0, 3.0).steepest == 0.0
+
+
 def test_flat_ground():
     flat = Terrain.flat(100.0, 2.5)
     assert flat.height(50.0, 20.0) == 2.5

@@ -11,16 +11,11 @@ from volery.core.compiled import inner_kernel, kernel
 from volery.core.rng import random_bits
 from volery.core.workers import fetch_add
 from volery.sensors.aim_kernels import LidarBatch, sensor_frame
+from volery.sensors.cameras.hit_kernels import new_scratch, note_hits
 from volery.sensors.cameras.light import CODES, Light
 from volery.sensors.cameras.pixel_table import PIECE, PixelTable
-from volery.sensors.cameras.shade_kernels import (
-    SCRATCH_ROWS,
-    Scratch,
-    find_shadows,
-    note_hits,
-    shade,
-    shading_bodies,
-)
+from volery.sensors.cameras.shade_kernels import shade
+from volery.sensors.cameras.shadow_kernels import find_shadows, shading_bodies
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.body_kernels import body_sphere
 from volery.world.embree import DIRECTION, FAR, LANES, ORIGIN
@@ -185,6 +180,22 @@ def _write_geometry(
 
 
 @inner_kernel
+def _gather_light(
+    colour: NDArray[np.float32], blinds: NDArray[np.bool_], samples: int, scale: Any
+) -> None:
+    """Make a packet's linear colours the exposed means of pixels, in the first lane of each."""
+    for j in range(3):
+        for k in range(LANES):
+            bounded = min(max(colour[j, k], f4(0.0)), f4(1e4))
+            colour[j, k] = f4(0.0) if blinds[k] else bounded
+        for k in range(0, LANES if samples > 1 else 0, samples):
+            for n in range(1, samples):
+                colour[j, k] += colour[j, k + n]
+        for k in range(LANES):
+            colour[j, k] *= scale
+
+
+@inner_kernel
 def _write_colour(
     table: PixelTable,
     optics: Optics,
@@ -197,31 +208,30 @@ def _write_colour(
     frames: Frames,
 ) -> None:
     """Bytes of pixels, each the mean of its samples' light."""
-    samples = table.samples
+    samples, codes, out = table.samples, light.code, frames.colour[shot]
     scale = f4(optics.exposure / samples)
     is_noisy = optics.read_noise > 0.0 or optics.shot_noise > 0.0
     dark, bright = f4(optics.read_noise**2), f4(optics.shot_noise**2)
     normals, key, number = optics.normals, batch.key[shot], _first_number(table, batch, shot)
-    bits: Any = np.uint64(0)
     for p in range(count):
-        colour, pixels, blinds = colours[p], table.pixel[first + p], table.blind[first + p]
+        colour, pixels = colours[p], table.pixel[first + p]
+        _gather_light(colour, table.blind[first + p], samples, scale)
+        for k in range(0, LANES if is_noisy else 0, samples):
+            bits: Any = random_bits(key, number + pixels[k])
+            for j in range(3):
+                lit = colour[j, k]
+                colour[j, k] += normals[bits & _LAST] * np.sqrt(dark + bright * min(lit, f4(1.0)))
+                bits >>= _CHANNEL_BITS
+        for j in range(3):
+            for k in range(LANES):
+                lit = min(max(colour[j, k], f4(0.0)), f4(1.0))
+                colour[j, k] = lit * f4(CODES - 1) + f4(0.5)
         for k in range(0, LANES, samples):
             pixel = pixels[k]
-            if pixel < 0:
-                continue
-            if is_noisy:
-                bits = random_bits(key, number + pixel)
-            for j in range(3):
-                total = f4(0.0)
-                for n in range(samples):
-                    if not blinds[k + n]:
-                        total += min(max(colour[j, k + n], f4(0.0)), f4(1e4))
-                lit = total * scale
-                if is_noisy:
-                    lit += normals[bits & _LAST] * np.sqrt(dark + bright * min(lit, f4(1.0)))
-                    bits >>= _CHANNEL_BITS
-                code = min(max(lit, f4(0.0)), f4(1.0)) * f4(CODES - 1) + f4(0.5)
-                frames.colour[shot, pixel, j] = light.code[int(code)]
+            if pixel >= 0:
+                out[pixel, 0] = codes[int(colour[0, k])]
+                out[pixel, 1] = codes[int(colour[1, k])]
+                out[pixel, 2] = codes[int(colour[2, k])]
 
 
 @kernel
@@ -243,13 +253,7 @@ def take_pictures(
     pieces = (packets + PIECE - 1) // PIECE
     interval = max(bodies_end_ns - bodies_start_ns, 1)
     wants_colour = frames.colour.shape[1] > 0
-    kept = PIECE if wants_colour else 0
-    scratch = Scratch(
-        np.empty((kept, SCRATCH_ROWS, LANES), f4),
-        np.empty((kept, LANES), f4),
-        np.empty((kept, 3, LANES), f4),
-        np.empty((kept, 3, LANES), f4),
-    )
+    scratch = new_scratch(PIECE if wants_colour else 0)
     while True:
         number = fetch_add(counter.ctypes.data)
         shot = number // pieces

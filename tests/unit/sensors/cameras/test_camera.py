@@ -106,6 +106,35 @@ def test_shadows_fall_away_from_the_sun(picture):
     np.testing.assert_array_equal(ratio[lit], 1.0)
 
 
+@pytest.mark.parametrize(
+    ("elevation_deg", "reach_m"), [(30.0, 10.0 / np.tan(np.pi / 6)), (50.0, 0)]
+)
+def test_a_ridge_throws_a_shadow_unless_the_sun_is_above_its_slope(elevation_deg, reach_m):
+    """A ridge of 10 m with slopes of 45 degrees; the sun is in the east, +x."""
+    heights = np.zeros((13, 13))
+    heights[:, 6] = 10.0
+    scene = Scene(Terrain.from_heights(heights, 10.0, origin=(-60.0, -60.0)), None)
+    down = CameraModel(width=81, height=41, horizontal_fov_deg=50.0)
+    history = new_history([(-20.0, 0.0, 30.0)], [rotations.from_rpy(0, np.pi / 2, 0)], 1_000_000)
+    batch = make_batch([0], [0], [0], [0], [0], stack_mounts([make_mount()]))
+    light = make_light(sun_elevation_deg=elevation_deg, sun_azimuth_deg=90.0)
+    seen = take(scene, down, light, batch, history)
+    scene.close()
+    # the picture's top shows what lies ahead of the UAV's belly: +x
+    up = -(np.arange(41) - down.centre_px[1]) / down.focal_px
+    x = -20.0 + up[:, None] * seen.depth[0]
+    level = x < -10.5
+    brightness = seen.colour[0].astype(float).sum(axis=-1)
+    dark = level & (x > -reach_m + 0.5)
+    bright = level & (x < -reach_m - 0.5)
+    assert bright.any()
+    if reach_m:
+        assert dark.any()
+        assert brightness[dark].max() < brightness[bright].min()
+    else:
+        assert brightness[level].min() > 0.6 * brightness[level].max()
+
+
 def test_night_is_dark_and_fog_hides(picture):
     day = picture(SMALL, solids=[wall(30.0)]).colour.mean()
     night = make_light(sun_elevation_deg=-20.0)
