@@ -241,7 +241,7 @@ def test_what_changes_while_paused_is_shown(paused):
     paused.post(lambda: paused.place_uav("uav2", moved, [0.0, 0.0, 0.0, 1.0])).result()
     shows(TF, lambda m: poses(m)["uav2/base_link"][0] == moved)
     shows(VEHICLES, lambda m: m.vehicles[1].position.z == 5.0)
-    paused.post(lambda: paused.uavs["uav1"].land()).result()
+    paused.post(paused.uavs["uav1"].land).result()
     shows(VEHICLES, lambda m: m.vehicles[0].mode == "LAND")
     paused.single_step(5)
     shows(TF, lambda m: stamp_s(m) == pytest.approx(3.005))
