@@ -320,6 +320,29 @@ def test_a_client_loads_another_world():
         run.close()
 
 
+def test_a_client_loads_a_scenario_with_changes():
+    run = Run("rosbridge", seconds=600, port=free_port())
+    client = RosbridgeClient(f"ws://127.0.0.1:{run.ports[0]}")
+    changes = json.dumps({"uavs": 3, "airframe": "crazyflie", "sensors": ["sonar"], "speed": 2.0})
+    try:
+        refused = answer(client, "/volery/load_scenario", scenario="hover", changes="{}x")
+        assert not refused.success
+        loaded = answer(client, "/volery/load_scenario", scenario="hover", changes=changes)
+        assert loaded.success, loaded.message
+        until = time.monotonic() + 60.0
+        entities = []
+        while len(entities) != 3:
+            assert run.process.poll() is None
+            assert time.monotonic() < until
+            with suppress(GraphError):
+                entities = answer(client, "/get_entities").entities
+        info = answer(client, "/get_entity_info", entity="uav3").info
+        assert "crazyflie" in info.description
+    finally:
+        client.close()
+        run.close()
+
+
 def test_a_client_unloads_the_world_and_loads_one_again():
     """In between the doors are open, the state is NO_WORLD, and little can be asked."""
     run = Run("rosbridge", seconds=600, port=free_port())

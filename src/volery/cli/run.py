@@ -116,10 +116,12 @@ def _scenario_of(options: RunOptions) -> Scenario:
 
 def _loading(options: RunOptions, request: WorldRequest) -> RunOptions:
     """The options for the flight that a client asks for."""
-    speed = request.changes.speed
-    if speed is not None:
-        options = replace(options, speed=speed or None)
-    return replace(options, scenario=request.name, changes=request.changes)
+    wanted = request.changes
+    if wanted.speed is not None:
+        options = replace(options, speed=wanted.speed or None)
+    if wanted.uavs is not None:
+        options = replace(options, uavs=None)
+    return replace(options, scenario=request.name, changes=wanted)
 
 
 class _Change:

@@ -36,5 +36,9 @@ class Rows(Sequence[Any]):
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle or copy is a plain list."""
+        return list, (list(self),)
+
     def __repr__(self) -> str:
         return repr(list(self))

@@ -1,5 +1,7 @@
 """Lists that are made when they are read go over every wire like others."""
 
+import pickle
+
 from volery.graph.json_form import JsonForm
 from volery.graph.messages import (
     Quaternion,
@@ -46,3 +48,6 @@ def test_they_read_like_a_list_and_are_not_made_before():
     assert rows == list(parts())
     assert rows != list(parts())[:2]
     assert "uav2/base_link" in repr(rows)
+    kept = pickle.loads(pickle.dumps(rows))
+    assert type(kept) is list
+    assert rows == kept

@@ -90,7 +90,7 @@ class Vehicles:
             state.position_map.tobytes(),
             state.velocity_map.tobytes(),
             state.battery_charge.tobytes(),
-            dict(self._gateway.commanded_ns),
+            self._gateway.commands,
             tuple(self.holder(name) for name in engine.names),
         )
 
