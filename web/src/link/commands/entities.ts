@@ -23,7 +23,7 @@ export async function spawnables(): Promise<Spawnable[]> {
 
 /** New UAVs, one at each place; names of those that came. Rejects where none did. */
 export async function spawn(uri: string, places: readonly Place[]): Promise<string[]> {
-  const answer = await link.call(
+  const answer = await link.call<"simulation_interfaces/srv/SpawnEntities">(
     "/spawn_entities",
     "simulation_interfaces/srv/SpawnEntities",
     {
