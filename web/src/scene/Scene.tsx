@@ -1,5 +1,8 @@
 import { Canvas } from "@react-three/fiber";
 import { Views } from "../views/Views.tsx";
+import { DragHandle } from "./DragHandle.tsx";
+import { EyeProbe } from "./EyeProbe.tsx";
+import { GroundPicker } from "./GroundPicker.tsx";
 import { Sky } from "./Sky.tsx";
 import { Uavs } from "./Uavs.tsx";
 import { World } from "./World.tsx";
@@ -20,8 +23,11 @@ export function Scene() {
       <World />
       <group rotation={ENU_ROTATION}>
         <Uavs />
+        <DragHandle />
       </group>
       <Views />
+      <EyeProbe />
+      <GroundPicker />
     </Canvas>
   );
 }

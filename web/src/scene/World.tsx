@@ -1,6 +1,7 @@
 import { useEffect, useState } from "react";
 import type { Group } from "three";
 import { useSimulation } from "../state/simulation.ts";
+import { planWorld } from "../state/worldPlan.ts";
 import { loadWorld } from "./loadWorld.ts";
 
 /** Ground, trees and buildings, as the server has them. */
@@ -9,10 +10,15 @@ export function World() {
   const [world, setWorld] = useState<Group | null>(null);
   useEffect(() => {
     const asked = new AbortController();
-    if (id === null) setWorld(null);
-    else
+    if (id === null) {
+      planWorld(null);
+      setWorld(null);
+    } else
       loadWorld(id, asked.signal)
-        .then(setWorld)
+        .then((loaded) => {
+          planWorld(loaded);
+          setWorld(loaded);
+        })
         .catch((error: unknown) => {
           if (!asked.signal.aborted) console.error("the world could not be shown:", error);
         });
