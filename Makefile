@@ -7,7 +7,7 @@ SCENARIO ?= forest_survey
 OUT ?= runs/$(SCENARIO)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint bench docs-benchmarks clean
+.PHONY: help run serve test lint bench docs-benchmarks clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -31,9 +31,12 @@ $(VENV)/.installed-bench: $(VENV)/.installed pyproject.toml
 	$(PIP) install --editable '.[bench]'
 	@touch $@
 
-run: $(VENV)/.installed ## fly the main job and leave a log and a report under runs/
+run: $(VENV)/.installed ## fly the main job, shown on a page, and leave a log and a report under runs/
 	@mkdir -p $(OUT)
-	$(BIN)/volery run $(SCENARIO) --record $(OUT)/flight.mcap --overwrite --report $(OUT)/report
+	$(BIN)/volery run $(SCENARIO) --record $(OUT)/flight.mcap --overwrite --report $(OUT)/report --page
+
+serve: $(VENV)/.installed ## serve the page until Ctrl-C: http://127.0.0.1:8080/
+	$(BIN)/volery serve
 
 lint: $(VENV)/.installed-tests ## style, types, layers
 	$(BIN)/ruff check src tests examples
