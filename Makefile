@@ -50,12 +50,12 @@ web: $(PAGE) ## build the page of the browser into the package (needs Node.js 20
 page: # the page where it can be built; without it everything else works
 	@.ci/node_fits && $(MAKE) --no-print-directory web || echo "going on without the page"
 
-run: $(VENV)/.installed page ## fly the main job and leave a log and a report under runs/
+run: $(VENV)/.installed page ## fly the main job, shown on a page, and leave a log and a report under runs/
 	@mkdir -p $(OUT)
-	$(BIN)/volery run $(SCENARIO) --record $(OUT)/flight.mcap --overwrite --report $(OUT)/report
+	$(BIN)/volery run $(SCENARIO) --record $(OUT)/flight.mcap --overwrite --report $(OUT)/report --page
 
-serve: $(VENV)/.installed web ## show a simulation in the browser until Ctrl-C
-	$(BIN)/volery serve $(SCENARIO)
+serve: $(VENV)/.installed page ## serve the page until Ctrl-C: http://127.0.0.1:8080/
+	$(BIN)/volery serve
 
 lint: $(VENV)/.installed-tests ## style, types, layers
 	$(BIN)/ruff check src tests examples
@@ -68,7 +68,7 @@ lint: $(VENV)/.installed-tests ## style, types, layers
 test: lint page ## install what tests need, check everything, run the tests
 	@.ci/install_ros1
 	@.ci/install_browser
-	@if .ci/node_fits; then cd web && npm test --silent -- --passWithNoTests; fi
+	@if .ci/node_fits; then cd web && npm test --silent; fi
 	$(BIN)/python -m volery.runtime.warm_up
 	$(BIN)/pytest -n 2 --dist loadfile -m 'not slow' tests
 
