@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from contextlib import suppress
 
 import roslibpy
 
-STARTING_S = 120.0
+STARTING_S = 240.0
 """The first start compiles."""
 ANSWER_S = 30.0
 _URL = re.compile(r"http://127\.0\.0\.1:(\d+)/")
@@ -63,7 +64,6 @@ class Served:
 
     def status(self):
         """What `./api/status` says."""
-        import json
 
         with urllib.request.urlopen(f"{self.url}api/status", timeout=5.0) as answer:
             return json.load(answer)
