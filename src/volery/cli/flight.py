@@ -42,6 +42,8 @@ class RunOptions:
     recordings: Path | None = None
     allow_remote: bool = False
     token: str | None = None
+    page: str | None = None
+    """`HOST:PORT`, `PORT` or, for the usual place, nothing; None: no page."""
 
 
 class _StoppedError(Exception):

@@ -29,6 +29,7 @@ from volery.runtime.assembly import assemble
 from volery.runtime.building import place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.crew import Crew
+from volery.runtime.geometry import Geometry, WorldTopic
 from volery.runtime.graph_building import all_down, plan_faults
 from volery.runtime.grid_world import GridWorld
 from volery.runtime.keeping import Keeper
@@ -42,13 +43,17 @@ from volery.runtime.sensor_fitting import lidar_mounts
 from volery.runtime.services import Services, open_services
 from volery.runtime.snapshot import Snapshot
 from volery.runtime.spawning import Spawner
+from volery.runtime.telling import LiveTopics
+from volery.runtime.telling.status import Told
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
 from volery.runtime.weather_messages import WeatherTopics
 from volery.runtime.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario, UavType
+from volery.scenario.shelf import Shelf
 from volery.sensors.mount import Mount
+from volery.world.ground_cover import BARE_GROUND
 from volery.world.things import MovingThings
 from volery.world.weather import Weather
 
@@ -67,8 +72,9 @@ class Simulation:
     `threads` share the ray casting; results do not depend on their number. `recordings` is the
     folder in which clients of the graph may record, None: nowhere. `on_load` is called, in the
     simulation's thread, with the name of a scenario that a client wants instead of this one, or
-    with None where it wants none; without `on_load` both are refused. Use it as a context manager,
-    or call `close` at the end. Raises `ScenarioError` where the scenario cannot be built.
+    with None where it wants none; without `on_load` both are refused. `shelf` has the scenarios
+    that clients can name, None: those that ship. Use it as a context manager, or call `close` at
+    the end. Raises `ScenarioError` where the scenario cannot be built.
     """
 
     def __init__(
@@ -78,6 +84,7 @@ class Simulation:
         threads: int = 2,
         recordings: Path | None = None,
         on_load: Callable[[str | None], None] | None = None,
+        shelf: Shelf | None = None,
     ) -> None:
         if threads < 1:
             raise ScenarioError(f"threads must be at least 1 (found {threads})")
@@ -87,6 +94,7 @@ class Simulation:
         self.city = build_city(scenario, self.terrain)
         self.forest = build_forest(scenario, self.terrain, self.city)
         self.scene = build_scene(scenario, self.terrain, self.forest, self.city, threads=threads)
+        self._geometry: Geometry | None = None
         self._closed = False
         self._pacer = Pacer()
 
@@ -110,6 +118,8 @@ class Simulation:
         )
         self.grid_world = GridWorld(scenario, self._engine)
         """The grid map whose blocks stand in the world, and how it is changed."""
+        self._world_topic = WorldTopic(self.graph, lambda: self.geometry)
+        self.grid_world.on_blocks = lambda: self.post(self._world_topic.tell)
         self._faults = FaultPlan(self._engine)
         self._crew = Crew(
             scenario,
@@ -123,7 +133,13 @@ class Simulation:
         self.uavs: Mapping[str, Uav] = MappingProxyType(self._crew.uavs)
         """In fleet order."""
         self._partners: list[Partner] = []
+        self._replays: list[Replay] = []
         self._keep_time(publisher)
+        self._live = LiveTopics(
+            self,
+            self._engine,
+            Told(lambda: self._services.state, lambda: self._services.recording),
+        )
         self._weather_topics = WeatherTopics(
             self.graph, scenario.world, lambda: self.weather, self.set_weather
         )
@@ -131,10 +147,11 @@ class Simulation:
         self._crew.open(parts)
         plan_faults(self._faults, scenario)
         self._loop = RunLoop(self._engine, self._pacer, scenario.duration_s, self._has_ended)
+        self._loop.look = self._live.look
         self._relocator = Relocator(self._engine, self.scene, self.terrain, self._crew)
         open_lock_step(self)
         self._services: Services = open_services(
-            self, recordings=recordings, on_load=on_load, every=self._engine.every
+            self, recordings=recordings, on_load=on_load, shelf=shelf, every=self._engine.every
         )
         self._keeper = Keeper(
             self._engine,
@@ -149,6 +166,7 @@ class Simulation:
         )
         self._spawner = Spawner(self._crew, self._keeper, self.scene, self.terrain)
         self._crew.take_off(self.uavs)
+        self._world_topic.tell()
 
     # -------------------------------------------------------------------------------------- time
 
@@ -284,6 +302,12 @@ class Simulation:
         """Let a recorded log speak into the graph, beginning now, in simulated time."""
         self._check_open()
         replay.start(self.graph, self._engine, lambda: self.time_ns)
+        self._replays.append(replay)
+
+    @property
+    def replaying(self) -> bool:
+        """Whether a recorded log is speaking into the graph."""
+        return any(replay.info.running for replay in self._replays)
 
     def take_in(self) -> None:
         """Do what other threads have posted, and hand out what that published, without a step.
@@ -292,6 +316,7 @@ class Simulation:
         """
         self._check_open()
         self._engine.take_in()
+        self._live.look()
 
     def inject(self, fault: Fault | Mapping[str, Any]) -> None:
         """Let something go wrong: a fault as in a scenario's `faults`, at once if its time is past.
@@ -360,6 +385,7 @@ class Simulation:
         self._check_open()
         self._keeper.restore(snapshot)
         self._pacer.drop_steps("another state was restored")
+        self._live.jumped()
 
     def reset(self, seed: int | None = None) -> None:
         """Go back to the start, with the scenario's seed or another one.
@@ -373,6 +399,7 @@ class Simulation:
             check_seed(seed)
         self._keeper.reset(self.scenario.seed if seed is None else seed)
         self._pacer.drop_steps("the simulation was reset")
+        self._live.jumped()
 
     def reset_uav(self, name: str) -> None:
         """Put one UAV back to its start while the others fly on: as it was, mended, charged, new.
@@ -494,6 +521,15 @@ class Simulation:
     def cloud_mounts(self) -> Mapping[str, Mount]:
         """Topics of PointCloud2s and how their LIDARs are mounted."""
         return lidar_mounts(self._crew.fitted, planar=False)
+
+    @property
+    def geometry(self) -> Geometry:
+        """What stands in the world at present; any thread may ask."""
+        present, solids = self._geometry, self.scene.solids
+        if present is None or present.solids is not solids:
+            cover = BARE_GROUND if self.city is None else self.city.cover
+            present = self._geometry = Geometry(self.terrain, self.forest, solids, cover)
+        return present
 
     @property
     def uav_names(self) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from volery.runtime.services.spawning import Spawning
 from volery.runtime.services.stepping import offer_steps
 from volery.runtime.services.things import offer_things
 from volery.runtime.services.worlds import OnLoad, offer_worlds
+from volery.scenario.shelf import Shelf
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
@@ -26,8 +27,19 @@ if TYPE_CHECKING:
 class Services:
     """What the services of one simulation hold on to."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, playing: Playing, recording: Recording) -> None:
+        self._playing = playing
         self._recording = recording
+
+    @property
+    def state(self) -> int:
+        """State of the simulation, as the standard numbers it."""
+        return int(self._playing.state)
+
+    @property
+    def recording(self) -> str:
+        """What a client is recording, below the folder of recordings; empty: nothing."""
+        return self._recording.name
 
     def close(self) -> None:
         """Give it back."""
@@ -39,6 +51,7 @@ def open_services(
     *,
     recordings: Path | None = None,
     on_load: OnLoad | None = None,
+    shelf: Shelf | None = None,
     every: Callable[..., None],
 ) -> Services:
     """Offer the standard's services and ours; what the arguments mean, `Simulation` says.
@@ -49,9 +62,10 @@ def open_services(
     offer_features(graph, loads_worlds=on_load is not None)
     Entities(simulation).offer()
     Spawning(simulation).offer()
-    Playing(simulation).offer()
+    playing = Playing(simulation)
+    playing.offer()
     offer_steps(simulation)
-    offer_worlds(graph, simulation.scenario, on_load)
+    offer_worlds(graph, simulation.scenario, on_load, shelf)
     offer_named_poses(graph, simulation.starts)
     offer_air_and_faults(simulation)
     if simulation.things is not None:
@@ -62,4 +76,4 @@ def open_services(
     KeptStates(simulation).offer()
     recording = Recording(graph, recordings)
     recording.offer()
-    return Services(recording)
+    return Services(playing, recording)
