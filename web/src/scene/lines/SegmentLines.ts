@@ -121,6 +121,14 @@ export class SegmentLines {
     this.buffer.needsUpdate = true;
   }
 
+  /** Forget all segments. */
+  clear(): void {
+    (this.buffer.array as Float32Array).fill(0);
+    this.buffer.clearUpdateRanges();
+    this.buffer.needsUpdate = true;
+    this.count = 0;
+  }
+
   update({ width, height }: Moment, nowS = 0): void {
     const { size, nowS: now } = this.object.material.uniforms;
     size!.value.set(width, height);

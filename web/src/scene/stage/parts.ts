@@ -5,6 +5,12 @@ import { Falling } from "../air/Falling.ts";
 import { Sky } from "../air/Sky.ts";
 import { Sun } from "../air/Sun.ts";
 import { Airframes } from "../uavs/Airframes.ts";
+import { Labels } from "../uavs/Labels.ts";
+import { Lamps } from "../uavs/Lamps.ts";
+import { Marks } from "../uavs/Marks.ts";
+import { Paths } from "../uavs/Paths.ts";
+import { Smoke } from "../uavs/Smoke.ts";
+import { Trails } from "../uavs/Trails.ts";
 import { standing } from "../world/standing.ts";
 import { World } from "../world/World.ts";
 import type { Part } from "./part.ts";
@@ -32,10 +38,16 @@ export function makeParts(
     ["view", new CameraMan(camera, renderer.domElement)],
     ["world", world],
     ["uavs", new Airframes()],
+    ["lamps", new Lamps(air)],
+    ["smoke", new Smoke(air)],
+    ["marks", new Marks()],
+    ["trails", new Trails()],
+    ["paths", new Paths()],
     ["sky", new Sky(air)],
     ["rain", new Falling("rain", air, most)],
     ["snow", new Falling("snow", air, most)],
     ["sun", sun],
+    ["labels", new Labels()],
   ];
   for (const [, { object }] of all) scene.add(object);
   return { all, world, sun };
