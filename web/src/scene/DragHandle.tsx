@@ -98,7 +98,7 @@ function useFollowing(
     handle.position.set(at?.x ?? pose[0], at?.y ?? pose[1], at?.z ?? pose[2]);
     const { x, y, z } = handle.position;
     const eye = camera.matrixWorld.elements;
-    const distance = Math.hypot(eye[12]! - x, eye[14]! + y, eye[13]! - z);
+    const distance = Math.hypot(eye[12]! - x, eye[13]! - y, eye[14]! - z);
     handle.scale.setScalar(Math.max(LEAST_SCALE, distance * SHARE));
   });
 }

@@ -10,9 +10,9 @@ export function EyeProbe() {
     const [x, y, z] = camera.matrixWorld.elements.slice(12, 15) as [number, number, number];
     camera.getWorldDirection(ahead);
     eye.x = x;
-    eye.y = -z;
-    eye.z = y;
-    eye.heading = Math.atan2(-ahead.z, ahead.x);
+    eye.y = y;
+    eye.z = z;
+    eye.heading = Math.atan2(ahead.y, ahead.x);
     if (camera instanceof PerspectiveCamera) {
       eye.width = 2 * Math.atan(Math.tan((camera.fov * Math.PI) / 360) * camera.aspect);
     }

@@ -4,7 +4,7 @@ type Vector = [number, number, number];
 
 const caster = new Raycaster();
 
-/** The ray below a point of the page, in the map's axes; `direction` is a unit vector. */
+/** The ray below a point of the page, in the map; `direction` is a unit vector. */
 export function rayAt(
   canvas: HTMLElement,
   camera: Camera,
@@ -16,5 +16,5 @@ export function rayAt(
   const y = 1 - ((clientY - box.top) / box.height) * 2;
   caster.setFromCamera(new Vector2(x, y), camera);
   const { origin: o, direction: d } = caster.ray;
-  return { origin: [o.x, -o.z, o.y], direction: [d.x, -d.z, d.y] };
+  return { origin: [o.x, o.y, o.z], direction: [d.x, d.y, d.z] };
 }

@@ -1,33 +1,32 @@
-import {
-  BoxGeometry,
-  CylinderGeometry,
-  Group,
-  InstancedMesh,
-  Matrix4,
-  Mesh,
-  PlaneGeometry,
-} from "three";
+import { BoxGeometry, CylinderGeometry, Matrix4, PlaneGeometry } from "three";
 import { expect, it } from "vitest";
-import { heightAt, planOf, planWorld } from "./worldPlan.ts";
+import { heightAt, planOf, planWorld, type PlanSource } from "./worldPlan.ts";
 
-/** Axes as in a glTF: y up, north is -z. */
-function world(): Group {
-  const ground = new Mesh(new PlaneGeometry(100, 60).rotateX(-Math.PI / 2));
-  ground.name = "ground";
-  ground.position.y = 1;
-  const block = new Mesh(new BoxGeometry(4, 6, 2));
-  block.name = "solids";
-  block.position.set(10, 4, -20);
-  const trees = new InstancedMesh(
-    new CylinderGeometry(0.2, 0.3, 8).translate(0, 4, 0),
-    undefined,
-    1,
-  );
-  trees.setMatrixAt(0, new Matrix4().makeScale(2, 2, 2).setPosition(-7, 1, 5));
-  return new Group().add(ground, block, trees);
+function world(): PlanSource {
+  const trunk = new CylinderGeometry(0.2, 0.3, 8).rotateX(Math.PI / 2).translate(0, 0, 4);
+  return {
+    solids: [
+      {
+        geometry: new PlaneGeometry(100, 60),
+        material: "ground",
+        place: new Matrix4().setPosition(0, 0, 1),
+      },
+      {
+        geometry: new BoxGeometry(4, 2, 6),
+        material: "concrete",
+        place: new Matrix4().setPosition(10, 20, 4),
+      },
+    ],
+    models: [
+      {
+        parts: [{ geometry: trunk }],
+        places: new Float32Array(new Matrix4().makeScale(2, 2, 2).setPosition(-7, -5, 1).elements),
+      },
+    ],
+  };
 }
 
-it("a world is seen from above in the map's axes", () => {
+it("a world is seen from above", () => {
   const { ground, trees, roofs } = planOf(world());
   expect(ground).toMatchObject({ x: -50, y: -30 });
   expect(trees).toHaveLength(1);

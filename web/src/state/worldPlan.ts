@@ -1,6 +1,6 @@
 // The world from above, for the map and for clicks on the ground: made once when a world is shown.
 
-import { InstancedMesh, Matrix4, Mesh, Vector3, type BufferGeometry, type Object3D } from "three";
+import { Matrix4, Vector3, type BufferGeometry } from "three";
 import { create } from "zustand";
 import { heightIn, heightsOf, type Heights, type Triangles } from "../lib/heights.ts";
 
@@ -9,7 +9,7 @@ export interface Tree {
   y: number;
   /** Radius of what is drawn, m. */
   crown: number;
-  /** Radius of the trunk, m; 0: these are leaves. */
+  /** Radius of the trunk, m. */
   trunk: number;
 }
 
@@ -20,6 +20,14 @@ export interface WorldPlan {
   roofs: Triangles;
 }
 
+/** A world as the scene reads it: z up, in the map. */
+export interface PlanSource {
+  /** What stands once, where its place says. */
+  solids: readonly { geometry: BufferGeometry; material: string; place: Matrix4 }[];
+  /** What stands in many places: matrices, 16 numbers each. */
+  models: readonly { parts: readonly { geometry: BufferGeometry }[]; places: Float32Array }[];
+}
+
 const MOST_CELLS = 384;
 /** Below this height a tree is its trunk, m. */
 const TRUNK_TOP_M = 1.5;
@@ -28,24 +36,21 @@ const UPWARD = 0.2;
 
 export const useWorldPlan = create<{ plan: WorldPlan | null }>(() => ({ plan: null }));
 
-/** Take a world that was loaded (axes of glTF, y up), before anything moves its parts; null: none. */
-export function planWorld(world: Object3D | null): void {
+/** Take a world that is shown from now on; null: none. */
+export function planWorld(world: PlanSource | null): void {
   useWorldPlan.setState({ plan: world === null ? null : planOf(world) });
 }
 
-export function planOf(world: Object3D): WorldPlan {
-  world.updateMatrixWorld(true);
+export function planOf({ solids, models }: PlanSource): WorldPlan {
   const ground: number[] = [];
   const roofs: number[] = [];
-  const trees: Tree[] = [];
-  world.traverse((object) => {
-    if (object instanceof InstancedMesh) addTrees(object, trees);
-    else if (object instanceof Mesh && isGround(object)) addTriangles(object, ground, -1);
-    else if (object instanceof Mesh) addTriangles(object, roofs, UPWARD);
-  });
+  for (const { geometry, material, place } of solids) {
+    if (material.startsWith("ground")) addTriangles(geometry, place, ground, -1);
+    else addTriangles(geometry, place, roofs, UPWARD);
+  }
   return {
     ground: heightsOf(new Float32Array(ground), MOST_CELLS),
-    trees,
+    trees: models.flatMap(treesOf),
     roofs: new Float32Array(roofs),
   };
 }
@@ -57,14 +62,13 @@ export function heightAt(x: number, y: number): number {
   return Number.isNaN(height) ? 0 : height;
 }
 
-/** Of several materials a ground is a group of that name. */
-function isGround(object: Object3D): boolean {
-  return /^ground/.test(object.name) || /^ground/.test(object.parent?.name ?? "");
-}
-
-/** Triangles of a mesh in the map whose normals point up at least so much. */
-function addTriangles(mesh: Mesh, into: number[], upward: number): void {
-  const geometry = mesh.geometry as BufferGeometry;
+/** Triangles in the map whose normals point up at least so much. */
+function addTriangles(
+  geometry: BufferGeometry,
+  place: Matrix4,
+  into: number[],
+  upward: number,
+): void {
   const position = geometry.getAttribute("position");
   const index = geometry.getIndex();
   const count = index?.count ?? position.count;
@@ -72,36 +76,34 @@ function addTriangles(mesh: Mesh, into: number[], upward: number): void {
   const [one, other] = [new Vector3(), new Vector3()];
   for (let i = 0; i + 3 <= count; i += 3) {
     corners.forEach((corner, k) => {
-      corner.fromBufferAttribute(position, index?.getX(i + k) ?? i + k);
-      corner.applyMatrix4(mesh.matrixWorld);
+      corner.fromBufferAttribute(position, index?.getX(i + k) ?? i + k).applyMatrix4(place);
     });
     const [a, b, c] = corners;
     const normal = one.subVectors(b, a).cross(other.subVectors(c, a));
-    if (normal.y < upward * normal.length()) continue;
-    for (const { x, y, z } of corners) into.push(x, -z, y);
+    if (normal.z < upward * normal.length()) continue;
+    for (const { x, y, z } of corners) into.push(x, y, z);
   }
 }
 
-function addTrees(mesh: InstancedMesh, into: Tree[]): void {
-  const { crown, trunk } = radiiOf(mesh.geometry as BufferGeometry);
-  const matrix = new Matrix4();
-  for (let i = 0; i < mesh.count; i++) {
-    mesh.getMatrixAt(i, matrix);
-    matrix.premultiply(mesh.matrixWorld);
-    const scale = matrix.getMaxScaleOnAxis();
-    const { elements } = matrix;
-    const [x, y] = [elements[12]!, -elements[14]!];
-    into.push({ x, y, crown: crown * scale, trunk: trunk * scale });
-  }
+function treesOf({ parts, places }: PlanSource["models"][number]): Tree[] {
+  const { crown, trunk } = radiiOf(parts.map(({ geometry }) => geometry));
+  return Array.from({ length: places.length / 16 }, (_, i) => {
+    const at = 16 * i;
+    const scale = Math.hypot(places[at]!, places[at + 1]!, places[at + 2]!);
+    const [x, y] = [places[at + 12]!, places[at + 13]!];
+    return { x, y, crown: crown * scale, trunk: trunk * scale };
+  });
 }
 
-function radiiOf(geometry: BufferGeometry): { crown: number; trunk: number } {
-  const position = geometry.getAttribute("position");
+function radiiOf(geometries: readonly BufferGeometry[]): { crown: number; trunk: number } {
   let [crown, trunk] = [0, 0];
-  for (let i = 0; i < position.count; i++) {
-    const radius = Math.hypot(position.getX(i), position.getZ(i));
-    crown = Math.max(crown, radius);
-    if (position.getY(i) < TRUNK_TOP_M) trunk = Math.max(trunk, radius);
+  for (const geometry of geometries) {
+    const position = geometry.getAttribute("position");
+    for (let i = 0; i < position.count; i++) {
+      const radius = Math.hypot(position.getX(i), position.getY(i));
+      crown = Math.max(crown, radius);
+      if (position.getZ(i) < TRUNK_TOP_M) trunk = Math.max(trunk, radius);
+    }
   }
   return { crown, trunk };
 }

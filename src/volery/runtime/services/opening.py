@@ -18,6 +18,7 @@ from volery.runtime.services.spawning import Spawning
 from volery.runtime.services.stepping import offer_steps
 from volery.runtime.services.things import offer_things
 from volery.runtime.services.worlds import OnLoad, offer_worlds
+from volery.scenario.shelf import Shelf
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
@@ -50,6 +51,7 @@ def open_services(
     *,
     recordings: Path | None = None,
     on_load: OnLoad | None = None,
+    shelf: Shelf | None = None,
     every: Callable[..., None],
 ) -> Services:
     """Offer the standard's services and ours; what the arguments mean, `Simulation` says.
@@ -63,7 +65,7 @@ def open_services(
     playing = Playing(simulation)
     playing.offer()
     offer_steps(simulation)
-    offer_worlds(graph, simulation.scenario, on_load)
+    offer_worlds(graph, simulation.scenario, on_load, shelf)
     offer_named_poses(graph, simulation.starts)
     offer_air_and_faults(simulation)
     if simulation.things is not None:

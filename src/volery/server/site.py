@@ -1,0 +1,102 @@
+"""What the server knows of the run: its state, its world, and who is connected.
+
+Its owner, who builds and flies, tells through `PageServer`; the server's own thread reads.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+from volery.bridges.rosbridge.conversation import SERVICE_RESTART, Channel
+from volery.bridges.rosbridge.forms import Forms
+from volery.bridges.rosbridge.protocol import Shared
+from volery.bridges.rosbridge.rosapi import RosApi
+from volery.graph.session import Gateway
+from volery.runtime.lobby import Lobby
+from volery.runtime.simulation import Simulation
+from volery.scenario.shelf import Shelf
+
+_FAREWELL_S = 1.0
+"""Time for a client to take the news that its world is gone."""
+
+
+class State(StrEnum):
+    """What goes on."""
+
+    BUILDING = "building"
+    FLYING = "flying"
+    LOBBY = "lobby"
+    FAILED = "failed"
+    """As in the lobby, because the scenario could not be built."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The present state, in words."""
+
+    state: State = State.BUILDING
+    scenario: str | None = None
+    description: str = ""
+    message: str = ""
+    """What went wrong, if something did."""
+
+
+class JoinedWorld:
+    """A simulation, or a lobby, that clients join: what their conversations have in common."""
+
+    def __init__(self, world: Simulation | Lobby) -> None:
+        graph = world.graph
+        self.gateway: Gateway = world.gateway
+        self.simulation = world if isinstance(world, Simulation) else None
+        self.shared = Shared(Forms("ros2"), graph.now_ns)
+        self._rosapi = RosApi(world.gateway, "ros2", graph.now_ns)
+        self._rosapi.start()
+
+    def leave(self) -> None:
+        """Take back what is offered to clients."""
+        self._rosapi.stop()
+
+
+@dataclass(eq=False)
+class Client:
+    """One rosbridge client."""
+
+    channel: Channel
+    conversation: asyncio.Task[Exception | None]
+
+    async def dismiss(self, reason: str) -> None:
+        """Have it connect again, to another world; who does not listen is left alone."""
+        with suppress(Exception):
+            async with asyncio.timeout(_FAREWELL_S):
+                await self.channel.close(SERVICE_RESTART, reason)
+        self.conversation.cancel()
+        await asyncio.gather(self.conversation, return_exceptions=True)
+
+
+@dataclass(eq=False)
+class Site:
+    """What all requests share. Written to in the server's thread only."""
+
+    recordings: Path | None = None
+    """Folder of logs; None: there is none."""
+    shelf: Shelf = field(default_factory=Shelf)
+    """Scenarios that can be loaded; its folder is that of uploads."""
+    situation: Situation = field(default_factory=Situation)
+    world: JoinedWorld | None = None
+    clients: set[Client] = field(default_factory=set)
+
+    async def join(self, world: Simulation | Lobby, situation: Situation) -> None:
+        """Let clients into a world."""
+        self.world, self.situation = JoinedWorld(world), situation
+
+    async def leave(self, situation: Situation) -> None:
+        """Send everybody out of the present world."""
+        world, self.world, self.situation = self.world, None, situation
+        farewell = situation.message or "the world changes"
+        await asyncio.gather(*(client.dismiss(farewell) for client in tuple(self.clients)))
+        if world is not None:
+            world.leave()
