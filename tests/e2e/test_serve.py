@@ -112,12 +112,14 @@ class Ros:
         answer = self.call("/load_world", "simulation_interfaces/LoadWorld", **source)
         return answer["result"]
 
-    def first(self, topic, msgtype, seconds=20.0):
+    def first(self, topic, msgtype, good=lambda message: True, seconds=20.0):
+        """The first message that is good."""
         found, there = [], threading.Event()
 
         def take(message):
-            found.append(message)
-            there.set()
+            if good(message):
+                found.append(message)
+                there.set()
 
         listener = roslibpy.Topic(self.ros, topic, msgtype)
         listener.subscribe(take)
@@ -146,7 +148,7 @@ def test_another_world_flies_while_the_page_stays(server):
         shown = server.status["world"]
         changed = ros.call("/volery/set_grid_map", "volery_interfaces/SetGridMap", block_height=9.0)
         assert changed["success"]
-        assert ros.first("/volery/world", "std_msgs/String")["data"] != shown
+        ros.first("/volery/world", "std_msgs/String", lambda told: told["data"] != shown)
         assert server.status["world"] != shown
         # the file is that of the higher blocks
         content = server.ask("/api/world.glb")[1]

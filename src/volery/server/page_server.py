@@ -21,13 +21,12 @@ import uvicorn
 from volery.bridges.origins import LOOPBACK, Origins
 from volery.bridges.rosbridge.wire import MOST_MESSAGE_BYTES
 from volery.core.errors import BridgeError
-from volery.runtime.lobby import Lobby
-from volery.runtime.simulation import Simulation
+from volery.scenario.schema import Scenario
 from volery.scenario.shelf import Shelf
 from volery.server.app import make_app
 from volery.server.rights import check_rights
 from volery.server.settings import PageSettings
-from volery.server.site import Site, Situation, State
+from volery.server.site import Site, Situation, State, World
 
 _SWITCH_INTERVAL_S = 0.0005
 """Python's own 5 ms would be the latency of every answer while the engine computes."""
@@ -105,16 +104,16 @@ class PageServer:
         self._leave(Situation(State.BUILDING, scenario, description.strip(), message))
 
     @contextmanager
-    def showing(self, world: Simulation | Lobby, message: str = "") -> Iterator[None]:
+    def showing(self, world: World, message: str = "") -> Iterator[None]:
         """Let clients into a world, and send them out of it at the end.
 
         message: what went wrong before, such as that another world could not be built.
         """
-        if isinstance(world, Simulation):
-            scenario = world.scenario
-            told = Situation(State.FLYING, scenario.name, scenario.description.strip(), message)
-        else:
+        scenario: Scenario | None = getattr(world, "scenario", None)
+        if scenario is None:
             told = Situation(State.FAILED if message else State.LOBBY, message=message)
+        else:
+            told = Situation(State.FLYING, scenario.name, scenario.description.strip(), message)
         self._call(self._site.join(world, told), _LONGEST_FAREWELL_S)
         try:
             yield
