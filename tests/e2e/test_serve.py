@@ -56,7 +56,7 @@ class Server:
     def ask(self, path, body=None):
         request = urllib.request.Request(f"http://127.0.0.1:{self.port}{path}", body)
         try:
-            with urllib.request.urlopen(request, timeout=150) as answer:
+            with urllib.request.urlopen(request, timeout=320) as answer:
                 return answer.status, answer.read()
         except urllib.error.HTTPError as error:
             with error:
