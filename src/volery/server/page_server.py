@@ -32,7 +32,8 @@ _SWITCH_INTERVAL_S = 0.0005
 """Python's own 5 ms would be the latency of every answer while the engine computes."""
 _KEEPALIVE_S = 20.0
 """Between two pings, and how long an answer may take."""
-_LONGEST_START_S, _LONGEST_FAREWELL_S = 30.0, 10.0
+_LONGEST_CALL_S = 30.0
+"""Of the server's own work on a busy machine; nothing in it waits for a client longer."""
 
 
 class PageServer:
@@ -97,7 +98,7 @@ class PageServer:
         )
         sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL_S))
         self._thread.start()
-        self._call(self._begin(self._server, self._socket), _LONGEST_START_S)
+        self._call(self._begin(self._server, self._socket))
 
     def building(self, scenario: str, description: str = "", message: str = "") -> None:
         """Tell that a scenario is being built; `message`: what went wrong before."""
@@ -114,7 +115,7 @@ class PageServer:
             told = Situation(State.FAILED if message else State.LOBBY, message=message)
         else:
             told = Situation(State.FLYING, scenario.name, scenario.description.strip(), message)
-        self._call(self._site.join(world, told), _LONGEST_FAREWELL_S)
+        self._call(self._site.join(world, told))
         try:
             yield
         finally:
@@ -123,19 +124,25 @@ class PageServer:
     def stop(self) -> None:
         """Let everybody go and end the thread; a second time nothing happens."""
         if not self._thread.is_alive():
+            if self._socket is not None:
+                self._socket.close()
             self._loop.close()
             return
         self._leave(Situation(State.LOBBY, message="the server ends"))
         if self._server is not None:
             self._server.should_exit = True
-        self._call(self._end(), _LONGEST_FAREWELL_S)
+        self._call(self._end())
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
 
     def __enter__(self) -> PageServer:
         """Start it."""
-        self.start()
+        try:
+            self.start()
+        except BaseException:
+            self.stop()
+            raise
         return self
 
     def __exit__(self, *_exception: object) -> None:
@@ -167,10 +174,10 @@ class PageServer:
             await asyncio.gather(self._serving, return_exceptions=True)
 
     def _leave(self, situation: Situation) -> None:
-        self._call(self._site.leave(situation), _LONGEST_FAREWELL_S)
+        self._call(self._site.leave(situation))
 
-    def _call(self, work: Coroutine[Any, Any, Any], timeout_s: float) -> None:
-        asyncio.run_coroutine_threadsafe(work, self._loop).result(timeout_s)
+    def _call(self, work: Coroutine[Any, Any, Any]) -> None:
+        asyncio.run_coroutine_threadsafe(work, self._loop).result(_LONGEST_CALL_S)
 
 
 def _listen(host: str, port: int) -> socket.socket:

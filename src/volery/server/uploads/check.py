@@ -2,8 +2,8 @@
 
     python -m volery.server.uploads.check grid_map FOLDER/map.png yard yard.png
 
-Files of strangers are read here, with bounds on memory and time, and without a simulation beside it that
-could suffer. Prints one JSON object: `{}` or `{"error": "one clear message"}`.
+Files of strangers are read here, with bounds on memory and time, and without a simulation beside it
+that could suffer. Prints one JSON object: `{}` or `{"error": "one clear message"}`.
 """
 
 from __future__ import annotations

@@ -42,17 +42,15 @@ async def upload(request: Request) -> Response:
     folder = site.shelf.folder
     if folder is None:
         raise RefusedError(409, "this server takes no files; start it with `volery serve`")
-    lock: asyncio.Lock = request.app.state.upload_lock
-    if lock.locked():
-        raise RefusedError(503, "another file is being checked; try again in a moment")
-    async with lock:
-        folder.mkdir(parents=True, exist_ok=True)
-        if len(site.shelf.added()) >= MOST_UPLOADS:
-            raise RefusedError(507, f"there are {MOST_UPLOADS} uploads already; remove some")
-        name = name_for(called, site.shelf)
-        with tempfile.TemporaryDirectory(prefix=".upload_", dir=folder) as made:
-            path = Path(made) / f"{kind_name}{suffix}"
-            await save_body(request, path, kind.most_bytes)
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".upload_", dir=folder) as made:
+        path = Path(made) / f"{kind_name}{suffix}"
+        await save_body(request, path, kind.most_bytes)
+        lock: asyncio.Lock = request.app.state.upload_lock
+        async with lock:  # one after the other
+            if len(site.shelf.added()) >= MOST_UPLOADS:
+                raise RefusedError(507, f"there are {MOST_UPLOADS} uploads already; remove some")
+            name = name_for(called, site.shelf)
             await asyncio.to_thread(_check, kind_name, path, name, called)
             await asyncio.to_thread(shutil.copytree, made, folder / name)
     return JSONResponse({"scenario": name}, 201)
