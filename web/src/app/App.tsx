@@ -1,0 +1,20 @@
+import { Scene } from "../scene/Scene.tsx";
+import { DockArea } from "./DockArea.tsx";
+import { Rail } from "./Rail.tsx";
+import { TopBar } from "./TopBar.tsx";
+
+/** The whole page: the scene, and around it what steers and explains it. */
+export function App() {
+  return (
+    <div className="page">
+      <TopBar />
+      <Rail />
+      <DockArea dock="left" />
+      <main className="scene">
+        <Scene />
+      </main>
+      <DockArea dock="right" />
+      <DockArea dock="bottom" />
+    </div>
+  );
+}

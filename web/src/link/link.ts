@@ -1,0 +1,199 @@
+import type { Messages, Services } from "../messages/generated.ts";
+import { Frames } from "./frames.ts";
+import type { FromWorker, LinkState, ToWorker } from "./protocol.ts";
+
+export interface Received<T> {
+  message: T;
+  /** Size on the wire. */
+  bytes: number;
+  arrivedMs: number;
+}
+
+type Listener = (received: Received<never>) => void;
+
+interface Subscription {
+  id: number;
+  key: string;
+  listeners: Set<Listener>;
+  last: Received<never> | null;
+}
+
+export interface SubscribeOptions {
+  /** Least time between two messages, ms. */
+  throttleMs?: number;
+  /** How many wait at the server for a slow page. */
+  depth?: number;
+}
+
+/** What the page has of a rosbridge: topics, services, frames. All in one worker. */
+export class Link {
+  readonly frames = new Frames();
+  state: LinkState = "connecting";
+  reason = "";
+  url = "";
+  /** When anything last arrived, as `nowMs()`. */
+  heardMs = 0;
+  bytesPerS = 0;
+  messagesPerS = 0;
+
+  private readonly worker: Worker;
+  private nextId = 1;
+  private readonly byKey = new Map<string, Subscription>();
+  private readonly byId = new Map<number, Subscription>();
+  private readonly answers = new Map<number, (answer: FromWorker & { kind: "answer" }) => void>();
+  private readonly watchers = new Set<() => void>();
+  private trafficMs = 0;
+
+  constructor(worker?: Worker) {
+    this.worker = worker ?? new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+    this.worker.onmessage = (event: MessageEvent<FromWorker>) => this.take(event.data);
+  }
+
+  connect(url: string): void {
+    this.tell({ kind: "connect", url });
+  }
+
+  /** Follow the transforms of the graph; with `truth` those of the simulation itself. */
+  followFrames(throttleMs: number, truth: boolean): void {
+    this.tell({ kind: "followFrames", throttleMs, truth });
+  }
+
+  /** Be told when `state` changes; returns how to end that. */
+  watch(watcher: () => void): () => void {
+    this.watchers.add(watcher);
+    return () => this.watchers.delete(watcher);
+  }
+
+  /** Receive a topic; equal wishes share one subscription. Returns how to end it. */
+  subscribe<N extends keyof Messages>(
+    topic: string,
+    type: N,
+    listener: (received: Received<Messages[N]>) => void,
+    options?: SubscribeOptions,
+  ): () => void;
+  subscribe(
+    topic: string,
+    type: string,
+    listener: (received: Received<unknown>) => void,
+    options?: SubscribeOptions,
+  ): () => void;
+  subscribe(
+    topic: string,
+    type: string,
+    listener: (received: Received<never>) => void,
+    { throttleMs = 0, depth = 1 }: SubscribeOptions = {},
+  ): () => void {
+    const key = `${topic} ${type} ${throttleMs} ${depth}`;
+    let subscription = this.byKey.get(key);
+    if (subscription === undefined) {
+      subscription = { id: this.nextId++, key, listeners: new Set(), last: null };
+      this.byKey.set(key, subscription);
+      this.byId.set(subscription.id, subscription);
+      this.tell({ kind: "subscribe", id: subscription.id, topic, type, throttleMs, depth });
+    } else if (subscription.last !== null) {
+      listener(subscription.last); // what is latched was sent to the first listener only
+    }
+    const mine = subscription;
+    mine.listeners.add(listener);
+    return () => {
+      mine.listeners.delete(listener);
+      if (mine.listeners.size > 0 || this.byKey.get(key) !== mine) return;
+      this.byKey.delete(key);
+      this.byId.delete(mine.id);
+      this.tell({ kind: "unsubscribe", id: mine.id });
+    };
+  }
+
+  /** Call a service; rejects with the server's reason. */
+  call<N extends keyof Services>(
+    service: string,
+    type: N,
+    request: DeepPartial<Services[N]["request"]>,
+    timeoutS?: number,
+  ): Promise<Services[N]["response"]>;
+  call(service: string, type: string, request: unknown, timeoutS?: number): Promise<unknown>;
+  call(service: string, type: string, request: unknown, timeoutS = 20): Promise<unknown> {
+    const id = this.nextId++;
+    return new Promise((resolve, reject) => {
+      this.answers.set(id, (answer) => {
+        if (answer.ok) resolve(answer.value);
+        else reject(new Error(answer.reason));
+      });
+      this.tell({ kind: "call", id, service, type, request, timeoutS });
+    });
+  }
+
+  publish<N extends keyof Messages>(
+    topic: string,
+    type: N,
+    message: DeepPartial<Messages[N]>,
+  ): void;
+  publish(topic: string, type: string, message: unknown): void;
+  publish(topic: string, type: string, message: unknown): void {
+    this.tell({ kind: "publish", topic, type, message });
+  }
+
+  unadvertise(topic: string): void {
+    this.tell({ kind: "unadvertise", topic });
+  }
+
+  private tell(order: ToWorker): void {
+    this.worker.postMessage(order);
+  }
+
+  private take(told: FromWorker): void {
+    switch (told.kind) {
+      case "message": {
+        this.heardMs = told.arrivedMs;
+        const subscription = this.byId.get(told.id);
+        if (subscription === undefined) return;
+        const received = told as unknown as Received<never>;
+        subscription.last = received;
+        for (const listener of subscription.listeners) listener(received);
+        break;
+      }
+      case "poses":
+        this.heardMs = told.arrivedMs;
+        this.frames.move(told);
+        break;
+      case "frames":
+        this.frames.rename(told);
+        break;
+      case "answer": {
+        const done = this.answers.get(told.id);
+        this.answers.delete(told.id);
+        done?.(told);
+        break;
+      }
+      case "traffic":
+        this.measure(told.bytes, told.messages, told.arrivedMs);
+        break;
+      case "state":
+        this.state = told.state;
+        this.reason = told.reason;
+        this.url = told.url;
+        if (told.state !== "open") for (const s of this.byId.values()) s.last = null;
+        for (const watcher of this.watchers) watcher();
+        break;
+    }
+  }
+
+  private measure(bytes: number, messages: number, arrivedMs: number): void {
+    const seconds = (arrivedMs - this.trafficMs) / 1000;
+    this.trafficMs = arrivedMs;
+    this.bytesPerS = bytes / seconds;
+    this.messagesPerS = messages / seconds;
+  }
+}
+
+/** A message of which the server fills in what is left out. */
+export type DeepPartial<T> = T extends (infer U)[]
+  ? DeepPartial<U>[]
+  : T extends ArrayBufferView
+    ? T
+    : T extends object
+      ? { [K in keyof T]?: DeepPartial<T[K]> }
+      : T;
+
+/** The page's one link. */
+export const link = new Link();

@@ -1,0 +1,24 @@
+import "@mantine/core/styles.css";
+import "@mantine/notifications/styles.css";
+import "./app/page.css";
+import { MantineProvider } from "@mantine/core";
+import { Notifications } from "@mantine/notifications";
+import { createRoot } from "react-dom/client";
+import { App } from "./app/App.tsx";
+import { theme } from "./app/theme.ts";
+import { followAddress } from "./state/addressed.ts";
+import { connectAsAddressed, useConnection } from "./state/connection.ts";
+import { followSimulation } from "./state/simulation.ts";
+import { followVehicles } from "./state/vehicles.ts";
+
+followAddress();
+connectAsAddressed(location);
+followSimulation(useConnection.getState().volery);
+followVehicles();
+
+createRoot(document.getElementById("root")!).render(
+  <MantineProvider theme={theme} defaultColorScheme="auto">
+    <Notifications position="top-center" />
+    <App />
+  </MantineProvider>,
+);

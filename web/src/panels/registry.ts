@@ -1,0 +1,23 @@
+import { Plane, type LucideIcon } from "lucide-react";
+import { lazy, type ComponentType, type LazyExoticComponent } from "react";
+import type { Dock } from "../state/layout.ts";
+
+/** A panel of the page; its script is fetched when it is first opened. */
+export interface PanelEntry {
+  id: string;
+  title: string;
+  icon: LucideIcon;
+  dock: Dock;
+  view: LazyExoticComponent<ComponentType>;
+}
+
+// A new panel: a file in this folder with a component as its default export, and a line here.
+export const PANELS: readonly PanelEntry[] = [
+  {
+    id: "vehicles",
+    title: "Vehicles",
+    icon: Plane,
+    dock: "left",
+    view: lazy(() => import("./Vehicles.tsx")),
+  },
+];

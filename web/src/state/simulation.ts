@@ -1,0 +1,43 @@
+import { create } from "zustand";
+import { link } from "../link/link.ts";
+import type { volery_interfaces_SimulationStatus } from "../messages/generated.ts";
+
+/** What the server says of itself over HTTP (`./api/status`). */
+export interface ServerStatus {
+  state: "flying" | "building" | "lobby" | "failed";
+  scenario: string;
+  description: string;
+  message: string;
+  /** Changes with the geometry; null: there is none. */
+  world: string | null;
+  version: string;
+  role: "pilot" | "viewer";
+  token_needed: boolean;
+}
+
+interface SimulationState {
+  server: ServerStatus | null;
+  status: volery_interfaces_SimulationStatus | null;
+}
+
+export const useSimulation = create<SimulationState>(() => ({ server: null, status: null }));
+
+const ASK_MS = 1000;
+
+/** Keep both stores of this file up to date. */
+export function followSimulation(ownServer: boolean): void {
+  link.subscribe("/volery/status", "volery_interfaces/msg/SimulationStatus", ({ message }) =>
+    useSimulation.setState({ status: message }),
+  );
+  if (!ownServer) return;
+  const ask = async () => {
+    try {
+      const answer = await fetch("./api/status", { cache: "no-store" });
+      if (answer.ok) useSimulation.setState({ server: (await answer.json()) as ServerStatus });
+    } catch {
+      // the link's own state tells that the server is gone
+    }
+    setTimeout(() => void ask(), ASK_MS);
+  };
+  void ask();
+}
