@@ -10,13 +10,15 @@ import { link } from "./link/link.ts";
 import { followAddress } from "./state/addressed.ts";
 import { connectAsAddressed, useConnection } from "./state/connection.ts";
 import { tellFailure } from "./state/notices.ts";
+import { followLeaving, usePilot } from "./state/pilots.ts";
 import { followSilence } from "./state/silence.ts";
 import { followSimulation } from "./state/simulation.ts";
 import { followTopics } from "./state/topics.ts";
 import { followVehicles } from "./state/vehicles.ts";
 
 followAddress();
-connectAsAddressed(location);
+connectAsAddressed(location, usePilot.getState().wished);
+followLeaving();
 followSimulation(useConnection.getState().volery);
 followVehicles();
 followSilence();

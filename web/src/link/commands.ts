@@ -5,5 +5,6 @@ export * from "./commands/entities.ts";
 export * from "./commands/environment.ts";
 export * from "./commands/flight.ts";
 export * from "./commands/graph.ts";
+export * from "./commands/pilots.ts";
 export * from "./commands/scenarios.ts";
 export * from "./commands/simulation.ts";

@@ -1785,6 +1785,17 @@ export interface volery_interfaces_Gust_Response {
   message: string;
 }
 
+export interface volery_interfaces_HandOver_Request {
+  uav: string;
+  pilot: string;
+  to: string;
+}
+
+export interface volery_interfaces_HandOver_Response {
+  success: boolean;
+  message: string;
+}
+
 export interface volery_interfaces_InjectFault_Request {
   fault: string;
 }
@@ -1832,6 +1843,16 @@ export interface volery_interfaces_LoadScenario_Request {
 }
 
 export interface volery_interfaces_LoadScenario_Response {
+  success: boolean;
+  message: string;
+}
+
+export interface volery_interfaces_ReleaseControl_Request {
+  uav: string;
+  pilot: string;
+}
+
+export interface volery_interfaces_ReleaseControl_Response {
   success: boolean;
   message: string;
 }
@@ -1898,6 +1919,16 @@ export interface volery_interfaces_StopRecording_Response {
   message: string;
   path: string;
   messages: number | bigint;
+}
+
+export interface volery_interfaces_TakeControl_Request {
+  uav: string;
+  pilot: string;
+}
+
+export interface volery_interfaces_TakeControl_Response {
+  success: boolean;
+  message: string;
 }
 
 export interface volery_interfaces_TakeOffTo_Request {
@@ -2118,16 +2149,19 @@ export interface Services {
   "volery_interfaces/srv/GetWeather": { request: volery_interfaces_GetWeather_Request; response: volery_interfaces_GetWeather_Response };
   "volery_interfaces/srv/GoTo": { request: volery_interfaces_GoTo_Request; response: volery_interfaces_GoTo_Response };
   "volery_interfaces/srv/Gust": { request: volery_interfaces_Gust_Request; response: volery_interfaces_Gust_Response };
+  "volery_interfaces/srv/HandOver": { request: volery_interfaces_HandOver_Request; response: volery_interfaces_HandOver_Response };
   "volery_interfaces/srv/InjectFault": { request: volery_interfaces_InjectFault_Request; response: volery_interfaces_InjectFault_Response };
   "volery_interfaces/srv/JoinLockStep": { request: volery_interfaces_JoinLockStep_Request; response: volery_interfaces_JoinLockStep_Response };
   "volery_interfaces/srv/JoinSearch": { request: volery_interfaces_JoinSearch_Request; response: volery_interfaces_JoinSearch_Response };
   "volery_interfaces/srv/ListSnapshots": { request: volery_interfaces_ListSnapshots_Request; response: volery_interfaces_ListSnapshots_Response };
   "volery_interfaces/srv/LoadScenario": { request: volery_interfaces_LoadScenario_Request; response: volery_interfaces_LoadScenario_Response };
+  "volery_interfaces/srv/ReleaseControl": { request: volery_interfaces_ReleaseControl_Request; response: volery_interfaces_ReleaseControl_Response };
   "volery_interfaces/srv/SetCommandTimeout": { request: volery_interfaces_SetCommandTimeout_Request; response: volery_interfaces_SetCommandTimeout_Response };
   "volery_interfaces/srv/SetGridMap": { request: volery_interfaces_SetGridMap_Request; response: volery_interfaces_SetGridMap_Response };
   "volery_interfaces/srv/SetSpeed": { request: volery_interfaces_SetSpeed_Request; response: volery_interfaces_SetSpeed_Response };
   "volery_interfaces/srv/SetWeather": { request: volery_interfaces_SetWeather_Request; response: volery_interfaces_SetWeather_Response };
   "volery_interfaces/srv/StartRecording": { request: volery_interfaces_StartRecording_Request; response: volery_interfaces_StartRecording_Response };
   "volery_interfaces/srv/StopRecording": { request: volery_interfaces_StopRecording_Request; response: volery_interfaces_StopRecording_Response };
+  "volery_interfaces/srv/TakeControl": { request: volery_interfaces_TakeControl_Request; response: volery_interfaces_TakeControl_Response };
   "volery_interfaces/srv/TakeOffTo": { request: volery_interfaces_TakeOffTo_Request; response: volery_interfaces_TakeOffTo_Response };
 }
