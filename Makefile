@@ -5,9 +5,12 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 SCENARIO ?= forest_survey
 OUT ?= runs/$(SCENARIO)
+PAGE := src/volery/server/static/index.html
+PAGE_SOURCES := web/index.html web/package.json web/tsconfig.json web/vite.config.ts \
+	$(shell find web/src web/public -type f)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint bench docs-benchmarks clean
+.PHONY: help run serve web page test lint bench docs-benchmarks clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -31,18 +34,41 @@ $(VENV)/.installed-bench: $(VENV)/.installed pyproject.toml
 	$(PIP) install --editable '.[bench]'
 	@touch $@
 
-run: $(VENV)/.installed ## fly the main job and leave a log and a report under runs/
+web/node_modules/.package-lock.json: web/package.json web/package-lock.json
+	@.ci/node_fits
+	@echo "installing what the page is built with into web/node_modules ..."
+	cd web && npm ci --no-progress --loglevel=error
+	@touch $@
+
+$(PAGE): web/node_modules/.package-lock.json $(PAGE_SOURCES)
+	@.ci/node_fits
+	cd web && npm run --silent build -- --logLevel warn
+	@touch $@
+
+web: $(PAGE) ## build the page of the browser into the package (needs Node.js 20.19 and npm)
+
+page: # the page where it can be built; without it everything else works
+	@.ci/node_fits && $(MAKE) --no-print-directory web || echo "going on without the page"
+
+run: $(VENV)/.installed page ## fly the main job, shown on a page, and leave a log and a report under runs/
 	@mkdir -p $(OUT)
-	$(BIN)/volery run $(SCENARIO) --record $(OUT)/flight.mcap --overwrite --report $(OUT)/report
+	$(BIN)/volery run $(SCENARIO) --record $(OUT)/flight.mcap --overwrite --report $(OUT)/report --page
+
+serve: $(VENV)/.installed page ## serve the page until Ctrl-C: http://127.0.0.1:8080/
+	$(BIN)/volery serve
 
 lint: $(VENV)/.installed-tests ## style, types, layers
 	$(BIN)/ruff check src tests examples
 	$(BIN)/ruff format --check src tests examples
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	@if .ci/node_fits; then $(MAKE) --no-print-directory web/node_modules/.package-lock.json \
+		&& cd web && npm run --silent check; fi
 
-test: lint ## install what tests need, check everything, run the tests
+test: lint page ## install what tests need, check everything, run the tests
 	@.ci/install_ros1
+	@.ci/install_browser
+	@if .ci/node_fits; then cd web && npm test --silent; fi
 	$(BIN)/python -m volery.runtime.warm_up
 	$(BIN)/pytest -n 2 --dist loadfile -m 'not slow' tests
 
@@ -55,3 +81,4 @@ bench: $(VENV)/.installed-bench ## measure this machine and its peers, rewrite d
 
 clean: ## remove what was built or flown here
 	rm -rf $(VENV) dist build runs .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf web/node_modules src/volery/server/static

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import tarfile
 import venv
 import zipfile
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+PAGE = "src/volery/server/static/index.html"
 FLY = """
 import volery, pathlib
 assert "site-packages" in volery.__file__, volery.__file__
@@ -16,6 +18,26 @@ with volery.Simulation(volery.load_scenario("longleaf")) as simulation:
     simulation.run(1.0)
     print(len(simulation.forest), simulation.time_s)
 """
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_page_is_in_what_is_published(tmp_path):
+    if not (ROOT / PAGE).is_file():
+        pytest.skip("the page is not built: make web")
+    subprocess.run(
+        [sys.executable, "-m", "build", "--outdir", str(tmp_path), str(ROOT)],
+        check=True,
+        capture_output=True,
+    )  # the wheel from the source distribution, which therefore needs no Node.js
+    (source,), (wheel,) = tmp_path.glob("*.tar.gz"), tmp_path.glob("*.whl")
+    with tarfile.open(source) as archive:
+        sources = archive.getnames()
+    assert any(name.endswith(PAGE) for name in sources)
+    assert not any("node_modules" in name for name in sources)
+    names = zipfile.ZipFile(wheel).namelist()
+    assert PAGE.removeprefix("src/") in names
+    assert any(name.startswith("volery/server/static/assets/index-") for name in names)
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ import typer
 
 from volery.cli.graph_commands import node, service_app, topic_app
 from volery.cli.guard import guarded
+from volery.cli.options import PageCommand
 
 app = typer.Typer(
     name="volery",
@@ -45,7 +46,7 @@ def volery(
     """Fly many UAVs with LIDARs through forests in lock step."""
 
 
-@app.command()
+@app.command(cls=PageCommand)
 @guarded
 def run(
     scenario: Annotated[str, typer.Argument(help="Name from `volery list`, or a TOML file.")],
@@ -85,6 +86,13 @@ def run(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an existing log.")
     ] = False,
+    page: Annotated[
+        str | None,
+        typer.Option(
+            metavar="[=HOST:PORT]",
+            help="Show the flight on a page in the browser; at 127.0.0.1:8080 unless said.",
+        ),
+    ] = None,
 ) -> None:
     """Fly a scenario.
 
@@ -111,10 +119,92 @@ def run(
         report=report,
         digest=digest,
         overwrite=overwrite,
+        page=page,
     )
     code = fly(options)
     if code:
         raise typer.Exit(code)
+
+
+@app.command()
+@guarded
+def serve(
+    scenario: Annotated[
+        str | None,
+        typer.Argument(
+            help="Name from `volery list`, or a TOML file; hover for an hour unless given."
+        ),
+    ] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: a free one.")] = 8080,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    allow_remote: Annotated[
+        bool, typer.Option("--allow-remote", help="Listen beyond this machine.")
+    ] = False,
+    token: Annotated[
+        str | None,
+        typer.Option(
+            envvar="VOLERY_TOKEN", help="What pilots must show; needed with --allow-remote."
+        ),
+    ] = None,
+    viewer_token: Annotated[
+        str | None,
+        typer.Option(envvar="VOLERY_VIEWER_TOKEN", help="What those must show who only look on."),
+    ] = None,
+    origin: Annotated[
+        list[str] | None,
+        typer.Option(help="Let in pages of this origin too, such as that of a reverse proxy."),
+    ] = None,
+    recordings: Annotated[
+        Path, typer.Option(help="Folder for recordings; uploads go to its folder uploads.")
+    ] = Path("runs/recordings"),
+    uavs: Annotated[int | None, typer.Option(help="Number of UAVs of the first scenario.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Simulated seconds of the first scenario.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the first scenario.")] = None,
+    speed: Annotated[str, typer.Option(help="Factor of real time, or max.")] = "1",
+    threads: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Threads; results do not depend on it.")
+    ] = None,
+    door: Annotated[
+        list[str] | None,
+        typer.Option(help="Open a door to other programs: NAME or NAME=[HOST:]PORT, repeatable."),
+    ] = None,
+) -> None:
+    """Serve the page until Ctrl-C: one world after the other, as its visitors choose.
+
+    A scenario that ends stays there, paused at its end.
+    """
+    from volery.cli.run import RunOptions, parse_speed
+    from volery.cli.serve import ServeOptions, serve
+    from volery.server.rights import Tokens
+    from volery.server.settings import PageSettings
+
+    serve(
+        ServeOptions(
+            RunOptions(
+                scenario=scenario or "hover",
+                uavs=uavs,
+                seconds=3600.0 if scenario is None and seconds is None else seconds,
+                seed=seed,
+                speed=parse_speed(speed),
+                doors=tuple(door or ()),
+                recordings=recordings,
+                allow_remote=allow_remote,
+                token=token,
+                threads=threads,
+            ),
+            PageSettings(
+                host=host,
+                port=port,
+                tokens=Tokens(token, viewer_token),
+                anywhere=allow_remote,
+                origins=tuple(origin or ()),
+                recordings=recordings,
+                uploads=recordings / "uploads",
+            ),
+        )
+    )
 
 
 @app.command("list")

@@ -45,6 +45,8 @@ class RunOptions:
     token: str | None = None
     changes: Changes | None = None
     """To the scenario, by the client that loaded it."""
+    page: str | None = None
+    """`HOST:PORT`, `PORT` or, for the usual place, nothing; None: no page."""
 
 
 class _StoppedError(Exception):

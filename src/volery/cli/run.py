@@ -13,6 +13,7 @@ from volery.cli.doors import open_doors
 from volery.cli.flight import Flight, RunOptions
 from volery.cli.guard import INTERRUPTED
 from volery.cli.interrupt import Interrupts
+from volery.cli.pages import Page, page_of
 from volery.cli.progress import FlightProgress
 from volery.cli.targets import check_record, check_report
 from volery.core.errors import CommandError, ScenarioError
@@ -45,15 +46,15 @@ def parse_speed(text: str) -> float | None:
 
 def fly(options: RunOptions) -> int:
     """Fly a scenario as the options say, then those that clients load; return the exit code."""
-    with Interrupts() as interrupts:
+    with page_of(options) as page, Interrupts() as interrupts:
         try:
-            code, change = _build_and_fly(options, interrupts)
+            code, change = _build_and_fly(options, interrupts, page)
             while change.asked and not code:
                 if change.wanted is None:
-                    code, change = _wait_for_world(options, interrupts)
+                    code, change = _wait_for_world(options, interrupts, page)
                 else:
                     options = _loading(options, change.wanted)
-                    code, change = _build_and_fly(options, interrupts)
+                    code, change = _build_and_fly(options, interrupts, page)
         except KeyboardInterrupt:
             if interrupts.gentle:
                 raise
@@ -62,7 +63,7 @@ def fly(options: RunOptions) -> int:
         return code
 
 
-def _build_and_fly(options: RunOptions, interrupts: Interrupts) -> tuple[int, _Change]:
+def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> tuple[int, _Change]:
     """Exit code, and what a client wants instead."""
     from volery import Simulation
 
@@ -73,6 +74,7 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts) -> tuple[int, _C
         check_report(options.report)
     threads = _THREADS if options.threads is None else options.threads
     change = _Change(options)
+    page.building(scenario)
     with FlightProgress(scenario.name, scenario.duration_s) as progress:
         simulation = Simulation(
             scenario, threads=threads, recordings=options.recordings, on_load=change.ask
@@ -80,21 +82,21 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts) -> tuple[int, _C
         change.quit = simulation.quit
         try:
             interrupts.be_gentle()
-            with open_doors(simulation, options):
+            with open_doors(simulation, options), page.showing(simulation):
                 code = Flight(simulation, options, progress, interrupts).fly()
         finally:
             simulation.close()
     return code, change
 
 
-def _wait_for_world(options: RunOptions, interrupts: Interrupts) -> tuple[int, _Change]:
+def _wait_for_world(options: RunOptions, interrupts: Interrupts, page: Page) -> tuple[int, _Change]:
     """Keep the doors open with no world behind them; exit code, and what a client wants then."""
     from volery.runtime.lobby import Lobby
 
     change = _Change(options)
     lobby = Lobby(change.ask)
     typer.echo("no world is loaded; /load_world brings one, Ctrl-C ends", err=True)
-    with open_doors(lobby, options):
+    with open_doors(lobby, options), page.showing(lobby):
         while not (change.asked or lobby.quitting or interrupts.pressed):
             lobby.wait(_GLANCE_S)
         lobby.wait(_FAREWELL_S)

@@ -25,6 +25,8 @@ class GridWorld:
         self._engine = engine
         self.tell: Callable[[GridMap], None] = lambda _grid: None
         """Called with each map that is shown; it must change nothing."""
+        self.on_blocks: Callable[[], object] = lambda: None
+        """Called when other blocks stand there, also after a restore; it must change nothing."""
         entries = () if world is None else world.maps
         self._maps = {entry.called: read_grid_map(scenario, entry) for entry in entries}
         starting = None if world is None or world.starting is None else self._maps[world.starting]
@@ -101,3 +103,4 @@ class GridWorld:
     def _stand(self, grid: GridMap | None, blocks: tuple[Solid, ...]) -> None:
         self._engine.replace_solids((*self._others, *blocks))
         self._current, self._blocks = grid, blocks
+        self.on_blocks()

@@ -11,6 +11,7 @@ from volery.runtime.services.features import offer_features
 from volery.runtime.services.offering import Fields, RefusedError, filled, offer_result
 from volery.runtime.services.playing import WRONG_TRANSITION, State
 from volery.runtime.services.worlds import OnLoad, offer_worlds
+from volery.scenario.shelf import Shelf
 
 _SRV = "simulation_interfaces/srv"
 
@@ -22,13 +23,13 @@ class Lobby:
     `on_load` was called or it is `quitting`.
     """
 
-    def __init__(self, on_load: OnLoad) -> None:
+    def __init__(self, on_load: OnLoad, shelf: Shelf | None = None) -> None:
         self.quitting = False
         self._inbox = Inbox()
         self.graph = Graph(lambda: 0, self._inbox.post)
         self.gateway = Gateway(self.graph, self._inbox.post)
         offer_features(self.graph, loads_worlds=True)
-        offer_worlds(self.graph, None, on_load)
+        offer_worlds(self.graph, None, on_load, shelf)
         get, put = f"{_SRV}/GetSimulationState", f"{_SRV}/SetSimulationState"
         offer_result(self.graph, "/get_simulation_state", get, self._get_state)
         offer_result(self.graph, "/set_simulation_state", put, self._set_state)

@@ -29,11 +29,13 @@ from volery.runtime.assembly import assemble
 from volery.runtime.building import place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.crew import Crew
+from volery.runtime.geometry import Geometry, WorldTopic
 from volery.runtime.graph_building import all_down, plan_faults
 from volery.runtime.grid_world import GridWorld
 from volery.runtime.keeping import Keeper
 from volery.runtime.lock_step import open_lock_step
 from volery.runtime.outlet import Outlet
+from volery.runtime.pilots import Pilots
 from volery.runtime.placement import Start
 from volery.runtime.progress import Progress
 from volery.runtime.relocation import Relocator
@@ -51,7 +53,9 @@ from volery.runtime.weather_messages import WeatherTopics
 from volery.runtime.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario, UavType
+from volery.scenario.shelf import Shelf
 from volery.sensors.mount import Mount
+from volery.world.ground_cover import BARE_GROUND
 from volery.world.things import MovingThings
 from volery.world.weather import Weather
 
@@ -70,8 +74,9 @@ class Simulation:
     `threads` share the ray casting; results do not depend on their number. `recordings` is the
     folder in which clients of the graph may record, None: nowhere. `on_load` is called, in the
     simulation's thread, with the scenario that a client wants instead of this one, or with None
-    where it wants none; without `on_load` both are refused. Use it as a context manager,
-    or call `close` at the end. Raises `ScenarioError` where the scenario cannot be built.
+    where it wants none; without `on_load` both are refused. `shelf` has the scenarios that clients
+    can name, None: those that ship. Use it as a context manager, or call `close` at the end. Raises
+    `ScenarioError` where the scenario cannot be built.
     """
 
     def __init__(
@@ -81,6 +86,7 @@ class Simulation:
         threads: int = 2,
         recordings: Path | None = None,
         on_load: OnLoad | None = None,
+        shelf: Shelf | None = None,
     ) -> None:
         if threads < 1:
             raise ScenarioError(f"threads must be at least 1 (found {threads})")
@@ -90,6 +96,7 @@ class Simulation:
         self.city = build_city(scenario, self.terrain)
         self.forest = build_forest(scenario, self.terrain, self.city)
         self.scene = build_scene(scenario, self.terrain, self.forest, self.city, threads=threads)
+        self._geometry: Geometry | None = None
         self._closed = False
         self._pacer = Pacer()
 
@@ -113,6 +120,8 @@ class Simulation:
         )
         self.grid_world = GridWorld(scenario, self._engine)
         """The grid map whose blocks stand in the world, and how it is changed."""
+        self._world_topic = WorldTopic(self.graph, lambda: self.geometry)
+        self.grid_world.on_blocks = lambda: self.post(self._world_topic.tell)
         self._faults = FaultPlan(self._engine)
         self._crew = Crew(
             scenario,
@@ -125,6 +134,8 @@ class Simulation:
         )
         self.uavs: Mapping[str, Uav] = MappingProxyType(self._crew.uavs)
         """In fleet order."""
+        self.pilots = Pilots(lambda: self.uav_names)
+        """Who steers which UAV."""
         self._partners: list[Partner] = []
         self._replays: list[Replay] = []
         self._keep_time(publisher)
@@ -144,7 +155,7 @@ class Simulation:
         self._relocator = Relocator(self._engine, self.scene, self.terrain, self._crew)
         open_lock_step(self)
         self._services: Services = open_services(
-            self, recordings=recordings, on_load=on_load, every=self._engine.every
+            self, recordings=recordings, on_load=on_load, shelf=shelf, every=self._engine.every
         )
         self._keeper = Keeper(
             self._engine,
@@ -159,6 +170,7 @@ class Simulation:
         )
         self._spawner = Spawner(self._crew, self._keeper, self.scene, self.terrain)
         self._crew.take_off(self.uavs)
+        self._world_topic.tell()
 
     # -------------------------------------------------------------------------------------- time
 
@@ -513,6 +525,15 @@ class Simulation:
     def cloud_mounts(self) -> Mapping[str, Mount]:
         """Topics of PointCloud2s and how their LIDARs are mounted."""
         return lidar_mounts(self._crew.fitted, planar=False)
+
+    @property
+    def geometry(self) -> Geometry:
+        """What stands in the world at present; any thread may ask."""
+        present, solids = self._geometry, self.scene.solids
+        if present is None or present.solids is not solids:
+            cover = BARE_GROUND if self.city is None else self.city.cover
+            present = self._geometry = Geometry(self.terrain, self.forest, solids, cover)
+        return present
 
     @property
     def uav_names(self) -> tuple[str, ...]:

@@ -53,6 +53,19 @@ class Mesh:
         return np.asarray(np.divide(cross, length, out=np.zeros_like(cross), where=length > 0))
 
     @property
+    def vertex_normals(self) -> NDArray[np.float64]:
+        """Unit normals (V, 3): of the triangles around each vertex, weighted by their areas.
+
+        Up where there is no triangle with an area.
+        """
+        cross = np.repeat(_crosses(self), 3, axis=0)
+        rows, count = self.triangles.ravel(), len(self.vertices)
+        sums = np.stack([np.bincount(rows, c, count) for c in cross.T], axis=1)
+        length = np.linalg.norm(sums, axis=1, keepdims=True)
+        up = np.broadcast_to([0.0, 0.0, 1.0], sums.shape)
+        return np.asarray(np.divide(sums, length, out=up.copy(), where=length > 0.0))
+
+    @property
     def area(self) -> float:
         """Sum of the triangles' areas, one side each, m^2."""
         return float(0.5 * np.linalg.norm(_crosses(self), axis=1).sum())

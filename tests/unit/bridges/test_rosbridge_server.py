@@ -19,6 +19,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from volery.bridges.doors import Doors
+from volery.bridges.origins import Origins
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import BridgeError, GraphError
@@ -251,7 +252,7 @@ def test_whose_pages_are_let_in(doors, headers, welcome):
     ],
 )
 def test_pages_from_where_they_connect_to(origin, host, token, welcome):
-    assert RosbridgeServer(token=token)._knows(origin, host) is welcome
+    assert Origins(token_needed=token is not None).let_in(origin, host) is welcome
 
 
 def test_the_token(doors):

@@ -21,3 +21,18 @@ export function clockText(seconds: number): string {
 export function nowMs(): number {
   return performance.timeOrigin + performance.now();
 }
+
+/** A short span: `0.4 s`, `12 s`, `3 min`, `2 h`. */
+export function spanText(seconds: number): string {
+  if (!Number.isFinite(seconds)) return "–";
+  if (seconds < 9.95) return `${seconds.toFixed(1)} s`;
+  if (seconds < 120) return `${seconds.toFixed(0)} s`;
+  if (seconds < 7200) return `${(seconds / 60).toFixed(0)} min`;
+  return `${(seconds / 3600).toFixed(0)} h`;
+}
+
+/** `16.5` as `16:30`. */
+export function hourText(hour: number): string {
+  const minutes = Math.round(hour * 60) % 1440;
+  return `${Math.floor(minutes / 60)}:${String(minutes % 60).padStart(2, "0")}`;
+}

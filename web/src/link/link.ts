@@ -36,6 +36,9 @@ export class Link {
   bytesPerS = 0;
   messagesPerS = 0;
 
+  /** Called with what the server refuses without an answer of its own: messages. */
+  onComplaint: (text: string) => void = () => undefined;
+
   private readonly worker: Worker;
   private nextId = 1;
   private readonly byKey = new Map<string, Subscription>();
@@ -165,6 +168,9 @@ export class Link {
         done?.(told);
         break;
       }
+      case "complaint":
+        this.onComplaint(told.text);
+        break;
       case "traffic":
         this.measure(told.bytes, told.messages, told.arrivedMs);
         break;

@@ -29,6 +29,7 @@ export type FromWorker =
   | { kind: "answer"; id: number; ok: false; reason: string }
   | ({ kind: "frames" } & FrameNames)
   | ({ kind: "poses" } & FramePoses)
+  | { kind: "complaint"; text: string }
   | { kind: "traffic"; bytes: number; messages: number; arrivedMs: number };
 
 /** Frames that move, in the order of the rows of `FramePoses`. */

@@ -74,6 +74,7 @@ async function connect(): Promise<void> {
   const mine = new Ros({
     transportFactory: (address) => {
       transport = new MeteredTransport(new WebSocket(address));
+      transport.on("message", heed);
       return Promise.resolve(transport);
     },
   });
@@ -91,6 +92,12 @@ async function connect(): Promise<void> {
     lose(event as CloseEvent);
   });
   await mine.connect(url).catch(() => undefined);
+}
+
+/** What is refused without an answer of its own, such as a message, comes as a status. */
+function heed(message: object): void {
+  const { op, level, msg } = message as { op?: string; level?: string; msg?: string };
+  if (op === "status" && level === "error") tell({ kind: "complaint", text: msg ?? "" });
 }
 
 function lose(event: CloseEvent): void {

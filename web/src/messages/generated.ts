@@ -1719,6 +1719,18 @@ export interface volery_interfaces_ByName_Response {
   message: string;
 }
 
+export type volery_interfaces_GetChoices_Request = Record<string, never>;
+
+export interface volery_interfaces_GetChoices_Response {
+  scenarios: string[];
+  airframes: string[];
+  sensor_sets: string[];
+  sensor_set_descriptions: string[];
+  changes_schema: string;
+  success: boolean;
+  message: string;
+}
+
 export type volery_interfaces_GetGridMap_Request = Record<string, never>;
 
 export interface volery_interfaces_GetGridMap_Response {
@@ -1773,6 +1785,17 @@ export interface volery_interfaces_Gust_Response {
   message: string;
 }
 
+export interface volery_interfaces_HandOver_Request {
+  uav: string;
+  pilot: string;
+  to: string;
+}
+
+export interface volery_interfaces_HandOver_Response {
+  success: boolean;
+  message: string;
+}
+
 export interface volery_interfaces_InjectFault_Request {
   fault: string;
 }
@@ -1812,6 +1835,26 @@ export interface volery_interfaces_ListSnapshots_Response {
   message: string;
   names: string[];
   stamps: builtin_interfaces_Time[];
+}
+
+export interface volery_interfaces_LoadScenario_Request {
+  scenario: string;
+  changes: string;
+}
+
+export interface volery_interfaces_LoadScenario_Response {
+  success: boolean;
+  message: string;
+}
+
+export interface volery_interfaces_ReleaseControl_Request {
+  uav: string;
+  pilot: string;
+}
+
+export interface volery_interfaces_ReleaseControl_Response {
+  success: boolean;
+  message: string;
 }
 
 export interface volery_interfaces_SetCommandTimeout_Request {
@@ -1876,6 +1919,16 @@ export interface volery_interfaces_StopRecording_Response {
   message: string;
   path: string;
   messages: number | bigint;
+}
+
+export interface volery_interfaces_TakeControl_Request {
+  uav: string;
+  pilot: string;
+}
+
+export interface volery_interfaces_TakeControl_Response {
+  success: boolean;
+  message: string;
 }
 
 export interface volery_interfaces_TakeOffTo_Request {
@@ -2034,289 +2087,81 @@ export interface Messages {
 }
 
 export interface Services {
-  "octomap_msgs/srv/BoundingBoxQuery": {
-    request: octomap_msgs_BoundingBoxQuery_Request;
-    response: octomap_msgs_BoundingBoxQuery_Response;
-  };
-  "octomap_msgs/srv/GetOctomap": {
-    request: octomap_msgs_GetOctomap_Request;
-    response: octomap_msgs_GetOctomap_Response;
-  };
-  "rosapi_msgs/srv/ActionType": {
-    request: rosapi_msgs_ActionType_Request;
-    response: rosapi_msgs_ActionType_Response;
-  };
-  "rosapi_msgs/srv/DeleteParam": {
-    request: rosapi_msgs_DeleteParam_Request;
-    response: rosapi_msgs_DeleteParam_Response;
-  };
-  "rosapi_msgs/srv/GetActionServers": {
-    request: rosapi_msgs_GetActionServers_Request;
-    response: rosapi_msgs_GetActionServers_Response;
-  };
-  "rosapi_msgs/srv/GetParamNames": {
-    request: rosapi_msgs_GetParamNames_Request;
-    response: rosapi_msgs_GetParamNames_Response;
-  };
-  "rosapi_msgs/srv/GetParam": {
-    request: rosapi_msgs_GetParam_Request;
-    response: rosapi_msgs_GetParam_Response;
-  };
-  "rosapi_msgs/srv/GetROSVersion": {
-    request: rosapi_msgs_GetROSVersion_Request;
-    response: rosapi_msgs_GetROSVersion_Response;
-  };
-  "rosapi_msgs/srv/GetTime": {
-    request: rosapi_msgs_GetTime_Request;
-    response: rosapi_msgs_GetTime_Response;
-  };
-  "rosapi_msgs/srv/HasParam": {
-    request: rosapi_msgs_HasParam_Request;
-    response: rosapi_msgs_HasParam_Response;
-  };
-  "rosapi_msgs/srv/Interfaces": {
-    request: rosapi_msgs_Interfaces_Request;
-    response: rosapi_msgs_Interfaces_Response;
-  };
-  "rosapi_msgs/srv/MessageDetails": {
-    request: rosapi_msgs_MessageDetails_Request;
-    response: rosapi_msgs_MessageDetails_Response;
-  };
-  "rosapi_msgs/srv/NodeDetails": {
-    request: rosapi_msgs_NodeDetails_Request;
-    response: rosapi_msgs_NodeDetails_Response;
-  };
-  "rosapi_msgs/srv/Nodes": {
-    request: rosapi_msgs_Nodes_Request;
-    response: rosapi_msgs_Nodes_Response;
-  };
-  "rosapi_msgs/srv/Publishers": {
-    request: rosapi_msgs_Publishers_Request;
-    response: rosapi_msgs_Publishers_Response;
-  };
-  "rosapi_msgs/srv/SearchParam": {
-    request: rosapi_msgs_SearchParam_Request;
-    response: rosapi_msgs_SearchParam_Response;
-  };
-  "rosapi_msgs/srv/ServiceHost": {
-    request: rosapi_msgs_ServiceHost_Request;
-    response: rosapi_msgs_ServiceHost_Response;
-  };
-  "rosapi_msgs/srv/ServiceNode": {
-    request: rosapi_msgs_ServiceNode_Request;
-    response: rosapi_msgs_ServiceNode_Response;
-  };
-  "rosapi_msgs/srv/ServiceProviders": {
-    request: rosapi_msgs_ServiceProviders_Request;
-    response: rosapi_msgs_ServiceProviders_Response;
-  };
-  "rosapi_msgs/srv/ServiceRequestDetails": {
-    request: rosapi_msgs_ServiceRequestDetails_Request;
-    response: rosapi_msgs_ServiceRequestDetails_Response;
-  };
-  "rosapi_msgs/srv/ServiceResponseDetails": {
-    request: rosapi_msgs_ServiceResponseDetails_Request;
-    response: rosapi_msgs_ServiceResponseDetails_Response;
-  };
-  "rosapi_msgs/srv/ServiceType": {
-    request: rosapi_msgs_ServiceType_Request;
-    response: rosapi_msgs_ServiceType_Response;
-  };
-  "rosapi_msgs/srv/ServicesForType": {
-    request: rosapi_msgs_ServicesForType_Request;
-    response: rosapi_msgs_ServicesForType_Response;
-  };
-  "rosapi_msgs/srv/Services": {
-    request: rosapi_msgs_Services_Request;
-    response: rosapi_msgs_Services_Response;
-  };
-  "rosapi_msgs/srv/SetParam": {
-    request: rosapi_msgs_SetParam_Request;
-    response: rosapi_msgs_SetParam_Response;
-  };
-  "rosapi_msgs/srv/Subscribers": {
-    request: rosapi_msgs_Subscribers_Request;
-    response: rosapi_msgs_Subscribers_Response;
-  };
-  "rosapi_msgs/srv/TopicType": {
-    request: rosapi_msgs_TopicType_Request;
-    response: rosapi_msgs_TopicType_Response;
-  };
-  "rosapi_msgs/srv/TopicsAndRawTypes": {
-    request: rosapi_msgs_TopicsAndRawTypes_Request;
-    response: rosapi_msgs_TopicsAndRawTypes_Response;
-  };
-  "rosapi_msgs/srv/TopicsForType": {
-    request: rosapi_msgs_TopicsForType_Request;
-    response: rosapi_msgs_TopicsForType_Response;
-  };
-  "rosapi_msgs/srv/Topics": {
-    request: rosapi_msgs_Topics_Request;
-    response: rosapi_msgs_Topics_Response;
-  };
-  "simulation_interfaces/srv/DeleteEntity": {
-    request: simulation_interfaces_DeleteEntity_Request;
-    response: simulation_interfaces_DeleteEntity_Response;
-  };
-  "simulation_interfaces/srv/GetAvailableWorlds": {
-    request: simulation_interfaces_GetAvailableWorlds_Request;
-    response: simulation_interfaces_GetAvailableWorlds_Response;
-  };
-  "simulation_interfaces/srv/GetCurrentWorld": {
-    request: simulation_interfaces_GetCurrentWorld_Request;
-    response: simulation_interfaces_GetCurrentWorld_Response;
-  };
-  "simulation_interfaces/srv/GetEntitiesStates": {
-    request: simulation_interfaces_GetEntitiesStates_Request;
-    response: simulation_interfaces_GetEntitiesStates_Response;
-  };
-  "simulation_interfaces/srv/GetEntities": {
-    request: simulation_interfaces_GetEntities_Request;
-    response: simulation_interfaces_GetEntities_Response;
-  };
-  "simulation_interfaces/srv/GetEntityBounds": {
-    request: simulation_interfaces_GetEntityBounds_Request;
-    response: simulation_interfaces_GetEntityBounds_Response;
-  };
-  "simulation_interfaces/srv/GetEntityInfo": {
-    request: simulation_interfaces_GetEntityInfo_Request;
-    response: simulation_interfaces_GetEntityInfo_Response;
-  };
-  "simulation_interfaces/srv/GetEntityState": {
-    request: simulation_interfaces_GetEntityState_Request;
-    response: simulation_interfaces_GetEntityState_Response;
-  };
-  "simulation_interfaces/srv/GetNamedPoseBounds": {
-    request: simulation_interfaces_GetNamedPoseBounds_Request;
-    response: simulation_interfaces_GetNamedPoseBounds_Response;
-  };
-  "simulation_interfaces/srv/GetNamedPoses": {
-    request: simulation_interfaces_GetNamedPoses_Request;
-    response: simulation_interfaces_GetNamedPoses_Response;
-  };
-  "simulation_interfaces/srv/GetSimulationState": {
-    request: simulation_interfaces_GetSimulationState_Request;
-    response: simulation_interfaces_GetSimulationState_Response;
-  };
-  "simulation_interfaces/srv/GetSimulatorFeatures": {
-    request: simulation_interfaces_GetSimulatorFeatures_Request;
-    response: simulation_interfaces_GetSimulatorFeatures_Response;
-  };
-  "simulation_interfaces/srv/GetSpawnables": {
-    request: simulation_interfaces_GetSpawnables_Request;
-    response: simulation_interfaces_GetSpawnables_Response;
-  };
-  "simulation_interfaces/srv/LoadWorld": {
-    request: simulation_interfaces_LoadWorld_Request;
-    response: simulation_interfaces_LoadWorld_Response;
-  };
-  "simulation_interfaces/srv/ResetSimulation": {
-    request: simulation_interfaces_ResetSimulation_Request;
-    response: simulation_interfaces_ResetSimulation_Response;
-  };
-  "simulation_interfaces/srv/SetEntityInfo": {
-    request: simulation_interfaces_SetEntityInfo_Request;
-    response: simulation_interfaces_SetEntityInfo_Response;
-  };
-  "simulation_interfaces/srv/SetEntityState": {
-    request: simulation_interfaces_SetEntityState_Request;
-    response: simulation_interfaces_SetEntityState_Response;
-  };
-  "simulation_interfaces/srv/SetSimulationState": {
-    request: simulation_interfaces_SetSimulationState_Request;
-    response: simulation_interfaces_SetSimulationState_Response;
-  };
-  "simulation_interfaces/srv/SpawnEntities": {
-    request: simulation_interfaces_SpawnEntities_Request;
-    response: simulation_interfaces_SpawnEntities_Response;
-  };
-  "simulation_interfaces/srv/SpawnEntity": {
-    request: simulation_interfaces_SpawnEntity_Request;
-    response: simulation_interfaces_SpawnEntity_Response;
-  };
-  "simulation_interfaces/srv/StepSimulation": {
-    request: simulation_interfaces_StepSimulation_Request;
-    response: simulation_interfaces_StepSimulation_Response;
-  };
-  "simulation_interfaces/srv/UnloadWorld": {
-    request: simulation_interfaces_UnloadWorld_Request;
-    response: simulation_interfaces_UnloadWorld_Response;
-  };
+  "octomap_msgs/srv/BoundingBoxQuery": { request: octomap_msgs_BoundingBoxQuery_Request; response: octomap_msgs_BoundingBoxQuery_Response };
+  "octomap_msgs/srv/GetOctomap": { request: octomap_msgs_GetOctomap_Request; response: octomap_msgs_GetOctomap_Response };
+  "rosapi_msgs/srv/ActionType": { request: rosapi_msgs_ActionType_Request; response: rosapi_msgs_ActionType_Response };
+  "rosapi_msgs/srv/DeleteParam": { request: rosapi_msgs_DeleteParam_Request; response: rosapi_msgs_DeleteParam_Response };
+  "rosapi_msgs/srv/GetActionServers": { request: rosapi_msgs_GetActionServers_Request; response: rosapi_msgs_GetActionServers_Response };
+  "rosapi_msgs/srv/GetParamNames": { request: rosapi_msgs_GetParamNames_Request; response: rosapi_msgs_GetParamNames_Response };
+  "rosapi_msgs/srv/GetParam": { request: rosapi_msgs_GetParam_Request; response: rosapi_msgs_GetParam_Response };
+  "rosapi_msgs/srv/GetROSVersion": { request: rosapi_msgs_GetROSVersion_Request; response: rosapi_msgs_GetROSVersion_Response };
+  "rosapi_msgs/srv/GetTime": { request: rosapi_msgs_GetTime_Request; response: rosapi_msgs_GetTime_Response };
+  "rosapi_msgs/srv/HasParam": { request: rosapi_msgs_HasParam_Request; response: rosapi_msgs_HasParam_Response };
+  "rosapi_msgs/srv/Interfaces": { request: rosapi_msgs_Interfaces_Request; response: rosapi_msgs_Interfaces_Response };
+  "rosapi_msgs/srv/MessageDetails": { request: rosapi_msgs_MessageDetails_Request; response: rosapi_msgs_MessageDetails_Response };
+  "rosapi_msgs/srv/NodeDetails": { request: rosapi_msgs_NodeDetails_Request; response: rosapi_msgs_NodeDetails_Response };
+  "rosapi_msgs/srv/Nodes": { request: rosapi_msgs_Nodes_Request; response: rosapi_msgs_Nodes_Response };
+  "rosapi_msgs/srv/Publishers": { request: rosapi_msgs_Publishers_Request; response: rosapi_msgs_Publishers_Response };
+  "rosapi_msgs/srv/SearchParam": { request: rosapi_msgs_SearchParam_Request; response: rosapi_msgs_SearchParam_Response };
+  "rosapi_msgs/srv/ServiceHost": { request: rosapi_msgs_ServiceHost_Request; response: rosapi_msgs_ServiceHost_Response };
+  "rosapi_msgs/srv/ServiceNode": { request: rosapi_msgs_ServiceNode_Request; response: rosapi_msgs_ServiceNode_Response };
+  "rosapi_msgs/srv/ServiceProviders": { request: rosapi_msgs_ServiceProviders_Request; response: rosapi_msgs_ServiceProviders_Response };
+  "rosapi_msgs/srv/ServiceRequestDetails": { request: rosapi_msgs_ServiceRequestDetails_Request; response: rosapi_msgs_ServiceRequestDetails_Response };
+  "rosapi_msgs/srv/ServiceResponseDetails": { request: rosapi_msgs_ServiceResponseDetails_Request; response: rosapi_msgs_ServiceResponseDetails_Response };
+  "rosapi_msgs/srv/ServiceType": { request: rosapi_msgs_ServiceType_Request; response: rosapi_msgs_ServiceType_Response };
+  "rosapi_msgs/srv/ServicesForType": { request: rosapi_msgs_ServicesForType_Request; response: rosapi_msgs_ServicesForType_Response };
+  "rosapi_msgs/srv/Services": { request: rosapi_msgs_Services_Request; response: rosapi_msgs_Services_Response };
+  "rosapi_msgs/srv/SetParam": { request: rosapi_msgs_SetParam_Request; response: rosapi_msgs_SetParam_Response };
+  "rosapi_msgs/srv/Subscribers": { request: rosapi_msgs_Subscribers_Request; response: rosapi_msgs_Subscribers_Response };
+  "rosapi_msgs/srv/TopicType": { request: rosapi_msgs_TopicType_Request; response: rosapi_msgs_TopicType_Response };
+  "rosapi_msgs/srv/TopicsAndRawTypes": { request: rosapi_msgs_TopicsAndRawTypes_Request; response: rosapi_msgs_TopicsAndRawTypes_Response };
+  "rosapi_msgs/srv/TopicsForType": { request: rosapi_msgs_TopicsForType_Request; response: rosapi_msgs_TopicsForType_Response };
+  "rosapi_msgs/srv/Topics": { request: rosapi_msgs_Topics_Request; response: rosapi_msgs_Topics_Response };
+  "simulation_interfaces/srv/DeleteEntity": { request: simulation_interfaces_DeleteEntity_Request; response: simulation_interfaces_DeleteEntity_Response };
+  "simulation_interfaces/srv/GetAvailableWorlds": { request: simulation_interfaces_GetAvailableWorlds_Request; response: simulation_interfaces_GetAvailableWorlds_Response };
+  "simulation_interfaces/srv/GetCurrentWorld": { request: simulation_interfaces_GetCurrentWorld_Request; response: simulation_interfaces_GetCurrentWorld_Response };
+  "simulation_interfaces/srv/GetEntitiesStates": { request: simulation_interfaces_GetEntitiesStates_Request; response: simulation_interfaces_GetEntitiesStates_Response };
+  "simulation_interfaces/srv/GetEntities": { request: simulation_interfaces_GetEntities_Request; response: simulation_interfaces_GetEntities_Response };
+  "simulation_interfaces/srv/GetEntityBounds": { request: simulation_interfaces_GetEntityBounds_Request; response: simulation_interfaces_GetEntityBounds_Response };
+  "simulation_interfaces/srv/GetEntityInfo": { request: simulation_interfaces_GetEntityInfo_Request; response: simulation_interfaces_GetEntityInfo_Response };
+  "simulation_interfaces/srv/GetEntityState": { request: simulation_interfaces_GetEntityState_Request; response: simulation_interfaces_GetEntityState_Response };
+  "simulation_interfaces/srv/GetNamedPoseBounds": { request: simulation_interfaces_GetNamedPoseBounds_Request; response: simulation_interfaces_GetNamedPoseBounds_Response };
+  "simulation_interfaces/srv/GetNamedPoses": { request: simulation_interfaces_GetNamedPoses_Request; response: simulation_interfaces_GetNamedPoses_Response };
+  "simulation_interfaces/srv/GetSimulationState": { request: simulation_interfaces_GetSimulationState_Request; response: simulation_interfaces_GetSimulationState_Response };
+  "simulation_interfaces/srv/GetSimulatorFeatures": { request: simulation_interfaces_GetSimulatorFeatures_Request; response: simulation_interfaces_GetSimulatorFeatures_Response };
+  "simulation_interfaces/srv/GetSpawnables": { request: simulation_interfaces_GetSpawnables_Request; response: simulation_interfaces_GetSpawnables_Response };
+  "simulation_interfaces/srv/LoadWorld": { request: simulation_interfaces_LoadWorld_Request; response: simulation_interfaces_LoadWorld_Response };
+  "simulation_interfaces/srv/ResetSimulation": { request: simulation_interfaces_ResetSimulation_Request; response: simulation_interfaces_ResetSimulation_Response };
+  "simulation_interfaces/srv/SetEntityInfo": { request: simulation_interfaces_SetEntityInfo_Request; response: simulation_interfaces_SetEntityInfo_Response };
+  "simulation_interfaces/srv/SetEntityState": { request: simulation_interfaces_SetEntityState_Request; response: simulation_interfaces_SetEntityState_Response };
+  "simulation_interfaces/srv/SetSimulationState": { request: simulation_interfaces_SetSimulationState_Request; response: simulation_interfaces_SetSimulationState_Response };
+  "simulation_interfaces/srv/SpawnEntities": { request: simulation_interfaces_SpawnEntities_Request; response: simulation_interfaces_SpawnEntities_Response };
+  "simulation_interfaces/srv/SpawnEntity": { request: simulation_interfaces_SpawnEntity_Request; response: simulation_interfaces_SpawnEntity_Response };
+  "simulation_interfaces/srv/StepSimulation": { request: simulation_interfaces_StepSimulation_Request; response: simulation_interfaces_StepSimulation_Response };
+  "simulation_interfaces/srv/UnloadWorld": { request: simulation_interfaces_UnloadWorld_Request; response: simulation_interfaces_UnloadWorld_Response };
   "std_srvs/srv/Empty": { request: std_srvs_Empty_Request; response: std_srvs_Empty_Response };
-  "std_srvs/srv/SetBool": {
-    request: std_srvs_SetBool_Request;
-    response: std_srvs_SetBool_Response;
-  };
-  "std_srvs/srv/Trigger": {
-    request: std_srvs_Trigger_Request;
-    response: std_srvs_Trigger_Response;
-  };
-  "tf2_msgs/srv/FrameGraph": {
-    request: tf2_msgs_FrameGraph_Request;
-    response: tf2_msgs_FrameGraph_Response;
-  };
-  "volery_interfaces/srv/ByName": {
-    request: volery_interfaces_ByName_Request;
-    response: volery_interfaces_ByName_Response;
-  };
-  "volery_interfaces/srv/GetGridMap": {
-    request: volery_interfaces_GetGridMap_Request;
-    response: volery_interfaces_GetGridMap_Response;
-  };
-  "volery_interfaces/srv/GetWeather": {
-    request: volery_interfaces_GetWeather_Request;
-    response: volery_interfaces_GetWeather_Response;
-  };
-  "volery_interfaces/srv/GoTo": {
-    request: volery_interfaces_GoTo_Request;
-    response: volery_interfaces_GoTo_Response;
-  };
-  "volery_interfaces/srv/Gust": {
-    request: volery_interfaces_Gust_Request;
-    response: volery_interfaces_Gust_Response;
-  };
-  "volery_interfaces/srv/InjectFault": {
-    request: volery_interfaces_InjectFault_Request;
-    response: volery_interfaces_InjectFault_Response;
-  };
-  "volery_interfaces/srv/JoinLockStep": {
-    request: volery_interfaces_JoinLockStep_Request;
-    response: volery_interfaces_JoinLockStep_Response;
-  };
-  "volery_interfaces/srv/JoinSearch": {
-    request: volery_interfaces_JoinSearch_Request;
-    response: volery_interfaces_JoinSearch_Response;
-  };
-  "volery_interfaces/srv/ListSnapshots": {
-    request: volery_interfaces_ListSnapshots_Request;
-    response: volery_interfaces_ListSnapshots_Response;
-  };
-  "volery_interfaces/srv/SetCommandTimeout": {
-    request: volery_interfaces_SetCommandTimeout_Request;
-    response: volery_interfaces_SetCommandTimeout_Response;
-  };
-  "volery_interfaces/srv/SetGridMap": {
-    request: volery_interfaces_SetGridMap_Request;
-    response: volery_interfaces_SetGridMap_Response;
-  };
-  "volery_interfaces/srv/SetSpeed": {
-    request: volery_interfaces_SetSpeed_Request;
-    response: volery_interfaces_SetSpeed_Response;
-  };
-  "volery_interfaces/srv/SetWeather": {
-    request: volery_interfaces_SetWeather_Request;
-    response: volery_interfaces_SetWeather_Response;
-  };
-  "volery_interfaces/srv/StartRecording": {
-    request: volery_interfaces_StartRecording_Request;
-    response: volery_interfaces_StartRecording_Response;
-  };
-  "volery_interfaces/srv/StopRecording": {
-    request: volery_interfaces_StopRecording_Request;
-    response: volery_interfaces_StopRecording_Response;
-  };
-  "volery_interfaces/srv/TakeOffTo": {
-    request: volery_interfaces_TakeOffTo_Request;
-    response: volery_interfaces_TakeOffTo_Response;
-  };
+  "std_srvs/srv/SetBool": { request: std_srvs_SetBool_Request; response: std_srvs_SetBool_Response };
+  "std_srvs/srv/Trigger": { request: std_srvs_Trigger_Request; response: std_srvs_Trigger_Response };
+  "tf2_msgs/srv/FrameGraph": { request: tf2_msgs_FrameGraph_Request; response: tf2_msgs_FrameGraph_Response };
+  "volery_interfaces/srv/ByName": { request: volery_interfaces_ByName_Request; response: volery_interfaces_ByName_Response };
+  "volery_interfaces/srv/GetChoices": { request: volery_interfaces_GetChoices_Request; response: volery_interfaces_GetChoices_Response };
+  "volery_interfaces/srv/GetGridMap": { request: volery_interfaces_GetGridMap_Request; response: volery_interfaces_GetGridMap_Response };
+  "volery_interfaces/srv/GetWeather": { request: volery_interfaces_GetWeather_Request; response: volery_interfaces_GetWeather_Response };
+  "volery_interfaces/srv/GoTo": { request: volery_interfaces_GoTo_Request; response: volery_interfaces_GoTo_Response };
+  "volery_interfaces/srv/Gust": { request: volery_interfaces_Gust_Request; response: volery_interfaces_Gust_Response };
+  "volery_interfaces/srv/HandOver": { request: volery_interfaces_HandOver_Request; response: volery_interfaces_HandOver_Response };
+  "volery_interfaces/srv/InjectFault": { request: volery_interfaces_InjectFault_Request; response: volery_interfaces_InjectFault_Response };
+  "volery_interfaces/srv/JoinLockStep": { request: volery_interfaces_JoinLockStep_Request; response: volery_interfaces_JoinLockStep_Response };
+  "volery_interfaces/srv/JoinSearch": { request: volery_interfaces_JoinSearch_Request; response: volery_interfaces_JoinSearch_Response };
+  "volery_interfaces/srv/ListSnapshots": { request: volery_interfaces_ListSnapshots_Request; response: volery_interfaces_ListSnapshots_Response };
+  "volery_interfaces/srv/LoadScenario": { request: volery_interfaces_LoadScenario_Request; response: volery_interfaces_LoadScenario_Response };
+  "volery_interfaces/srv/ReleaseControl": { request: volery_interfaces_ReleaseControl_Request; response: volery_interfaces_ReleaseControl_Response };
+  "volery_interfaces/srv/SetCommandTimeout": { request: volery_interfaces_SetCommandTimeout_Request; response: volery_interfaces_SetCommandTimeout_Response };
+  "volery_interfaces/srv/SetGridMap": { request: volery_interfaces_SetGridMap_Request; response: volery_interfaces_SetGridMap_Response };
+  "volery_interfaces/srv/SetSpeed": { request: volery_interfaces_SetSpeed_Request; response: volery_interfaces_SetSpeed_Response };
+  "volery_interfaces/srv/SetWeather": { request: volery_interfaces_SetWeather_Request; response: volery_interfaces_SetWeather_Response };
+  "volery_interfaces/srv/StartRecording": { request: volery_interfaces_StartRecording_Request; response: volery_interfaces_StartRecording_Response };
+  "volery_interfaces/srv/StopRecording": { request: volery_interfaces_StopRecording_Request; response: volery_interfaces_StopRecording_Response };
+  "volery_interfaces/srv/TakeControl": { request: volery_interfaces_TakeControl_Request; response: volery_interfaces_TakeControl_Response };
+  "volery_interfaces/srv/TakeOffTo": { request: volery_interfaces_TakeOffTo_Request; response: volery_interfaces_TakeOffTo_Response };
 }

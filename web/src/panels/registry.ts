@@ -1,4 +1,4 @@
-import { Plane, type LucideIcon } from "lucide-react";
+import { CloudSun, Plane, SlidersHorizontal, type LucideIcon } from "lucide-react";
 import { lazy, type ComponentType, type LazyExoticComponent } from "react";
 import type { Dock } from "../state/layout.ts";
 
@@ -18,6 +18,20 @@ export const PANELS: readonly PanelEntry[] = [
     title: "Vehicles",
     icon: Plane,
     dock: "left",
-    view: lazy(() => import("./Vehicles.tsx")),
+    view: lazy(() => import("./vehicles/Vehicles.tsx")),
+  },
+  {
+    id: "inspector",
+    title: "Inspector",
+    icon: SlidersHorizontal,
+    dock: "right",
+    view: lazy(() => import("./inspector/Inspector.tsx")),
+  },
+  {
+    id: "environment",
+    title: "Environment",
+    icon: CloudSun,
+    dock: "right",
+    view: lazy(() => import("./environment/Environment.tsx")),
   },
 ];

@@ -25,6 +25,7 @@ from volery.bridges.rosbridge.cbor_form import encode_cbor
 from volery.bridges.rosbridge.fields import read_choice, read_id, with_id
 from volery.bridges.rosbridge.forms import Forms
 from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, Assembly, split
+from volery.bridges.rosbridge.gate import Gate, refusal
 from volery.bridges.rosbridge.services import Post, Services
 from volery.bridges.rosbridge.topics import Topics
 from volery.bridges.rosbridge.wire import (
@@ -77,6 +78,8 @@ class RosbridgePeer:
         Has a function called in the thread of this peer.
     authorized
         Whether it has shown the token already.
+    gate
+        What it may do; None: everything.
 
     """
 
@@ -88,12 +91,14 @@ class RosbridgePeer:
         wake: Callable[[], None],
         post: Post,
         authorized: bool = False,
+        gate: Gate | None = None,
     ) -> None:
         self.authorized = authorized or shared.token is None
         self.refused: str | None = None
         """Why the connection must end, once it must."""
         self._session = session
         self._shared = shared
+        self._gate = gate
         self._wake = wake
         self._level = LEVELS[0]
         self._outbox: deque[tuple[int, Iterator[Frame]]] = deque()
@@ -165,9 +170,24 @@ class RosbridgePeer:
             if handler is None:
                 known = ", ".join(sorted((*self._handlers, "fragment", "png")))
                 raise BridgeError(f"unknown operation '{op[:40]}'; there are {known}")
+            if not self._passes(operation):
+                return
             handler(operation)
             if self._level == "info":
                 self._status("info", f"{op}: done", operation)
+
+    def _passes(self, operation: Operation) -> bool:
+        """Whether the client may do that; who asked for something is answered that it may not."""
+        if self._gate is None:
+            return True
+        try:
+            return self._gate.check(operation)
+        except BridgeError as error:
+            answer = refusal(operation, str(error))
+            if answer is None:
+                raise
+            self.send(answer, None, "none")
+            return False
 
     def _handle_inner(self, operation: Operation, now_s: float, depth: int) -> None:
         """An unwrapped operation; its errors carry its own id."""

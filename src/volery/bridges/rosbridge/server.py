@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import ipaddress
-import itertools
 import logging
-import time
 from collections.abc import Sequence
-from contextlib import suppress
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -18,7 +14,9 @@ from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from volery.bridges.doors import check_address, wake_of
+from volery.bridges.doors import check_address
+from volery.bridges.origins import LOOPBACK, Origins
+from volery.bridges.rosbridge.conversation import Bell, converse, post_to
 from volery.bridges.rosbridge.forms import Forms, Generation
 from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared, shows_token
 from volery.bridges.rosbridge.rosapi import RosApi
@@ -30,14 +28,8 @@ from volery.graph.session import Gateway
 
 _log = logging.getLogger(__name__)
 
-LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 DEFAULT_PORT = 9090
 MOST_CLIENTS = 1000
-
-_LONGEST_SILENCE_S = 10.0
-"""Time a client has to show its token."""
-_FRAMES_A_TURN = 32
-"""Frames sent before other clients get their turn, though the network takes more."""
 
 
 class RosbridgeServer:
@@ -97,7 +89,7 @@ class RosbridgeServer:
         self._anywhere = anywhere
         self._most_bytes = max_message_bytes
         self._generation: Generation = generation
-        self._origins = frozenset(origins)
+        self._origins = Origins(origins, token_needed=bool(token))
         self._keepalive_s = keepalive_s
         self._parameters = parameters
         self._server: Server | None = None
@@ -174,7 +166,7 @@ class RosbridgeServer:
         if self._path is not None and url.path.rstrip("/") != self._path.rstrip("/"):
             return connection.respond(HTTPStatus.NOT_FOUND, f"rosbridge is at {self._path}\n")
         origin = request.headers.get("Origin")
-        if origin is not None and not self._knows(origin, request.headers.get("Host", "")):
+        if not self._origins.let_in(origin, request.headers.get("Host", "")):
             return connection.respond(
                 HTTPStatus.FORBIDDEN, f"pages of {origin} are not let in; list it in `origins`\n"
             )
@@ -190,20 +182,6 @@ class RosbridgeServer:
             self._shown.add(connection)
         return None
 
-    def _knows(self, origin: str, host: str) -> bool:
-        """Whether pages of an origin are let in."""
-        if origin in self._origins:
-            return True
-        page = urlsplit(origin).hostname
-        if page is None:  # "null": a file, or a page that hides where it is from
-            return False
-        if page in LOOPBACK:
-            return True
-        # A name may be made to point here by whoever owns it, so only an address proves the page
-        # to be from where it connects to; where a token is asked for, a name will do.
-        same = page == urlsplit(f"//{host}").hostname
-        return same and (_is_address(page) or self._token is not None)
-
     # -------------------------------------------------------------------------------- one client
 
     async def _serve(self, connection: ServerConnection) -> None:
@@ -212,101 +190,22 @@ class RosbridgeServer:
         address = connection.remote_address or ("?", 0)
         tend(connection.transport.get_extra_info("socket"))
         session = self._gateway.open(f"rosbridge {address[0]}:{address[1]}")
-        bell = _Bell(loop)
-
-        def post(action: Any) -> None:
-            wake_of(loop, action)()
-
+        bell = Bell(loop)
         peer = RosbridgePeer(
             session,
             self._shared,
             wake=bell.ring,
-            post=post,
+            post=post_to(loop),
             authorized=connection in self._shown,
         )
         self._clients.add(connection)
-        read = asyncio.Event()
-        tasks = [
-            asyncio.create_task(_read(connection, peer, read)),
-            asyncio.create_task(_write(connection, peer, bell, read)),
-        ]
         try:
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            trouble = await converse(connection, bell, peer)
         finally:
             self._clients.discard(connection)
-            peer.close()
-            for task in tasks:
-                task.cancel()
-            for outcome in await asyncio.gather(*tasks, return_exceptions=True):
-                if isinstance(outcome, Exception) and not isinstance(outcome, ConnectionClosed):
-                    _log.error("serving %s failed", session.name, exc_info=outcome)
-
-
-class _Bell:
-    """Wakes a writer from any thread; rung often before it is heard, it costs the ringer once."""
-
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self.heard = asyncio.Event()
-        self._wake = wake_of(loop, self.heard.set)
-        self._rung = False
-
-    def ring(self) -> None:
-        if not self._rung:
-            self._rung = True
-            self._wake()
-
-    def silence(self) -> None:
-        """Called before looking at what there is: who rings afterwards is heard again."""
-        self.heard.clear()
-        self._rung = False
-
-
-async def _read(connection: ServerConnection, peer: RosbridgePeer, read: asyncio.Event) -> None:
-    """Hand the client's frames to its peer until it leaves or must go."""
-    while peer.refused is None:
-        silence_s = None if peer.authorized else _LONGEST_SILENCE_S
-        try:
-            async with asyncio.timeout(silence_s):  # unlike wait_for it loses no cancellation
-                frame = await connection.recv()
-        except TimeoutError:
-            await connection.close(1008, "no token was shown")
-            return
-        peer.receive(frame, time.monotonic())
-        while peer.congested:  # it asks for more than it reads
-            read.clear()
-            await read.wait()
-    for answer in peer.frames(time.monotonic()):
-        await connection.send(answer)
-    await connection.close(1008, peer.refused[:100])
-
-
-async def _write(
-    connection: ServerConnection, peer: RosbridgePeer, bell: _Bell, read: asyncio.Event
-) -> None:
-    """Send what the peer has to say, as fast as the client reads."""
-    turns = itertools.count(1)
-    while True:
-        bell.silence()
-        for frame in peer.frames(time.monotonic()):
-            await connection.send(frame)
-            read.set()
-            if next(turns) % _FRAMES_A_TURN == 0:
-                await asyncio.sleep(0)
-        read.set()
-        now_s = time.monotonic()
-        due_s = peer.due_s(now_s)
-        with suppress(TimeoutError):
-            async with asyncio.timeout(None if due_s is None else due_s - now_s):
-                await bell.heard.wait()
+        if trouble is not None and not isinstance(trouble, ConnectionClosed):
+            _log.error("serving %s failed", session.name, exc_info=trouble)
 
 
 def _select_subprotocol(_connection: ServerConnection, offered: Sequence[Any]) -> Any:
     return CBOR_PROTOCOL if CBOR_PROTOCOL in offered else None
-
-
-def _is_address(host: str) -> bool:
-    try:
-        ipaddress.ip_address(host)
-    except ValueError:
-        return False
-    return True

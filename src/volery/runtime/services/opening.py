@@ -12,12 +12,14 @@ from volery.runtime.services.features import offer_features
 from volery.runtime.services.grid_maps import offer_grid_maps
 from volery.runtime.services.kept_states import KeptStates
 from volery.runtime.services.named_poses import offer_named_poses
+from volery.runtime.services.piloting import offer_piloting
 from volery.runtime.services.playing import Playing
 from volery.runtime.services.recording import Recording
 from volery.runtime.services.spawning import Spawning
 from volery.runtime.services.stepping import offer_steps
 from volery.runtime.services.things import offer_things
 from volery.runtime.services.worlds import OnLoad, offer_worlds
+from volery.scenario.shelf import Shelf
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
@@ -50,6 +52,7 @@ def open_services(
     *,
     recordings: Path | None = None,
     on_load: OnLoad | None = None,
+    shelf: Shelf | None = None,
     every: Callable[..., None],
 ) -> Services:
     """Offer the standard's services and ours; what the arguments mean, `Simulation` says.
@@ -63,7 +66,7 @@ def open_services(
     playing = Playing(simulation)
     playing.offer()
     offer_steps(simulation)
-    offer_worlds(graph, simulation.scenario, on_load)
+    offer_worlds(graph, simulation.scenario, on_load, shelf)
     offer_named_poses(graph, simulation.starts)
     offer_air_and_faults(simulation)
     if simulation.things is not None:
@@ -71,6 +74,7 @@ def open_services(
     if simulation.scenario.world.grid_map is not None:
         settings = simulation.scenario.world.grid_map
         offer_grid_maps(graph, simulation.grid_world, settings, lambda: simulation.time_ns)
+    offer_piloting(graph, simulation.pilots)
     KeptStates(simulation).offer()
     recording = Recording(graph, recordings)
     recording.offer()

@@ -16,6 +16,7 @@ from volery.scenario import library
 from volery.scenario.changes import WorldRequest
 from volery.scenario.load import load_scenario
 from volery.scenario.schema import Scenario
+from volery.scenario.shelf import Shelf
 
 _SRV = "simulation_interfaces/srv"
 _UNSUPPORTED_FORMAT = 101
@@ -27,30 +28,33 @@ OnLoad = Callable[[WorldRequest | None], None]
 """Has another scenario of the library flown instead of the present one, or, for None, no one."""
 
 
-def offer_worlds(graph: Graph, loaded: Scenario | None, on_load: OnLoad | None) -> None:
+def offer_worlds(
+    graph: Graph, loaded: Scenario | None, on_load: OnLoad | None, shelf: Shelf | None = None
+) -> None:
     """Offer what is known of worlds, and loading and unloading them where `on_load` does that.
 
     That is the owner's business: the process builds another simulation, or none. `loaded`: the
-    present scenario.
+    present scenario. `shelf`: where scenarios come from, None: the library alone.
     """
+    shelf = shelf or Shelf()
 
     def available(request: Any) -> Fields:
         passes = tag_filter(request.filter)
         if list(request.additional_sources) and not request.continue_on_error:
             reason = "there are no sources of worlds but the library of scenarios"
             raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
-        worlds = [_shipped(name) for name in library.names()]
-        return {"worlds": [_world(s) for s in worlds if passes(tags_of(s))]}
+        worlds = [_read(shelf, name) for name in shelf.names()]
+        return {"worlds": [_world(s, shelf) for s in worlds if passes(tags_of(s))]}
 
     def current(_request: Any) -> Fields:
         if loaded is None:
             raise RefusedError(_NO_WORLD, "no world is loaded")
-        return {"world": _world(loaded)}
+        return {"world": _world(loaded, shelf)}
 
     def load(request: Any) -> Fields:
-        scenario = _wanted(request.world_resource) if on_load is not None else None
+        scenario = _wanted(request.world_resource, shelf) if on_load is not None else None
         change(None if scenario is None else WorldRequest(scenario.name))
-        return {"world": _world(scenario)} if scenario is not None else {}
+        return {"world": _world(scenario, shelf)} if scenario is not None else {}
 
     def unload(_request: Any) -> None:
         if loaded is None:
@@ -70,7 +74,7 @@ def offer_worlds(graph: Graph, loaded: Scenario | None, on_load: OnLoad | None) 
     offer_result(graph, "/get_current_world", f"{_SRV}/GetCurrentWorld", current)
     offer_result(graph, "/load_world", f"{_SRV}/LoadWorld", load)
     offer_result(graph, "/unload_world", f"{_SRV}/UnloadWorld", unload)
-    offer_choices(graph, library.names, _shipped, change)
+    offer_choices(graph, shelf.names, lambda name: _read(shelf, name), change)
 
 
 def tags_of(scenario: Scenario) -> list[str]:
@@ -81,16 +85,16 @@ def tags_of(scenario: Scenario) -> list[str]:
     return [f"{world.terrain.kind}_ground", *there]
 
 
-def _wanted(source: Any) -> Scenario:
+def _wanted(source: Any, shelf: Shelf) -> Scenario:
     if source.resource_string:
         raise RefusedError(_UNSUPPORTED_FORMAT, "worlds are loaded by name, not from a string")
     if not source.uri:
         raise RefusedError(_NO_RESOURCE, "uri must be the name of a scenario of the library")
-    if source.uri not in library.names():
-        known = ", ".join(library.names())
+    if source.uri not in shelf.names():
+        known = ", ".join(shelf.names())
         raise RefusedError(Code.NOT_FOUND, f"no scenario '{source.uri}'; known: {known}")
     try:
-        return _shipped(source.uri)
+        return _read(shelf, source.uri)
     except ScenarioError as error:
         raise RefusedError(_PARSE_ERROR, str(error)) from None
 
@@ -100,10 +104,14 @@ def _shipped(name: str) -> Scenario:
     return load_scenario(name)
 
 
-def _world(scenario: Scenario) -> Any:
+def _read(shelf: Shelf, name: str) -> Scenario:
+    return _shipped(name) if name in library.names() else shelf.load(name)
+
+
+def _world(scenario: Scenario, shelf: Shelf) -> Any:
     fields = {
         "name": scenario.name,
-        "world_resource": resource(scenario.name if scenario.name in library.names() else ""),
+        "world_resource": resource(scenario.name if scenario.name in shelf.names() else ""),
         "description": scenario.description.strip(),
         "tags": tags_of(scenario),
     }

@@ -1,0 +1,91 @@
+"""The page's server beside the runs of a command."""
+
+from __future__ import annotations
+
+import errno
+import socket
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from volery.cli.flight import RunOptions
+from volery.core.errors import CommandError
+
+if TYPE_CHECKING:
+    from volery.scenario.schema import Scenario
+    from volery.server.page_server import PageServer
+    from volery.server.settings import PageSettings
+
+AT_THE_USUAL_PLACE = ""
+"""Value of `--page` without an address."""
+
+
+class Page:
+    """The page of a command's runs; without a server nothing happens."""
+
+    def __init__(self, server: PageServer | None = None) -> None:
+        self._server = server
+
+    def building(self, scenario: Scenario, message: str = "") -> None:
+        """Tell that a scenario is being built."""
+        if self._server is not None:
+            self._server.building(scenario.name, scenario.description, message)
+
+    def showing(self, world: Any, message: str = "") -> AbstractContextManager[None]:
+        """Let clients into a simulation or lobby while the context lasts."""
+        if self._server is None:
+            return nullcontext()
+        world.be_prompt()
+        return self._server.showing(world, message)
+
+
+@contextmanager
+def page_of(options: RunOptions) -> Iterator[Page]:
+    """The page that `--page` asks for, if it does."""
+    if options.page is None:
+        yield Page()
+        return
+    with serving(_settings_of(options)) as page:
+        yield page
+
+
+@contextmanager
+def serving(settings: PageSettings) -> Iterator[Page]:
+    """Serve the page and say where."""
+    from volery.server.page_server import PageServer
+
+    with PageServer(settings) as server:
+        needed = "  (it asks for the token)" if settings.tokens.needed else ""
+        typer.echo(f"page    {server.url}{needed}", err=True)
+        yield Page(server)
+
+
+def _settings_of(options: RunOptions) -> PageSettings:
+    from volery.server.rights import Tokens
+    from volery.server.settings import PageSettings
+
+    settings = PageSettings(
+        tokens=Tokens(options.token), anywhere=options.allow_remote, recordings=options.recordings
+    )
+    if options.page == AT_THE_USUAL_PLACE:
+        if _is_taken(settings.host, settings.port):
+            typer.echo(f"port {settings.port} is taken; the page takes a free one", err=True)
+            settings = replace(settings, port=0)
+        return settings
+    host, colon, port = (options.page or "").rpartition(":")
+    if not port.isdecimal() or not 0 <= int(port) <= 65535 or (colon and not host):
+        raise CommandError(f"--page={options.page}: an address is PORT or HOST:PORT")
+    return replace(settings, host=host.strip("[]") or settings.host, port=int(port))
+
+
+def _is_taken(host: str, port: int) -> bool:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            return error.errno == errno.EADDRINUSE
+    return False

@@ -1,0 +1,206 @@
+"""`volery serve`: the page, and one world after the other behind it, until Ctrl-C."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from volery.cli.doors import open_doors
+from volery.cli.flight import RunOptions
+from volery.cli.guard import complain
+from volery.cli.interrupt import Interrupts
+from volery.cli.pages import Page, serving
+from volery.core.errors import VoleryError
+from volery.scenario import changes
+
+if TYPE_CHECKING:
+    from volery.scenario.changes import WorldRequest
+    from volery.scenario.schema import Scenario
+    from volery.scenario.shelf import Shelf
+    from volery.server.settings import PageSettings
+
+_log = logging.getLogger(__name__)
+
+_THREADS = 2
+_GLANCE_S = 0.02
+"""How often a world that stands still looks for clients, and a lobby for Ctrl-C."""
+_FAREWELL_S = 0.1
+"""Time for the last answer to reach its client."""
+
+
+@dataclass(frozen=True)
+class ServeOptions:
+    """What the command line asked for."""
+
+    first: RunOptions
+    """The scenario to begin with, and what holds for all of them."""
+    page: PageSettings
+
+
+class _StoppedError(Exception):
+    """Ctrl-C was pressed; raised between two steps."""
+
+
+def serve(options: ServeOptions) -> None:
+    """Serve until Ctrl-C, or until a client lets the simulator quit.
+
+    Raises `VoleryError` where the first scenario cannot be built or the server cannot listen.
+    """
+    with Interrupts() as interrupts, serving(options.page) as page:
+        host = _Host(options, page, interrupts)
+        while host.goes_on:
+            host.go_on()
+    typer.echo("the server has ended", err=True)
+
+
+class _Wish:
+    """What is to be flown next: the first scenario, then what clients ask for."""
+
+    def __init__(self, scenario: Scenario, shelf: Shelf, speed: float | None) -> None:
+        self._shelf = shelf
+        self.asked = True
+        self.scenario: Scenario | None = scenario
+        """None: no world at all."""
+        self.speed = speed
+        """Factor of real time; None: as fast as possible."""
+        self.quit: Callable[[], None] = _nothing
+
+    def ask(self, request: WorldRequest | None) -> None:
+        """End the present flight for another one; `ScenarioError` where that cannot be read."""
+        if request is None:
+            self.want(None)
+        else:
+            self.want(changes.apply(self._shelf.load(request.name), request.changes))
+            if request.changes.speed is not None:
+                self.speed = request.changes.speed or None
+        self.quit()
+
+    def want(self, scenario: Scenario | None) -> None:
+        """Have this flown next."""
+        self.asked, self.scenario = True, scenario
+
+    def take(self) -> Scenario | None:
+        """What to fly now; what is asked for from here on comes after it."""
+        self.asked, self.quit = False, _nothing
+        return self.scenario
+
+
+class _Host:
+    """Builds worlds and flies them, one at a time."""
+
+    def __init__(self, options: ServeOptions, page: Page, interrupts: Interrupts) -> None:
+        from volery.scenario.shelf import Shelf
+
+        self._options = options
+        self._page = page
+        self._interrupts = interrupts
+        self._shelf = Shelf(options.page.uploads)
+        self._wish = _Wish(_first_scenario(options.first), self._shelf, options.first.speed)
+        self._present: Scenario | None = None
+        """What was built last."""
+        self._trouble = ""
+        """What went wrong last, for the page."""
+        self._quits = False
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether there is more to do."""
+        return not (self._quits or self._interrupts.pressed)
+
+    def go_on(self) -> None:
+        """Do what is wished for until something else is; after a failure go back."""
+        wanted = self._wish.take()
+        if wanted is None:
+            self._wait()
+            return
+        try:
+            self._fly(wanted)
+        except Exception as error:  # a mistake of ours in one world must not end the others
+            if self._present is None:
+                raise
+            what = str(error) if isinstance(error, VoleryError) else _unexpected(error)
+            self._trouble = f"{wanted.name}: {what}"
+            complain(self._trouble)
+            self._wish.want(None if self._present is wanted else self._present)
+
+    def _fly(self, scenario: Scenario) -> None:
+        """Build a world and stay with it."""
+        from volery import Simulation
+
+        first, page = self._options.first, self._page
+        page.building(scenario, self._trouble)
+        threads = _THREADS if first.threads is None else first.threads
+        with Simulation(
+            scenario,
+            threads=threads,
+            recordings=first.recordings,
+            on_load=self._wish.ask,
+            shelf=self._shelf,
+        ) as simulation:
+            self._present, self._wish.quit = scenario, simulation.quit
+            self._interrupts.be_gentle()
+            with open_doors(simulation, first), page.showing(simulation, self._trouble):
+                self._trouble = ""
+                typer.echo(f"flying  {scenario.name}", err=True)
+                self._stay(simulation)
+            self._quits = simulation.quitting and not self._wish.asked
+
+    def _stay(self, simulation: Any) -> None:
+        """Fly; at the end hold still there, until a reset or something else is asked for."""
+        speed = self._wish.speed
+        try:
+            while not simulation.quitting:
+                simulation.run(speed=speed, on_progress=self._look)
+                speed = simulation.speed
+                while simulation.finished and not simulation.quitting:
+                    self._look()
+                    simulation.pause()
+                    simulation.take_in()
+                    time.sleep(_GLANCE_S)
+        except _StoppedError:
+            return
+        time.sleep(_FAREWELL_S)
+
+    def _look(self, _progress: Any = None) -> None:
+        if self._interrupts.pressed:
+            raise _StoppedError
+
+    def _wait(self) -> None:
+        """Keep the doors open with no world behind them."""
+        from volery.runtime.lobby import Lobby
+
+        lobby = Lobby(self._wish.ask, self._shelf)
+        with open_doors(lobby, self._options.first), self._page.showing(lobby, self._trouble):
+            typer.echo("no world is loaded", err=True)
+            self._trouble = ""
+            while not (self._wish.asked or lobby.quitting or self._interrupts.pressed):
+                lobby.wait(_GLANCE_S)
+            lobby.wait(_FAREWELL_S)
+        self._quits = lobby.quitting
+
+
+def _first_scenario(options: RunOptions) -> Scenario:
+    from volery import load_scenario
+    from volery.scenario import overrides
+
+    return overrides.apply(
+        load_scenario(options.scenario),
+        uavs=options.uavs,
+        seconds=options.seconds,
+        seed=options.seed,
+    )
+
+
+def _unexpected(error: Exception) -> str:
+    """A sentence for what should not happen; where it did is logged."""
+    _log.error("a world ended with an error", exc_info=error)
+    return f"internal error: {type(error).__name__}: {error}"
+
+
+def _nothing() -> None:
+    """Nothing can be ended before it has begun."""

@@ -1,0 +1,75 @@
+"""What stands in a running world: the parts that a picture of it is made of, and its name."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from volery.graph.graph import Graph
+from volery.graph.messages import String
+from volery.world.forest import Forest
+from volery.world.ground_cover import BARE_GROUND, GroundCover
+from volery.world.scene_content import Solid
+from volery.world.terrain import Terrain
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """Ground, trees and solids of a world at one time; no part is ever written to."""
+
+    terrain: Terrain
+    forest: Forest | None = None
+    solids: tuple[Solid, ...] = ()
+    cover: GroundCover = BARE_GROUND
+
+    @cached_property
+    def id(self) -> str:
+        """24 hexadecimal digits, the same wherever and whenever the same things stand there."""
+        taken = hashlib.blake2b(digest_size=12)
+        for part in self._parts():
+            taken.update(repr(part).encode() if not isinstance(part, np.ndarray) else part.data)
+        return taken.hexdigest()
+
+    def _parts(self) -> Iterator[Any]:
+        yield from _plain(self.terrain.grid)
+        yield from _plain(self.cover)
+        if self.forest is not None:
+            for model in self.forest.models:
+                yield from (model.species, model.variant, model.height_m, model.dbh_m)
+            forest = self.forest
+            placing = (forest.model_index, forest.position_map, forest.yaw, forest.scale)
+            yield from _plain(placing)
+        for solid in self.solids:
+            yield from (solid.name, solid.material, solid.top, solid.look)
+            yield from _plain((solid.mesh.vertices, solid.mesh.triangles))
+
+
+def _plain(parts: tuple[Any, ...]) -> Iterator[Any]:
+    """Arrays as they lie in memory, after their shapes; other values as they are."""
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            yield part.shape
+            yield np.ascontiguousarray(part)
+        else:
+            yield part
+
+
+class WorldTopic:
+    """Tells on `/volery/world`, latched, the id of the geometry that stands there."""
+
+    def __init__(self, graph: Graph, geometry: Callable[[], Geometry]) -> None:
+        self._publisher = graph.advertise("/volery/world", String, latched=True)
+        self._geometry = geometry
+        self._told = ""
+
+    def tell(self) -> None:
+        """Publish the id where it has changed; for the simulation's thread."""
+        present = self._geometry().id
+        if present != self._told:
+            self._told = present
+            self._publisher.publish(String(data=present))

@@ -1,0 +1,49 @@
+"""The page itself: the files that its build leaves in `static/`."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+from starlette.requests import Request
+from starlette.responses import FileResponse, HTMLResponse, Response
+from starlette.staticfiles import StaticFiles
+
+STATIC = Path(str(files("volery.server") / "static"))
+_ASSETS = STATIC / "assets"
+_FOREVER = "public, max-age=31536000, immutable"
+"""The build names assets by a hash of their content."""
+
+_NOT_BUILT = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><title>Volery</title>
+<style>body{font:16px/1.5 system-ui,sans-serif;max-width:40em;margin:4em auto;padding:0 1em}</style>
+<h1>Volery is running, its page is not built</h1>
+<p>This is a checkout of the sources without the page. Node.js 20 or newer builds it:
+<pre>cd web &amp;&amp; npm ci &amp;&amp; npm run build</pre>
+<p>Everything else is here: <a href="./api/status">status</a>,
+<a href="./api/scenarios">scenarios</a>, <a href="./api/world.glb">the world</a>, and rosbridge for
+roslib, Foxglove and other clients at <code>./rosbridge</code>.
+</html>
+"""
+
+
+async def index(_request: Request) -> Response:
+    """The page, or how it is built."""
+    page = STATIC / "index.html"
+    if not page.is_file():
+        return HTMLResponse(_NOT_BUILT, headers={"Cache-Control": "no-cache"})
+    return FileResponse(page, headers={"Cache-Control": "no-cache"})
+
+
+class PageFiles(StaticFiles):
+    """Files of the page; those of `assets/` may be kept for good."""
+
+    def __init__(self) -> None:
+        super().__init__(directory=STATIC, check_dir=False)
+
+    def file_response(self, full_path: object, *arguments: object, **options: object) -> Response:
+        """As of starlette, and how long a browser may keep the file."""
+        response = super().file_response(full_path, *arguments, **options)  # type: ignore[arg-type]
+        kept = Path(str(full_path)).is_relative_to(_ASSETS)
+        response.headers["Cache-Control"] = _FOREVER if kept else "no-cache"
+        return response

@@ -1,0 +1,203 @@
+"""The page's server in a thread of its own, which outlives the worlds it shows.
+
+with PageServer(PageSettings(port=8080)) as server:
+    server.building("hover", "One F450 ...")
+    with Simulation(load_scenario("hover")) as simulation, server.showing(simulation):
+        simulation.run(speed=1.0)
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import sys
+import threading
+from collections.abc import Coroutine, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import uvicorn
+
+from volery.bridges.origins import LOOPBACK, Origins
+from volery.bridges.rosbridge.wire import MOST_MESSAGE_BYTES
+from volery.core.errors import BridgeError
+from volery.scenario.schema import Scenario
+from volery.scenario.shelf import Shelf
+from volery.server.app import make_app
+from volery.server.rights import check_rights
+from volery.server.settings import PageSettings
+from volery.server.site import Site, Situation, State, World
+
+_SWITCH_INTERVAL_S = 0.0005
+"""Python's own 5 ms would be the latency of every answer while the engine computes."""
+_KEEPALIVE_S = 20.0
+"""Between two pings, and how long an answer may take."""
+_LONGEST_CALL_S = 30.0
+"""Of the server's own work on a busy machine; nothing in it waits for a client longer."""
+
+
+class PageServer:
+    """Serves the page. Use it as a context manager, or call `start` and `stop`."""
+
+    def __init__(self, settings: PageSettings) -> None:
+        self._settings = settings
+        self._site = Site(settings.recordings, Shelf(settings.uploads))
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, name="volery-page", daemon=True)
+        self._server: uvicorn.Server | None = None
+        self._socket: socket.socket | None = None
+        self._serving: asyncio.Task[None] | None = None
+
+    @property
+    def port(self) -> int:
+        """Where it listens."""
+        return self._settings.port if self._socket is None else self._socket.getsockname()[1]
+
+    @property
+    def url(self) -> str:
+        """What to open in a browser."""
+        host = self._settings.host
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/"
+
+    # ---------------------------------------------------------------- for the owner, in his thread
+
+    def start(self) -> None:
+        """Begin to serve.
+
+        Raises
+        ------
+        BridgeError
+            The address is taken, not this machine's, or beyond loopback without consent and token.
+
+        """
+        settings = self._settings
+        check_rights(settings.host, settings.tokens, anywhere=settings.anywhere)
+        self._socket = _listen(settings.host, settings.port)
+        app = make_app(
+            self._site,
+            tokens=settings.tokens,
+            origins=Origins(settings.origins, token_needed=settings.tokens.needed),
+            cookie=f"volery_{self.port}",
+            only_loopback=settings.host in LOOPBACK,
+        )
+        self._server = uvicorn.Server(
+            uvicorn.Config(
+                app,
+                ws="websockets-sansio",
+                ws_max_size=MOST_MESSAGE_BYTES,
+                ws_ping_interval=_KEEPALIVE_S,
+                ws_ping_timeout=_KEEPALIVE_S,
+                ws_per_message_deflate=False,  # costs more time than loopback and LANs do
+                lifespan="off",
+                log_config=None,
+                log_level="warning",
+                access_log=False,
+                server_header=False,
+                timeout_graceful_shutdown=2,
+            )
+        )
+        sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL_S))
+        self._thread.start()
+        self._call(self._begin(self._server, self._socket))
+
+    def building(self, scenario: str, description: str = "", message: str = "") -> None:
+        """Tell that a scenario is being built; `message`: what went wrong before."""
+        self._leave(Situation(State.BUILDING, scenario, description.strip(), message))
+
+    @contextmanager
+    def showing(self, world: World, message: str = "") -> Iterator[None]:
+        """Let clients into a world, and send them out of it at the end.
+
+        message: what went wrong before, such as that another world could not be built.
+        """
+        scenario: Scenario | None = getattr(world, "scenario", None)
+        if scenario is None:
+            told = Situation(State.FAILED if message else State.LOBBY, message=message)
+        else:
+            told = Situation(State.FLYING, scenario.name, scenario.description.strip(), message)
+        self._call(self._site.join(world, told))
+        try:
+            yield
+        finally:
+            self._leave(Situation(State.BUILDING, told.scenario, told.description, message))
+
+    def stop(self) -> None:
+        """Let everybody go and end the thread; a second time nothing happens."""
+        if not self._thread.is_alive():
+            if self._socket is not None:
+                self._socket.close()
+            self._loop.close()
+            return
+        self._leave(Situation(State.LOBBY, message="the server ends"))
+        if self._server is not None:
+            self._server.should_exit = True
+        self._call(self._end())
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    def __enter__(self) -> PageServer:
+        """Start it."""
+        try:
+            self.start()
+        except BaseException:
+            self.stop()
+            raise
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        """Stop it."""
+        self.stop()
+
+    # ------------------------------------------------------------------------------- its own thread
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        self._loop.run_forever()
+        left = asyncio.all_tasks(self._loop)
+        for task in left:
+            task.cancel()
+        self._loop.run_until_complete(asyncio.gather(*left, return_exceptions=True))
+        self._loop.run_until_complete(self._loop.shutdown_asyncgens())
+        self._loop.run_until_complete(self._loop.shutdown_default_executor())
+
+    async def _begin(self, server: uvicorn.Server, listening: socket.socket) -> None:
+        self._serving = asyncio.create_task(server.serve([listening]))
+        while not server.started:
+            if self._serving.done():
+                self._serving.result()
+                raise BridgeError("the page's server ended before it began")
+            await asyncio.sleep(0.01)
+
+    async def _end(self) -> None:
+        if self._serving is not None:
+            await asyncio.gather(self._serving, return_exceptions=True)
+
+    def _leave(self, situation: Situation) -> None:
+        self._call(self._site.leave(situation))
+
+    def _call(self, work: Coroutine[Any, Any, Any]) -> None:
+        asyncio.run_coroutine_threadsafe(work, self._loop).result(_LONGEST_CALL_S)
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    """A listening socket. `BridgeError` where there cannot be one."""
+    try:
+        (family, kind, protocol, _, address), *_ = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )
+        listening = socket.socket(family, kind, protocol)
+        try:
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listening.bind(address)
+            listening.listen(100)
+            listening.setblocking(False)
+        except BaseException:
+            listening.close()
+            raise
+    except OSError as error:
+        raise BridgeError(
+            f"the page's server cannot listen on {host}:{port}: {error.strerror or error}; "
+            "end the program that has the port, or choose another"
+        ) from None
+    return listening

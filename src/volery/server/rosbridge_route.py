@@ -1,0 +1,112 @@
+"""`./rosbridge`: clients of the graph, over starlette's WebSocket."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from starlette.types import Message
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from volery.bridges.rosbridge.conversation import SERVICE_RESTART, Bell, converse, post_to
+from volery.bridges.rosbridge.gate import Gate
+from volery.bridges.rosbridge.protocol import RosbridgePeer
+from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, Frame
+from volery.server.gate import PilotGate, ViewerGate
+from volery.server.rights import Role
+from volery.server.site import Client, JoinedWorld, Site
+
+_log = logging.getLogger(__name__)
+
+MOST_CLIENTS = 1000
+LONGEST_STALL_S = 60.0
+"""A client that lets a frame wait so long is given up; pings notice one that is gone earlier."""
+_TRY_AGAIN_LATER = 1013
+"""IANA's WebSocket Close Code Number Registry."""
+
+
+class _Channel:
+    """A WebSocket of starlette as a `Channel`."""
+
+    def __init__(self, websocket: WebSocket) -> None:
+        self._websocket = websocket
+
+    async def recv(self) -> Frame:
+        message: Message = await self._websocket.receive()
+        if message["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect(message.get("code", 1006))
+        text: str | None = message.get("text")
+        data: bytes = message.get("bytes") or b""
+        return data if text is None else text
+
+    async def send(self, message: Frame) -> None:
+        kind = "text" if isinstance(message, str) else "bytes"
+        async with asyncio.timeout(LONGEST_STALL_S):
+            await self._websocket.send({"type": "websocket.send", kind: message})
+
+    async def close(self, code: int = 1000, reason: str = "") -> None:
+        await self._websocket.close(code, reason[:100])
+
+
+async def serve_rosbridge(websocket: WebSocket) -> None:
+    """Serve one client until it leaves or its world is gone."""
+    site: Site = websocket.app.state.site
+    spoken = CBOR_PROTOCOL if CBOR_PROTOCOL in websocket.scope["subprotocols"] else None
+    await websocket.accept(spoken)
+    if site.world is None:
+        await websocket.close(SERVICE_RESTART, "the world is being built")
+        return
+    if len(site.clients) >= MOST_CLIENTS:
+        await websocket.close(_TRY_AGAIN_LATER, "too many clients")
+        return
+    world, address = site.world, websocket.client
+    name = f"page {address.host}:{address.port}" if address else "page"
+    with _gate_of(websocket, site, world) as gate:
+        await _serve(site, world, _Channel(websocket), name, gate)
+
+
+@contextmanager
+def _gate_of(websocket: WebSocket, site: Site, world: JoinedWorld) -> Iterator[Gate | None]:
+    """What the client may do, as long as it is there; a pilot who leaves lets go of his UAVs."""
+    if websocket.state.role is not Role.PILOT:
+        yield ViewerGate()
+        return
+    pilots = world.pilots
+    if pilots is None:
+        yield None
+        return
+    gate = PilotGate(site.crew.sign_in(websocket.query_params.get("pilot", "")), site.crew, pilots)
+    try:
+        yield gate
+    finally:
+        site.crew.sign_out(gate.name)
+        world.gateway.post(lambda: pilots.leave(gate.name))
+
+
+async def _serve(
+    site: Site, world: JoinedWorld, channel: _Channel, name: str, gate: Gate | None
+) -> None:
+    """Hold one conversation."""
+    loop = asyncio.get_running_loop()
+    bell = Bell(loop)
+    session = world.gateway.open(name)
+    peer = RosbridgePeer(
+        session,
+        world.shared,
+        wake=bell.ring,
+        post=post_to(loop),
+        authorized=True,
+        gate=gate,
+    )
+    conversation = asyncio.create_task(converse(channel, bell, peer))
+    client = Client(channel, conversation)
+    site.clients.add(client)
+    try:
+        (trouble,) = await asyncio.gather(conversation, return_exceptions=True)
+    finally:
+        site.clients.discard(client)
+    gone = (WebSocketDisconnect, OSError, TimeoutError, asyncio.CancelledError)
+    if isinstance(trouble, BaseException) and not isinstance(trouble, gone):
+        _log.error("serving %s failed", name, exc_info=trouble)

@@ -1,0 +1,128 @@
+"""What the server knows of the run: its state, its world, and who is connected.
+
+Its owner, who builds and flies, tells through `PageServer`; the server's own thread reads.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Protocol
+
+from volery.bridges.rosbridge.conversation import SERVICE_RESTART, Channel
+from volery.bridges.rosbridge.forms import Forms
+from volery.bridges.rosbridge.protocol import Shared
+from volery.bridges.rosbridge.rosapi import RosApi
+from volery.graph.graph import Graph
+from volery.graph.session import Gateway
+from volery.runtime.geometry import Geometry
+from volery.runtime.pilots import Pilots
+from volery.scenario.schema import Scenario
+from volery.scenario.shelf import Shelf
+from volery.server.crew_list import CrewList
+
+_FAREWELL_S = 1.0
+"""Time for a client to take the news that its world is gone."""
+
+
+class State(StrEnum):
+    """What goes on."""
+
+    BUILDING = "building"
+    FLYING = "flying"
+    LOBBY = "lobby"
+    FAILED = "failed"
+    """As in the lobby, because the scenario could not be built."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The present state, in words."""
+
+    state: State = State.BUILDING
+    scenario: str | None = None
+    description: str = ""
+    message: str = ""
+    """What went wrong, if something did."""
+
+
+class World(Protocol):
+    """What clients can join: a simulation, a lobby, a recording.
+
+    Where it has a `scenario`, `geometry` and `pilots`, as a `Simulation` has, they are served too.
+    """
+
+    graph: Graph
+    gateway: Gateway
+
+    def be_prompt(self) -> None:
+        """Answer clients soon."""
+
+
+class JoinedWorld:
+    """A world that clients have joined: what their conversations have in common."""
+
+    def __init__(self, world: World) -> None:
+        graph = world.graph
+        self.gateway = world.gateway
+        self.scenario: Scenario | None = getattr(world, "scenario", None)
+        self.pilots: Pilots | None = getattr(world, "pilots", None)
+        self.shared = Shared(Forms("ros2"), graph.now_ns)
+        self._world = world
+        self._rosapi = RosApi(world.gateway, "ros2", graph.now_ns)
+        self._rosapi.start()
+
+    @property
+    def geometry(self) -> Geometry | None:
+        """What stands there at present; None: nothing that could be shown."""
+        geometry: Geometry | None = getattr(self._world, "geometry", None)
+        return geometry
+
+    def leave(self) -> None:
+        """Take back what is offered to clients."""
+        self._rosapi.stop()
+
+
+@dataclass(eq=False)
+class Client:
+    """One rosbridge client."""
+
+    channel: Channel
+    conversation: asyncio.Task[Exception | None]
+
+    async def dismiss(self, reason: str) -> None:
+        """Have it connect again, to another world; who does not listen is left alone."""
+        with suppress(Exception):
+            async with asyncio.timeout(_FAREWELL_S):
+                await self.channel.close(SERVICE_RESTART, reason)
+        self.conversation.cancel()
+        await asyncio.gather(self.conversation, return_exceptions=True)
+
+
+@dataclass(eq=False)
+class Site:
+    """What all requests share. Written to in the server's thread only."""
+
+    recordings: Path | None = None
+    """Folder of logs; None: there is none."""
+    shelf: Shelf = field(default_factory=Shelf)
+    """Scenarios that can be loaded; its folder is that of uploads."""
+    situation: Situation = field(default_factory=Situation)
+    world: JoinedWorld | None = None
+    clients: set[Client] = field(default_factory=set)
+    crew: CrewList = field(default_factory=CrewList)
+
+    async def join(self, world: World, situation: Situation) -> None:
+        """Let clients into a world."""
+        self.world, self.situation = JoinedWorld(world), situation
+
+    async def leave(self, situation: Situation) -> None:
+        """Send everybody out of the present world."""
+        world, self.world, self.situation = self.world, None, situation
+        farewell = situation.message or "the world changes"
+        await asyncio.gather(*(client.dismiss(farewell) for client in tuple(self.clients)))
+        if world is not None:
+            world.leave()

@@ -1,0 +1,36 @@
+"""`./api/status`: what goes on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+
+from volery import __version__
+from volery.server.rights import Role
+from volery.server.site import Site
+
+
+async def status(request: Request) -> Response:
+    """State, scenario and world; who has yet to show a token learns that and no more."""
+    site: Site = request.app.state.site
+    role: Role | None = request.state.role
+    return JSONResponse(_told(site, role), headers={"Cache-Control": "no-store"})
+
+
+def _told(site: Site, role: Role | None) -> dict[str, Any]:
+    told: dict[str, Any] = {"version": __version__, "role": role, "token_needed": role is None}
+    if role is None:
+        nothing = {"state": None, "scenario": None, "description": "", "message": "", "world": None}
+        return nothing | told
+    now, world = site.situation, site.world
+    geometry = None if world is None else world.geometry
+    return {
+        "state": now.state,
+        "scenario": now.scenario,
+        "description": now.description,
+        "message": now.message,
+        "world": None if geometry is None else geometry.id,
+        **told,
+    }

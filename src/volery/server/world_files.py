@@ -1,0 +1,48 @@
+"""The world as glTF, made once for each geometry, in a thread of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import gzip
+from dataclasses import dataclass
+
+from volery.runtime.geometry import Geometry
+from volery.runtime.world_asset import asset_of
+from volery.scenario.schema import Scenario
+from volery.world.trees.model import DetailLevel
+
+_KEPT = 6
+"""Files that are kept for those who come later."""
+_EFFORT = 6
+"""Of gzip; 9 takes three times as long for one per cent."""
+
+
+@dataclass(frozen=True)
+class WorldFile:
+    """One .glb file as it goes out."""
+
+    plain: bytes
+    zipped: bytes
+
+
+class WorldFiles:
+    """Makes and keeps the files. Its methods belong to one event loop."""
+
+    def __init__(self) -> None:
+        self._kept: dict[tuple[str, DetailLevel], asyncio.Task[WorldFile]] = {}
+
+    async def get(self, scenario: Scenario, geometry: Geometry, detail: DetailLevel) -> WorldFile:
+        """The file of a geometry; those who ask meanwhile wait for the same one."""
+        key = geometry.id, detail
+        task = self._kept.get(key)
+        if task is None or (task.done() and (task.cancelled() or task.exception())):
+            making = asyncio.to_thread(_made, scenario, geometry, detail)
+            task = self._kept[key] = asyncio.create_task(making)
+            while len(self._kept) > _KEPT:
+                del self._kept[next(iter(self._kept))]
+        return await asyncio.shield(task)
+
+
+def _made(scenario: Scenario, geometry: Geometry, detail: DetailLevel) -> WorldFile:
+    content = asset_of(scenario, geometry, detail)
+    return WorldFile(content, gzip.compress(content, _EFFORT, mtime=0))

@@ -1,0 +1,55 @@
+"""A server and a browser for each module of page tests, and a page for each test."""
+
+import importlib.util
+
+import pytest
+
+MISSING = [name for name in ("playwright", "roslibpy") if importlib.util.find_spec(name) is None]
+if not MISSING:
+    from page_browsing import Browsing
+    from page_serving import Served
+
+    from volery.bench.page.browser import browser_path, open_browser
+
+collect_ignore_glob = ["test_page_*.py"] if MISSING else []
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """The browser; without one these tests are skipped."""
+    from volery.server.page import STATIC
+
+    if browser_path() is None:
+        pytest.skip("there is no Chromium: apt-get install chromium")
+    if not (STATIC / "index.html").is_file():
+        pytest.skip("the page is not built: make web")
+    with open_browser() as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def scenario(request):
+    """What is flown; a module names another one as `SCENARIO`."""
+    return getattr(request.module, "SCENARIO", "hover")
+
+
+@pytest.fixture(scope="module")
+def served(scenario, chromium):
+    """A running `volery serve`."""
+    with Served(scenario) as server:
+        yield server
+
+
+@pytest.fixture
+def browsing(chromium):
+    """Opens pages; a page that complains on its console fails the test."""
+    pages = Browsing(chromium)
+    yield pages
+    pages.close()
+    assert pages.unexpected() == []
+
+
+@pytest.fixture
+def page(browsing, served):
+    """The page of `served`, in a small window."""
+    return browsing.open(served.url)

@@ -1,0 +1,74 @@
+// Which scenario flies, and with what; uploads. What is not on the graph is asked for over HTTP.
+
+import { order, RefusedError } from "./asking.ts";
+
+export interface ScenarioCard {
+  name: string;
+  description: string;
+  uavs: number;
+  airframes: string[];
+  sensors: string[];
+  world: "forest" | "city" | "grid_map" | "open";
+  duration_s: number;
+  /** Relative URL; null: none is there. */
+  picture: string | null;
+  uploaded: boolean;
+}
+
+/** What may be set before a scenario starts; what is left out stays as it is written. */
+export interface ScenarioChanges {
+  uavs?: number;
+  airframe?: string;
+  sensors?: string[];
+  seed?: number;
+  tree_density_per_ha?: number;
+  tree_share?: number;
+  speed?: number;
+}
+
+export interface Choices {
+  airframes: string[];
+  sensor_sets: string[];
+  sensor_set_descriptions: string[];
+}
+
+/** A world with many trees takes a while until the server answers. */
+const LOAD_TIMEOUT_S = 120;
+
+export async function scenarios(): Promise<ScenarioCard[]> {
+  return (await get("./api/scenarios")) as ScenarioCard[];
+}
+
+/** What `changes` may name. */
+export async function choices(): Promise<Choices> {
+  return await order<Choices>("/volery/get_choices", "volery_interfaces/srv/GetChoices", {});
+}
+
+/** Build a world and fly it in place of the present one; the link is made anew meanwhile. */
+export async function loadScenario(scenario: string, changes: ScenarioChanges): Promise<void> {
+  const request = { scenario, changes: JSON.stringify(changes) };
+  const type = "volery_interfaces/srv/LoadScenario";
+  await order("/volery/load_scenario", type, request, LOAD_TIMEOUT_S);
+}
+
+export const UPLOAD_KINDS = ["grid_map", "city", "mesh", "forest"] as const;
+export type UploadKind = (typeof UPLOAD_KINDS)[number];
+
+/** Make a scenario of a file; its name. */
+export async function upload(file: File, kind: UploadKind): Promise<string> {
+  const query = new URLSearchParams({ kind, name: file.name });
+  const answer = await fetch(`./api/uploads?${query}`, { method: "POST", body: file });
+  const told = await read(answer);
+  return (told as { scenario: string }).scenario;
+}
+
+async function get(url: string): Promise<unknown> {
+  return await read(await fetch(url, { cache: "no-store" }));
+}
+
+/** JSON of an answer; a refusal's reason is its `error`. */
+async function read(answer: Response): Promise<unknown> {
+  const told = (await answer.json().catch(() => null)) as { error?: string } | null;
+  if (answer.ok && told !== null) return told;
+  throw new RefusedError(told?.error ?? `the server answered ${answer.status}`);
+}
