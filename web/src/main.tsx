@@ -8,6 +8,9 @@ import { App } from "./app/App.tsx";
 import { theme } from "./app/theme.ts";
 import { followAddress } from "./state/addressed.ts";
 import { connectAsAddressed, useConnection } from "./state/connection.ts";
+import { followHealth } from "./state/health.ts";
+import { followJournal } from "./state/journal.ts";
+import { followPlayer } from "./state/player.ts";
 import { followSimulation } from "./state/simulation.ts";
 import { followVehicles } from "./state/vehicles.ts";
 
@@ -15,6 +18,9 @@ followAddress();
 connectAsAddressed(location);
 followSimulation(useConnection.getState().volery);
 followVehicles();
+followHealth();
+followJournal();
+followPlayer();
 
 createRoot(document.getElementById("root")!).render(
   <MantineProvider theme={theme} defaultColorScheme="auto">

@@ -1,5 +1,7 @@
 import { Scene } from "../scene/Scene.tsx";
+import { Banner } from "./Banner.tsx";
 import { DockArea } from "./DockArea.tsx";
+import { PlayerBar } from "./PlayerBar.tsx";
 import { Rail } from "./Rail.tsx";
 import { TopBar } from "./TopBar.tsx";
 
@@ -12,6 +14,8 @@ export function App() {
       <DockArea dock="left" />
       <main className="scene">
         <Scene />
+        <PlayerBar />
+        <Banner />
       </main>
       <DockArea dock="right" />
       <DockArea dock="bottom" />

@@ -1,4 +1,5 @@
 import { Group, Text } from "@mantine/core";
+import { Health } from "./Health.tsx";
 import { TimeControls } from "./TimeControls.tsx";
 import { useSimulation } from "../state/simulation.ts";
 
@@ -15,6 +16,7 @@ export function TopBar() {
         </Text>
       </Group>
       <TimeControls />
+      <Health />
     </Group>
   );
 }

@@ -1,4 +1,13 @@
-import { Plane, type LucideIcon } from "lucide-react";
+import {
+  ChartLine,
+  Disc,
+  List,
+  Plane,
+  ScrollText,
+  Wrench,
+  Zap,
+  type LucideIcon,
+} from "lucide-react";
 import { lazy, type ComponentType, type LazyExoticComponent } from "react";
 import type { Dock } from "../state/layout.ts";
 
@@ -19,5 +28,47 @@ export const PANELS: readonly PanelEntry[] = [
     icon: Plane,
     dock: "left",
     view: lazy(() => import("./Vehicles.tsx")),
+  },
+  {
+    id: "topics",
+    title: "Topics",
+    icon: List,
+    dock: "bottom",
+    view: lazy(() => import("./Topics/index.tsx")),
+  },
+  {
+    id: "plots",
+    title: "Plots",
+    icon: ChartLine,
+    dock: "bottom",
+    view: lazy(() => import("./Plots/index.tsx")),
+  },
+  {
+    id: "services",
+    title: "Services",
+    icon: Wrench,
+    dock: "bottom",
+    view: lazy(() => import("./Services/index.tsx")),
+  },
+  {
+    id: "log",
+    title: "Log",
+    icon: ScrollText,
+    dock: "bottom",
+    view: lazy(() => import("./Log/index.tsx")),
+  },
+  {
+    id: "faults",
+    title: "Faults",
+    icon: Zap,
+    dock: "bottom",
+    view: lazy(() => import("./Faults/index.tsx")),
+  },
+  {
+    id: "recordings",
+    title: "Recordings",
+    icon: Disc,
+    dock: "bottom",
+    view: lazy(() => import("./Recordings/index.tsx")),
   },
 ];
