@@ -50,6 +50,7 @@ def serve(options: ServeOptions) -> None:
         host = _Host(options, page, interrupts)
         while host.goes_on:
             host.go_on()
+    typer.echo("the server has ended", err=True)
 
 
 class _Wish:

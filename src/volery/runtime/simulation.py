@@ -35,6 +35,7 @@ from volery.runtime.grid_world import GridWorld
 from volery.runtime.keeping import Keeper
 from volery.runtime.lock_step import open_lock_step
 from volery.runtime.outlet import Outlet
+from volery.runtime.pilots import Pilots
 from volery.runtime.placement import Start
 from volery.runtime.progress import Progress
 from volery.runtime.relocation import Relocator
@@ -132,6 +133,8 @@ class Simulation:
         )
         self.uavs: Mapping[str, Uav] = MappingProxyType(self._crew.uavs)
         """In fleet order."""
+        self.pilots = Pilots(lambda: self.uav_names)
+        """Who steers which UAV."""
         self._partners: list[Partner] = []
         self._replays: list[Replay] = []
         self._keep_time(publisher)

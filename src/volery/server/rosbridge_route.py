@@ -12,7 +12,7 @@ from volery.bridges.rosbridge.conversation import SERVICE_RESTART, Bell, convers
 from volery.bridges.rosbridge.gate import Gate
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, Frame
-from volery.server.gate import ViewerGate
+from volery.server.gate import PilotGate, ViewerGate
 from volery.server.rights import Role
 from volery.server.site import Client, JoinedWorld, Site
 
@@ -61,13 +61,27 @@ async def serve_rosbridge(websocket: WebSocket) -> None:
         return
     address = websocket.client
     name = f"page {address.host}:{address.port}" if address else "page"
-    await _serve(site, site.world, _Channel(websocket), name, websocket.state.role)
+    if websocket.state.role is Role.VIEWER or site.world.simulation is None:
+        gate = ViewerGate() if websocket.state.role is Role.VIEWER else None
+        await _serve(site, site.world, _Channel(websocket), name, gate)
+        return
+    pilots = site.world.simulation.pilots
+    pilot = site.crew.sign_in(websocket.query_params.get("pilot", ""))
+    pilot_gate = PilotGate(pilot, site.crew, pilots)
+    world = site.world
+    try:
+        await _serve(site, world, _Channel(websocket), name, pilot_gate)
+    finally:
+        site.crew.sign_out(pilot_gate.name)
+        world.gateway.post(lambda: pilots.leave(pilot_gate.name))
 
 
-async def _serve(site: Site, world: JoinedWorld, channel: _Channel, name: str, role: Role) -> None:
+async def _serve(
+    site: Site, world: JoinedWorld, channel: _Channel, name: str, gate: Gate | None
+) -> None:
+    """Hold one conversation."""
     loop = asyncio.get_running_loop()
     bell = Bell(loop)
-    gate: Gate | None = ViewerGate() if role is Role.VIEWER else None
     session = world.gateway.open(name)
     peer = RosbridgePeer(
         session,

@@ -19,6 +19,7 @@ from volery.graph.session import Gateway
 from volery.runtime.lobby import Lobby
 from volery.runtime.simulation import Simulation
 from volery.scenario.shelf import Shelf
+from volery.server.crew_list import CrewList
 
 _FAREWELL_S = 1.0
 """Time for a client to take the news that its world is gone."""
@@ -88,6 +89,7 @@ class Site:
     situation: Situation = field(default_factory=Situation)
     world: JoinedWorld | None = None
     clients: set[Client] = field(default_factory=set)
+    crew: CrewList = field(default_factory=CrewList)
 
     async def join(self, world: Simulation | Lobby, situation: Situation) -> None:
         """Let clients into a world."""
