@@ -1,0 +1,50 @@
+import { describe, expect, it, vi } from "vitest";
+
+vi.mock("../link/link.ts", () => ({ link: {} }));
+const { troubleOf } = await import("./trouble.ts");
+const { entryOfEvent } = await import("./journal.ts");
+
+describe("trouble", () => {
+  it("is nothing while all is well", () => {
+    expect(troubleOf("open", "", 0, undefined)).toBeNull();
+  });
+
+  it("tells a lost link, and why", () => {
+    const told = troubleOf("lost", "the world changes", 0, undefined);
+    expect(told?.what).toContain("lost: the world changes");
+    expect(told?.grave).toBe(true);
+  });
+
+  it("is not grave while a world is built", () => {
+    expect(troubleOf("lost", "", 0, "building")?.grave).toBe(false);
+  });
+
+  it("tells silence of a link that stands, and a refusal", () => {
+    expect(troubleOf("open", "", 12, undefined)?.what).toContain("silent");
+    expect(troubleOf("refused", "no token", 0, undefined)?.what).toContain("no token");
+  });
+});
+
+describe("an entry of the log", () => {
+  const EVENT = {
+    time_ns: 2_500_000_000,
+    uav: "uav1",
+    kind: "collision",
+    position_map: [1, 2, 3],
+    speed_m_s: 1.25,
+    partner: "tree 7",
+    detail: "",
+  };
+
+  it("says what was hit, how fast and where", () => {
+    const entry = entryOfEvent(JSON.stringify(EVENT));
+    expect(entry).toMatchObject({ timeS: 2.5, sort: "trouble", who: "uav1" });
+    expect(entry?.text).toBe("hit tree 7 at 1.25 m/s at (1.0, 2.0, 3.0) m");
+  });
+
+  it("is made of events alone", () => {
+    expect(entryOfEvent("hello")).toBeNull();
+    expect(entryOfEvent('{"a": 1}')).toBeNull();
+    expect(entryOfEvent("null")).toBeNull();
+  });
+});
