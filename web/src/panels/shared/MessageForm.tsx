@@ -1,4 +1,4 @@
-import { Fieldset, NumberInput, Stack, Switch, Textarea, TextInput } from "@mantine/core";
+import { Fieldset, Group, NumberInput, Stack, Switch, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { isNumeric, isTruth, type Field } from "../../lib/typeDefinitions.ts";
 
@@ -10,19 +10,26 @@ interface MessageFormProps {
   onChange: (value: Value) => void;
 }
 
+/** So many numbers stand side by side: the parts of a point or of a quaternion. */
+const MOST_IN_A_ROW = 4;
+
 /** A form for any type, made of its description. */
 export function MessageForm({ fields, value, onChange }: MessageFormProps) {
+  const inputs = fields.map((field) => (
+    <FieldInput
+      key={field.name}
+      field={field}
+      value={value[field.name]}
+      onChange={(changed) => onChange({ ...value, [field.name]: changed })}
+    />
+  ));
+  const row =
+    fields.length <= MOST_IN_A_ROW && fields.every(({ type, array }) => !array && isNumeric(type));
+  if (!row) return <Stack gap={6}>{inputs}</Stack>;
   return (
-    <Stack gap={6}>
-      {fields.map((field) => (
-        <FieldInput
-          key={field.name}
-          field={field}
-          value={value[field.name]}
-          onChange={(changed) => onChange({ ...value, [field.name]: changed })}
-        />
-      ))}
-    </Stack>
+    <Group gap={6} wrap="nowrap" align="start" grow>
+      {inputs}
+    </Group>
   );
 }
 
