@@ -15,8 +15,10 @@ from volery.cli.guard import complain
 from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, serving
 from volery.core.errors import VoleryError
+from volery.scenario import changes
 
 if TYPE_CHECKING:
+    from volery.scenario.changes import WorldRequest
     from volery.scenario.schema import Scenario
     from volery.scenario.shelf import Shelf
     from volery.server.settings import PageSettings
@@ -56,17 +58,23 @@ def serve(options: ServeOptions) -> None:
 class _Wish:
     """What is to be flown next: the first scenario, then what clients ask for."""
 
-    def __init__(self, scenario: Scenario, shelf: Shelf) -> None:
+    def __init__(self, scenario: Scenario, shelf: Shelf, speed: float | None) -> None:
         self._shelf = shelf
         self.asked = True
         self.scenario: Scenario | None = scenario
         """None: no world at all."""
+        self.speed = speed
+        """Factor of real time; None: as fast as possible."""
         self.quit: Callable[[], None] = _nothing
 
-    def ask(self, name: str | None) -> None:
+    def ask(self, request: WorldRequest | None) -> None:
         """End the present flight for another one; `ScenarioError` where that cannot be read."""
-        scenario = None if name is None else self._shelf.load(name)
-        self.want(scenario)
+        if request is None:
+            self.want(None)
+        else:
+            self.want(changes.apply(self._shelf.load(request.name), request.changes))
+            if request.changes.speed is not None:
+                self.speed = request.changes.speed or None
         self.quit()
 
     def want(self, scenario: Scenario | None) -> None:
@@ -89,7 +97,7 @@ class _Host:
         self._page = page
         self._interrupts = interrupts
         self._shelf = Shelf(options.page.uploads)
-        self._wish = _Wish(_first_scenario(options.first), self._shelf)
+        self._wish = _Wish(_first_scenario(options.first), self._shelf, options.first.speed)
         self._present: Scenario | None = None
         """What was built last."""
         self._trouble = ""
@@ -140,7 +148,7 @@ class _Host:
 
     def _stay(self, simulation: Any) -> None:
         """Fly; at the end hold still there, until a reset or something else is asked for."""
-        speed = self._options.first.speed
+        speed = self._wish.speed
         try:
             while not simulation.quitting:
                 simulation.run(speed=speed, on_progress=self._look)

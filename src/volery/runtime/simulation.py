@@ -42,6 +42,7 @@ from volery.runtime.relocation import Relocator
 from volery.runtime.run_loop import RunLoop
 from volery.runtime.sensor_fitting import lidar_mounts
 from volery.runtime.services import Services, open_services
+from volery.runtime.services.worlds import OnLoad
 from volery.runtime.snapshot import Snapshot
 from volery.runtime.spawning import Spawner
 from volery.runtime.telling import LiveTopics
@@ -72,10 +73,10 @@ class Simulation:
 
     `threads` share the ray casting; results do not depend on their number. `recordings` is the
     folder in which clients of the graph may record, None: nowhere. `on_load` is called, in the
-    simulation's thread, with the name of a scenario that a client wants instead of this one, or
-    with None where it wants none; without `on_load` both are refused. `shelf` has the scenarios
-    that clients can name, None: those that ship. Use it as a context manager, or call `close` at
-    the end. Raises `ScenarioError` where the scenario cannot be built.
+    simulation's thread, with the scenario that a client wants instead of this one, or with None
+    where it wants none; without `on_load` both are refused. `shelf` has the scenarios that clients
+    can name, None: those that ship. Use it as a context manager, or call `close` at the end. Raises
+    `ScenarioError` where the scenario cannot be built.
     """
 
     def __init__(
@@ -84,7 +85,7 @@ class Simulation:
         *,
         threads: int = 2,
         recordings: Path | None = None,
-        on_load: Callable[[str | None], None] | None = None,
+        on_load: OnLoad | None = None,
         shelf: Shelf | None = None,
     ) -> None:
         if threads < 1:

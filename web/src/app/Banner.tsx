@@ -1,9 +1,8 @@
 import { Alert } from "@mantine/core";
-import { Unplug } from "lucide-react";
+import { CloudOff, Hourglass } from "lucide-react";
 import { useEffect, useState } from "react";
-import classes from "./Banner.module.css";
 import { nowMs } from "../lib/time.ts";
-import { useTrouble, type Trouble } from "../state/trouble.ts";
+import { useTrouble } from "../state/trouble.ts";
 
 const COUNT_MS = 500;
 
@@ -13,26 +12,25 @@ export function Banner() {
   if (trouble === null) return null;
   return (
     <Alert
-      className={classes.banner}
-      color={trouble.grave ? "red" : "yellow"}
+      className="banner"
+      color="yellow"
       variant="filled"
-      icon={<Unplug size={18} />}
-      title={trouble.what}
+      autoContrast
+      icon={trouble.linked ? <Hourglass size={18} /> : <CloudOff size={18} />}
       role="alert"
-      p="xs"
+      title={trouble.what}
     >
-      <Since trouble={trouble} />
+      <Since sinceMs={trouble.sinceMs} /> {trouble.does}
     </Alert>
   );
 }
 
-function Since({ trouble }: { trouble: Trouble }) {
+function Since({ sinceMs }: { sinceMs: number }) {
   const [now, setNow] = useState(nowMs);
   useEffect(() => {
     const timer = setInterval(() => setNow(nowMs()), COUNT_MS);
     return () => clearInterval(timer);
   }, []);
-  const seconds = Math.max(0, Math.floor((now - trouble.sinceMs) / 1000));
-  const clock = new Date(trouble.sinceMs).toLocaleTimeString();
-  return `Since ${clock} (${seconds} s). ${trouble.does}`;
+  const seconds = Math.max(0, Math.floor((now - sinceMs) / 1000));
+  return `Since ${new Date(sinceMs).toLocaleTimeString()}, ${seconds} s ago.`;
 }

@@ -1,27 +1,45 @@
-import { Canvas } from "@react-three/fiber";
-import { Views } from "../views/Views.tsx";
-import { Sky } from "./Sky.tsx";
-import { Uavs } from "./Uavs.tsx";
-import { World } from "./World.tsx";
+import { Canvas, useFrame, useThree } from "@react-three/fiber";
+import { useEffect, useRef } from "react";
+import { NeutralToneMapping, Object3D, PCFShadowMap, type PerspectiveCamera } from "three";
+import { DragHandle } from "./DragHandle.tsx";
+import { EyeProbe } from "./EyeProbe.tsx";
+import { GroundPicker } from "./GroundPicker.tsx";
+import { Stage } from "./stage/Stage.ts";
 
-/** Inside, coordinates are those of the map: ENU, metres. */
-export const ENU_ROTATION: [number, number, number] = [-Math.PI / 2, 0, 0];
+// Coordinates of the picture are those of the map: ENU, metres.
+Object3D.DEFAULT_UP.set(0, 0, 1);
 
 /** The picture: the world, what flies in it, and from where it is seen. */
 export function Scene() {
   return (
     <Canvas
-      shadows
-      dpr={[1, 2]}
-      camera={{ fov: 55, near: 0.05, far: 4000, position: [20, 14, 20] }}
-      gl={{ antialias: true, powerPreference: "high-performance" }}
+      shadows={{ type: PCFShadowMap }}
+      camera={{ fov: 55, near: 0.05, far: 6000, position: [-9, -5, 5] }}
+      gl={{ antialias: true, powerPreference: "high-performance", toneMapping: NeutralToneMapping }}
+      tabIndex={0}
+      aria-label="Scene"
     >
-      <Sky />
-      <World />
-      <group rotation={ENU_ROTATION}>
-        <Uavs />
-      </group>
-      <Views />
+      <Pictures />
+      <DragHandle />
+      <EyeProbe />
+      <GroundPicker />
     </Canvas>
   );
+}
+
+/** Runs the stage; it draws by itself, once a frame. */
+function Pictures() {
+  const { scene, camera, gl, setDpr } = useThree();
+  const stage = useRef<Stage | null>(null);
+  useEffect(() => {
+    const made = new Stage(scene, camera as PerspectiveCamera, gl, setDpr);
+    stage.current = made;
+    return () => {
+      stage.current = null;
+      made.dispose();
+    };
+  }, [scene, camera, gl, setDpr]);
+  // A priority above 0 leaves the drawing to us.
+  useFrame(({ size }) => stage.current?.frame(size.width, size.height), 1);
+  return null;
 }

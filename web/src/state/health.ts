@@ -21,8 +21,6 @@ export interface Health {
   dropped: number;
   /** Memory of the page's script, bytes; NaN: the browser does not tell. */
   heapBytes: number;
-  /** Since when (wall time, ms) nothing comes though it should; 0: all is well. */
-  silentSinceMs: number;
 }
 
 const NOTHING: Health = {
@@ -34,16 +32,12 @@ const NOTHING: Health = {
   messagesPerS: 0,
   dropped: 0,
   heapBytes: NaN,
-  silentSinceMs: 0,
 };
 
 export const useHealth = create<Health>(() => NOTHING);
 
 const TELL_MS = 500;
-const WATCH_MS = 100;
 const ASK_MS = 2000;
-/** A simulation tells its status five times a second, also while it is paused. */
-export const SILENT_MS = 1000;
 const PLAYING = 1;
 /** A few seconds at 60 frames a second. */
 const FRAMES = 240;
@@ -53,19 +47,16 @@ const offset = new ClockOffset();
 const ages: number[] = [];
 const intervals: number[] = [];
 let frameMs = NaN;
-let openedMs = 0;
 let droppedBefore = NaN;
 
 export function followHealth(): void {
   useConnection.subscribe(({ state }, before) => {
     if (state === before.state) return;
-    openedMs = nowMs();
     offset.clear();
     ages.length = 0;
   });
   requestAnimationFrame(frame);
   setInterval(() => void askTime(), ASK_MS);
-  setInterval(watchSilence, WATCH_MS);
   setInterval(tell, TELL_MS);
 }
 
@@ -110,15 +101,6 @@ async function askTime(): Promise<void> {
   } catch {
     // asked again soon
   }
-}
-
-function watchSilence(): void {
-  const { status } = useSimulation.getState();
-  const heardMs = Math.max(link.heardMs, openedMs);
-  const silent =
-    link.state === "open" && status !== null && nowMs() - heardMs > SILENT_MS && link.heardMs > 0;
-  const since = silent ? heardMs : 0;
-  if (since !== useHealth.getState().silentSinceMs) useHealth.setState({ silentSinceMs: since });
 }
 
 function tell(): void {

@@ -6,22 +6,18 @@ const { entryOfEvent } = await import("./journal.ts");
 
 describe("trouble", () => {
   it("is nothing while all is well", () => {
-    expect(troubleOf("open", "", 0, undefined)).toBeNull();
+    expect(troubleOf("open", "", "the simulation", false)).toBeNull();
   });
 
   it("tells a lost link, and why", () => {
-    const told = troubleOf("lost", "the world changes", 0, undefined);
-    expect(told?.what).toContain("lost: the world changes");
-    expect(told?.grave).toBe(true);
+    const told = troubleOf("lost", "the world changes", "the simulation", false);
+    expect(told?.what).toBe("No connection to the simulation: the world changes");
+    expect(told?.linked).toBe(false);
   });
 
-  it("is not grave while a world is built", () => {
-    expect(troubleOf("lost", "", 0, "building")?.grave).toBe(false);
-  });
-
-  it("tells silence of a link that stands, and a refusal", () => {
-    expect(troubleOf("open", "", 12, undefined)?.what).toContain("silent");
-    expect(troubleOf("refused", "no token", 0, undefined)?.what).toContain("no token");
+  it("tells silence of a link that stands", () => {
+    const told = troubleOf("open", "", "ws://robot:9090", true);
+    expect(told).toMatchObject({ what: "Nothing comes from ws://robot:9090", linked: true });
   });
 });
 

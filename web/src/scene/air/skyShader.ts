@@ -1,0 +1,72 @@
+export const SKY_VERTEX = /* glsl */ `
+varying vec3 vWay;
+void main() {
+  vWay = position;
+  vec4 place = projectionMatrix * vec4(mat3(viewMatrix) * position, 1.0);
+  gl_Position = place.xyww; // as far away as anything
+}
+`;
+
+export const SKY_FRAGMENT = /* glsl */ `
+varying vec3 vWay;
+uniform vec3 zenith, horizon, towardsSun, sun;
+uniform float extinction, night, overcast, drift;
+
+float hash(vec3 p) {
+  p = fract(p * 0.3183099 + 0.1);
+  p *= 17.0;
+  return fract(p.x * p.y * p.z * (p.x + p.y + p.z));
+}
+
+float noise(vec2 p) {
+  vec2 cell = floor(p), f = fract(p);
+  f = f * f * (3.0 - 2.0 * f);
+  float a = hash(vec3(cell, 0.0)), b = hash(vec3(cell + vec2(1, 0), 0.0));
+  float c = hash(vec3(cell + vec2(0, 1), 0.0)), d = hash(vec3(cell + vec2(1, 1), 0.0));
+  return mix(mix(a, b, f.x), mix(c, d, f.x), f.y);
+}
+
+float cloud(vec2 p) {
+  float sum = 0.0, part = 0.5;
+  for (int i = 0; i < 4; i++) {
+    sum += part * noise(p);
+    p = p * 2.03 + 17.7;
+    part *= 0.5;
+  }
+  return sum;
+}
+
+/** A star in some of the cells of a fine lattice on the sphere. */
+float stars(vec3 way) {
+  vec3 p = way * 170.0;
+  vec3 cell = floor(p);
+  float bright = step(0.9965, hash(cell));
+  return bright * smoothstep(0.45, 0.0, length(fract(p) - 0.5)) * (0.4 + hash(cell + 3.0));
+}
+
+void main() {
+  vec3 way = normalize(vWay);
+  float up = max(way.z, 0.0);
+  vec3 light = mix(horizon, zenith, 1.0 - pow(1.0 - up, 3.2));
+  float towards = max(dot(way, towardsSun), 0.0);
+  float clear = 1.0 - overcast;
+  // glow around the sun, wide and narrow, and its disc
+  light += sun * clear * (0.05 * pow(towards, 6.0) + 0.14 * pow(towards, 60.0));
+  light += sun * clear * 12.0 * smoothstep(0.99985, 0.99995, towards);
+  light += vec3(0.9, 0.95, 1.0) * stars(way) * night * clear * smoothstep(0.02, 0.25, way.z);
+#ifdef CLOUDS
+  if (way.z > 0.02) {
+    vec2 over = way.xy / (way.z + 0.12) * 1.6 + drift;
+    float amount = smoothstep(0.56 - 0.3 * overcast, 0.86 - 0.2 * overcast, cloud(over));
+    vec3 lit = mix(horizon, vec3(1.0), 0.35) * (1.0 - 0.97 * night) + sun * 0.12 * clear;
+    light = mix(light, lit, 0.75 * amount * smoothstep(0.02, 0.22, way.z));
+  }
+#endif
+  // The way through a layer of haze 400 m deep; below the horizon it never ends.
+  float through = way.z > 0.0 ? extinction * 400.0 / max(way.z, 0.02) : 1e3;
+  light = mix(horizon, light, exp(-min(through, 60.0)));
+  gl_FragColor = vec4(light, 1.0);
+  #include <tonemapping_fragment>
+  #include <colorspace_fragment>
+}
+`;

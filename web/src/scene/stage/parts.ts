@@ -1,0 +1,54 @@
+import type { PerspectiveCamera, Scene, WebGLRenderer } from "three";
+import { CameraMan } from "../../views/CameraMan.ts";
+import type { Air } from "../air/air.ts";
+import { Falling } from "../air/Falling.ts";
+import { Sky } from "../air/Sky.ts";
+import { Sun } from "../air/Sun.ts";
+import { Airframes } from "../uavs/Airframes.ts";
+import { Labels } from "../uavs/Labels.ts";
+import { Lamps } from "../uavs/Lamps.ts";
+import { Marks } from "../uavs/Marks.ts";
+import { Paths } from "../uavs/Paths.ts";
+import { Smoke } from "../uavs/Smoke.ts";
+import { Trails } from "../uavs/Trails.ts";
+import { standing } from "../world/standing.ts";
+import { World } from "../world/World.ts";
+import type { Part } from "./part.ts";
+import { LEVELS } from "./quality.ts";
+
+export interface Parts {
+  /** In the order in which a frame brings them up to date: the camera first. */
+  all: readonly (readonly [name: string, part: Part])[];
+  world: World;
+  sun: Sun;
+}
+
+/** Everything in the picture. A new part: a class below `scene/`, and a line here. */
+export function makeParts(
+  scene: Scene,
+  camera: PerspectiveCamera,
+  renderer: WebGLRenderer,
+  air: Air,
+): Parts {
+  const most = LEVELS.at(-1)!.particles;
+  const fixedUrl = new URLSearchParams(location.search).get("world");
+  const world = new World(air, renderer, fixedUrl);
+  const sun = new Sun(air, (x, y) => standing.ground.heightAt(x, y));
+  const all: Parts["all"] = [
+    ["view", new CameraMan(camera, renderer.domElement)],
+    ["world", world],
+    ["uavs", new Airframes()],
+    ["lamps", new Lamps(air)],
+    ["smoke", new Smoke(air)],
+    ["marks", new Marks()],
+    ["trails", new Trails()],
+    ["paths", new Paths()],
+    ["sky", new Sky(air)],
+    ["rain", new Falling("rain", air, most)],
+    ["snow", new Falling("snow", air, most)],
+    ["sun", sun],
+    ["labels", new Labels()],
+  ];
+  for (const [, { object }] of all) scene.add(object);
+  return { all, world, sun };
+}

@@ -1,0 +1,69 @@
+import { Vector3, type PerspectiveCamera } from "three";
+import { POSE } from "../../link/protocol.ts";
+import { fleet } from "../uavs/fleet.ts";
+import { standing } from "../world/standing.ts";
+import { shown } from "./shown.ts";
+
+/** A click so close to a UAV's middle means it, CSS pixels; a large one has more. */
+const CLOSE_PX = 16;
+const BODY_M = 0.35;
+
+const point = new Vector3();
+
+/** Name of the UAV at a place of the picture; empty: none. */
+export function pickUav(
+  x: number,
+  y: number,
+  camera: PerspectiveCamera,
+  { width, height }: { width: number; height: number },
+): string {
+  const scale = height / (2 * Math.tan((camera.fov * Math.PI) / 360));
+  let best = Infinity;
+  let name = "";
+  for (const uav of fleet.uavs) {
+    const at = uav.row * POSE;
+    if (at < 0) continue;
+    point.fromArray(shown.poses, at);
+    const away = point.distanceTo(camera.position);
+    point.project(camera);
+    if (!(Math.abs(point.z) < 1)) continue;
+    const px = Math.hypot((0.5 + 0.5 * point.x) * width - x, (0.5 - 0.5 * point.y) * height - y);
+    const reach = Math.max(CLOSE_PX, (BODY_M * scale) / away);
+    if (px > reach || px + 0.05 * away > best) continue;
+    best = px + 0.05 * away;
+    name = uav.name;
+  }
+  return name;
+}
+
+const way = new Vector3();
+
+/** Where the ground is at a place of the picture, map; null where the sky is. */
+export function pickGround(
+  x: number,
+  y: number,
+  camera: PerspectiveCamera,
+  { width, height }: { width: number; height: number },
+): [number, number, number] | null {
+  way.set((2 * x) / width - 1, 1 - (2 * y) / height, 0.5).unproject(camera);
+  way.sub(camera.position).normalize();
+  const { ground } = standing;
+  const heightAbove = (d: number) => {
+    point.copy(camera.position).addScaledVector(way, d);
+    return point.z - ground.heightAt(point.x, point.y);
+  };
+  let near = 0;
+  for (let far = 0.5; far < 4000; far *= 1.02) {
+    if (heightAbove(far) > 0) {
+      near = far;
+      continue;
+    }
+    for (let i = 0; i < 24; i++) {
+      const middle = 0.5 * (near + far);
+      if (heightAbove(middle) > 0) near = middle;
+      else far = middle;
+    }
+    return [point.x, point.y, ground.heightAt(point.x, point.y)];
+  }
+  return null;
+}

@@ -1,0 +1,113 @@
+import {
+  BufferAttribute,
+  InstancedBufferAttribute,
+  InstancedBufferGeometry,
+  Mesh,
+  ShaderMaterial,
+  UniformsLib,
+  UniformsUtils,
+  Vector2,
+  Vector3,
+} from "three";
+import { POSE } from "../../link/protocol.ts";
+import type { Air } from "../air/air.ts";
+import { FADE } from "../air/fog.ts";
+import type { Moment, Part } from "../stage/part.ts";
+import { shown } from "../stage/shown.ts";
+import { fleet } from "./fleet.ts";
+
+const PUFFS = 14;
+const MOST_WRECKS = 32;
+const RISE_S = 4;
+
+/** Smoke over UAVs that have crashed. */
+export class Smoke implements Part {
+  readonly object: Mesh<InstancedBufferGeometry, ShaderMaterial>;
+
+  constructor(private readonly air: Air) {
+    const geometry = new InstancedBufferGeometry();
+    const corners = new Float32Array([-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0]);
+    geometry.setAttribute("position", new BufferAttribute(corners, 3));
+    geometry.setIndex([0, 1, 2, 0, 2, 3]);
+    const count = PUFFS * MOST_WRECKS;
+    geometry.setAttribute("place", new InstancedBufferAttribute(new Float32Array(3 * count), 3));
+    const phases = Float32Array.from({ length: count }, (_, i) => (i % PUFFS) / PUFFS);
+    geometry.setAttribute("phase", new InstancedBufferAttribute(phases, 1));
+    const own = {
+      timeS: { value: 0 },
+      wind: { value: new Vector2() },
+      light: { value: new Vector3() },
+    };
+    const material = new ShaderMaterial({
+      vertexShader: VERTEX,
+      fragmentShader: FRAGMENT,
+      uniforms: UniformsUtils.merge([UniformsLib.fog, own]),
+      transparent: true,
+      depthWrite: false,
+      fog: true,
+    });
+    this.object = new Mesh(geometry, material);
+    this.object.frustumCulled = false;
+    this.object.renderOrder = 1450;
+  }
+
+  update({ nowMs }: Moment): void {
+    const place = this.object.geometry.getAttribute("place") as InstancedBufferAttribute;
+    let wrecks = 0;
+    for (const { crashed, row } of fleet.uavs) {
+      const at = row * POSE;
+      if (!crashed || at < 0 || wrecks >= MOST_WRECKS) continue;
+      const [x, y, z] = [shown.poses[at]!, shown.poses[at + 1]!, shown.poses[at + 2]!];
+      for (let k = wrecks * PUFFS; k < (wrecks + 1) * PUFFS; k++) place.setXYZ(k, x, y, z);
+      wrecks++;
+    }
+    this.object.visible = wrecks > 0;
+    if (wrecks === 0) return;
+    this.object.geometry.instanceCount = wrecks * PUFFS;
+    place.needsUpdate = true;
+    const { timeS, wind, light } = this.object.material.uniforms;
+    timeS!.value = (nowMs / 1000) % 3600;
+    wind!.value.set(this.air.weather.wind[0], this.air.weather.wind[1]);
+    light!.value.set(...this.air.light.above).multiplyScalar(0.14);
+  }
+
+  dispose(): void {
+    this.object.geometry.dispose();
+    this.object.material.dispose();
+  }
+}
+
+const VERTEX = /* glsl */ `
+#include <fog_pars_vertex>
+attribute vec3 place;
+attribute float phase;
+uniform float timeS;
+uniform vec2 wind;
+varying vec2 vOn;
+varying float vAge;
+void main() {
+  float age = fract(timeS / ${RISE_S.toFixed(1)} + phase);
+  float wobble = 12.0 * phase + timeS;
+  vec3 p = place + vec3(wind * age * 1.2, 1.9 * age) + 0.12 * vec3(sin(wobble), cos(1.3 * wobble), 0.0) * age;
+  vec4 mvPosition = viewMatrix * vec4(p, 1.0);
+  mvPosition.xy += position.xy * (0.1 + 0.45 * age);
+  vOn = position.xy;
+  vAge = age;
+  gl_Position = projectionMatrix * mvPosition;
+  #include <fog_vertex>
+}
+`;
+
+const FRAGMENT = /* glsl */ `
+#include <fog_pars_fragment>
+uniform vec3 light;
+varying vec2 vOn;
+varying float vAge;
+void main() {
+  float soft = 1.0 - smoothstep(0.2, 1.0, length(vOn));
+  gl_FragColor = vec4(light * (0.4 + vAge), soft * 0.55 * (1.0 - vAge));
+  ${FADE}
+  #include <tonemapping_fragment>
+  #include <colorspace_fragment>
+}
+`;

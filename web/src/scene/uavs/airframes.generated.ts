@@ -1,0 +1,84 @@
+// Written by `python -m volery.vehicle.typescript` from the airframes' data files.
+// A test of the project fails when this file is older than they are.
+
+/** Body axes: x forward, y left, z up; metres. */
+export interface AirframeShape {
+  title: string;
+  /** Sides of the box between the rotors. */
+  size: readonly [number, number, number];
+  rotorRadius: number;
+  /** x, y, z, axis x, y, z, and 1 for counter-clockwise seen from above, else -1. */
+  rotors: readonly (readonly number[])[];
+  feet: readonly (readonly number[])[];
+}
+
+export const AIRFRAMES: Readonly<Record<string, AirframeShape>> = {
+  crazyflie: {
+    title: "Bitcraze Crazyflie 2.x",
+    size: [0.05, 0.05, 0.025],
+    rotorRadius: 0.0231348,
+    rotors: [
+      [0.028, -0.028, 0, 0, 0, 1, 1],
+      [-0.028, -0.028, 0, 0, 0, 1, -1],
+      [-0.028, 0.028, 0, 0, 0, 1, 1],
+      [0.028, 0.028, 0, 0, 0, 1, -1],
+    ],
+    feet: [
+      [0.028, 0.028, -0.02],
+      [-0.028, 0.028, -0.02],
+      [-0.028, -0.028, -0.02],
+      [0.028, -0.028, -0.02],
+    ],
+  },
+  f450: {
+    title: "DJI F450 (OpenUAV)",
+    size: [0.24, 0.24, 0.14],
+    rotorRadius: 0.12,
+    rotors: [
+      [0.159, -0.159, 0.11, 0, 0, 1, 1],
+      [-0.159, 0.159, 0.11, 0, 0, 1, 1],
+      [0.159, 0.159, 0.11, 0, 0, 1, -1],
+      [-0.159, -0.159, 0.11, 0, 0, 1, -1],
+    ],
+    feet: [
+      [0.13, 0.13, -0.12],
+      [-0.13, 0.13, -0.12],
+      [-0.13, -0.13, -0.12],
+      [0.13, -0.13, -0.12],
+    ],
+  },
+  hummingbird: {
+    title: "AscTec Hummingbird (RotorS)",
+    size: [0.1, 0.1, 0.12],
+    rotorRadius: 0.1,
+    rotors: [
+      [0.17, 0, 0.01, 0, 0, 1, -1],
+      [0, 0.17, 0.01, 0, 0, 1, 1],
+      [-0.17, 0, 0.01, 0, 0, 1, -1],
+      [0, -0.17, 0.01, 0, 0, 1, 1],
+    ],
+    feet: [
+      [0.1, 0.1, -0.07],
+      [-0.1, 0.1, -0.07],
+      [-0.1, -0.1, -0.07],
+      [0.1, -0.1, -0.07],
+    ],
+  },
+  iris: {
+    title: "3DR Iris (PX4)",
+    size: [0.24, 0.16, 0.11],
+    rotorRadius: 0.128,
+    rotors: [
+      [0.13, -0.22, 0.023, 0, 0, 1, 1],
+      [-0.13, 0.2, 0.023, 0, 0, 1, 1],
+      [0.13, 0.22, 0.023, 0, 0, 1, -1],
+      [-0.13, -0.2, 0.023, 0, 0, 1, -1],
+    ],
+    feet: [
+      [0.12, 0.18, -0.1],
+      [-0.12, 0.16, -0.1],
+      [-0.12, -0.16, -0.1],
+      [0.12, -0.18, -0.1],
+    ],
+  },
+};

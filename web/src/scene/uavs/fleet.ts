@@ -1,0 +1,78 @@
+import { link } from "../../link/link.ts";
+import { baseFrame, useVehicles } from "../../state/vehicles.ts";
+import { colourOf } from "./colours.ts";
+
+export interface ShownUav {
+  name: string;
+  /** Row of its pose in `shown.poses`; -1: not told yet. */
+  row: number;
+  airframe: string;
+  mode: string;
+  crashed: boolean;
+  airborne: boolean;
+  /** Fraction of full, mean over the rotors. */
+  rotorSpeed: number;
+  colour: [number, number, number];
+}
+
+const BASE = /^(?:(.+)\/)?base_link$/;
+/** What a UAV is drawn as of which only the frame is known. */
+const UNKNOWN = "";
+
+/** The UAVs in the picture: those that the simulation tells of, else every `base_link`. */
+export class ShownFleet {
+  uavs: ShownUav[] = [];
+  /** Grows when another UAV, row or airframe is in the list. */
+  version = 0;
+
+  private framesVersion = -1;
+  private told: unknown = null;
+
+  /** Whether the list is newer than before. */
+  update(): void {
+    const { list } = useVehicles.getState();
+    const { version } = link.frames;
+    if (list === this.told && version === this.framesVersion) return;
+    this.told = list;
+    this.framesVersion = version;
+    const next = list.length > 0 ? fromVehicles() : fromFrames();
+    const alike =
+      next.length === this.uavs.length &&
+      next.every((uav, i) => {
+        const old = this.uavs[i]!;
+        return uav.name === old.name && uav.row === old.row && uav.airframe === old.airframe;
+      });
+    this.uavs = next;
+    if (!alike) this.version++;
+  }
+
+  named(name: string): ShownUav | undefined {
+    return this.uavs.find((uav) => uav.name === name);
+  }
+}
+
+function fromVehicles(): ShownUav[] {
+  return useVehicles.getState().list.map((vehicle, i) => ({
+    name: vehicle.name,
+    row: link.frames.row(baseFrame(vehicle.name)),
+    airframe: vehicle.airframe,
+    mode: vehicle.mode,
+    crashed: vehicle.crashed === true,
+    airborne: vehicle.airborne === true,
+    rotorSpeed: Number.isFinite(vehicle.rotor_speed) ? vehicle.rotor_speed : 0,
+    colour: colourOf(i),
+  }));
+}
+
+function fromFrames(): ShownUav[] {
+  return link.frames.names.flatMap((frame, row) => {
+    const found = BASE.exec(frame);
+    if (found === null) return [];
+    const name = found[1] ?? "robot";
+    const still = { mode: "", crashed: false, airborne: false, rotorSpeed: 0 };
+    return [{ name, row, airframe: UNKNOWN, ...still, colour: colourOf(row) }];
+  });
+}
+
+/** Those of the page's one picture. */
+export const fleet = new ShownFleet();

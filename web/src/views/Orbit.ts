@@ -1,0 +1,117 @@
+import { Vector3 } from "three";
+import type { CameraPose } from "../state/view.ts";
+import type { Input } from "./input.ts";
+import {
+  clamp,
+  easing,
+  FOV,
+  headingOf,
+  lookFromTo,
+  STEEPEST,
+  wayOf,
+  type Eye,
+  type Rig,
+  type Surroundings,
+} from "./rig.ts";
+
+const TURN = 0.0052;
+const DAMPING_S = 0.07;
+const NEAREST_M = 0.25;
+const FARTHEST_M = 3000;
+const ABOVE_GROUND_M = 0.25;
+
+/** Around a point: the selected UAV until one moves on. */
+export class Orbit implements Rig {
+  private readonly target = new Vector3();
+  private readonly shownTarget = new Vector3();
+  private yaw = 0.7;
+  private pitch = -0.35;
+  private distance = 12;
+  private shown = { yaw: 0.7, pitch: -0.35, distance: 12 };
+  private follows = true;
+  private placed = false;
+  private readonly way = new Vector3();
+
+  enter(eye: Eye, around: Surroundings, kept: CameraPose | null): void {
+    if (kept !== null) {
+      this.target.set(kept.x, kept.y, kept.z);
+      this.yaw = kept.yaw;
+      this.pitch = clamp(-STEEPEST, kept.pitch, STEEPEST);
+      this.distance = clamp(NEAREST_M, kept.distance, FARTHEST_M);
+      this.follows = kept.follows;
+      this.placed = true;
+      this.settle();
+      return;
+    }
+    if (this.placed && around.uav !== null) {
+      const { yaw } = headingOf(eye.quaternion);
+      this.yaw = yaw;
+    }
+    this.begin(around);
+  }
+
+  /** Around the selected UAV and those near it. */
+  private begin(around: Surroundings): void {
+    this.follows = true;
+    if (around.uav === null) {
+      this.target.set(0, 0, around.heightAt(0, 0) + 1);
+      return;
+    }
+    this.placed = true;
+    this.target.copy(around.uav.position);
+    this.pitch = -0.3;
+    this.distance = clamp(14 * around.uav.reach, 2.4 * around.spread, 90);
+    this.settle();
+  }
+
+  private settle(): void {
+    this.shownTarget.copy(this.target);
+    this.shown = { yaw: this.yaw, pitch: this.pitch, distance: this.distance };
+  }
+
+  focus(around: Surroundings): void {
+    if (around.uav === null) return;
+    this.follows = true;
+    this.distance = clamp(9 * around.uav.reach, this.distance, 16 * around.uav.reach);
+  }
+
+  update(input: Input, around: Surroundings, stepS: number, eye: Eye): void {
+    if (!this.placed && around.uav !== null) this.begin(around);
+    this.yaw -= TURN * input.turnX;
+    this.pitch = clamp(-STEEPEST, this.pitch - TURN * input.turnY, STEEPEST);
+    this.distance = clamp(NEAREST_M, this.distance * input.zoom, FARTHEST_M);
+    if (input.panX !== 0 || input.panY !== 0) this.pan(input, eye);
+    if (this.follows && around.uav !== null) this.target.copy(around.uav.position);
+    this.ease(stepS);
+    wayOf(this.shown.yaw, this.shown.pitch, this.way);
+    eye.position.copy(this.shownTarget).addScaledVector(this.way, -this.shown.distance);
+    const ground = around.heightAt(eye.position.x, eye.position.y) + ABOVE_GROUND_M;
+    eye.position.z = Math.max(eye.position.z, ground);
+    lookFromTo(eye.position, this.shownTarget, eye.quaternion);
+    eye.fov = FOV;
+  }
+
+  private ease(stepS: number): void {
+    const share = easing(stepS, DAMPING_S);
+    const { shown } = this;
+    shown.yaw += share * (this.yaw - shown.yaw);
+    shown.pitch += share * (this.pitch - shown.pitch);
+    shown.distance *= (this.distance / shown.distance) ** share;
+    // What is followed is as smooth as its messages; only leaps need easing.
+    const gap = this.shownTarget.distanceTo(this.target);
+    if (this.follows && gap < 0.02 * this.distance + 0.1) this.shownTarget.copy(this.target);
+    else this.shownTarget.lerp(this.target, share);
+  }
+
+  private pan({ panX, panY }: Input, { quaternion }: Eye): void {
+    this.follows = false;
+    const scale = 0.0011 * this.distance;
+    this.target.add(this.way.set(-panX * scale, panY * scale, 0).applyQuaternion(quaternion));
+  }
+
+  pose(): CameraPose {
+    const { x, y, z } = this.target;
+    const { yaw, pitch, distance, follows } = this;
+    return { x, y, z, yaw, pitch, distance, follows };
+  }
+}
