@@ -4,7 +4,7 @@ The level scan shows the surroundings at flight height 40 times a second, the no
 what is above and below. Returns become points in the odometry frame; the ground's slope is fitted
 to the lowest ones; points near the height of flight are remembered as obstacles; the heading goes
 through the gap that lies best towards the next waypoint, at a speed from which the UAV can stop
-before whatever ends the gap. Returns that nothing confirms are left out: they are rain, snow or fog.
+before whatever ends the gap. Returns that nothing confirms are left out: rain, snow, fog.
 Height above ground is held by the sonar and the slope ahead.
 """
 
