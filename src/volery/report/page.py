@@ -157,8 +157,8 @@ def _figures(flight: FlightData) -> list[str]:
     found.append(
         chart(
             charts.clearance_chart(flight),
-            "Distance from the UAV's middle to the nearest tree or solid, exact to the leaf; searched up "
-            f"to {flight.clearance_reach_m:g} m, where the line stays if there is none.",
+            "Distance from the UAV's middle to the nearest obstacle, exact to the leaf; searched "
+            f"up to {flight.clearance_reach_m:g} m, where the line stays if there is none.",
         )
     )
     found.append(chart(charts.speed_chart(flight), "Speed over the ground and upward together."))
