@@ -48,7 +48,7 @@ from volery.runtime.spawning import Spawner
 from volery.runtime.telling import LiveTopics
 from volery.runtime.telling.status import Told
 from volery.runtime.uav import Uav
-from volery.runtime.warm_up import compile_kernels
+from volery.runtime.warm_up import compiled_kernels
 from volery.runtime.weather_messages import WeatherTopics
 from volery.runtime.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.scenario.faults import Fault, parse_fault
@@ -90,12 +90,14 @@ class Simulation:
     ) -> None:
         if threads < 1:
             raise ScenarioError(f"threads must be at least 1 (found {threads})")
-        compile_kernels()
         self.scenario = scenario
-        self.terrain = build_terrain(scenario)
-        self.city = build_city(scenario, self.terrain)
-        self.forest = build_forest(scenario, self.terrain, self.city)
-        self.scene = build_scene(scenario, self.terrain, self.forest, self.city, threads=threads)
+        with compiled_kernels():
+            self.terrain = build_terrain(scenario)
+            self.city = build_city(scenario, self.terrain)
+            self.forest = build_forest(scenario, self.terrain, self.city)
+            self.scene = build_scene(
+                scenario, self.terrain, self.forest, self.city, threads=threads
+            )
         self._geometry: Geometry | None = None
         self._closed = False
         self._pacer = Pacer()
