@@ -117,6 +117,7 @@ class Flight:
         if self._log is None:
             return True
         try:
+            self._simulation.commands.end()
             self._log.close()
         except RecordingError as error:
             complain(str(error))

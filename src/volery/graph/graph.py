@@ -72,6 +72,11 @@ class Publisher:
         self._graph = graph
         self._topic = topic
         self.latched = latched
+        self.lasting = False
+        """Whether what it publishes is no part of kept states.
+
+        It comes although another state is restored before its delivery, and never twice.
+        """
         self.cancelled = False
         """Whether it publishes no more."""
 
@@ -94,6 +99,12 @@ class Publisher:
         """Queue a message for delivery; nothing after `cancel`."""
         if not self.cancelled:
             self._graph.enqueue(self, self._topic, message)
+
+    def check(self, message: Any) -> None:
+        """`GraphError` for a message that is not of the topic's type."""
+        name = getattr(message, "__msgtype__", None)
+        if name != self.msgtype:
+            raise GraphError(f"topic '{self.topic}' carries {self.msgtype}, not {name}")
 
     def publish_posted(self, message: Any) -> None:
         """Queue a message that was published before `cancel`, even if it gets here after that."""
@@ -275,9 +286,7 @@ class Graph:
 
     def enqueue(self, sender: Publisher, topic: _Topic, message: Any) -> None:
         """Queue a message; used by `Publisher`."""
-        name = getattr(message, "__msgtype__", None)
-        if name != topic.msgtype:
-            raise GraphError(f"topic '{topic.name}' carries {topic.msgtype}, not {name}")
+        sender.check(message)
         topic.messages += 1
         if sender.wanted:
             published = Published(topic.name, topic.msgtype, self._now_ns(), message)
@@ -302,11 +311,13 @@ class Graph:
         """What a snapshot keeps: undelivered and latched messages, how many each topic has seen."""
         with self._members:
             topics = {name: (t.messages, dict(t.kept)) for name, t in self._topics.items()}
-        return {"queue": list(self._queue), "topics": topics}
+        queue = [letter for letter in self._queue if not letter.sender.lasting]
+        return {"queue": queue, "topics": topics}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state; topics, subscribers and services stay as they are."""
-        self._queue = deque(state["queue"])
+        lasting = [letter for letter in self._queue if letter.sender.lasting]
+        self._queue = deque([*lasting, *state["queue"]])
         with self._members:
             for name, topic in self._topics.items():
                 messages, kept = state["topics"].get(name, (0, {}))
@@ -387,6 +398,10 @@ class Graph:
     def has_service(self, service: str) -> bool:
         """Whether the service is offered."""
         return service in self._services
+
+    def service_type(self, service: str) -> str:
+        """Type of a service. `GraphError` if nobody offers it."""
+        return self._service(service).srvtype
 
     def services(self) -> dict[str, str]:
         """Service names and their types."""

@@ -60,6 +60,6 @@ def open_services(
         settings = simulation.scenario.world.grid_map
         offer_grid_maps(graph, simulation.grid_world, settings, lambda: simulation.time_ns)
     KeptStates(simulation).offer()
-    recording = Recording(graph, recordings)
+    recording = Recording(graph, recordings, simulation.commands)
     recording.offer()
     return Services(recording)

@@ -1,0 +1,252 @@
+"""A flight that a client disturbs at arbitrary moments, then repeated from its log alone."""
+
+from __future__ import annotations
+
+import json
+import random
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from volery.bridges.doors import Doors
+from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.flights import read_flight
+from volery.bridges.rosbridge.client import RosbridgeClient
+from volery.bridges.rosbridge.server import RosbridgeServer
+from volery.core.errors import CommandError, GraphError
+from volery.graph.link import call_and_wait
+from volery.graph.messages import OccupancyGrid, Twist, Vector3
+from volery.graph.zero import zero_message
+from volery.runtime import Simulation
+from volery.runtime.origin import scenario_of
+from volery.scenario.load import parse_scenario
+
+SENSORS = [
+    {"kind": "lidar", "position_m": [0.0, 0.0, 0.18]},
+    {"kind": "imu"},
+    {"kind": "odometry"},
+    {"kind": "gnss"},
+    {"kind": "ground_truth"},
+]
+DATA = {
+    "name": "disturbed",
+    "seed": 11,
+    "duration_s": 12.0,
+    "world": {
+        "grid_map": {"block_height_m": 4.0},
+        "wind": {"velocity_m_s": [2.0, 0.0, 0.0], "turbulence": "light"},
+    },
+    "types": {
+        "f450": {
+            "sensors": SENSORS,
+            "nodes": [{"node": "repeated_nodes:Thinker", "latency_s": 0.013}],
+        }
+    },
+    "uavs": [
+        {"type": "f450", "count": 2, "position_m": [0.0, 0.0, 3.0], "last_position_m": [8, 0]}
+    ],
+}
+
+
+class Pilot:
+    """A client behind a real WebSocket."""
+
+    def __init__(self, port, name="pilot"):
+        self.client = RosbridgeClient(f"ws://127.0.0.1:{port}", name=name)
+        self.client.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
+        self.client.advertise("/map_in", "nav_msgs/msg/OccupancyGrid")
+
+    def call(self, service, srvtype="std_srvs/srv/Trigger", **fields):
+        request = zero_message(f"{srvtype}_Request")
+        for name, value in fields.items():
+            setattr(request, name, value)
+        return call_and_wait(self.client, service, request, 20.0)
+
+    def ours(self, service, kind, **fields):
+        return self.call(f"/volery/{service}", f"volery_interfaces/srv/{kind}", **fields)
+
+    def standard(self, service, **fields):
+        kind = "".join(word.capitalize() for word in service.split("_"))
+        return self.call(f"/{service}", f"simulation_interfaces/srv/{kind}", **fields)
+
+    def fly(self, x, y, z=0.0):
+        self.client.publish("/uav1/cmd_vel", Twist(Vector3(x, y, z), Vector3(0.0, 0.0, 0.1)))
+
+    def send_map(self, cells):
+        message = zero_message("nav_msgs/msg/OccupancyGrid")
+        message.header.frame_id = "map"
+        message.info.resolution = 0.7  # no float32
+        message.info.width = message.info.height = cells
+        message.info.origin.position.x = 20.0
+        message.info.origin.orientation.w = 1.0
+        message.data = np.resize(np.array([0, 0, 100], np.int8), cells * cells)
+        self.client.publish("/map_in", message)
+
+
+def resource(uri):
+    message = zero_message("simulation_interfaces/msg/Resource")
+    message.uri = uri
+    return message
+
+
+def pose_at(x, y, z, kind="geometry_msgs/msg/PoseStamped"):
+    message = zero_message(kind)
+    place = message.pose.position
+    place.x, place.y, place.z = x, y, z
+    message.pose.orientation.w = 1.0
+    return message
+
+
+def disturb(pilot, wait):
+    """Everything that a page can do, `wait()` in between."""
+    for k in range(10):
+        pilot.fly(0.3 + 0.1 * k, -0.2)
+        wait(0.3)
+    assert pilot.standard(
+        "spawn_entity",
+        name="scout",
+        entity_resource=resource("crazyflie"),
+        initial_pose=pose_at(3.0, 6.0, 0.0),
+    ).result.result == 1
+    pilot.call("/scout/take_off")
+    pilot.ours("set_weather", "SetWeather", wind=Vector3(3.3, 1.1, 0.0), only=["wind"])
+    wait(1.0)
+    pilot.ours("gust", "Gust", amplitude=Vector3(0.0, 2.7, 0.0), rise=0.31, duration=1.7)
+    pilot.call("/uav2/go_to", "volery_interfaces/srv/GoTo", position=zero_point(10.1, 2.2, 4.0))
+    wait(0.6)
+    pilot.ours("snapshot", "ByName", name="early")
+    pilot.send_map(3)
+    pilot.send_map(90)
+    fault = {"kind": "motor", "uav": "uav2", "rotor": 1, "thrust_factor": 0.93}
+    pilot.ours("inject_fault", "InjectFault", fault=json.dumps(fault))
+    assert not pilot.ours("inject_fault", "InjectFault", fault="nonsense").success
+    wait(0.7)
+    state = zero_message("simulation_interfaces/msg/EntityState")
+    state.pose = pose_at(-3.0, -4.0, 5.0).pose
+    pilot.standard("set_entity_state", entity="uav2", state=state, set_pose=True)
+    wait(0.5)
+    assert pilot.ours("restore", "ByName", name="early").success
+    pilot.fly(-0.7, 0.1)
+    wait(0.4)
+    assert pilot.standard("delete_entity", entity="scout").result.result == 1
+    wait(0.3)
+    paused = zero_message("simulation_interfaces/msg/SimulationState")
+    paused.state = 2
+    pilot.standard("set_simulation_state", state=paused)
+    pilot.fly(0.2, 0.2)
+    pilot.standard("step_simulation", steps=37)
+    pilot.call("/uav1/hold")
+    playing = zero_message("simulation_interfaces/msg/SimulationState")
+    playing.state = 1
+    pilot.standard("set_simulation_state", state=playing)
+    pilot.ours("set_speed", "SetSpeed", factor=0.0)
+    wait(0.3)
+    pilot.standard("reset_simulation")
+    wait(1.1)
+    pilot.fly(0.5, 0.5)
+    parameter = {"name": "/uav1/thinker:gain", "value": "0.35"}
+    answer = pilot.call("/rosapi/set_param", "rosapi_msgs/srv/SetParam", **parameter)
+    assert answer.successful
+    wait(0.6)
+
+
+def zero_point(x, y, z):
+    message = zero_message("geometry_msgs/msg/Point")
+    message.x, message.y, message.z = x, y, z
+    return message
+
+
+NODES = '''
+from volery.graph.messages import Float32, Imu, Twist
+from volery.graph.node import Node
+
+class Thinker(Node):
+    """Turns what it hears and measures into a number, after a while."""
+
+    def __init__(self, **options):
+        super().__init__("thinker", **options)
+        self.total = 0.0
+        self.gain = self.declare_parameter("gain", 0.1, read_only=False)
+        self.out = self.create_publisher(Float32, "thought", 5)
+        self.create_subscription(Twist, "cmd_vel", self.hear, 5)
+        self.create_timer(0.05, self.think)
+
+    def hear(self, twist):
+        self.total += self.gain.value * twist.linear.x
+        self.think()
+
+    def think(self):
+        self.total *= 0.999
+        self.out.publish(Float32(self.total))
+
+    def get_state(self):
+        return self.total
+
+    def set_state(self, state):
+        self.total = state
+'''
+
+
+@pytest.fixture(autouse=True)
+def nodes(tmp_path, monkeypatch):
+    (tmp_path / "repeated_nodes.py").write_text(NODES)
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+def recorded(path, speed, seed):
+    """Digest of a flight disturbed at moments that `seed` chooses."""
+    log = open_log(path)
+    with Simulation(parse_scenario(DATA), threads=1) as simulation:
+        simulation.enable_digest()
+        simulation.graph.subscribe_all(log.write)
+        server = RosbridgeServer("127.0.0.1", 0)
+        with Doors(simulation.gateway) as doors:
+            doors.open(server)
+            simulation.be_prompt()
+            pilot = Pilot(server.port)
+            chance = random.Random(seed)
+            errors = []
+
+            def wait(seconds):
+                until = simulation.time_s + seconds * chance.random()
+                late = time.monotonic() + 20.0
+                while until - seconds < simulation.time_s < until and time.monotonic() < late:
+                    time.sleep(0.0003 * chance.random())
+
+            def work():
+                try:
+                    disturb(pilot, wait)
+                    chance_to_end.set()
+                except BaseException as error:
+                    errors.append(error)
+                simulation.quit()
+
+            chance_to_end = threading.Event()
+            thread = threading.Thread(target=work)
+            thread.start()
+            simulation.run(speed=speed)
+            thread.join()
+            pilot.client.close()
+        assert not errors, errors
+        assert chance_to_end.is_set()
+        simulation.commands.end()
+        log.close()
+        return simulation.digest()
+
+
+def repeated(path, **options):
+    flight = read_flight(path)
+    with Simulation(scenario_of(flight.origin), threads=1) as simulation:
+        simulation.enable_digest()
+        simulation.repeat(flight)
+        simulation.run(**options)
+        return simulation.digest()
+
+
+@pytest.mark.parametrize(("speed", "seed"), [(1.0, 1), (2.0, 2)])
+def test_a_disturbed_flight_is_repeated_to_the_byte(tmp_path, speed, seed):
+    path = tmp_path / "flight.mcap"
+    digest = recorded(path, speed, seed)
+    assert repeated(path) == digest
