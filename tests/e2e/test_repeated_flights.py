@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import json
 import random
+import re
+import subprocess
+import sys
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,13 +17,17 @@ import pytest
 from volery.bridges.doors import Doors
 from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.flights import read_flight
+from volery.bridges.logs.records import LogWalk
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import CommandError, GraphError
+from volery.graph.command_records import content_bytes
 from volery.graph.link import call_and_wait
-from volery.graph.messages import OccupancyGrid, Twist, Vector3
+from volery.graph.messages import Twist, Vector3, message_type
+from volery.graph.reply import Reply
 from volery.graph.zero import zero_message
 from volery.runtime import Simulation
+from volery.runtime.command_kinds import Weight, weight_of
 from volery.runtime.origin import scenario_of
 from volery.scenario.load import parse_scenario
 
@@ -104,12 +112,15 @@ def disturb(pilot, wait):
     for k in range(10):
         pilot.fly(0.3 + 0.1 * k, -0.2)
         wait(0.3)
-    assert pilot.standard(
-        "spawn_entity",
-        name="scout",
-        entity_resource=resource("crazyflie"),
-        initial_pose=pose_at(3.0, 6.0, 0.0),
-    ).result.result == 1
+    assert (
+        pilot.standard(
+            "spawn_entity",
+            name="scout",
+            entity_resource=resource("crazyflie"),
+            initial_pose=pose_at(3.0, 6.0, 0.0),
+        ).result.result
+        == 1
+    )
     pilot.call("/scout/take_off")
     pilot.ours("set_weather", "SetWeather", wind=Vector3(3.3, 1.1, 0.0), only=["wind"])
     wait(1.0)
@@ -236,17 +247,155 @@ def recorded(path, speed, seed):
         return simulation.digest()
 
 
-def repeated(path, **options):
+def repeated(path, again=None, **options):
+    """Digest of the flight of a log flown again, and recorded into `again`."""
     flight = read_flight(path)
     with Simulation(scenario_of(flight.origin), threads=1) as simulation:
         simulation.enable_digest()
         simulation.repeat(flight)
+        log = None if again is None else open_log(again)
+        if log is not None:
+            simulation.graph.subscribe_all(log.write)
         simulation.run(**options)
+        if log is not None:
+            simulation.commands.end()
+            log.close()
         return simulation.digest()
 
 
-@pytest.mark.parametrize(("speed", "seed"), [(1.0, 1), (2.0, 2)])
+def flown(path):
+    """All that a log tells but for how the run was watched and steered."""
+    return [
+        (r.topic.topic, r.time_ns, r.data)
+        for r in LogWalk(path)
+        if not r.topic.topic.startswith("/volery/")
+    ]
+
+
+def changes(path):
+    """Moments and contents of the commands in a log that may change results."""
+    return [
+        (c.step, c.turn, c.taken.kind, c.taken.name, content_bytes(c.taken))
+        for c in read_flight(path).commands
+        if weight_of(c.taken) is Weight.CHANGES
+    ]
+
+
+@pytest.mark.parametrize(("speed", "seed"), [(1.0, 1), (2.5, 2)])
 def test_a_disturbed_flight_is_repeated_to_the_byte(tmp_path, speed, seed):
-    path = tmp_path / "flight.mcap"
+    path, again = tmp_path / "flight.mcap", tmp_path / "again.mcap"
     digest = recorded(path, speed, seed)
-    assert repeated(path) == digest
+    names = {command.taken.name for command in read_flight(path).commands}
+    assert names >= {"/spawn_entity", "/uav1/cmd_vel", "/map_in", "/volery/restore", "/uav1/hold"}
+    assert "/volery/set_speed" in names  # logged, though it is not repeated
+    assert repeated(path, again) == digest
+    assert flown(again) == flown(path)
+    assert changes(again) == changes(path)
+    assert len(changes(path)) > 25
+    if seed == 2:
+        assert repeated(again, speed=6.0) == digest
+
+
+def test_without_its_commands_the_flight_is_another_one(tmp_path):
+    path = tmp_path / "flight.mcap"
+    digest = recorded(path, 3.0, 3)
+    flight = read_flight(path)
+    with Simulation(scenario_of(flight.origin), threads=1) as simulation:
+        simulation.enable_digest()
+        less = [c for c in flight.commands if c.taken.name != "/reset_simulation"]
+        simulation.repeat(replace(flight, commands=tuple(less)))
+        with pytest.raises(CommandError, match="is not the recorded one"):
+            simulation.run()
+        assert simulation.digest() != digest
+
+
+def test_a_flight_of_the_command_line_is_repeated(tmp_path):
+    """Quit by a client; repeated by another process, without doors."""
+    path = tmp_path / "flight.mcap"
+    words = [sys.executable, "-m", "volery.cli", "run", "hover", "--digest"]
+    with subprocess.Popen(
+        [*words, "--uavs", "2", "--door", "rosbridge=0", "--record", path],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        for line in process.stderr:
+            if found := re.match(r"open .*127\.0\.0\.1:(\d+)", line):
+                break
+        pilot = Pilot(int(found[1]))
+        try:
+            pilot.call("/uav2/land")
+            for _ in range(20):
+                pilot.fly(0.5, 0.1)
+                time.sleep(0.03)
+            pilot.ours("set_weather", "SetWeather", wind=Vector3(4.0, 0.0, 0.0), only=["wind"])
+            time.sleep(0.5)
+            quit_it = zero_message("simulation_interfaces/msg/SimulationState")
+            quit_it.state = 3
+            pilot.standard("set_simulation_state", state=quit_it)
+        finally:
+            pilot.client.close()
+        out, _ = process.communicate(timeout=60)
+    digest = re.search(r"digest  (\w+)", out)[1]
+
+    def again(*more, scenario="hover"):
+        command = [*words[:4], scenario, "--digest", "--replay-commands", path, *more]
+        done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=120)
+        assert "Traceback" not in done.stderr
+        return done
+
+    assert f"digest  {digest}" in again().stdout
+    assert "of a flight of 'hover', not of 'longleaf'" in again(scenario="longleaf").stderr
+    assert "--seed" in again("--seed", "3").stderr
+    other = tmp_path / "none.mcap"
+    open_log(other).close()
+    assert "no scenario" in again("--replay-commands", other).stderr
+
+
+def test_a_recording_begun_late_holds_what_came_before(tmp_path):
+    with Simulation(parse_scenario(DATA), threads=1, recordings=tmp_path) as simulation:
+        session = simulation.gateway.open("pilot")
+        session.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
+        session.publish("/uav1/cmd_vel", Twist(Vector3(1.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)))
+        simulation.run(0.5)
+        request = message_type("volery_interfaces/srv/StartRecording_Request")("late.mcap")
+        answers = []
+        session.call("/volery/start_recording", request, Reply(answers.append, answers.append))
+        simulation.run(0.5)
+        stopping = Reply(answers.append, answers.append)
+        session.call("/volery/stop_recording", None, stopping)
+        simulation.run(0.1)
+        assert [answer.success for answer in answers] == [True, True]
+        place = simulation.uavs["uav1"].position_map
+    flight = read_flight(tmp_path / "late.mcap")
+    assert [c.taken.kind for c in flight.commands] == ["advertise", "publish", "call"]
+    with Simulation(scenario_of(flight.origin), threads=1) as simulation:
+        simulation.repeat(flight)
+        simulation.run()
+        assert simulation.time_s == pytest.approx(1.0, abs=0.02)  # the log knows no more
+        simulation.run(1.1 - simulation.time_s)
+        assert (simulation.uavs["uav1"].position_map == place).all()
+
+
+def test_nobody_changes_a_flight_that_is_repeated(tmp_path):
+    path = tmp_path / "flight.mcap"
+    log = open_log(path)
+    with Simulation(parse_scenario(DATA), threads=1) as simulation:
+        simulation.graph.subscribe_all(log.write)
+        simulation.run(0.3)
+        simulation.commands.end()
+    log.close()
+    flight = read_flight(path)
+    with Simulation(scenario_of(flight.origin), threads=1) as simulation:
+        simulation.repeat(flight)
+        session = simulation.gateway.open("visitor")
+        answers = []
+        for service in ("/uav1/land", "/get_entities"):
+            session.call(service, None, Reply(answers.append, answers.append))
+        simulation.run()
+        assert simulation.time_s == 0.3
+        assert isinstance(answers[0], GraphError)
+        assert "is repeated" in str(answers[0])
+        assert answers[1].entities == ["uav1", "uav2"]
+        with pytest.raises(CommandError, match="from its start"):
+            simulation.repeat(flight)

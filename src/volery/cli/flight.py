@@ -42,6 +42,7 @@ class RunOptions:
     recordings: Path | None = None
     allow_remote: bool = False
     token: str | None = None
+    replay_commands: Path | None = None
 
 
 class _StoppedError(Exception):

@@ -14,6 +14,7 @@ from volery.cli.flight import Flight, RunOptions
 from volery.cli.guard import INTERRUPTED
 from volery.cli.interrupt import Interrupts
 from volery.cli.progress import FlightProgress
+from volery.cli.repeating import recorded_flight, recorded_scenario
 from volery.cli.targets import check_record, check_report
 from volery.core.errors import CommandError, ScenarioError
 
@@ -65,7 +66,8 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts) -> tuple[int, _C
     """Exit code, and what a client wants instead."""
     from volery import Simulation
 
-    scenario = _scenario_of(options)
+    flight = recorded_flight(options)
+    scenario = _scenario_of(options) if flight is None else recorded_scenario(flight, options)
     if options.record is not None:
         check_record(options.record, overwrite=options.overwrite)
     if options.report is not None:
@@ -77,6 +79,8 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts) -> tuple[int, _C
             scenario, threads=threads, recordings=options.recordings, on_load=change.ask
         )
         change.quit = simulation.quit
+        if flight is not None:
+            simulation.repeat(flight)
         try:
             interrupts.be_gentle()
             with open_doors(simulation, options):
@@ -130,6 +134,8 @@ class _Change:
                 raise CommandError(f"this run writes a file of one flight ({flag})")
         if options.digest:
             raise CommandError("this run prints the digest of one flight (--digest)")
+        if options.replay_commands is not None:
+            raise CommandError("this run repeats one flight (--replay-commands)")
         if name is not None:
             _scenario_of(replace(options, scenario=name))
         self.asked, self.wanted = True, name

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import struct
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rosbags.rosbag1.reader import decompressors
 
 from volery.bridges.logs.chunks import Chunk, ChunkedLog, Content, Head, Span, Unindexed
@@ -32,17 +34,16 @@ class BagChunks(ChunkedLog):
         position = len(BAG_MAGIC)
         span: Span | None = None
         counts: dict[int, int] = {}
-        times: list[int] = []
+        stamps: list[NDArray[Any]] = []
         indexed = False
 
         def end_chunk() -> None:
             nonlocal span
             if span is not None:
-                ends = (min(times), max(times)) if times else (0, 0)
-                found.append(Chunk(span, *ends, dict(counts)) if times else Unindexed(span))
+                found.append(_indexed(span, dict(counts), stamps) if counts else Unindexed(span))
             span = None
             counts.clear()
-            times.clear()
+            stamps.clear()
 
         while position < self.size:
             record = self._record(position)
@@ -58,11 +59,10 @@ class BagChunks(ChunkedLog):
                 span = Span(position, after - position)
             elif kind == _INDEX and span is not None:
                 (channel,) = _LENGTH.unpack(fields[b"conn"])
-                stamps = np.frombuffer(self._read(body, after - body), "<u4").reshape(-1, 3)
-                if len(stamps):
-                    found_ns = stamps[:, 0].astype(np.int64) * NS_PER_S + stamps[:, 1]
-                    times += [int(found_ns.min()), int(found_ns.max())]
-                    counts[channel] = counts.get(channel, 0) + len(stamps)
+                data = self._read(body, after - body)
+                if data:
+                    stamps.append(np.frombuffer(data, "<u4").reshape(-1, 3))
+                    counts[channel] = counts.get(channel, 0) + len(stamps[-1])
             elif kind == _CONNECTION:
                 self._learn(fields, self._read(body, after - body))
             position = after
@@ -102,6 +102,13 @@ class BagChunks(ChunkedLog):
     def _learn(self, fields: dict[bytes, bytes], data: bytes) -> None:
         (channel,) = _LENGTH.unpack(fields[b"conn"])
         self.topics[channel] = LogTopic.of_bag(fields, bag_fields(data))
+
+
+def _indexed(span: Span, counts: dict[int, int], stamps: list[NDArray[Any]]) -> Chunk:
+    """A chunk by its index records: rows of seconds, nanoseconds, offset."""
+    found = np.concatenate(stamps).astype(np.int64)
+    found = found[np.argsort(found[:, 2])]
+    return Chunk.of_times(span, counts, found[:, 0] * NS_PER_S + found[:, 1])
 
 
 def _inner(data: bytes, position: int) -> tuple[dict[bytes, bytes], int, int]:

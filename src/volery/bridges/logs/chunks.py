@@ -15,6 +15,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from volery.bridges.logs.records import LogRecord, LogTopic
 
 _CHUNKS_KEPT = 8
@@ -36,6 +39,15 @@ class Chunk:
     start_ns: int
     end_ns: int
     counts: Mapping[int, int]
+    falls_ns: int
+    """By how much a message is at most earlier than one before it in the chunk."""
+
+    @classmethod
+    def of_times(cls, span: Span, counts: Mapping[int, int], times_ns: NDArray[np.int64]) -> Chunk:
+        """A chunk with messages at `times_ns` (N,), N > 0, in their order."""
+        falls = np.maximum.accumulate(times_ns) - times_ns
+        first, last = int(times_ns.min()), int(times_ns.max())
+        return cls(span, first, last, counts, int(falls.max()))
 
 
 class Head(NamedTuple):
@@ -138,9 +150,11 @@ class ChunkedLog(ABC):
         if isinstance(found, Chunk):
             return found
         heads = self._content(found.span).heads
-        times = [head.time_ns for head in heads]
+        if not heads:
+            return Chunk(found.span, 0, 0, {}, 0)
         counts = Counter(head.channel for head in heads)
-        return Chunk(found.span, min(times, default=0), max(times, default=0), counts)
+        times = np.array([head.time_ns for head in heads], np.int64)
+        return Chunk.of_times(found.span, counts, times)
 
     def _learn_channels(self) -> None:
         """Read the chunks that tell of channels which nothing outside of them does."""

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Mapping
+from typing import Any
 
 import lz4.frame
+import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
+from numpy.typing import NDArray
 
 from volery.bridges.logs.chunks import Chunk, ChunkedLog, Content, Head, Span, Unindexed
 from volery.bridges.logs.records import CUT_OFF, MCAP_MAGIC, PART_CHUNK, LogTopic, mcap_records
@@ -20,6 +24,7 @@ _MESSAGE = struct.Struct("<HIQ")
 """Channel, sequence, log time; the publish time follows."""
 _MESSAGE_BYTES = 22
 _INDEX = struct.Struct("<HL")
+_ENTRIES = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _LOOSE_BYTES = 1 << 20
 """Messages outside of chunks are taken together up to so many bytes."""
 
@@ -33,19 +38,18 @@ class McapChunks(ChunkedLog):
         self._schemas: dict[int, Schema] = {}
         found = self._found
         position = len(MCAP_MAGIC)
-        chunk: tuple[Span, int, int] | None = None
-        counts: dict[int, int] = {}
+        chunk: Span | None = None
+        entries: dict[int, NDArray[Any]] = {}
         loose: Span | None = None
 
         def end_chunk() -> None:
             nonlocal chunk, loose
             if chunk is not None:
-                span, start, end = chunk
-                found.append(Chunk(span, start, end, dict(counts)) if counts else Unindexed(span))
+                found.append(_indexed(chunk, entries) if entries else Unindexed(chunk))
             if loose is not None:
                 found.append(Unindexed(loose))
             chunk = loose = None
-            counts.clear()
+            entries.clear()
 
         while True:
             head = self._read(position, _HEAD.size)
@@ -62,9 +66,10 @@ class McapChunks(ChunkedLog):
                     self.trouble = CUT_OFF
                 break
             if opcode == Opcode.MESSAGE_INDEX and chunk is not None:
-                channel, size = _INDEX.unpack(self._read(body, _INDEX.size))
+                data = self._read(body, length)
+                channel, size = _INDEX.unpack_from(data)
                 if size:
-                    counts[channel] = counts.get(channel, 0) + size // 16
+                    entries[channel] = np.frombuffer(data[_INDEX.size :], _ENTRIES)
             elif opcode == Opcode.MESSAGE:
                 if loose is None or loose.length > _LOOSE_BYTES:
                     end_chunk()
@@ -72,8 +77,7 @@ class McapChunks(ChunkedLog):
                 loose = Span(loose.position, after - loose.position)
             elif opcode == Opcode.CHUNK:
                 end_chunk()
-                start, end, *_ = _CHUNK.unpack(self._read(body, _CHUNK.size))
-                chunk = (Span(position, after - position), start, end)
+                chunk = Span(position, after - position)
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 self._learn(opcode, self._read(body, length))
             position = after
@@ -102,6 +106,14 @@ class McapChunks(ChunkedLog):
             elif isinstance(record, Channel):
                 schema = self._schemas.get(record.schema_id)
                 self.topics[record.id] = LogTopic.of_mcap(record, schema)
+
+
+def _indexed(span: Span, entries: Mapping[int, NDArray[Any]]) -> Chunk:
+    """A chunk by its message indexes."""
+    counts = {channel: len(found) for channel, found in entries.items()}
+    found = np.concatenate(list(entries.values()))
+    times = found["time"][np.argsort(found["offset"])].astype(np.int64)
+    return Chunk.of_times(span, counts, times)
 
 
 def _unpacked(chunk: memoryview) -> bytes:
