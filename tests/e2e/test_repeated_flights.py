@@ -399,3 +399,110 @@ def test_nobody_changes_a_flight_that_is_repeated(tmp_path):
         assert answers[1].entities == ["uav1", "uav2"]
         with pytest.raises(CommandError, match="from its start"):
             simulation.repeat(flight)
+
+
+def finish(simulation, log):
+    """End a flight and its log; its digest."""
+    simulation.commands.end()
+    log.close()
+    return simulation.digest()
+
+
+def test_a_lock_step_partner_is_met_again(tmp_path):
+    """What it answered, meeting by meeting, and that it left."""
+    path = tmp_path / "flight.mcap"
+    log = open_log(path)
+    data = {**DATA, "duration_s": 1.0}
+    clock = "rosgraph_msgs/msg/Clock"
+    with Simulation(parse_scenario(data), threads=1) as simulation:
+        simulation.enable_digest()
+        simulation.graph.subscribe_all(log.write)
+        session = simulation.gateway.open("partner")
+        session.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
+        session.advertise("/volery/lock_step/pilot/done", clock)
+        come = threading.Event()
+        go = session.subscribe("/volery/lock_step/pilot/go", clock, depth=5, wake=come.set)
+        request = zero_message("volery_interfaces/srv/JoinLockStep_Request")
+        request.name, request.period_s, request.timeout_s = "pilot", 0.05, 20.0
+        joined = []
+        session.call("/volery/join_lock_step", request, Reply(joined.append, joined.append))
+        meetings = []
+
+        def steer():
+            while len(meetings) < 12:
+                come.wait(20.0)
+                come.clear()
+                for published in go.take():
+                    meetings.append(published.message)
+                    stamp = published.message.clock
+                    turn = Vector3(0.0, 0.0, 0.7 * random.random())
+                    session.publish("/uav1/cmd_vel", Twist(Vector3(0.5, 0.0, 0.0), turn))
+                    assert stamp.nanosec % 50_000_000 == 0
+                    session.publish("/volery/lock_step/pilot/done", published.message)
+            session.close()
+
+        thread = threading.Thread(target=steer)
+        thread.start()
+        simulation.run()
+        thread.join()
+        assert joined[0].success
+        digest = finish(simulation, log)
+    assert repeated(path) == digest
+
+
+ASKER = """
+from volery.graph.messages import Float32
+from volery.graph.node import Node
+
+class Asker(Node):
+    def __init__(self, **options):
+        super().__init__("asker", **options)
+        self.total = 0.0
+        self.ask = self.create_client("std_srvs/srv/Trigger", "/oracle")
+        self.out = self.create_publisher(Float32, "heard", 5)
+        self.create_timer(0.05, self.on_timer)
+
+    def on_timer(self):
+        if self.ask.service_is_ready():
+            self.ask.call_async().add_done_callback(self.hear)
+
+    def hear(self, answer):
+        number = -1.0 if answer.exception() else float(answer.result().message)
+        self.total = 0.5 * self.total + number
+        self.out.publish(Float32(self.total))
+"""
+
+
+def test_what_a_service_outside_answered_is_answered_again(tmp_path):
+    (tmp_path / "repeated_askers.py").write_text(ASKER)
+    path = tmp_path / "flight.mcap"
+    log = open_log(path)
+    kind = {"sensors": SENSORS[1:], "nodes": [{"node": "repeated_askers:Asker"}]}
+    data = {**DATA, "duration_s": 1.5, "types": {"f450": kind}}
+    response = message_type("std_srvs/srv/Trigger_Response")
+    with Simulation(parse_scenario(data), threads=1) as simulation:
+        simulation.enable_digest()
+        simulation.graph.subscribe_all(log.write)
+        session = simulation.gateway.open("oracle")
+        timers = []
+
+        def answer(_request, reply):
+            def tell():
+                if random.random() < 0.2:
+                    reply.fail(GraphError("no idea"))
+                reply.answer(response(success=True, message=str(random.random())))
+
+            timers.append(threading.Timer(0.1 * random.random(), tell))
+            timers[-1].start()
+
+        session.offer("/oracle", "std_srvs/srv/Trigger", answer)
+        simulation.run(1.2, speed=1.0)
+        session.close()  # open requests fail
+        simulation.run(0.3, speed=1.0)
+        for timer in timers:
+            timer.join()
+        digest = finish(simulation, log)
+    kinds = [command.taken.kind for command in read_flight(path).commands]
+    assert kinds.count("answer") > 10
+    assert {"offer", "withdraw", "failure"} <= set(kinds)
+    assert repeated(path) == digest

@@ -34,7 +34,7 @@ class Origin:
         """As it stands in a log."""
         folder = None if self.folder is None else str(self.folder)
         fields = {"name": self.name, "seed": self.seed, "version": self.version, "folder": folder}
-        return json.dumps({**fields, "content": self.content})
+        return json.dumps({**fields, "content": self.content}, default=str)  # of dates
 
     @classmethod
     def from_json(cls, text: str) -> Origin:
