@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
 
 from volery.graph.cdr import decode_cdr, encode_cdr
 from volery.graph.json_form import JsonForm
 from volery.graph.mailbox import array_bytes
-from volery.graph.messages import message_type, time_from_ns
+from volery.graph.messages import message_type, time_from_ns, typestore
 from volery.graph.session import Taken
 
 TOPIC = "/volery/log"
@@ -44,7 +45,9 @@ def content_type(kind: str, name: str) -> str:
 
 def is_large(taken: Taken) -> bool:
     """Whether a command is a published message that rather follows its record."""
-    return taken.kind == "publish" and array_bytes(taken.content) > _INLINE_BYTES
+    if taken.kind != "publish" or not _grows(taken.type):
+        return False
+    return array_bytes(taken.content) > _INLINE_BYTES
 
 
 def content_bytes(taken: Taken) -> bytes:
@@ -96,6 +99,18 @@ def _for_people(taken: Taken) -> str:
     if len(text) > _MOST_CHARACTERS:
         text = json.dumps({"shortened": text[:_MOST_CHARACTERS]}, ensure_ascii=False)
     return text
+
+
+@cache
+def _grows(msgtype: str) -> bool:
+    """Whether messages of a type have no fixed size: whether it holds a sequence or a text."""
+    for _, (kind, detail) in typestore().fielddefs[msgtype][1]:
+        if kind == Nodetype.SEQUENCE or (kind == Nodetype.BASE and detail[0] == "string"):
+            return True
+        inner, name = detail[0] if kind == Nodetype.ARRAY else (kind, detail)
+        if inner == Nodetype.NAME and _grows(name):
+            return True
+    return False
 
 
 @cache

@@ -56,9 +56,9 @@ class CommandLog:
         if self.repeats and weight is Weight.CHANGES:
             raise GraphError("a recorded flight is repeated; nothing else may change it")
         if weight is not Weight.ASKS:
-            self.note(taken)
+            self.note(taken, weight)
 
-    def note(self, taken: Taken) -> None:
+    def note(self, taken: Taken, weight: Weight) -> None:
         """Tell of a command that is about to take effect."""
         cdr = None if records.is_large(taken) else records.content_bytes(taken)
         moment = self._engine.moment
@@ -67,14 +67,14 @@ class CommandLog:
         if self._publisher.wanted:
             self._publisher.publish(_message(kept))
         self._keep(kept)
-        if weight_of(taken) is Weight.CHANGES:
+        if weight is Weight.CHANGES:
             self._engine.count_command()
 
     def end(self) -> None:
         """Tell that the flight is over; a second time nothing happens."""
         if not self._ended:
             self._ended = True
-            self.note(Taken("", "end", "", ""))
+            self.note(Taken("", "end", "", ""), Weight.PACES)
             self._graph.deliver()
 
     def earlier(self) -> Iterator[Published]:

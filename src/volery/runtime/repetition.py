@@ -95,7 +95,7 @@ class Repetition:
             return
         if self._is_left_out(taken):
             return
-        self._log.note(taken)
+        self._log.note(taken, weight_of(taken))
         paused = self._pacer.paused
         # What broke in the hands of a service, or was refused, broke and was refused then too.
         with suppress(Exception):

@@ -9,6 +9,7 @@ import pytest
 
 from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.flights import Origin, read_flight
+from volery.bridges.logs.recording import Recorder
 from volery.core.errors import RecordingError
 from volery.graph.command_records import TOPIC, TYPE, content_of, record_of
 from volery.graph.messages import String, Twist, Vector3, message_type
@@ -137,6 +138,18 @@ def test_a_large_message_is_logged_once(tmp_path, flying):
     assert "10000 x int8" in record.content
     assert record.follows
     assert len(record.cdr) == 0
+
+
+def test_a_log_without_what_follows_is_refused(tmp_path, flying):
+    recorder = Recorder(flying.graph, open_log(tmp_path / "x.mcap"), topics=("/volery/**",))
+    recorder.start()
+    session = flying.gateway.open("mapper")
+    session.advertise("/large", "nav_msgs/msg/OccupancyGrid")
+    session.publish("/large", large_map())
+    flying.take_in()
+    recorder.stop()
+    with pytest.raises(RecordingError, match="lacks the messages of '/large'"):
+        read_flight(tmp_path / "x.mcap")
 
 
 def test_texts_and_lists_are_shortened_for_people():

@@ -105,6 +105,7 @@ def read_flight(path: Path) -> RecordedFlight:
 def _commands_of(log: ChunkedLog) -> tuple[Command, ...]:
     decoder = LogDecoder()
     commands: list[Command] = []
+    topics = {topic.topic for topic in log.topics.values()}
     waiting: Any = None
     """The record whose content is the next message."""
     for record in _records_of(log, command_records.TOPIC, following=True):
@@ -119,6 +120,11 @@ def _commands_of(log: ChunkedLog) -> tuple[Command, ...]:
             continue
         message = decoder.decode(record).message
         if message.follows:
+            if message.name not in topics:
+                raise RecordingError(
+                    f"{log.path}: lacks the messages of '{message.name}', which a command of the "
+                    "flight published; record all topics"
+                )
             waiting = message
         else:
             content = command_records.content_of(message.kind, message.type, message.cdr.tobytes())
