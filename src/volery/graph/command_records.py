@@ -104,7 +104,8 @@ def _for_people(taken: Taken) -> str:
 @cache
 def _grows(msgtype: str) -> bool:
     """Whether messages of a type have no fixed size: whether it holds a sequence or a text."""
-    for _, (kind, detail) in typestore().fielddefs[msgtype][1]:
+    fields: Any = typestore().fielddefs[msgtype][1]
+    for _, (kind, detail) in fields:
         if kind == Nodetype.SEQUENCE or (kind == Nodetype.BASE and detail[0] == "string"):
             return True
         inner, name = detail[0] if kind == Nodetype.ARRAY else (kind, detail)

@@ -53,7 +53,7 @@ from volery.runtime.telling.status import Told
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compiled_kernels
 from volery.runtime.weather_messages import WeatherTopics
-from volery.runtime.worlds import build_city, build_forest, build_scene, build_terrain
+from volery.runtime.worlds import build_world
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario, UavType
 from volery.scenario.shelf import Shelf
@@ -96,12 +96,7 @@ class Simulation:
             raise ScenarioError(f"threads must be at least 1 (found {threads})")
         self.scenario = scenario
         with compiled_kernels():
-            self.terrain = build_terrain(scenario)
-            self.city = build_city(scenario, self.terrain)
-            self.forest = build_forest(scenario, self.terrain, self.city)
-            self.scene = build_scene(
-                scenario, self.terrain, self.forest, self.city, threads=threads
-            )
+            self.terrain, self.city, self.forest, self.scene = build_world(scenario, threads)
         self._geometry: Geometry | None = None
         self._closed = False
         self._pacer = Pacer()
