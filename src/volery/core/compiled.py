@@ -144,12 +144,15 @@ def _ignore(*_arguments: Any, **_keywords: Any) -> None:
 
 
 def _decorate(function: F, **options: Any) -> F:
+    # What is not said numba takes from whichever kernel first asks for a part, and keeps it for all
+    # others: results would depend on the order in which a cache was filled.
+    said: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": False}
     # Nobody hands kernels to C code: entries for it would take a tenth of the time to compile.
-    choices: dict[str, Any] = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
+    choices = {**said, "nogil": True, "no_cfunc_wrapper": True, **options}
     saved = _CONFIG.CACHE_DIR
     _CONFIG.CACHE_DIR = str(cache_dir())
     try:
-        compiled: F = numba.njit(cache=True, **choices, **options)(function)
+        compiled: F = numba.njit(cache=True, **choices)(function)
     finally:
         _CONFIG.CACHE_DIR = saved
     return compiled
