@@ -20,6 +20,7 @@ from volery.core.errors import RecordingError, VoleryError
 if TYPE_CHECKING:
     from volery.bridges.logs.bag import Log
     from volery.report.collect import FlightCollector
+    from volery.scenario.changes import Changes
 
 _CONTACTS_SHOWN = 10
 
@@ -44,6 +45,8 @@ class RunOptions:
     token: str | None = None
     page: str | None = None
     """`HOST:PORT`, `PORT` or, for the usual place, nothing; None: no page."""
+    changes: Changes | None = None
+    """To the scenario, by the client that loaded it."""
 
 
 class _StoppedError(Exception):

@@ -18,6 +18,7 @@ from volery.cli.pages import Page, serving
 from volery.core.errors import VoleryError
 
 if TYPE_CHECKING:
+    from volery.scenario.changes import WorldRequest
     from volery.scenario.schema import Scenario
     from volery.scenario.shelf import Shelf
     from volery.server.settings import PageSettings
@@ -59,17 +60,25 @@ def serve(options: ServeOptions) -> None:
 class _Wish:
     """What is to be flown next: the first scenario, then what clients ask for."""
 
-    def __init__(self, scenario: Scenario, shelf: Shelf) -> None:
+    def __init__(self, scenario: Scenario, speed: float | None, shelf: Shelf) -> None:
         self._shelf = shelf
+        self.speed = speed
+        """Factor of real time to begin with; None: as fast as possible."""
         self.asked = True
         self.scenario: Scenario | None = scenario
         """None: no world at all."""
         self.quit: Callable[[], None] = _nothing
 
-    def ask(self, name: str | None) -> None:
-        """End the present flight for another one; `ScenarioError` where that cannot be read."""
-        scenario = None if name is None else self._shelf.load(name)
-        self.want(scenario)
+    def ask(self, request: WorldRequest | None) -> None:
+        """End the present flight for another one; `ScenarioError` where that cannot be."""
+        from volery.scenario import changes
+
+        if request is None:
+            self.want(None)
+        else:
+            self.want(changes.apply(self._shelf.load(request.name), request.changes))
+            speed = request.changes.speed
+            self.speed = self.speed if speed is None else speed or None
         self.quit()
 
     def want(self, scenario: Scenario | None) -> None:
@@ -92,7 +101,7 @@ class _Host:
         self._page = page
         self._interrupts = interrupts
         self._shelf = Shelf(options.page.uploads)
-        self._wish = _Wish(_first_scenario(options.first), self._shelf)
+        self._wish = _Wish(_first_scenario(options.first), options.first.speed, self._shelf)
         self._present: Scenario | None = None
         """What was built last."""
         self._trouble = ""
@@ -144,7 +153,7 @@ class _Host:
 
     def _stay(self, simulation: Any) -> None:
         """Fly; at the end hold still there, until a reset or something else is asked for."""
-        speed = self._options.first.speed
+        speed = self._wish.speed
         try:
             while not simulation.quitting:
                 simulation.run(speed=speed, on_progress=self._look)

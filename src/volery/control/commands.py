@@ -65,6 +65,12 @@ class FleetCommands:
         """Flight mode of UAV `i`."""
         return FlightMode(int(self._pilots["mode"][i]))
 
+    @property
+    def modes(self) -> NDArray[np.int64]:
+        """(N,) flight modes, as numbers."""
+        modes: NDArray[np.int64] = self._pilots["mode"].copy()
+        return modes
+
     def set_command_timeout(self, seconds: float, i: int | None = None) -> None:
         """Time without a velocity or trajectory setpoint after which UAV `i` (None: all) holds.
 

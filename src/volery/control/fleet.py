@@ -300,6 +300,8 @@ class Fleet(FleetCommands):
         self._bodies["contact_budget"][i] = 0.0
         self._bodies["separation_budget"][i] = 0.0
         self._begin_anew(i, in_air)
+        if in_air:
+            self._bodies["on_ground"][i] = False
 
     def push(self, i: int, velocity: ArrayLike, omega_body: ArrayLike) -> None:
         """Let UAV `i` move at (3,) m/s, map, and turn at (3,) rad/s, FLU, at once.

@@ -54,6 +54,8 @@ class _Topic:
         self.name = name
         self.msgtype = msgtype
         self.callbacks: list[Callback] = []
+        self.outside: list[Callback] = []  # those of them that other threads have attached
+        self.attached = 0  # how many did so far
         self.publishers = 0
         self.messages = 0
         self.latched = False
@@ -98,6 +100,25 @@ class Publisher:
     def publish_posted(self, message: Any) -> None:
         """Queue a message that was published before `cancel`, even if it gets here after that."""
         self._graph.enqueue(self, self._topic, message)
+
+    @property
+    def watched(self) -> bool:
+        """Whether a client outside receives the topic."""
+        return bool(self._topic.outside)
+
+    @property
+    def watchers_so_far(self) -> int:
+        """How many clients outside have begun to receive the topic: more means somebody is new."""
+        return self._topic.attached
+
+    def show(self, message: Any) -> None:
+        """Hand a message to the clients outside, at once; nothing in the simulation sees it.
+
+        What follows wall time, or who is watching, is told like this: nodes, digests and recorders
+        cannot come to depend on it.
+        """
+        if not self.cancelled:
+            self._graph.show(self._topic, message)
 
     @property
     def keeps(self) -> bool:
@@ -244,7 +265,14 @@ class Graph:
             for kept in tuple(found.kept.values()):
                 put(kept)
             found.callbacks.append(put)
-        return Subscription(found.callbacks, put, lambda: self._drop_unused(found))
+            found.outside.append(put)
+            found.attached += 1
+
+        def leave() -> None:
+            found.outside.remove(put)
+            self._drop_unused(found)
+
+        return Subscription(found.callbacks, put, leave)
 
     def subscribe_all(self, callback: Callback) -> Subscription:
         """Call `callback` with every message of every topic, before the topic's subscribers.
@@ -275,13 +303,28 @@ class Graph:
 
     def enqueue(self, sender: Publisher, topic: _Topic, message: Any) -> None:
         """Queue a message; used by `Publisher`."""
-        name = getattr(message, "__msgtype__", None)
-        if name != topic.msgtype:
-            raise GraphError(f"topic '{topic.name}' carries {topic.msgtype}, not {name}")
+        _check_type(topic, message)
         topic.messages += 1
         if sender.wanted:
             published = Published(topic.name, topic.msgtype, self._now_ns(), message)
             self._queue.append(_Letter(topic, published, sender))
+
+    def show(self, topic: _Topic, message: Any) -> None:
+        """Hand a message to clients outside alone; used by `Publisher`."""
+        _check_type(topic, message)
+        topic.messages += 1
+        published = Published(topic.name, topic.msgtype, self._now_ns(), message)
+        for put in tuple(topic.outside):
+            put(published)
+
+    def show_kept(self) -> None:
+        """Hand everything that is latched to the clients outside again: the world has jumped."""
+        with self._members:
+            topics = [(tuple(t.kept.values()), tuple(t.outside)) for t in self._topics.values()]
+        for kept, outside in topics:
+            for put in outside:
+                for published in kept:
+                    put(published)
 
     def deliver(self) -> None:
         """Hand out all queued messages, those published meanwhile included."""
@@ -405,6 +448,12 @@ class Graph:
         if found is None:
             raise GraphError(f"nobody offers service '{name}'")
         return found
+
+
+def _check_type(topic: _Topic, message: Any) -> None:
+    name = getattr(message, "__msgtype__", None)
+    if name != topic.msgtype:
+        raise GraphError(f"topic '{topic.name}' carries {topic.msgtype}, not {name}")
 
 
 def _request(service: _Service, request: Any | None) -> Any:

@@ -32,6 +32,9 @@ Post = Callable[[Callable[[], Any]], "Future[Any]"]
 Handler = Callable[[Any, Reply], None]
 """Takes a request in the simulation's thread, at once, and answers through the reply later."""
 
+_MOST_NAMES = 20_000
+"""Of UAVs that are remembered as commanded; more than any fleet has."""
+
 
 @dataclass(frozen=True)
 class SessionInfo:
@@ -51,6 +54,11 @@ class Gateway:
         self._post = post
         self._sessions: list[Session] = []
         self._lock = threading.Lock()
+        self._lost = 0
+        self.commands = 0
+        """How often somebody outside has published or called something below a name."""
+        self.commanded_ns: dict[str, int] = {}
+        """When that was last the case, by the name, such as a UAV's."""
 
     def open(self, name: str) -> Session:
         """Begin the session of one client; `name` tells people who it is."""
@@ -64,9 +72,33 @@ class Gateway:
         with self._lock:
             return [session.info for session in self._sessions]
 
+    @property
+    def dropped(self) -> int:
+        """Messages that clients have lost because they were too slow, those that left included."""
+        present = (box.dropped for session in self.sessions() for box in session.mailboxes)
+        return self._lost + sum(present)
+
     def post(self, action: Callable[[], Any]) -> Future[Any]:
         """Have `action()` called by the simulation's thread."""
         return self._post(action)
+
+    def note_command(self, name: str) -> None:
+        """Note that a topic or service of a UAV is used from outside; in the simulation's thread.
+
+        Names outside of any namespace are nobody's.
+        """
+        uav, below, _ = name[1:].partition("/")
+        if below:
+            self.commands += 1
+            self.commanded_ns.pop(uav, None)  # the newest last
+            self.commanded_ns[uav] = self.graph.now_ns()
+            if len(self.commanded_ns) > _MOST_NAMES:
+                del self.commanded_ns[next(iter(self.commanded_ns))]
+
+    def note_lost(self, messages: int) -> None:
+        """Remember what a subscription that ends has lost; used by `Session`."""
+        with self._lock:
+            self._lost += messages
 
     def forget(self, session: Session) -> None:
         """Strike a session that has ended off the list; used by `Session`."""
@@ -127,7 +159,12 @@ class Session:
         publisher = self._publishers.get(topic)
         if publisher is None:
             raise GraphError(f"{self.name} has not advertised '{topic}'")
-        self._gateway.post(lambda: publisher.publish_posted(message))
+
+        def take() -> None:
+            self._gateway.note_command(topic)
+            publisher.publish_posted(message)
+
+        self._gateway.post(take)
 
     def subscribe(
         self,
@@ -157,6 +194,7 @@ class Session:
             subscription = self._mailboxes.pop(mailbox, None)
         if subscription is not None:
             subscription.cancel()
+            self._gateway.note_lost(mailbox.info.dropped)
 
     # ---------------------------------------------------------------------------------- services
 
@@ -164,6 +202,7 @@ class Session:
         """Call a service; `reply` gets the response or a `GraphError`, in some other thread."""
 
         def ask() -> None:
+            self._gateway.note_command(service)
             try:
                 self._graph.call_async(service, request, reply)
             except GraphError as error:
@@ -219,15 +258,17 @@ class Session:
         self._gateway.forget(self)
 
     @property
+    def mailboxes(self) -> tuple[MailboxInfo, ...]:
+        """How its subscriptions fare."""
+        with self._lock:
+            return tuple(mailbox.info for mailbox in self._mailboxes)
+
+    @property
     def info(self) -> SessionInfo:
         """What the client does at present."""
         with self._lock:
-            return SessionInfo(
-                self.name,
-                tuple(self._publishers),
-                tuple(mailbox.info for mailbox in self._mailboxes),
-                tuple(self._offers),
-            )
+            publishes, offers = tuple(self._publishers), tuple(self._offers)
+            return SessionInfo(self.name, publishes, self.mailboxes, offers)
 
     def _check_open(self) -> None:
         if self._closed:

@@ -7,9 +7,13 @@ from collections.abc import Callable
 from volery.control.fleet import Fleet
 from volery.engine.events import Event
 from volery.graph.graph import Graph
+from volery.graph.messages import Published
 from volery.graph.publishing import GraphPublisher
 from volery.runtime.digest import Digest
 from volery.sensors.samples import Samples
+
+NOT_OF_THE_WORLD = ("/volery/", "/ground_truth/tf")
+"""Topics that tell of the simulation and who takes part in it, and of poses that are in already."""
 
 
 class Outlet:
@@ -29,7 +33,11 @@ class Outlet:
         """Fingerprint all states and messages from now on."""
         if self.digest is None:
             self.digest = Digest()
-            self._graph.subscribe_all(self.digest.add_message)
+            self._graph.subscribe_all(self._fingerprint)
+
+    def _fingerprint(self, published: Published) -> None:
+        if self.digest is not None and not published.topic.startswith(NOT_OF_THE_WORLD):
+            self.digest.add_message(published)
 
     def take_fingerprint(self) -> None:
         """Take the present states into the digest, if there is one."""

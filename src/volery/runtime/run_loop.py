@@ -14,7 +14,8 @@ from volery.runtime.progress import Progress, ProgressTeller
 class RunLoop:
     """Advances `engine` at the pace of `pacer` until `duration_s`, or until `has_ended()`.
 
-    `has_ended` must follow from the simulated world alone.
+    `has_ended` must follow from the simulated world alone. `look` is called between two pieces and
+    all along while the run is held; it must change nothing.
     """
 
     def __init__(
@@ -24,6 +25,7 @@ class RunLoop:
         self._pacer = pacer
         self._duration_s = duration_s
         self._has_ended = has_ended
+        self.look: Callable[[], None] = _nothing
         self.owed_ns = 0
         """Parts of physics steps that runs have asked for and not got yet."""
         self.quitting = False
@@ -58,10 +60,12 @@ class RunLoop:
         over = engine.fleet.step >= end_step or self.quitting
         while not over:
             self._advance(end_step, until)
+            self.look()
             over = engine.fleet.step >= end_step or (until is not None and until())
             over = over or self.quitting
             while pacer.wait(engine.time_ns) and not (over and pacer.paused):
                 engine.take_in()
+                self.look()
                 teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns))
                 if self.quitting:
                     over = True
@@ -84,3 +88,7 @@ class RunLoop:
             return math.ceil(ns_from_s(max(seconds, 0.0)) / dt_ns)
         steps, self.owed_ns = divmod(self.owed_ns + ns_from_s(seconds), dt_ns)
         return steps
+
+
+def _nothing() -> None:
+    """Nobody looks."""

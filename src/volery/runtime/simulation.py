@@ -42,8 +42,11 @@ from volery.runtime.relocation import Relocator
 from volery.runtime.run_loop import RunLoop
 from volery.runtime.sensor_fitting import lidar_mounts
 from volery.runtime.services import Services, open_services
+from volery.runtime.services.worlds import OnLoad
 from volery.runtime.snapshot import Snapshot
 from volery.runtime.spawning import Spawner
+from volery.runtime.telling import LiveTopics
+from volery.runtime.telling.status import Told
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up import compile_kernels
 from volery.runtime.weather_messages import WeatherTopics
@@ -70,10 +73,10 @@ class Simulation:
 
     `threads` share the ray casting; results do not depend on their number. `recordings` is the
     folder in which clients of the graph may record, None: nowhere. `on_load` is called, in the
-    simulation's thread, with the name of a scenario that a client wants instead of this one, or
-    with None where it wants none; without `on_load` both are refused. `shelf` has the scenarios
-    that clients can name, None: those that ship. Use it as a context manager, or call `close` at
-    the end. Raises `ScenarioError` where the scenario cannot be built.
+    simulation's thread, with the scenario that a client wants instead of this one, or with None
+    where it wants none; without `on_load` both are refused. `shelf` has the scenarios that clients
+    can name, None: those that ship. Use it as a context manager, or call `close` at the end. Raises
+    `ScenarioError` where the scenario cannot be built.
     """
 
     def __init__(
@@ -82,7 +85,7 @@ class Simulation:
         *,
         threads: int = 2,
         recordings: Path | None = None,
-        on_load: Callable[[str | None], None] | None = None,
+        on_load: OnLoad | None = None,
         shelf: Shelf | None = None,
     ) -> None:
         if threads < 1:
@@ -134,7 +137,14 @@ class Simulation:
         self.pilots = Pilots(lambda: self.uav_names)
         """Who steers which UAV."""
         self._partners: list[Partner] = []
+        self._replays: list[Replay] = []
         self._keep_time(publisher)
+        self._live = LiveTopics(
+            self,
+            self._engine,
+            Told(lambda: self._services.state, lambda: self._services.recording),
+        )
+        self._live.vehicles.holder = self.pilots.holder_of
         self._weather_topics = WeatherTopics(
             self.graph, scenario.world, lambda: self.weather, self.set_weather
         )
@@ -142,6 +152,7 @@ class Simulation:
         self._crew.open(parts)
         plan_faults(self._faults, scenario)
         self._loop = RunLoop(self._engine, self._pacer, scenario.duration_s, self._has_ended)
+        self._loop.look = self._live.look
         self._relocator = Relocator(self._engine, self.scene, self.terrain, self._crew)
         open_lock_step(self)
         self._services: Services = open_services(
@@ -296,6 +307,12 @@ class Simulation:
         """Let a recorded log speak into the graph, beginning now, in simulated time."""
         self._check_open()
         replay.start(self.graph, self._engine, lambda: self.time_ns)
+        self._replays.append(replay)
+
+    @property
+    def replaying(self) -> bool:
+        """Whether a recorded log is speaking into the graph."""
+        return any(replay.info.running for replay in self._replays)
 
     def take_in(self) -> None:
         """Do what other threads have posted, and hand out what that published, without a step.
@@ -304,6 +321,7 @@ class Simulation:
         """
         self._check_open()
         self._engine.take_in()
+        self._live.look()
 
     def inject(self, fault: Fault | Mapping[str, Any]) -> None:
         """Let something go wrong: a fault as in a scenario's `faults`, at once if its time is past.
@@ -372,6 +390,7 @@ class Simulation:
         self._check_open()
         self._keeper.restore(snapshot)
         self._pacer.drop_steps("another state was restored")
+        self._live.jumped()
 
     def reset(self, seed: int | None = None) -> None:
         """Go back to the start, with the scenario's seed or another one.
@@ -385,6 +404,7 @@ class Simulation:
             check_seed(seed)
         self._keeper.reset(self.scenario.seed if seed is None else seed)
         self._pacer.drop_steps("the simulation was reset")
+        self._live.jumped()
 
     def reset_uav(self, name: str) -> None:
         """Put one UAV back to its start while the others fly on: as it was, mended, charged, new.

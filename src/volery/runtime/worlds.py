@@ -118,6 +118,7 @@ def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
         return forest_from_inventory(
             resolve(forest.file, scenario.folder, SHIPPED_DATA),
             region=forest.region_m,
+            share=forest.share,
             species=forest.species,
             seed=scenario.world_seed,
             terrain=terrain,

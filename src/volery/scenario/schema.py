@@ -61,6 +61,8 @@ class InventoryForest(Data):
     species: str
     region_m: tuple[float, float, float, float] | None = None
     """x_min, y_min, x_max, y_max; trees with x_min <= x < x_max are kept. None keeps all."""
+    share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    """Of the trees; chosen at random, those of a smaller share are among those of a larger one."""
 
     @model_validator(mode="after")
     def _region_is_a_rectangle(self) -> Self:

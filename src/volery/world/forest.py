@@ -82,6 +82,7 @@ def forest_from_inventory(
     species: str,
     terrain: Terrain,
     region: Region | None = None,
+    share: float = 1.0,
     seed: int = 0,
     diameters: str | None = None,
 ) -> Forest:
@@ -90,10 +91,12 @@ def forest_from_inventory(
     inventory: a CSV file or what `read_inventory` made of one.
     species: species of trees for which the inventory names none.
     region: (x0, y0, x1, y1) in m; trees with x0 <= x < x1 and y0 <= y < y1 stay. None keeps all.
+    share: of the trees, from 0 to 1, chosen at random.
     diameters: name of the species' spread from which missing diameters come (None: its "stand").
 
     Sizes are drawn for the whole inventory before the region is cut out, so a tree is the same in
-    every region. Raises DataFileError for a bad file, ScenarioError for an unknown species.
+    every region and with every share. Raises DataFileError for a bad file, ScenarioError for an
+    unknown species.
     """
     trees = inventory if isinstance(inventory, Inventory) else read_inventory(inventory)
     load_species(species)
@@ -110,6 +113,8 @@ def forest_from_inventory(
         _check(region)
         x, y = trees.position.T
         rows = rows[(x >= region[0]) & (x < region[2]) & (y >= region[1]) & (y < region[3])]
+    if share < 1.0:
+        rows = rows[generator(seed, "forest/thinning").random(len(trees))[rows] < share]
     return _assemble(
         trees.position[rows],
         names[rows],

@@ -123,6 +123,8 @@ def test_one_pilot_at_a_time(server, flight):
             values, _ = anna.call("/volery/take_control", uav="uav2")
             assert values == {"success": True, "message": "Anna steers uav2"}
             assert pilots.holder_of("uav2") == "Anna"
+            ben.send("subscribe", topic="/volery/vehicles")
+            eventually(lambda: ben.until("publish")["msg"]["vehicles"][1]["holder"] == "Anna")
             values, success = ben.call("/uav2/hold")
             assert (success, values) == (False, "uav2 is held by Anna, who can hand it over")
             values, success = ben.call("/volery/take_control", uav="uav2")

@@ -28,8 +28,19 @@ if TYPE_CHECKING:
 class Services:
     """What the services of one simulation hold on to."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, playing: Playing, recording: Recording) -> None:
+        self._playing = playing
         self._recording = recording
+
+    @property
+    def state(self) -> int:
+        """State of the simulation, as the standard numbers it."""
+        return int(self._playing.state)
+
+    @property
+    def recording(self) -> str:
+        """What a client is recording, below the folder of recordings; empty: nothing."""
+        return self._recording.name
 
     def close(self) -> None:
         """Give it back."""
@@ -52,7 +63,8 @@ def open_services(
     offer_features(graph, loads_worlds=on_load is not None)
     Entities(simulation).offer()
     Spawning(simulation).offer()
-    Playing(simulation).offer()
+    playing = Playing(simulation)
+    playing.offer()
     offer_steps(simulation)
     offer_worlds(graph, simulation.scenario, on_load, shelf)
     offer_named_poses(graph, simulation.starts)
@@ -66,4 +78,4 @@ def open_services(
     KeptStates(simulation).offer()
     recording = Recording(graph, recordings)
     recording.offer()
-    return Services(recording)
+    return Services(playing, recording)

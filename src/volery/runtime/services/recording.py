@@ -30,6 +30,13 @@ class Recording:
         offer_command(graph, "/volery/start_recording", f"{_OURS}/StartRecording", self._start)
         offer_command(graph, "/volery/stop_recording", f"{_OURS}/StopRecording", self._stop)
 
+    @property
+    def name(self) -> str:
+        """The file that is being recorded, below the folder; empty: none."""
+        if self._log is None or self._folder is None:
+            return ""
+        return self._log.path.relative_to(self._folder.resolve()).as_posix()
+
     def close(self) -> None:
         """End a recording that is still running."""
         if self._log is not None:
