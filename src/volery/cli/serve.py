@@ -61,23 +61,23 @@ def serve(options: ServeOptions) -> None:
 class _Wish:
     """What is to be flown next: the first scenario, then what clients ask for."""
 
-    def __init__(self, scenario: Scenario, shelf: Shelf, speed: float | None) -> None:
+    def __init__(self, scenario: Scenario, speed: float | None, shelf: Shelf) -> None:
         self._shelf = shelf
+        self.speed = speed
+        """Factor of real time to begin with; None: as fast as possible."""
         self.asked = True
         self.scenario: Scenario | None = scenario
         """None: no world at all."""
-        self.speed = speed
-        """Factor of real time; None: as fast as possible."""
         self.quit: Callable[[], None] = _nothing
 
     def ask(self, request: WorldRequest | None) -> None:
-        """End the present flight for another one; `ScenarioError` where that cannot be read."""
+        """End the present flight for another one; `ScenarioError` where that cannot be."""
         if request is None:
             self.want(None)
         else:
             self.want(changes.apply(self._shelf.load(request.name), request.changes))
-            if request.changes.speed is not None:
-                self.speed = request.changes.speed or None
+            speed = request.changes.speed
+            self.speed = self.speed if speed is None else speed or None
         self.quit()
 
     def want(self, scenario: Scenario | None) -> None:
@@ -100,7 +100,7 @@ class _Host:
         self._page = page
         self._interrupts = interrupts
         self._shelf = Shelf(options.page.uploads)
-        self._wish = _Wish(_first_scenario(options.first), self._shelf, options.first.speed)
+        self._wish = _Wish(_first_scenario(options.first), options.first.speed, self._shelf)
         self._present: Scenario | None = None
         """What was built last."""
         self._trouble = ""
