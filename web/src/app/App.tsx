@@ -1,5 +1,6 @@
 import { lazy, Suspense } from "react";
 import { Scene } from "../scene/Scene.tsx";
+import { PlayerBar } from "./PlayerBar.tsx";
 import { useLayout } from "../state/layout.ts";
 import { useWindows } from "../state/windows.ts";
 import { DockArea } from "./DockArea.tsx";
@@ -30,6 +31,7 @@ export function App() {
         <SceneBoundary>
           <Scene />
         </SceneBoundary>
+        <PlayerBar />
         <Overlays />
         <Situation />
       </main>

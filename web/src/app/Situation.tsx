@@ -1,5 +1,4 @@
 import {
-  Alert,
   Button,
   Group,
   Loader,
@@ -10,11 +9,11 @@ import {
   Text,
   Title,
 } from "@mantine/core";
-import { CloudOff, Hourglass, TriangleAlert } from "lucide-react";
+import { TriangleAlert } from "lucide-react";
 import { useConnection } from "../state/connection.ts";
-import { useSilence } from "../state/silence.ts";
 import { useSimulation } from "../state/simulation.ts";
 import { openWindow } from "../state/windows.ts";
+import { Banner } from "./Banner.tsx";
 
 /** What stands between the user and a flight, if anything does: told over the scene. */
 export function Situation() {
@@ -24,8 +23,7 @@ export function Situation() {
   if (server?.state === "building") return <Building />;
   if (server?.state === "failed") return <Failed />;
   if (server?.state === "lobby") return <Lobby />;
-  if (link === "lost" || link === "connecting") return <NoLink />;
-  return <Silent />;
+  return <Banner />;
 }
 
 function Building() {
@@ -70,41 +68,6 @@ function Lobby() {
       </Text>
       <Button onClick={() => openWindow("scenarios")}>Choose a scenario</Button>
     </Paper>
-  );
-}
-
-function NoLink() {
-  const { reason, url, volery } = useConnection();
-  return (
-    <Alert
-      className="banner"
-      color="yellow"
-      variant="filled"
-      autoContrast
-      icon={<CloudOff size={18} />}
-      role="alert"
-      title={volery ? "No connection to the simulation" : `No connection to ${url}`}
-    >
-      {reason || "Trying again…"} What is shown is the last that came.
-    </Alert>
-  );
-}
-
-function Silent() {
-  const seconds = useSilence((silence) => silence.seconds);
-  if (seconds === 0) return null;
-  return (
-    <Alert
-      className="banner"
-      color="yellow"
-      variant="filled"
-      autoContrast
-      icon={<Hourglass size={18} />}
-      role="alert"
-      title={`Nothing has come for ${seconds} s`}
-    >
-      The simulation or the network stands still. What is shown is the last that came.
-    </Alert>
   );
 }
 

@@ -2,20 +2,20 @@ import { create } from "zustand";
 import { nowMs } from "../lib/time.ts";
 import { link } from "../link/link.ts";
 
-/** For how long nothing has come over a link that stands, s; 0: it is not silent. */
-export const useSilence = create(() => ({ seconds: 0 }));
+/** Since when nothing has come over a link that stands, as `nowMs()`; 0: it is not silent. */
+export const useSilence = create(() => ({ sinceMs: 0 }));
 
-const LOOK_MS = 500;
+const LOOK_MS = 100;
 /** A simulation tells its status five times a second, even while paused. */
-const SILENT_AFTER_MS = 2000;
+const SILENT_AFTER_MS = 1000;
 
 export function followSilence(): void {
   let openSinceMs = nowMs();
   link.watch(() => (openSinceMs = nowMs()));
   setInterval(() => {
-    const quietMs = nowMs() - Math.max(openSinceMs, link.heardMs);
-    const seconds =
-      link.state === "open" && quietMs > SILENT_AFTER_MS ? Math.floor(quietMs / 1000) : 0;
-    if (seconds !== useSilence.getState().seconds) useSilence.setState({ seconds });
+    const heardMs = Math.max(openSinceMs, link.heardMs);
+    const silent = link.state === "open" && nowMs() - heardMs > SILENT_AFTER_MS;
+    const sinceMs = silent ? heardMs : 0;
+    if (sinceMs !== useSilence.getState().sinceMs) useSilence.setState({ sinceMs });
   }, LOOK_MS);
 }

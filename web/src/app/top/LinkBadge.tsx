@@ -5,7 +5,7 @@ import { useSilence } from "../../state/silence.ts";
 /** How the link is. */
 export function LinkBadge() {
   const { state, reason, url } = useConnection();
-  const silent = useSilence((silence) => silence.seconds > 0);
+  const silent = useSilence((silence) => silence.sinceMs > 0);
   const [text, color] =
     state === "open"
       ? silent

@@ -4,6 +4,7 @@ import { useConnection } from "../../state/connection.ts";
 import { toggleOverlay, useLayout, type Overlay } from "../../state/layout.ts";
 import { useSimulation } from "../../state/simulation.ts";
 import { openWindow } from "../../state/windows.ts";
+import { Health } from "../Health.tsx";
 import { ColourScheme } from "./ColourScheme.tsx";
 import { LinkBadge } from "./LinkBadge.tsx";
 import { TimeControls } from "./TimeControls.tsx";
@@ -21,6 +22,7 @@ export function TopBar() {
       </Group>
       <TimeControls />
       <Group gap={4} wrap="nowrap">
+        <Health />
         <LinkBadge />
         <OverlayButton overlay="map" label="Map (M)" icon={<MapIcon size={18} />} />
         <OverlayButton overlay="pictures" label="Pictures (P)" icon={<Images size={18} />} />
