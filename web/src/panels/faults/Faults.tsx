@@ -54,11 +54,10 @@ export default function Faults() {
           {PASSING.includes(form.kind) && (
             <NumberInput
               size="xs"
-              label="Lasts"
+              label="Lasts (0: it stays)"
               suffix=" s"
               min={0}
               value={form.lastsS}
-              description={form.lastsS > 0 ? "" : "0: it stays"}
               onChange={(lastsS) => change({ lastsS: Number(lastsS) })}
             />
           )}

@@ -37,7 +37,11 @@ export class Drawing {
         scales: { x: { time: false, auto: false, range: (_plot, from, to) => [from, to] } },
         axes: [
           { ...axis, size: 26, values: (_plot, marks) => marks.map((mark) => `${round(mark)} s`) },
-          { ...axis, size: 56 },
+          {
+            ...axis,
+            size: 64,
+            values: (_plot, marks, _axis, _space, step) => marks.map((mark) => fixed(mark, step)),
+          },
         ],
         cursor: { drag: { x: true, y: false, setScale: false }, points: { size: 5 } },
         hooks: { setSelect: [(plot) => this.zoom(plot)] },
@@ -92,6 +96,11 @@ export class Drawing {
     this.zoomed = [plot.posToVal(left, "x"), plot.posToVal(left + width, "x")];
     plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
   }
+}
+
+/** A mark with the digits that tell it from the next one. */
+function fixed(mark: number, step: number): string {
+  return mark.toFixed(Math.min(12, Math.max(0, -Math.floor(Math.log10(step)))));
 }
 
 function round(time: number): string {
