@@ -13,7 +13,8 @@ import type { sensor_msgs_LaserScan, sensor_msgs_PointCloud2 } from "../../messa
 import { useVehicles } from "../../state/vehicles.ts";
 import { useView } from "../../state/view.ts";
 import { FADE } from "../air/fog.ts";
-import { frameOf, toMap } from "../stage/frames.ts";
+import { frameOf } from "../stage/frames.ts";
+import { toMap } from "../stage/placing.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { LEVELS } from "../stage/quality.ts";
 import { shown } from "../stage/shown.ts";
