@@ -27,6 +27,8 @@ const HEAD_M = 1.75;
 const REST_S = 0.6;
 /** UAVs as near as this to the selected one belong into its first picture, m. */
 const NEIGHBOURS_M = 40;
+/** So long a page waits for the first UAV before it shows the world without, s. */
+const LONGEST_WAIT_S = 1;
 
 /** Moves the camera: one view at a time, changed by menu, number keys and links. */
 export class CameraMan implements Part {
@@ -53,6 +55,7 @@ export class CameraMan implements Part {
   private selected = "";
   private standingVersion = 0;
   private restedS = 0;
+  private waitedS = 0;
   private unsaved = false;
   private screen = { width: 1, height: 1 };
   private readonly mover = new Mover();
@@ -92,10 +95,13 @@ export class CameraMan implements Part {
     this.lookAround();
     const { name, cameraVersion, camera: kept } = useView.getState();
     if (name !== this.entered || cameraVersion !== this.cameraVersion) {
-      const fromLink = cameraVersion !== this.cameraVersion;
-      this.enter(name, fromLink ? kept : null);
+      const given = cameraVersion !== this.cameraVersion ? kept : null;
+      if (this.entered === null && given === null && this.waits(stepS)) return;
+      if (this.entered === null) this.prepare();
+      this.enter(name, given);
       this.cameraVersion = cameraVersion;
     }
+    if (this.entered === null) return; // nobody is there to look at yet
     this.blendLeaps();
     this.rigs[name].update(this.hands, this.around, stepS, this.eye);
     this.blend.apply(this.eye, stepS);
@@ -107,6 +113,18 @@ export class CameraMan implements Part {
   dispose(): void {
     this.hands.dispose();
     this.ended.abort();
+  }
+
+  /** Whether the first picture had better wait for the first UAV. */
+  private waits(stepS: number): boolean {
+    this.waitedS += stepS;
+    return this.around.uav === null && this.waitedS < LONGEST_WAIT_S;
+  }
+
+  /** Every view begins from somewhere: the first one from where orbit would. */
+  private prepare(): void {
+    this.rigs.orbit.enter(this.eye, this.around, null);
+    this.rigs.orbit.update(this.hands, this.around, 0, this.eye);
   }
 
   private enter(name: ViewName, kept: Parameters<Rig["enter"]>[2]): void {

@@ -40,7 +40,6 @@ export class Returns implements Part {
   private readonly wanted = new Set<string>();
   private lookedMs = 0;
   private selected = "";
-  private begunMs = 0;
   private nowS = 0;
   private next = 0;
   private capacity = LEVELS[0]!.returns;
@@ -65,9 +64,8 @@ export class Returns implements Part {
     );
   }
 
-  update({ nowMs, quality, height, camera, renderer }: Moment): void {
-    if (this.begunMs === 0) this.begunMs = nowMs;
-    this.nowS = (nowMs - this.begunMs) / 1000;
+  update({ nowMs, stepS, quality, height, camera, renderer }: Moment): void {
+    this.nowS += stepS; // steps are bounded: where frames are slow returns are still seen in some
     this.capacity = quality.returns;
     const { lidar } = useView.getState().show;
     this.object.visible = lidar;
