@@ -21,6 +21,7 @@ from volery.cli.run import RunOptions, _Change
 from volery.core.errors import CommandError, GraphError, VoleryError
 from volery.graph.link import call_and_wait
 from volery.graph.zero import zero_message
+from volery.scenario.changes import Changes, WorldRequest
 
 pytest.importorskip("roslibpy")
 ROOT = Path(__file__).parents[2]
@@ -319,6 +320,29 @@ def test_a_client_loads_another_world():
         run.close()
 
 
+def test_a_client_loads_a_scenario_with_changes():
+    run = Run("rosbridge", seconds=600, port=free_port())
+    client = RosbridgeClient(f"ws://127.0.0.1:{run.ports[0]}")
+    changes = json.dumps({"uavs": 3, "airframe": "crazyflie", "sensors": ["sonar"], "speed": 2.0})
+    try:
+        refused = answer(client, "/volery/load_scenario", scenario="hover", changes="{}x")
+        assert not refused.success
+        loaded = answer(client, "/volery/load_scenario", scenario="hover", changes=changes)
+        assert loaded.success, loaded.message
+        until = time.monotonic() + 60.0
+        entities = []
+        while len(entities) != 3:
+            assert run.process.poll() is None
+            assert time.monotonic() < until
+            with suppress(GraphError):
+                entities = answer(client, "/get_entities").entities
+        info = answer(client, "/get_entity_info", entity="uav3").info
+        assert "crazyflie" in info.description
+    finally:
+        client.close()
+        run.close()
+
+
 def test_a_client_unloads_the_world_and_loads_one_again():
     """In between the doors are open, the state is NO_WORLD, and little can be asked."""
     run = Run("rosbridge", seconds=600, port=free_port())
@@ -362,14 +386,16 @@ def test_a_client_unloads_the_world_and_loads_one_again():
 def test_files_of_one_flight_stay_of_one_world(tmp_path):
     change = _Change(RunOptions("hover", record=tmp_path / "a.mcap"))
     with pytest.raises(CommandError, match="--record"):
-        change.ask("swarm_100")
+        change.ask(WorldRequest("swarm_100"))
     change = _Change(RunOptions("hover", digest=True))
     with pytest.raises(CommandError, match="--digest"):
-        change.ask("swarm_100")
+        change.ask(WorldRequest("swarm_100"))
     change = _Change(RunOptions("hover", uavs=3))
     change.quit = lambda: quits.append(change.wanted)
     quits = []
     with pytest.raises(VoleryError):
-        change.ask("atlantis")
-    change.ask("longleaf")
-    assert quits == ["longleaf"]
+        change.ask(WorldRequest("atlantis"))
+    with pytest.raises(VoleryError, match="inventory"):
+        change.ask(WorldRequest("hover", Changes(tree_share=0.5)))
+    change.ask(WorldRequest("longleaf", Changes(tree_share=0.5, speed=0.0)))
+    assert quits == [change.wanted]

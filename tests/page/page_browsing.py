@@ -28,7 +28,7 @@ class Browsing:
     def open(self, url, *, viewport=None, **context):
         """Open a page and wait until it stands."""
         opened = self._chromium.new_context(viewport=viewport or SMALL, **context)
-        opened.set_default_timeout(20_000)
+        opened.set_default_timeout(60_000)
         self._contexts.append(opened)
         page = opened.new_page()
         page.on("console", self._hear)

@@ -6,15 +6,30 @@ import { Notifications } from "@mantine/notifications";
 import { createRoot } from "react-dom/client";
 import { App } from "./app/App.tsx";
 import { theme } from "./app/theme.ts";
+import { link } from "./link/link.ts";
 import { followAddress } from "./state/addressed.ts";
 import { connectAsAddressed, useConnection } from "./state/connection.ts";
+import { followHealth } from "./state/health.ts";
+import { followJournal } from "./state/journal.ts";
+import { followPlayer } from "./state/player.ts";
+import { tellFailure } from "./state/notices.ts";
+import { followLeaving, usePilot } from "./state/pilots.ts";
+import { followSilence } from "./state/silence.ts";
 import { followSimulation } from "./state/simulation.ts";
+import { followTopics } from "./state/topics.ts";
 import { followVehicles } from "./state/vehicles.ts";
 
 followAddress();
-connectAsAddressed(location);
+connectAsAddressed(location, usePilot.getState().wished);
+followLeaving();
 followSimulation(useConnection.getState().volery);
 followVehicles();
+followHealth();
+followJournal();
+followPlayer();
+followSilence();
+followTopics();
+link.onComplaint = (text) => tellFailure("The simulation refuses", text);
 
 createRoot(document.getElementById("root")!).render(
   <MantineProvider theme={theme} defaultColorScheme="auto">

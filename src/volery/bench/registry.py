@@ -226,6 +226,26 @@ BENCHES: dict[str, Bench] = {
             },
         ),
         Bench(
+            "page",
+            "Page: the page in headless Chromium that draws WebGL in software, server and "
+            "browser on loopback of one machine; `hover` at 640x360 opened, 10 UAVs at 320x180, a "
+            "forest of 5,000 trees; memory over 15 minutes",
+            {
+                "bundle_initial_mb": Bound(1.0, at_most=True),
+                "first_picture_s": Bound(4.0, at_most=True),
+                "script_ms_50_uavs": Bound(5.0, at_most=True),
+                "script_ms_256_uavs": Bound(12.0, at_most=True),
+                "draw_calls": Bound(250.0, at_most=True),
+                "age_p95_ms": Bound(80.0, at_most=True),
+                "stalled_client_rtf_loss": Bound(0.03, at_most=True),
+                "stalled_client_memory_mb": Bound(20.0, at_most=True),
+                "nine_clients_lost": Bound(0.0, at_most=True),
+                "nine_clients_real_time_factor": Bound(0.99),
+                "heap_growth_15_min": Bound(0.15, at_most=True),
+            },
+            in_all=False,  # it takes twenty minutes and a browser
+        ),
+        Bench(
             "peers",
             "Peers: other simulators beside Volery, in turns on one core; what each includes is "
             "told in [peers.md](peers.md)",

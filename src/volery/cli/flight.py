@@ -20,6 +20,7 @@ from volery.core.errors import RecordingError, VoleryError
 if TYPE_CHECKING:
     from volery.bridges.logs.bag import Log
     from volery.report.collect import FlightCollector
+    from volery.scenario.changes import Changes
 
 _CONTACTS_SHOWN = 10
 
@@ -42,6 +43,8 @@ class RunOptions:
     recordings: Path | None = None
     allow_remote: bool = False
     token: str | None = None
+    changes: Changes | None = None
+    """To the scenario, by the client that loaded it."""
     page: str | None = None
     """`HOST:PORT`, `PORT` or, for the usual place, nothing; None: no page."""
 

@@ -19,6 +19,7 @@ from volery.cli.targets import check_record, check_report
 from volery.core.errors import CommandError, ScenarioError
 
 if TYPE_CHECKING:
+    from volery.scenario.changes import WorldRequest
     from volery.scenario.schema import Scenario
 
 __all__ = ["RunOptions", "fly", "parse_speed"]
@@ -52,7 +53,7 @@ def fly(options: RunOptions) -> int:
                 if change.wanted is None:
                     code, change = _wait_for_world(options, interrupts, page)
                 else:
-                    options = replace(options, scenario=change.wanted)
+                    options = _loading(options, change.wanted)
                     code, change = _build_and_fly(options, interrupts, page)
         except KeyboardInterrupt:
             if interrupts.gentle:
@@ -104,14 +105,25 @@ def _wait_for_world(options: RunOptions, interrupts: Interrupts, page: Page) -> 
 
 def _scenario_of(options: RunOptions) -> Scenario:
     from volery import load_scenario
-    from volery.scenario import overrides
+    from volery.scenario import changes, overrides
 
-    return overrides.apply(
+    scenario = overrides.apply(
         load_scenario(options.scenario),
         uavs=options.uavs,
         seconds=options.seconds,
         seed=options.seed,
     )
+    return scenario if options.changes is None else changes.apply(scenario, options.changes)
+
+
+def _loading(options: RunOptions, request: WorldRequest) -> RunOptions:
+    """The options for the flight that a client asks for."""
+    wanted = request.changes
+    if wanted.speed is not None:
+        options = replace(options, speed=wanted.speed or None)
+    if wanted.uavs is not None:
+        options = replace(options, uavs=None)
+    return replace(options, scenario=request.name, changes=wanted)
 
 
 class _Change:
@@ -120,11 +132,11 @@ class _Change:
     def __init__(self, options: RunOptions) -> None:
         self._options = options
         self.asked = False
-        self.wanted: str | None = None
-        """Name of the scenario; None: no world at all."""
+        self.wanted: WorldRequest | None = None
+        """None: no world at all."""
         self.quit: Callable[[], None] = _nothing
 
-    def ask(self, name: str | None) -> None:
+    def ask(self, request: WorldRequest | None) -> None:
         """End the present flight for another one; `CommandError` where it must not end."""
         options = self._options
         for flag, given in (("--record", options.record), ("--report", options.report)):
@@ -132,9 +144,9 @@ class _Change:
                 raise CommandError(f"this run writes a file of one flight ({flag})")
         if options.digest:
             raise CommandError("this run prints the digest of one flight (--digest)")
-        if name is not None:
-            _scenario_of(replace(options, scenario=name))
-        self.asked, self.wanted = True, name
+        if request is not None:
+            _scenario_of(_loading(options, request))
+        self.asked, self.wanted = True, request
         self.quit()
 
 

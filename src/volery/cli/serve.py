@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,11 +16,15 @@ from volery.cli.guard import complain
 from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, serving
 from volery.core.errors import VoleryError
+from volery.scenario import changes
 
 if TYPE_CHECKING:
+    from volery.scenario.changes import WorldRequest
     from volery.scenario.schema import Scenario
     from volery.scenario.shelf import Shelf
     from volery.server.settings import PageSettings
+
+_log = logging.getLogger(__name__)
 
 _THREADS = 2
 _GLANCE_S = 0.02
@@ -50,22 +55,29 @@ def serve(options: ServeOptions) -> None:
         host = _Host(options, page, interrupts)
         while host.goes_on:
             host.go_on()
+    typer.echo("the server has ended", err=True)
 
 
 class _Wish:
     """What is to be flown next: the first scenario, then what clients ask for."""
 
-    def __init__(self, scenario: Scenario, shelf: Shelf) -> None:
+    def __init__(self, scenario: Scenario, shelf: Shelf, speed: float | None) -> None:
         self._shelf = shelf
         self.asked = True
         self.scenario: Scenario | None = scenario
         """None: no world at all."""
+        self.speed = speed
+        """Factor of real time; None: as fast as possible."""
         self.quit: Callable[[], None] = _nothing
 
-    def ask(self, name: str | None) -> None:
+    def ask(self, request: WorldRequest | None) -> None:
         """End the present flight for another one; `ScenarioError` where that cannot be read."""
-        scenario = None if name is None else self._shelf.load(name)
-        self.want(scenario)
+        if request is None:
+            self.want(None)
+        else:
+            self.want(changes.apply(self._shelf.load(request.name), request.changes))
+            if request.changes.speed is not None:
+                self.speed = request.changes.speed or None
         self.quit()
 
     def want(self, scenario: Scenario | None) -> None:
@@ -88,7 +100,7 @@ class _Host:
         self._page = page
         self._interrupts = interrupts
         self._shelf = Shelf(options.page.uploads)
-        self._wish = _Wish(_first_scenario(options.first), self._shelf)
+        self._wish = _Wish(_first_scenario(options.first), self._shelf, options.first.speed)
         self._present: Scenario | None = None
         """What was built last."""
         self._trouble = ""
@@ -108,10 +120,11 @@ class _Host:
             return
         try:
             self._fly(wanted)
-        except VoleryError as error:
+        except Exception as error:  # a mistake of ours in one world must not end the others
             if self._present is None:
                 raise
-            self._trouble = f"{wanted.name}: {error}"
+            what = str(error) if isinstance(error, VoleryError) else _unexpected(error)
+            self._trouble = f"{wanted.name}: {what}"
             complain(self._trouble)
             self._wish.want(None if self._present is wanted else self._present)
 
@@ -139,7 +152,7 @@ class _Host:
 
     def _stay(self, simulation: Any) -> None:
         """Fly; at the end hold still there, until a reset or something else is asked for."""
-        speed = self._options.first.speed
+        speed = self._wish.speed
         try:
             while not simulation.quitting:
                 simulation.run(speed=speed, on_progress=self._look)
@@ -181,6 +194,12 @@ def _first_scenario(options: RunOptions) -> Scenario:
         seconds=options.seconds,
         seed=options.seed,
     )
+
+
+def _unexpected(error: Exception) -> str:
+    """A sentence for what should not happen; where it did is logged."""
+    _log.error("a world ended with an error", exc_info=error)
+    return f"internal error: {type(error).__name__}: {error}"
 
 
 def _nothing() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.graph.graph import Graph, Publisher
+from volery.graph.lidar_returns import ReturnsPublisher
 from volery.graph.messages import (
     LaserEcho,
     LaserScan,
@@ -23,6 +24,7 @@ from volery.graph.messages import (
     single,
 )
 from volery.sensors.lidar_model import LidarModel
+from volery.sensors.mount import Mount
 from volery.sensors.point_cloud import POINT, PointMaker
 from volery.sensors.samples import LidarScans, SensorId
 from volery.sensors.scan_patterns import PlanarScan
@@ -63,9 +65,11 @@ class LidarPublisher:
         self._scans: dict[str, Publisher] = {}
         self._echoes: dict[str, Publisher] = {}
         self._clouds: dict[str, Publisher] = {}
+        self._returns = ReturnsPublisher(graph)
 
-    def announce(self, sensor: SensorId, model: LidarModel, topic: str) -> None:
+    def announce(self, sensor: SensorId, model: LidarModel, topic: str, mount: Mount) -> None:
         """Advertise what a LIDAR publishes; all echoes go to `echoes` beside a scan's topic."""
+        self._returns.announce(sensor, mount, topic)
         if not isinstance(model.scan, PlanarScan):
             self._clouds[sensor.path] = self._graph.advertise(topic, PointCloud2)
             return
@@ -76,12 +80,14 @@ class LidarPublisher:
 
     def retire(self, uav_name: str) -> None:
         """Publish no more for the LIDARs of a UAV."""
+        self._returns.retire(uav_name)
         for publishers in (self._scans, self._echoes, self._clouds):
             for path in [path for path in publishers if path.startswith(f"{uav_name}/")]:
                 publishers.pop(path).cancel()
 
     def publish(self, scans: LidarScans) -> None:
         """Queue the messages of one sweep of a bank, where somebody receives them."""
+        self._returns.publish(scans)
         if not isinstance(scans.model.scan, PlanarScan):
             self._publish_clouds(scans)
             return

@@ -13,6 +13,7 @@ import numpy as np
 
 from volery.graph.messages import Published
 from volery.graph.qos import MOST_DEPTH
+from volery.graph.rows import Rows
 
 Wake = Callable[[], None]
 """Tells a door's thread, from the simulation's, that there is something to take; must not block."""
@@ -119,7 +120,7 @@ def array_bytes(message: Any) -> int:
         value = getattr(message, field.name)
         if isinstance(value, np.ndarray):
             size += value.nbytes
-        elif isinstance(value, str | bytes | list) and not field.name.startswith("__"):
+        elif isinstance(value, str | bytes | list | Rows) and not field.name.startswith("__"):
             size += len(value)
         elif is_dataclass(value):
             inner = vars(value).values()

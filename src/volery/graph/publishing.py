@@ -134,7 +134,7 @@ class GraphPublisher:
         """Advertise what a LIDAR publishes and place its frame."""
         self._static_sent = False
         self._mounts[sensor.path] = mount
-        self._lidars.announce(sensor, model, topic)
+        self._lidars.announce(sensor, model, topic, mount)
         if not mount.nods:
             base = f"{sensor.uav_name}/base_link"
             self._static.append(_mount_transform(base, laser_frame(sensor), mount))

@@ -32,6 +32,9 @@ Post = Callable[[Callable[[], Any]], "Future[Any]"]
 Handler = Callable[[Any, Reply], None]
 """Takes a request in the simulation's thread, at once, and answers through the reply later."""
 
+_MOST_NAMES = 20_000
+"""Of UAVs that are remembered as commanded; more than any fleet has."""
+
 
 @dataclass(frozen=True)
 class SessionInfo:
@@ -52,8 +55,10 @@ class Gateway:
         self._sessions: list[Session] = []
         self._lock = threading.Lock()
         self._lost = 0
+        self.commands = 0
+        """How often somebody outside has published or called something below a name."""
         self.commanded_ns: dict[str, int] = {}
-        """When somebody outside last published or called something of a UAV, by its name."""
+        """When that was last the case, by the name, such as a UAV's."""
 
     def open(self, name: str) -> Session:
         """Begin the session of one client; `name` tells people who it is."""
@@ -84,7 +89,11 @@ class Gateway:
         """
         uav, below, _ = name[1:].partition("/")
         if below:
+            self.commands += 1
+            self.commanded_ns.pop(uav, None)  # the newest last
             self.commanded_ns[uav] = self.graph.now_ns()
+            if len(self.commanded_ns) > _MOST_NAMES:
+                del self.commanded_ns[next(iter(self.commanded_ns))]
 
     def note_lost(self, messages: int) -> None:
         """Remember what a subscription that ends has lost; used by `Session`."""

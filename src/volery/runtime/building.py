@@ -23,6 +23,17 @@ from volery.world.terrain import Terrain
 
 def place(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[Start, ...]:
     """Where every UAV starts. Raises `ScenarioError` for what cannot be."""
+    return place_uavs(scenario, airframes_of(scenario), scene, terrain)
+
+
+def check_types(scenario: Scenario) -> None:
+    """Raise a `ScenarioError` where UAVs of some type could not be built, in whatever world."""
+    for name, airframe in airframes_of(scenario).items():
+        plant_of_type(scenario, name, airframe)
+
+
+def airframes_of(scenario: Scenario) -> dict[str, Airframe]:
+    """Airframe of each type. Raises `ScenarioError` for one that cannot be, or wear of another."""
     airframes: dict[str, Airframe] = {}
     for name, kind in scenario.types.items():
         try:
@@ -40,7 +51,7 @@ def place(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[Start, ..
                 f"{scenario.name}: types.{name}.wear has {len(kind.wear)} entries; "
                 f"{kind.airframe} has {rotors} rotors, and needs one for each, or none"
             )
-    return place_uavs(scenario, airframes, scene, terrain)
+    return airframes
 
 
 def build_fleet(

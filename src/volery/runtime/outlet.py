@@ -12,8 +12,8 @@ from volery.graph.publishing import GraphPublisher
 from volery.runtime.digest import Digest
 from volery.sensors.samples import Samples
 
-ABOUT_ITSELF = "/volery/"
-"""Topics below this tell of the simulation and who takes part in it."""
+NOT_OF_THE_WORLD = ("/volery/", "/ground_truth/tf")
+"""Topics that tell of the simulation and who takes part in it, and of poses that are in already."""
 
 
 class Outlet:
@@ -36,8 +36,7 @@ class Outlet:
             self._graph.subscribe_all(self._fingerprint)
 
     def _fingerprint(self, published: Published) -> None:
-        """What is told of the simulation and its clients says nothing of the world."""
-        if self.digest is not None and not published.topic.startswith(ABOUT_ITSELF):
+        if self.digest is not None and not published.topic.startswith(NOT_OF_THE_WORLD):
             self.digest.add_message(published)
 
     def take_fingerprint(self) -> None:

@@ -35,12 +35,14 @@ from volery.runtime.grid_world import GridWorld
 from volery.runtime.keeping import Keeper
 from volery.runtime.lock_step import open_lock_step
 from volery.runtime.outlet import Outlet
+from volery.runtime.pilots import Pilots
 from volery.runtime.placement import Start
 from volery.runtime.progress import Progress
 from volery.runtime.relocation import Relocator
 from volery.runtime.run_loop import RunLoop
 from volery.runtime.sensor_fitting import lidar_mounts
 from volery.runtime.services import Services, open_services
+from volery.runtime.services.worlds import OnLoad
 from volery.runtime.snapshot import Snapshot
 from volery.runtime.spawning import Spawner
 from volery.runtime.telling import LiveTopics
@@ -71,10 +73,10 @@ class Simulation:
 
     `threads` share the ray casting; results do not depend on their number. `recordings` is the
     folder in which clients of the graph may record, None: nowhere. `on_load` is called, in the
-    simulation's thread, with the name of a scenario that a client wants instead of this one, or
-    with None where it wants none; without `on_load` both are refused. `shelf` has the scenarios
-    that clients can name, None: those that ship. Use it as a context manager, or call `close` at
-    the end. Raises `ScenarioError` where the scenario cannot be built.
+    simulation's thread, with the scenario that a client wants instead of this one, or with None
+    where it wants none; without `on_load` both are refused. `shelf` has the scenarios that clients
+    can name, None: those that ship. Use it as a context manager, or call `close` at the end. Raises
+    `ScenarioError` where the scenario cannot be built.
     """
 
     def __init__(
@@ -83,7 +85,7 @@ class Simulation:
         *,
         threads: int = 2,
         recordings: Path | None = None,
-        on_load: Callable[[str | None], None] | None = None,
+        on_load: OnLoad | None = None,
         shelf: Shelf | None = None,
     ) -> None:
         if threads < 1:
@@ -132,6 +134,8 @@ class Simulation:
         )
         self.uavs: Mapping[str, Uav] = MappingProxyType(self._crew.uavs)
         """In fleet order."""
+        self.pilots = Pilots(lambda: self.uav_names)
+        """Who steers which UAV."""
         self._partners: list[Partner] = []
         self._replays: list[Replay] = []
         self._keep_time(publisher)

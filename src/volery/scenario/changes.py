@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from pydantic import Field, ValidationError
@@ -37,6 +38,14 @@ class Changes(Data):
     """Of the trees of an inventory."""
     speed: Annotated[float, Field(ge=0.0, lt=1e6)] | None = None
     """Factor of real time at which it is flown; 0: as fast as possible."""
+
+
+@dataclass(frozen=True)
+class WorldRequest:
+    """A scenario that a client wants to see flown."""
+
+    name: str
+    changes: Changes = field(default_factory=Changes)
 
 
 def parse_changes(text: str) -> Changes:

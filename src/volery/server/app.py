@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
@@ -12,11 +14,14 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from volery.bridges.origins import Origins
 from volery.server.guard import Guard
 from volery.server.page import PageFiles, index
+from volery.server.recordings import bring_recording, recording, recordings
 from volery.server.replies import RefusedError, refused
 from volery.server.rights import Tokens
 from volery.server.rosbridge_route import serve_rosbridge
+from volery.server.scenarios import picture, scenarios
 from volery.server.site import Site
 from volery.server.status import status
+from volery.server.uploads.route import upload
 from volery.server.world_files import WorldFiles
 from volery.server.world_route import world_glb
 
@@ -34,6 +39,12 @@ def make_app(
             Route("/index.html", index),
             Route("/api/status", status),
             Route("/api/world.glb", world_glb),
+            Route("/api/scenarios", scenarios),
+            Route("/api/scenarios/{name}.jpg", picture),
+            Route("/api/uploads", upload, methods=["POST"]),
+            Route("/api/recordings", recordings, methods=["GET"]),
+            Route("/api/recordings", bring_recording, methods=["POST"]),
+            Route("/api/recordings/{name}", recording),
             WebSocketRoute("/rosbridge", serve_rosbridge),
             Mount("/", PageFiles()),
         ],
@@ -42,6 +53,7 @@ def make_app(
     )
     app.state.site = site
     app.state.world_files = WorldFiles()
+    app.state.upload_lock = asyncio.Lock()
     return app
 
 

@@ -2,76 +2,133 @@
 
 from __future__ import annotations
 
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from typing import Any
+
+from volery.bridges.rosbridge.fields import absolute
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError
+from volery.runtime.pilots import MOST_CHARACTERS, Pilots
+from volery.runtime.services.piloting import HAND_OVER, RELEASE, TAKE
+from volery.server.crew_list import CrewList
+from volery.server.read_only import READ_ONLY_SERVICES
 
 _LOOKING = {"subscribe", "unsubscribe", "set_level", "status", "auth"}
 """Operations that change nothing for others."""
-READ_ONLY_SERVICES = frozenset(
-    {
-        *(
-            f"/rosapi/{name}"
-            for name in (
-                "topics",
-                "topics_for_type",
-                "topic_type",
-                "topics_and_raw_types",
-                "services",
-                "services_for_type",
-                "service_type",
-                "service_providers",
-                "service_node",
-                "nodes",
-                "node_details",
-                "publishers",
-                "subscribers",
-                "message_details",
-                "service_request_details",
-                "service_response_details",
-                "get_param",
-                "has_param",
-                "get_param_names",
-                "get_time",
-                "get_ros_version",
-                "action_servers",
-                "interfaces",
-            )
-        ),
-        "/get_available_worlds",
-        "/get_current_world",
-        "/get_entities",
-        "/get_entities_states",
-        "/get_entity_bounds",
-        "/get_entity_info",
-        "/get_entity_state",
-        "/get_named_pose_bounds",
-        "/get_named_poses",
-        "/get_simulation_state",
-        "/get_simulator_features",
-        "/get_spawnables",
-        "/volery/get_grid_map",
-        "/volery/get_weather",
-        "/volery/list_snapshots",
-    }
-)
-"""Services that change nothing; a new one joins this list, or is for pilots."""
+_DEEPEST = 8
+"""Of arguments that are searched for the name of a UAV."""
+_TOLD_AGAIN_S = 1.0
+"""How often the sender of a stream of commands learns that it is refused."""
+_MOST_TOLD = 1000
 
 
 class ViewerGate:
     """Lets a client look on."""
 
-    def check(self, operation: Operation) -> None:
+    def check(self, operation: Operation) -> bool:
         """`BridgeError` for whatever changes something."""
         op = operation["op"]
-        if op in _LOOKING:
-            return
-        name = str(operation.get("service", operation.get("topic", operation.get("action", ""))))
-        if op == "call_service" and service_name(name) in READ_ONLY_SERVICES:
-            return
-        raise BridgeError(f"a viewer may not {op.replace('_', ' ')} {name}; show the pilots' token")
+        if op in _LOOKING or (op == "call_service" and service_of(operation) in READ_ONLY_SERVICES):
+            return True
+        what = operation.get("service", operation.get("topic", operation.get("action", "")))
+        doing = f"{op.replace('_', ' ')} {what}".strip()
+        raise BridgeError(f"a viewer may not {doing[:120]}; show the pilots' token")
 
 
-def service_name(called: str) -> str:
+class PilotGate:
+    """Lets a client command the UAVs that nobody else holds.
+
+    `name` is what the pilot is called; `crew` are all who are connected to this server. What it
+    asks of the services of control it asks in its own name.
+    """
+
+    def __init__(
+        self, name: str, crew: CrewList, pilots: Pilots, now_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.name = name
+        self._crew = crew
+        self._pilots = pilots
+        self._now_s = now_s
+        self._told_s: dict[str, float] = {}
+
+    def check(self, operation: Operation) -> bool:
+        """`BridgeError` for a command to a UAV that another pilot holds."""
+        op = operation["op"]
+        if op == "call_service":
+            service = service_of(operation)
+            if service in (TAKE, RELEASE, HAND_OVER):
+                self._sign(service, operation)
+            elif service not in READ_ONLY_SERVICES:
+                self._check_free(service, operation)
+        elif op == "send_action_goal":
+            self._check_free(_absolute(operation.get("action")), operation)
+        elif op in ("publish", "advertise", "advertise_service", "advertise_action"):
+            return self._may_publish(operation)
+        return True
+
+    def _may_publish(self, operation: Operation) -> bool:
+        """Whether a publication passes; one of a stream that does not is told of now and then."""
+        topic = _absolute(operation.get("topic", operation.get("service", operation.get("action"))))
+        try:
+            self._check_free(topic, {})
+        except BridgeError:
+            now_s = self._now_s()
+            if now_s - self._told_s.get(topic, -_TOLD_AGAIN_S) < _TOLD_AGAIN_S:
+                return False
+            if len(self._told_s) >= _MOST_TOLD:
+                self._told_s.clear()
+            self._told_s[topic] = now_s
+            raise
+        return True
+
+    def _check_free(self, name: str, operation: Operation) -> None:
+        """Refuse what is below, or about, a UAV that another pilot holds."""
+        for uav in (name.split("/")[1], *_texts_in(operation.get("args"))):
+            holder = self._pilots.holder_of(uav)
+            if holder not in ("", self.name):
+                raise BridgeError(f"{uav} is held by {holder}, who can hand it over")
+
+    def _sign(self, service: str, operation: Operation) -> None:
+        """See to it that the pilot speaks for nobody else."""
+        args = operation.get("args")
+        if not isinstance(args, dict):
+            raise BridgeError(f"{service}: args must be an object with uav")
+        called = args.get("pilot")
+        if isinstance(called, str) and called not in ("", self.name):
+            if service != TAKE or self._pilots.held_by(self.name):
+                raise BridgeError(f"you are {self.name}, not {called[:MOST_CHARACTERS]}")
+            self._crew.rename(self.name, called)
+            self.name = called
+        to = args.get("to")
+        if service == HAND_OVER and to not in self._crew:
+            raise BridgeError(f"no pilot is called {str(to)[:MOST_CHARACTERS]!r} here")
+        operation["args"] = {**args, "pilot": self.name}
+
+
+def service_of(operation: Operation) -> str:
     """Name in the graph of what a client calls `/add` or, long ago, `/add#3`."""
-    name = called.partition("#")[0]
-    return name if name.startswith("/") else f"/{name}"
+    return _absolute(str(operation.get("service", "")).partition("#")[0])
+
+
+def _absolute(name: Any) -> str:
+    return absolute(str(name or ""))
+
+
+def _texts_in(value: Any, depth: int = 0) -> Iterator[str]:
+    """All texts of a call's arguments, also of those that are JSON in a text."""
+    if depth > _DEEPEST:
+        return
+    if isinstance(value, str):
+        yield value
+        if value.lstrip().startswith("{"):
+            with suppress(ValueError, RecursionError):
+                yield from _texts_in(json.loads(value), depth + 1)
+    elif isinstance(value, dict):
+        for inner in value.values():
+            yield from _texts_in(inner, depth + 1)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _texts_in(inner, depth + 1)

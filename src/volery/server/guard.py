@@ -7,6 +7,7 @@ rebinding (Host); W3C, Content Security Policy Level 3.
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
 from http.cookies import CookieError, Morsel, SimpleCookie
 from typing import NamedTuple
 from urllib.parse import parse_qs
@@ -38,6 +39,8 @@ _HEADERS = {
 }
 _WRONG_TOKEN_S = 0.5
 """What a wrong token costs its guesser."""
+_GONE_S = 0.2
+"""How long a refused WebSocket has to go."""
 _HARMLESS = {"GET", "HEAD", "OPTIONS"}
 _GUARDED = ("/api/", "/rosbridge")
 _FOR_ALL = "/api/status"
@@ -170,3 +173,8 @@ async def _refuse(error: RefusedError, scope: Scope, receive: Receive, send: Sen
         await response(scope, receive, send)
         return
     await WebSocket(scope, receive, send).send_denial_response(response)
+    # uvicorn logs an error for who returns before the connection is gone
+    with suppress(TimeoutError):
+        async with asyncio.timeout(_GONE_S):
+            while True:
+                await receive()

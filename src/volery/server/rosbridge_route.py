@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from starlette.types import Message
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -12,7 +14,7 @@ from volery.bridges.rosbridge.conversation import SERVICE_RESTART, Bell, convers
 from volery.bridges.rosbridge.gate import Gate
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, Frame
-from volery.server.gate import ViewerGate
+from volery.server.gate import PilotGate, ViewerGate
 from volery.server.rights import Role
 from volery.server.site import Client, JoinedWorld, Site
 
@@ -59,15 +61,36 @@ async def serve_rosbridge(websocket: WebSocket) -> None:
     if len(site.clients) >= MOST_CLIENTS:
         await websocket.close(_TRY_AGAIN_LATER, "too many clients")
         return
-    address = websocket.client
+    world, address = site.world, websocket.client
     name = f"page {address.host}:{address.port}" if address else "page"
-    await _serve(site, site.world, _Channel(websocket), name, websocket.state.role)
+    with _gate_of(websocket, site, world) as gate:
+        await _serve(site, world, _Channel(websocket), name, gate)
 
 
-async def _serve(site: Site, world: JoinedWorld, channel: _Channel, name: str, role: Role) -> None:
+@contextmanager
+def _gate_of(websocket: WebSocket, site: Site, world: JoinedWorld) -> Iterator[Gate | None]:
+    """What the client may do, as long as it is there; a pilot who leaves lets go of his UAVs."""
+    if websocket.state.role is not Role.PILOT:
+        yield ViewerGate()
+        return
+    pilots = world.pilots
+    if pilots is None:
+        yield None
+        return
+    gate = PilotGate(site.crew.sign_in(websocket.query_params.get("pilot", "")), site.crew, pilots)
+    try:
+        yield gate
+    finally:
+        site.crew.sign_out(gate.name)
+        world.gateway.post(lambda: pilots.leave(gate.name))
+
+
+async def _serve(
+    site: Site, world: JoinedWorld, channel: _Channel, name: str, gate: Gate | None
+) -> None:
+    """Hold one conversation."""
     loop = asyncio.get_running_loop()
     bell = Bell(loop)
-    gate: Gate | None = ViewerGate() if role is Role.VIEWER else None
     session = world.gateway.open(name)
     peer = RosbridgePeer(
         session,

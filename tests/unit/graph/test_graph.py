@@ -199,3 +199,47 @@ def test_what_was_latched_on_the_way_goes_with_its_publisher(graph):
     graph.subscribe("/a", late.append)
     graph.deliver()
     assert late == []
+
+
+def test_what_is_shown_reaches_clients_outside_alone(timed):
+    publisher = timed.advertise("/live", String)
+    inside, everything, outside = [], [], []
+    timed.subscribe("/live", inside.append)
+    timed.subscribe_all(everything.append)
+    assert not publisher.watched
+    subscription = timed.attach("/live", outside.append)
+    assert publisher.watched
+    assert publisher.watchers_so_far == 1
+    publisher.show(String("now"))
+    assert texts(outside) == ["now"]  # at once, without a delivery
+    timed.deliver()
+    assert inside == everything == []
+    publisher.publish(String("to all"))
+    timed.deliver()
+    assert [texts(got) for got in (inside, everything, outside)] == [
+        ["to all"],
+        ["to all"],
+        ["now", "to all"],
+    ]
+    subscription.cancel()
+    assert not publisher.watched
+    publisher.show(String("nobody"))
+    assert len(outside) == 2
+    with pytest.raises(GraphError, match="carries"):
+        publisher.show(Twist(None, None))
+    publisher.cancel()
+    timed.attach("/live", outside.append)
+    publisher.show(String("gone"))
+    assert len(outside) == 2
+
+
+def test_what_is_kept_is_shown_again(timed):
+    publisher = timed.advertise("/map", String, latched=True)
+    publisher.publish(String("m"))
+    timed.deliver()
+    inside, outside = [], []
+    timed.subscribe("/map", inside.append)
+    timed.attach("/map", outside.append)
+    timed.deliver()
+    timed.show_kept()
+    assert (texts(inside), texts(outside)) == (["m"], ["m", "m"])

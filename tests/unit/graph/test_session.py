@@ -241,3 +241,33 @@ def test_last_words_of_who_leaves_are_heard(bench):
     bench.graph.subscribe("/in", late.append, STRING)
     bench.graph.deliver()
     assert not late
+
+
+def test_who_was_commanded_from_outside(bench, monkeypatch):
+    monkeypatch.setattr("volery.graph.session._MOST_NAMES", 2)
+    session, gateway = bench.gateway.open("client"), bench.gateway
+    bench.graph.advertise("/uav1/inside", STRING).publish(message_type(STRING)("x"))
+    bench.work_off()
+    assert gateway.commanded_ns == {}
+    for topic in ("/chat", "/uav1/word", "/uav2/word", "/uav1/word", "/uav3/word"):
+        session.advertise(topic, STRING)
+        session.publish(topic, message_type(STRING)("x"))
+    session.call("/uav3/none", None, Reply(lambda _: None, lambda _: None))
+    bench.work_off()
+    assert list(gateway.commanded_ns) == ["uav1", "uav3"]
+    assert gateway.commanded_ns["uav3"] == bench.graph.now_ns()
+    assert gateway.commands == 5
+
+
+def test_losses_of_those_who_left_count(bench):
+    session = bench.gateway.open("slow")
+    publisher = bench.graph.advertise("/fast", STRING)
+    for _ in range(2):
+        session.subscribe("/fast", depth=1, wake=lambda: None)
+    for _ in range(4):
+        publisher.publish(message_type(STRING)("x"))
+    bench.work_off()
+    assert bench.gateway.dropped == 6
+    session.close()
+    bench.gateway.open("another")
+    assert bench.gateway.dropped == 6

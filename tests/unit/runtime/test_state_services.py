@@ -226,7 +226,7 @@ def test_loading_is_the_owners_business(simulate, flat_data):
     simulation = simulate(flat_data, on_load=loaded.append)
     response = ask(simulation, "/load_world", **wanted)
     assert code_of(response) == OK
-    assert response.world.name == loaded[0] == "hover"
+    assert response.world.name == loaded[0].name == "hover"
     for source, code in (
         ({"uri": "nowhere"}, NOT_FOUND),
         ({"uri": "../../etc/passwd"}, NOT_FOUND),

@@ -1,20 +1,70 @@
+import { lazy, Suspense } from "react";
 import { Scene } from "../scene/Scene.tsx";
+import { PlayerBar } from "./PlayerBar.tsx";
+import { useLayout } from "../state/layout.ts";
+import { useWindows } from "../state/windows.ts";
 import { DockArea } from "./DockArea.tsx";
+import { DropZone } from "./DropZone.tsx";
+import { HandControls } from "./hands/HandControls.tsx";
+import { Picking } from "./Picking.tsx";
 import { Rail } from "./Rail.tsx";
-import { TopBar } from "./TopBar.tsx";
+import { SceneBoundary } from "./SceneBoundary.tsx";
+import { Situation } from "./Situation.tsx";
+import { TopBar } from "./top/TopBar.tsx";
+import { useHotkeys } from "./useHotkeys.ts";
+
+const MiniMap = lazy(() => import("../panels/map/MiniMap.tsx"));
+const Pictures = lazy(() => import("../panels/pictures/Pictures.tsx"));
+const Help = lazy(() => import("./Help.tsx"));
+const Scenarios = lazy(() => import("../panels/scenarios/Scenarios.tsx"));
+const Upload = lazy(() => import("../panels/scenarios/Upload.tsx"));
 
 /** The whole page: the scene, and around it what steers and explains it. */
 export function App() {
+  useHotkeys();
   return (
     <div className="page">
       <TopBar />
       <Rail />
       <DockArea dock="left" />
       <main className="scene">
-        <Scene />
+        <SceneBoundary>
+          <Scene />
+        </SceneBoundary>
+        <PlayerBar />
+        <Overlays />
+        <Situation />
       </main>
       <DockArea dock="right" />
       <DockArea dock="bottom" />
+      <Windows />
+      <DropZone />
     </div>
+  );
+}
+
+/** What lies over the scene. */
+function Overlays() {
+  const shown = useLayout((layout) => layout.shown);
+  return (
+    <div className="overlays">
+      <Suspense>
+        {shown.map && <MiniMap />}
+        {shown.pictures && <Pictures />}
+      </Suspense>
+      <Picking />
+      <HandControls />
+    </div>
+  );
+}
+
+function Windows() {
+  const open = useWindows((windows) => windows.open);
+  return (
+    <Suspense>
+      {open === "help" && <Help />}
+      {open === "scenarios" && <Scenarios />}
+      {open === "upload" && <Upload />}
+    </Suspense>
   );
 }

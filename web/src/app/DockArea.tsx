@@ -3,20 +3,25 @@ import { X } from "lucide-react";
 import { Suspense } from "react";
 import { PANELS } from "../panels/registry.ts";
 import { closePanel, useLayout, type Dock } from "../state/layout.ts";
+import { DockEdge } from "./DockEdge.tsx";
 
 /** One side of the page, with the panel that is open there. */
 export function DockArea({ dock }: { dock: Dock }) {
   const open = useLayout((layout) => layout[dock]);
+  const size = useLayout((layout) => layout.sizes[dock]);
   const panel = PANELS.find(({ id }) => id === open);
   if (panel === undefined) return null;
   return (
     <aside
       className={`dock dock-${dock}`}
       aria-label={panel.title}
-      style={{ display: "flex", flexDirection: "column" }}
+      style={{ "--dock-size": `${size}px` } as React.CSSProperties}
     >
+      <DockEdge dock={dock} title={panel.title} />
       <Group justify="space-between" px="sm" py={4} wrap="nowrap">
-        <Title order={6}>{panel.title}</Title>
+        <Title order={6} component="h2">
+          {panel.title}
+        </Title>
         <ActionIcon
           variant="subtle"
           color="gray"
@@ -26,7 +31,7 @@ export function DockArea({ dock }: { dock: Dock }) {
           <X size={16} />
         </ActionIcon>
       </Group>
-      <div style={{ flex: 1, minHeight: 0 }}>
+      <div className="dock-content">
         <Suspense fallback={<Loader size="sm" m="md" />}>
           <panel.view />
         </Suspense>

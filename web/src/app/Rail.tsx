@@ -1,8 +1,13 @@
 import { ActionIcon, Stack, Tooltip } from "@mantine/core";
+import { Gamepad2, Move3d } from "lucide-react";
 import { PANELS } from "../panels/registry.ts";
+import { toggleControls, useFlying } from "../state/flying.ts";
 import { togglePanel, useLayout } from "../state/layout.ts";
+import { useWhyNot } from "../state/rights.ts";
+import { setMoving, useTool } from "../state/tool.ts";
+import { useVehicles } from "../state/vehicles.ts";
 
-/** The column of buttons that open panels. */
+/** The column of buttons that open panels, and the tools of the hand. */
 export function Rail() {
   const layout = useLayout();
   return (
@@ -20,6 +25,44 @@ export function Rail() {
           </ActionIcon>
         </Tooltip>
       ))}
+      <div className="rail-rule" role="separator" />
+      <Tools />
     </Stack>
+  );
+}
+
+function Tools() {
+  const uav = useVehicles(({ selected }) => selected);
+  const flying = useFlying((state) => state.uav !== "");
+  const moving = useTool((tool) => tool.moving);
+  const whyNot = useWhyNot() ?? (uav === "" ? "No UAV is selected" : null);
+  return (
+    <>
+      <Tooltip label={whyNot ?? `Fly ${uav} by hand (C)`} position="right">
+        <ActionIcon
+          size="lg"
+          variant={flying ? "filled" : "subtle"}
+          color={flying ? "orange" : "cyan"}
+          aria-label="Fly by hand"
+          aria-pressed={flying}
+          disabled={whyNot !== null}
+          onClick={toggleControls}
+        >
+          <Gamepad2 size={19} />
+        </ActionIcon>
+      </Tooltip>
+      <Tooltip label={whyNot ?? `Move ${uav} by dragging it (V)`} position="right">
+        <ActionIcon
+          size="lg"
+          variant={moving ? "filled" : "subtle"}
+          aria-label="Move by dragging"
+          aria-pressed={moving}
+          disabled={whyNot !== null}
+          onClick={() => setMoving(!moving)}
+        >
+          <Move3d size={19} />
+        </ActionIcon>
+      </Tooltip>
+    </>
   );
 }

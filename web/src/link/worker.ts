@@ -9,7 +9,7 @@ import type { FromWorker, ToWorker, Wish } from "./protocol.ts";
 import { MeteredTransport } from "./transport.ts";
 
 const FIRST_RETRY_MS = 250;
-const LONGEST_RETRY_MS = 2000;
+const LONGEST_RETRY_MS = 500;
 const TRAFFIC_MS = 500;
 const POLICY_VIOLATION = 1008;
 

@@ -1719,6 +1719,18 @@ export interface volery_interfaces_ByName_Response {
   message: string;
 }
 
+export type volery_interfaces_GetChoices_Request = Record<string, never>;
+
+export interface volery_interfaces_GetChoices_Response {
+  scenarios: string[];
+  airframes: string[];
+  sensor_sets: string[];
+  sensor_set_descriptions: string[];
+  changes_schema: string;
+  success: boolean;
+  message: string;
+}
+
 export type volery_interfaces_GetGridMap_Request = Record<string, never>;
 
 export interface volery_interfaces_GetGridMap_Response {
@@ -1773,6 +1785,17 @@ export interface volery_interfaces_Gust_Response {
   message: string;
 }
 
+export interface volery_interfaces_HandOver_Request {
+  uav: string;
+  pilot: string;
+  to: string;
+}
+
+export interface volery_interfaces_HandOver_Response {
+  success: boolean;
+  message: string;
+}
+
 export interface volery_interfaces_InjectFault_Request {
   fault: string;
 }
@@ -1812,6 +1835,26 @@ export interface volery_interfaces_ListSnapshots_Response {
   message: string;
   names: string[];
   stamps: builtin_interfaces_Time[];
+}
+
+export interface volery_interfaces_LoadScenario_Request {
+  scenario: string;
+  changes: string;
+}
+
+export interface volery_interfaces_LoadScenario_Response {
+  success: boolean;
+  message: string;
+}
+
+export interface volery_interfaces_ReleaseControl_Request {
+  uav: string;
+  pilot: string;
+}
+
+export interface volery_interfaces_ReleaseControl_Response {
+  success: boolean;
+  message: string;
 }
 
 export interface volery_interfaces_SetCommandTimeout_Request {
@@ -1876,6 +1919,16 @@ export interface volery_interfaces_StopRecording_Response {
   message: string;
   path: string;
   messages: number | bigint;
+}
+
+export interface volery_interfaces_TakeControl_Request {
+  uav: string;
+  pilot: string;
+}
+
+export interface volery_interfaces_TakeControl_Response {
+  success: boolean;
+  message: string;
 }
 
 export interface volery_interfaces_TakeOffTo_Request {
@@ -2091,19 +2144,24 @@ export interface Services {
   "std_srvs/srv/Trigger": { request: std_srvs_Trigger_Request; response: std_srvs_Trigger_Response };
   "tf2_msgs/srv/FrameGraph": { request: tf2_msgs_FrameGraph_Request; response: tf2_msgs_FrameGraph_Response };
   "volery_interfaces/srv/ByName": { request: volery_interfaces_ByName_Request; response: volery_interfaces_ByName_Response };
+  "volery_interfaces/srv/GetChoices": { request: volery_interfaces_GetChoices_Request; response: volery_interfaces_GetChoices_Response };
   "volery_interfaces/srv/GetGridMap": { request: volery_interfaces_GetGridMap_Request; response: volery_interfaces_GetGridMap_Response };
   "volery_interfaces/srv/GetWeather": { request: volery_interfaces_GetWeather_Request; response: volery_interfaces_GetWeather_Response };
   "volery_interfaces/srv/GoTo": { request: volery_interfaces_GoTo_Request; response: volery_interfaces_GoTo_Response };
   "volery_interfaces/srv/Gust": { request: volery_interfaces_Gust_Request; response: volery_interfaces_Gust_Response };
+  "volery_interfaces/srv/HandOver": { request: volery_interfaces_HandOver_Request; response: volery_interfaces_HandOver_Response };
   "volery_interfaces/srv/InjectFault": { request: volery_interfaces_InjectFault_Request; response: volery_interfaces_InjectFault_Response };
   "volery_interfaces/srv/JoinLockStep": { request: volery_interfaces_JoinLockStep_Request; response: volery_interfaces_JoinLockStep_Response };
   "volery_interfaces/srv/JoinSearch": { request: volery_interfaces_JoinSearch_Request; response: volery_interfaces_JoinSearch_Response };
   "volery_interfaces/srv/ListSnapshots": { request: volery_interfaces_ListSnapshots_Request; response: volery_interfaces_ListSnapshots_Response };
+  "volery_interfaces/srv/LoadScenario": { request: volery_interfaces_LoadScenario_Request; response: volery_interfaces_LoadScenario_Response };
+  "volery_interfaces/srv/ReleaseControl": { request: volery_interfaces_ReleaseControl_Request; response: volery_interfaces_ReleaseControl_Response };
   "volery_interfaces/srv/SetCommandTimeout": { request: volery_interfaces_SetCommandTimeout_Request; response: volery_interfaces_SetCommandTimeout_Response };
   "volery_interfaces/srv/SetGridMap": { request: volery_interfaces_SetGridMap_Request; response: volery_interfaces_SetGridMap_Response };
   "volery_interfaces/srv/SetSpeed": { request: volery_interfaces_SetSpeed_Request; response: volery_interfaces_SetSpeed_Response };
   "volery_interfaces/srv/SetWeather": { request: volery_interfaces_SetWeather_Request; response: volery_interfaces_SetWeather_Response };
   "volery_interfaces/srv/StartRecording": { request: volery_interfaces_StartRecording_Request; response: volery_interfaces_StartRecording_Response };
   "volery_interfaces/srv/StopRecording": { request: volery_interfaces_StopRecording_Request; response: volery_interfaces_StopRecording_Response };
+  "volery_interfaces/srv/TakeControl": { request: volery_interfaces_TakeControl_Request; response: volery_interfaces_TakeControl_Response };
   "volery_interfaces/srv/TakeOffTo": { request: volery_interfaces_TakeOffTo_Request; response: volery_interfaces_TakeOffTo_Response };
 }

@@ -1,4 +1,15 @@
-import { Plane, type LucideIcon } from "lucide-react";
+import {
+  ChartLine,
+  CloudSun,
+  Disc,
+  List,
+  Plane,
+  ScrollText,
+  SlidersHorizontal,
+  Wrench,
+  Zap,
+  type LucideIcon,
+} from "lucide-react";
 import { lazy, type ComponentType, type LazyExoticComponent } from "react";
 import type { Dock } from "../state/layout.ts";
 
@@ -18,6 +29,62 @@ export const PANELS: readonly PanelEntry[] = [
     title: "Vehicles",
     icon: Plane,
     dock: "left",
-    view: lazy(() => import("./Vehicles.tsx")),
+    view: lazy(() => import("./vehicles/Vehicles.tsx")),
+  },
+  {
+    id: "inspector",
+    title: "Inspector",
+    icon: SlidersHorizontal,
+    dock: "right",
+    view: lazy(() => import("./inspector/Inspector.tsx")),
+  },
+  {
+    id: "environment",
+    title: "Environment",
+    icon: CloudSun,
+    dock: "right",
+    view: lazy(() => import("./environment/Environment.tsx")),
+  },
+  {
+    id: "topics",
+    title: "Topics",
+    icon: List,
+    dock: "bottom",
+    view: lazy(() => import("./topics/Topics.tsx")),
+  },
+  {
+    id: "plots",
+    title: "Plots",
+    icon: ChartLine,
+    dock: "bottom",
+    view: lazy(() => import("./plots/Plots.tsx")),
+  },
+  {
+    id: "services",
+    title: "Services",
+    icon: Wrench,
+    dock: "bottom",
+    view: lazy(() => import("./services/Services.tsx")),
+  },
+  {
+    id: "log",
+    title: "Log",
+    icon: ScrollText,
+    dock: "bottom",
+    view: lazy(() => import("./log/Log.tsx")),
+  },
+  {
+    id: "faults",
+    title: "Faults",
+    icon: Zap,
+    dock: "bottom",
+    view: lazy(() => import("./faults/Faults.tsx")),
+  },
+  {
+    id: "recordings",
+    title: "Recordings",
+    icon: Disc,
+    dock: "bottom",
+    view: lazy(() => import("./recordings/Recordings.tsx")),
   },
 ];

@@ -2,6 +2,9 @@ import { Canvas, useFrame, useThree } from "@react-three/fiber";
 import { useEffect, useRef } from "react";
 import { NeutralToneMapping, Object3D, PCFShadowMap, type PerspectiveCamera } from "three";
 import { ViewMenu } from "../views/ViewMenu.tsx";
+import { DragHandle } from "./DragHandle.tsx";
+import { EyeProbe } from "./EyeProbe.tsx";
+import { GroundPicker } from "./GroundPicker.tsx";
 import { Stage } from "./stage/Stage.ts";
 
 // Coordinates of the picture are those of the map: ENU, metres.
@@ -23,6 +26,9 @@ export function Scene() {
         aria-label="Scene"
       >
         <Pictures />
+        <DragHandle />
+        <EyeProbe />
+        <GroundPicker />
       </Canvas>
       <ViewMenu />
     </>

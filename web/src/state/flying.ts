@@ -24,6 +24,16 @@ export const useFlying = create<Flying>(() => ({
   speeds: readKept(KEY, USUAL),
 }));
 
+let haste = () => 1;
+
+/** What multiplies the speeds, such as a key that is held; returns how to end that. */
+export function setHaste(asked: () => number): () => void {
+  haste = asked;
+  return () => {
+    haste = () => 1;
+  };
+}
+
 /** What asks for a velocity; each is asked 20 times a second while the controls are taken. */
 const sources = new Set<() => Partial<Wish>>();
 let timer: ReturnType<typeof setInterval> | undefined;
@@ -71,7 +81,8 @@ function tick(): void {
   if (!same(wish, before)) useFlying.setState({ wish });
   if (isAtRest(wish)) return rest();
   moving = true;
-  fly(uav, twistOf(wish, speeds));
+  const by = haste();
+  fly(uav, twistOf(wish, { ...speeds, level: speeds.level * by, climb: speeds.climb * by }));
 }
 
 function same(a: Wish, b: Wish): boolean {

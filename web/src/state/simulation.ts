@@ -1,4 +1,5 @@
 import { create } from "zustand";
+import { secondsOf } from "../lib/time.ts";
 import { link } from "../link/link.ts";
 import type { volery_interfaces_SimulationStatus } from "../messages/generated.ts";
 
@@ -40,4 +41,10 @@ export function followSimulation(ownServer: boolean): void {
     setTimeout(() => void ask(), ASK_MS);
   };
   void ask();
+}
+
+/** Simulated time of what came last, s. */
+export function simulatedS(): number {
+  const { status } = useSimulation.getState();
+  return Math.max(link.frames.stampS, status === null ? 0 : secondsOf(status.stamp));
 }

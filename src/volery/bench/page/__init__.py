@@ -1,1 +1,5 @@
-"""The page in the browser: how fast it is, how honest, and what it costs the simulation."""
+"""The bench `page`: how fast the page is, how honest, and what it costs the simulation."""
+
+from volery.bench.page.measuring import measure
+
+__all__ = ["measure"]

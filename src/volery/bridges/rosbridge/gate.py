@@ -11,8 +11,11 @@ from volery.bridges.rosbridge.wire import Operation
 class Gate(Protocol):
     """Stands before the operations of one client, those of the connection itself excepted."""
 
-    def check(self, operation: Operation) -> None:
-        """`BridgeError` with the reason where the client must not do that."""
+    def check(self, operation: Operation) -> bool:
+        """Whether the client may do that; `BridgeError` with the reason where it shall be told.
+
+        A gate may put right what a client says of itself.
+        """
 
 
 def refusal(operation: Operation, reason: str) -> Operation | None:

@@ -181,14 +181,13 @@ class RosbridgePeer:
         if self._gate is None:
             return True
         try:
-            self._gate.check(operation)
+            return self._gate.check(operation)
         except BridgeError as error:
             answer = refusal(operation, str(error))
             if answer is None:
                 raise
             self.send(answer, None, "none")
             return False
-        return True
 
     def _handle_inner(self, operation: Operation, now_s: float, depth: int) -> None:
         """An unwrapped operation; its errors carry its own id."""

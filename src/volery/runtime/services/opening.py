@@ -12,6 +12,7 @@ from volery.runtime.services.features import offer_features
 from volery.runtime.services.grid_maps import offer_grid_maps
 from volery.runtime.services.kept_states import KeptStates
 from volery.runtime.services.named_poses import offer_named_poses
+from volery.runtime.services.piloting import offer_piloting
 from volery.runtime.services.playing import Playing
 from volery.runtime.services.recording import Recording
 from volery.runtime.services.spawning import Spawning
@@ -73,6 +74,7 @@ def open_services(
     if simulation.scenario.world.grid_map is not None:
         settings = simulation.scenario.world.grid_map
         offer_grid_maps(graph, simulation.grid_world, settings, lambda: simulation.time_ns)
+    offer_piloting(graph, simulation.pilots)
     KeptStates(simulation).offer()
     recording = Recording(graph, recordings)
     recording.offer()

@@ -8,10 +8,12 @@ from typing import Any
 
 from volery.core.errors import ScenarioError, VoleryError
 from volery.graph.graph import Graph
+from volery.runtime.services.choosing import offer_choices
 from volery.runtime.services.filters import tag_filter
 from volery.runtime.services.offering import Code, Fields, RefusedError, filled, offer_result
 from volery.runtime.services.spawning import resource
 from volery.scenario import library
+from volery.scenario.changes import WorldRequest
 from volery.scenario.load import load_scenario
 from volery.scenario.schema import Scenario
 from volery.scenario.shelf import Shelf
@@ -22,7 +24,7 @@ _NO_RESOURCE = 102
 _PARSE_ERROR = 103
 _NO_WORLD = 101
 
-OnLoad = Callable[[str | None], None]
+OnLoad = Callable[[WorldRequest | None], None]
 """Has another scenario of the library flown instead of the present one, or, for None, no one."""
 
 
@@ -51,7 +53,7 @@ def offer_worlds(
 
     def load(request: Any) -> Fields:
         scenario = _wanted(request.world_resource, shelf) if on_load is not None else None
-        change(scenario)
+        change(None if scenario is None else WorldRequest(scenario.name))
         return {"world": _world(scenario, shelf)} if scenario is not None else {}
 
     def unload(_request: Any) -> None:
@@ -59,12 +61,12 @@ def offer_worlds(
             raise RefusedError(_NO_WORLD, "no world is loaded")
         change(None)
 
-    def change(scenario: Scenario | None) -> None:
+    def change(request: WorldRequest | None) -> None:
         if on_load is None:
             reason = "this process simulates one scenario; start another one for another world"
             raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
         try:
-            on_load(None if scenario is None else scenario.name)
+            on_load(request)
         except VoleryError as error:
             raise RefusedError(Code.OPERATION_FAILED, str(error)) from None
 
@@ -72,6 +74,7 @@ def offer_worlds(
     offer_result(graph, "/get_current_world", f"{_SRV}/GetCurrentWorld", current)
     offer_result(graph, "/load_world", f"{_SRV}/LoadWorld", load)
     offer_result(graph, "/unload_world", f"{_SRV}/UnloadWorld", unload)
+    offer_choices(graph, shelf.names, lambda name: _read(shelf, name), change)
 
 
 def tags_of(scenario: Scenario) -> list[str]:

@@ -5,7 +5,11 @@ For pages and renderers. Autonomy must not read it: on a robot there is nothing 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from volery.engine.engine import Engine
 from volery.graph.graph import Graph
@@ -17,7 +21,10 @@ from volery.graph.messages import (
     Vector3,
     header,
 )
+from volery.graph.rows import Rows
 from volery.runtime.telling.present import Present
+
+Array = NDArray[np.float64]
 
 TOPIC = "/ground_truth/tf"
 _PERIOD_S = 0.02
@@ -34,25 +41,21 @@ def tell_poses(graph: Graph, engine: Engine) -> Present:
 
 
 def _message(engine: Engine) -> TFMessage:
-    state = engine.fleet.state
-    stamp = header(engine.time_ns, "map")
+    state, things = engine.fleet.state, engine.things
     frames = [f"{name}/base_link" for name in engine.names]
-    transforms = _transforms(stamp, frames, state.position_map.tolist(), state.attitude.tolist())
-    things = engine.things
+    poses = np.hstack([state.position_map, state.attitude])
     if things is not None:
-        poses = things.poses_at(engine.time_ns)
-        named = list(things.names)
-        transforms += _transforms(stamp, named, poses[:, :3].tolist(), poses[:, 3:].tolist())
+        frames += things.names
+        poses = np.vstack([poses, things.poses_at(engine.time_ns)])
+    stamp = header(engine.time_ns, "map")
+    transforms: Any = Rows(len(frames), lambda: _transforms(stamp, frames, poses))
     return TFMessage(transforms)
 
 
-def _transforms(
-    stamp: Any, frames: list[str], places: list[list[float]], turns: list[list[float]]
-) -> list[TransformStamped]:
-    return [
-        TransformStamped(stamp, frame, Transform(Vector3(*place), Quaternion(*turn)))
-        for frame, place, turn in zip(frames, places, turns, strict=True)
-    ]
+def _transforms(stamp: Any, frames: list[str], poses: Array) -> Iterator[TransformStamped]:
+    """One a frame; poses (N, 7) of x y z qx qy qz qw."""
+    for frame, (x, y, z, *turn) in zip(frames, poses.tolist(), strict=True):
+        yield TransformStamped(stamp, frame, Transform(Vector3(x, y, z), Quaternion(*turn)))
 
 
 def _content(engine: Engine) -> tuple[Any, ...]:

@@ -53,6 +53,6 @@ class Present:
             self.publisher.show(self.message())
 
     def _tell(self) -> None:
-        self._told_at_s = self._now_s
+        self._told_at_s, self._watchers = self._now_s, self.publisher.watchers_so_far
         self._told = self.content() if self.publisher.watched else None
         self.publisher.publish(self.message())

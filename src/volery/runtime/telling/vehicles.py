@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ from volery.control.flight_modes import FlightMode
 from volery.core.clock import s_from_ns
 from volery.engine.engine import Engine
 from volery.graph.messages import Point, Vector3, header, message_type
+from volery.graph.rows import Rows
 from volery.graph.session import Gateway
 from volery.runtime.telling.present import Present
 from volery.runtime.uav import Uav
@@ -62,18 +63,20 @@ class Vehicles:
         voltage = np.where(build.has_battery, state.battery_voltage, math.nan)
         rotors = state.rotor_speed.sum(axis=1) / build.full_speed
         columns = (
+            self._engine.names,
             build.airframes,
-            modes.tolist(),
+            [self._uavs[name].type_name for name in self._engine.names],
+            [_MODES[mode] for mode in modes.tolist()],
             in_air.tolist(),
             state.crashed.tolist(),
             battery.astype(np.float32).tolist(),
             voltage.astype(np.float32).tolist(),
-            state.position_map.tolist(),
-            state.velocity_map.tolist(),
+            np.hstack([state.position_map, state.velocity_map]),
             rotors.astype(np.float32).tolist(),
+            [self._command_age_s(name) for name in self._engine.names],
+            [self.holder(name) for name in self._engine.names],
         )
-        rows = zip(self._engine.names, *columns, strict=True)
-        vehicles = [self._vehicle(name, *columns) for name, *columns in rows]
+        vehicles = Rows(len(build.airframes), lambda: _vehicles(*columns))
         return message_type(_ALL)(header(self._engine.time_ns, "map"), vehicles)
 
     def content(self) -> tuple[Any, ...]:
@@ -87,37 +90,8 @@ class Vehicles:
             state.position_map.tobytes(),
             state.velocity_map.tobytes(),
             state.battery_charge.tobytes(),
-            dict(self._gateway.commanded_ns),
+            self._gateway.commands,
             tuple(self.holder(name) for name in engine.names),
-        )
-
-    def _vehicle(
-        self,
-        name: str,
-        airframe: str,
-        mode: int,
-        airborne: bool,
-        crashed: bool,
-        battery: float,
-        voltage: float,
-        place: list[float],
-        velocity: list[float],
-        rotors: float,
-    ) -> Any:
-        return message_type(_ONE)(
-            name,
-            airframe,
-            self._uavs[name].type_name,
-            _MODES[mode],
-            airborne,
-            crashed,
-            battery,
-            voltage,
-            Point(*place),
-            Vector3(*velocity),
-            rotors,
-            self._command_age_s(name),
-            self.holder(name),
         )
 
     def _command_age_s(self, name: str) -> float:
@@ -130,6 +104,14 @@ class Vehicles:
         if self._build.fleet is not self._engine.fleet:
             self._build = _build_of(self._engine.fleet)
         return self._build
+
+
+def _vehicles(*columns: Any) -> Iterator[Any]:
+    """One VehicleState a row; columns in the order of its fields, place and velocity in one."""
+    one = message_type(_ONE)
+    for *head, motion, rotors, age_s, holder in zip(*columns, strict=True):
+        x, y, z, *velocity = motion.tolist()
+        yield one(*head, Point(x, y, z), Vector3(*velocity), rotors, age_s, holder)
 
 
 def _build_of(fleet: Fleet) -> _Build:

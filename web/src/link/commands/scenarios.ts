@@ -1,6 +1,7 @@
 // Which scenario flies, and with what; uploads. What is not on the graph is asked for over HTTP.
 
-import { order, RefusedError } from "./asking.ts";
+import { order } from "./asking.ts";
+import { read } from "./http.ts";
 
 export interface ScenarioCard {
   name: string;
@@ -64,11 +65,4 @@ export async function upload(file: File, kind: UploadKind): Promise<string> {
 
 async function get(url: string): Promise<unknown> {
   return await read(await fetch(url, { cache: "no-store" }));
-}
-
-/** JSON of an answer; a refusal's reason is its `error`. */
-async function read(answer: Response): Promise<unknown> {
-  const told = (await answer.json().catch(() => null)) as { error?: string } | null;
-  if (answer.ok && told !== null) return told;
-  throw new RefusedError(told?.error ?? `the server answered ${answer.status}`);
 }

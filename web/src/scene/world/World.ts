@@ -1,5 +1,6 @@
 import { AxesHelper, GridHelper, Group, Mesh, type Object3D, type WebGLRenderer } from "three";
 import { useSimulation } from "../../state/simulation.ts";
+import { planWorld } from "../../state/worldPlan.ts";
 import type { Air } from "../air/air.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { Forest } from "./Forest.ts";
@@ -89,6 +90,7 @@ export class World implements Part {
       new Ground(ground.map(({ geometry, place }) => geometry.clone().applyMatrix4(place))),
       obstaclesOf(content, isGround),
     );
+    planWorld(content);
     this.ready = true;
     this.version++;
   }
@@ -105,6 +107,7 @@ export class World implements Part {
     }
     this.grid.visible = true;
     stand(new Ground([]), new Obstacles());
+    planWorld(null);
     this.version++;
   }
 }

@@ -1,0 +1,14 @@
+"""`python -m volery.bench.page [SECONDS]`: the bench with a shorter watch over memory."""
+
+import sys
+
+from volery.bench.page.measuring import measure
+from volery.bench.registry import find
+
+if __name__ == "__main__":
+    soak_s = float(sys.argv[1]) if len(sys.argv) > 1 else 60.0
+    measured, bounds = measure(soak_s), find("page").bounds
+    for figure, value in measured.figures.items():
+        print(f"{figure:32} {value:10.4g}  {bounds.get(figure, '')}")  # noqa: T201
+    for what, reason in measured.failures.items():
+        print(f"not measured: {what}: {reason}")  # noqa: T201

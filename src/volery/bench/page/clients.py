@@ -1,0 +1,70 @@
+"""Other clients beside the page, over plain WebSockets: many that read, one that stops.
+
+python -m volery.bench.page.clients URL CLIENTS SECONDS TOPIC...   prints what each lost, as JSON
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+from collections import defaultdict
+from typing import Any
+
+import numpy as np
+from websockets.asyncio.client import connect
+
+_SETTLING_S = 1.0
+
+
+def main() -> None:
+    """Read for so long and print how many messages were lost."""
+    url, clients, seconds, *topics = sys.argv[1:]
+    print(json.dumps(asyncio.run(_read(url, int(clients), float(seconds), topics))))  # noqa: T201
+
+
+async def _read(url: str, clients: int, seconds: float, topics: list[str]) -> dict[str, int]:
+    found = await asyncio.gather(*(_stamps(url, seconds, topics) for _ in range(clients)))
+    series = [stamps for client in found for stamps in client.values()]
+    return {
+        "messages": sum(map(len, series)),
+        "lost": sum(map(lost, series)),
+        "silent": clients * len(topics) - len(series),
+    }
+
+
+async def _stamps(url: str, seconds: float, topics: list[str]) -> dict[str, list[int]]:
+    """Stamps of what comes, ns, by topic."""
+    stamps: dict[str, list[int]] = defaultdict(list)
+    async with connect(url, max_size=None) as socket:
+        for topic in topics:
+            await socket.send(subscription(topic))
+        loop = asyncio.get_running_loop()
+        begins = loop.time() + _SETTLING_S
+        while (left := begins + seconds - loop.time()) > 0:
+            try:
+                text = await asyncio.wait_for(socket.recv(), left)
+            except TimeoutError:
+                break
+            told: dict[str, Any] = json.loads(text)
+            if told.get("op") == "publish" and loop.time() >= begins:
+                stamp = told["msg"]["header"]["stamp"]
+                stamps[told["topic"]].append(stamp["sec"] * 10**9 + stamp["nanosec"])
+    return stamps
+
+
+def subscription(topic: str) -> str:
+    """What subscribes to all messages of a topic."""
+    return json.dumps({"op": "subscribe", "topic": topic, "queue_length": 100})
+
+
+def lost(stamps: list[int]) -> int:
+    """How many messages of a periodic topic are missing between the first and the last."""
+    steps = np.diff(stamps)
+    if steps.size == 0:
+        return 0
+    return int(np.rint(steps / np.median(steps)).sum()) - steps.size
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+"""What is measured inside the browser."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.resources import files
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+import numpy as np
+
+from volery.core.errors import VoleryError
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+_PATIENCE_MS = 120_000
+_FRAMES = 150
+_STATIC = Path(str(files("volery.server") / "static"))
+
+_SCRIPT_OF_FRAMES = """async (frames) => {
+  const found = [];
+  for (let seen = window.volery.frames; found.length < frames; ) {
+    await new Promise((resolve) => requestAnimationFrame(resolve));
+    if (window.volery.frames === seen) continue;
+    seen = window.volery.frames;
+    found.push([window.volery.scriptMs, window.volery.updateMs, window.volery.drawCalls]);
+  }
+  return found;
+}"""
+
+
+@contextmanager
+def looking(browser: Browser, url: str, width: int = 640, height: int = 360) -> Iterator[Page]:
+    """The page in a window of its own, with panels closed, from when its picture is there."""
+    context = browser.new_context(viewport={"width": width, "height": height})
+    context.set_default_timeout(_PATIENCE_MS)
+    try:
+        page = context.new_page()
+        page.goto(url)
+        wait_for_picture(page)
+        yield page
+    finally:
+        context.close()
+
+
+def wait_for_picture(page: Page) -> None:
+    """Until the world has been drawn."""
+    page.wait_for_function("window.volery !== undefined && window.volery.firstPictureMs > 0")
+
+
+def first_picture_s(page: Page) -> float:
+    """From the request for the page to the first picture with the world in it, s."""
+    return float(page.evaluate("window.volery.firstPictureMs")) / 1000.0
+
+
+def initial_script_mb(page: Page) -> float:
+    """Scripts that were fetched until the first picture, each compressed by gzip, MB."""
+    fetched = page.evaluate(
+        """() => performance.getEntriesByType("resource")
+            .filter(({name, startTime}) => name.endsWith(".js")
+                && startTime < window.volery.firstPictureMs)
+            .map(({name}) => name)"""
+    )
+    names = {PurePosixPath(urlsplit(url).path).name for url in fetched}
+    names |= _workers()
+    if not names:
+        raise VoleryError("the page fetched no script")
+    scripts = (_STATIC / "assets" / name for name in names)
+    return sum(len(gzip.compress(script.read_bytes(), 9)) for script in scripts) / 1e6
+
+
+def frame_work(page: Page) -> dict[str, float]:
+    """Work of the frame loop: medians of `script_ms`, `update_ms`; most `draw_calls`."""
+    found = np.array(page.evaluate(_SCRIPT_OF_FRAMES, _FRAMES))
+    return {
+        "script_ms": float(np.median(found[:, 0])),
+        "update_ms": float(np.median(found[:, 1])),
+        "draw_calls": float(found[:, 2].max()),
+    }
+
+
+def shown_age_ms(page: Page, seconds: float) -> float:
+    """Age that 95 % of frames stay below, as the page's own meter tells it, ms."""
+    meter = page.get_by_role("button", name=re.compile("^Health"))
+    ages, ends = [], time.monotonic() + seconds
+    while time.monotonic() < ends:
+        page.wait_for_timeout(1000)
+        found = re.search(r"(\d+) ms", meter.get_attribute("aria-label") or "")
+        if found:
+            ages.append(float(found[1]))
+    if not ages:
+        raise VoleryError("the page does not know how old what it shows is")
+    return float(np.median(ages))
+
+
+def heap_bytes(page: Page) -> float:
+    """Live memory of the page's script, after a collection of garbage."""
+    devtools = page.context.new_cdp_session(page)
+    devtools.send("HeapProfiler.enable")
+    devtools.send("HeapProfiler.collectGarbage")
+    used = devtools.send("Runtime.getHeapUsage")["usedSize"]
+    devtools.detach()
+    return float(used)
+
+
+def _workers() -> set[str]:
+    """Scripts of workers, which the page's own list of resources leaves out."""
+    return {path.name for path in (_STATIC / "assets").glob("worker-*.js")}

@@ -1,0 +1,132 @@
+"""`volery serve` in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from collections import deque
+from contextlib import suppress
+from typing import Any
+
+from volery.core.errors import VoleryError
+
+_STARTING_S = 300.0
+"""The first start compiles, and the machine may be busy."""
+_ENDING_S = 20.0
+_URL = re.compile(r"http://127\.0\.0\.1:(\d+)/")
+
+
+class PageProcess:
+    """A server and its simulation. Use it as a context manager, or call `start` and `stop`.
+
+    Parameters
+    ----------
+    scenario
+        A name, or the path of a TOML file.
+    options
+        Words of the command line.
+    port
+        Where to listen; 0: a free one, the same after a restart.
+
+    """
+
+    def __init__(self, scenario: str, *options: str, port: int = 0) -> None:
+        self.port = port
+        self._command = [sys.executable, "-m", "volery.cli", "serve", scenario, *options]
+        self._process: subprocess.Popen[str] | None = None
+        self._reader = threading.Thread()
+        self._said: deque[str] = deque(maxlen=50)
+
+    @property
+    def url(self) -> str:
+        """Of the page."""
+        return f"http://127.0.0.1:{self.port}/"
+
+    @property
+    def rosbridge(self) -> str:
+        """Of the graph."""
+        return f"ws://127.0.0.1:{self.port}/rosbridge"
+
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        if self._process is None:
+            raise VoleryError("the server does not run")
+        return self._process.pid
+
+    def start(self) -> None:
+        """Start it and wait until it flies. `VoleryError` with what it said if it does not."""
+        self._process = subprocess.Popen(
+            [*self._command, "--port", str(self.port)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        listening = threading.Event()
+        self._reader = threading.Thread(
+            target=self._read, args=(self._process, listening), daemon=True
+        )
+        self._reader.start()
+        if not listening.wait(_STARTING_S) or self._process.poll() is not None:
+            raise VoleryError(f"the server did not start: {''.join(self._said)}")
+        self.wait_until_flying()
+
+    def stop(self) -> None:
+        """End it."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        process.terminate()
+        try:
+            process.wait(_ENDING_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait(_ENDING_S)
+        self._reader.join(_ENDING_S)
+        if process.stdout is not None:
+            process.stdout.close()
+
+    def restart(self) -> None:
+        """End it and start it anew at the same port."""
+        self.stop()
+        self.start()
+
+    def status(self) -> dict[str, Any]:
+        """What `./api/status` says."""
+        with urllib.request.urlopen(f"{self.url}api/status", timeout=10.0) as answer:
+            told: dict[str, Any] = json.load(answer)
+            return told
+
+    def wait_until_flying(self) -> None:
+        """Until a simulation is there."""
+        ends = time.monotonic() + _STARTING_S
+        while time.monotonic() < ends:
+            with suppress(OSError):
+                if self.status()["state"] == "flying":
+                    return
+            time.sleep(0.05)
+        raise VoleryError(f"no simulation flies: {''.join(self._said)}")
+
+    def __enter__(self) -> PageProcess:
+        """Start it."""
+        self.start()
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        """Stop it."""
+        self.stop()
+
+    def _read(self, process: subprocess.Popen[str], listening: threading.Event) -> None:
+        for line in process.stdout or ():
+            self._said.append(line)
+            address = _URL.search(line)
+            if address is not None and not listening.is_set():
+                self.port = int(address[1])
+                listening.set()
+        listening.set()

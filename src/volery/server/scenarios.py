@@ -1,0 +1,71 @@
+"""Scenario cards: what can be loaded, told from the scenarios themselves without flying them."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+
+from volery.core.errors import VoleryError
+from volery.runtime.world_asset import kind_of
+from volery.scenario import library
+from volery.scenario.load import load_scenario
+from volery.scenario.schema import Scenario
+from volery.scenario.shelf import Shelf
+from volery.server.cards import CARDS
+from volery.server.replies import RefusedError
+from volery.server.site import Site
+
+_DAY_S = 86_400
+Card = dict[str, Any]
+
+
+async def scenarios(request: Request) -> Response:
+    """`./api/scenarios`: a card for each, those that ship first."""
+    site: Site = request.app.state.site
+    told = await run_in_threadpool(cards_of, site.shelf)
+    return JSONResponse(told, headers={"Cache-Control": "no-store"})
+
+
+async def picture(request: Request) -> Response:
+    """`./api/scenarios/NAME.jpg`: the picture of a card."""
+    name: str = request.path_params["name"]
+    if name not in library.names() or not (CARDS / f"{name}.jpg").is_file():
+        raise RefusedError(404, f"there is no picture of '{name[:80]}'")
+    kept = {"Cache-Control": f"private, max-age={_DAY_S}"}
+    return FileResponse(CARDS / f"{name}.jpg", headers=kept)
+
+
+def cards_of(shelf: Shelf) -> list[Card]:
+    """Cards of all scenarios; one that cannot be read any more has none."""
+    cards = [_shipped(name) for name in library.names()]
+    for name in shelf.added():
+        try:
+            cards.append(_card(shelf.load(name), uploaded=True))
+        except VoleryError:
+            continue
+    return cards
+
+
+@cache
+def _shipped(name: str) -> Card:
+    return _card(load_scenario(name), uploaded=False)
+
+
+def _card(scenario: Scenario, *, uploaded: bool) -> Card:
+    flown = [scenario.types[group.type] for group in scenario.uavs]
+    has_picture = not uploaded and (CARDS / f"{scenario.name}.jpg").is_file()
+    return {
+        "name": scenario.name,
+        "description": scenario.description.strip(),
+        "uavs": scenario.uav_count,
+        "airframes": sorted({kind.airframe for kind in flown}),
+        "sensors": sorted({sensor.kind for kind in flown for sensor in kind.sensors}),
+        "world": kind_of(scenario),
+        "duration_s": scenario.duration_s,
+        "picture": f"./api/scenarios/{scenario.name}.jpg" if has_picture else None,
+        "uploaded": uploaded,
+    }

@@ -1,0 +1,1 @@
+"""Scenarios made of files that visitors of the page bring."""

@@ -1,0 +1,66 @@
+"""Makes a scenario of an uploaded file and builds its world, in a process of its own.
+
+    python -m volery.server.uploads.check grid_map FOLDER/map.png yard yard.png
+
+Files of strangers are read here, with bounds on memory and time, and without a simulation beside it
+that could suffer. Prints one JSON object: `{}` or `{"error": "one clear message"}`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import sys
+from pathlib import Path
+
+from volery.core.errors import VoleryError
+from volery.scenario.shelf import Shelf
+from volery.server.uploads.making import toml_of
+
+_NICENESS = 5
+"""A run beside it, at full speed on all cores, keeps three quarters of them."""
+_MOST_CPU_S = 90
+_MOST_MEMORY = 8 * 1024**3
+"""Of addresses; Embree and the compiler reserve about a gigabyte that they do not use."""
+
+
+def check(kind: str, path: Path, name: str, called: str) -> None:
+    """Write `scenario.toml` beside `path`, and build all that stands in it.
+
+    Raises `VoleryError` where the file is no such thing, or no UAV finds a place.
+    """
+    from volery.runtime.building import place
+    from volery.runtime.worlds import build_city, build_forest, build_scene, build_terrain
+    from volery.scenario.load import load_scenario
+
+    target = path.parent / Shelf.FILE
+    target.write_text(toml_of(kind, path, name, called), encoding="utf-8")
+    scenario = load_scenario(target)
+    terrain = build_terrain(scenario)
+    city = build_city(scenario, terrain)
+    forest = build_forest(scenario, terrain, city)
+    scene = build_scene(scenario, terrain, forest, city)
+    try:
+        place(scenario, scene, terrain)
+    finally:
+        scene.close()
+
+
+def main(kind: str, file: str, name: str, called: str) -> None:
+    """Check, and print what came of it."""
+    os.nice(_NICENESS)
+    resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY, _MOST_MEMORY))
+    resource.setrlimit(resource.RLIMIT_CPU, (_MOST_CPU_S, 2 * _MOST_CPU_S))
+    told: dict[str, str] = {}
+    try:
+        check(kind, Path(file), name, called)
+    except VoleryError as error:
+        told["error"] = str(error)
+    except MemoryError:
+        told["error"] = f"{file} needs more than {_MOST_MEMORY // 1024**3} GB of memory"
+    sys.stdout.write(json.dumps(told))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,49 @@
+"""Which files are taken, and how large they may be."""
+
+from __future__ import annotations
+
+from pathlib import PurePosixPath
+from typing import NamedTuple
+
+from volery.server.replies import RefusedError
+
+
+class Kind(NamedTuple):
+    """One kind of upload. The limits hold beside those of the readers of such files."""
+
+    suffixes: tuple[str, ...]
+    most_bytes: int
+    what: str
+
+
+KINDS = {
+    "grid_map": Kind((".csv", ".txt", ".png", ".map"), 8_000_000, "a matrix of 0 and 1"),
+    "city": Kind((".geojson", ".json"), 32_000_000, "outlines of buildings as GeoJSON"),
+    "mesh": Kind((".glb", ".obj", ".stl"), 64_000_000, "a mesh in metres"),
+    "forest": Kind((".csv",), 8_000_000, "trees: x_m, y_m[, dbh_cm, height_m, species]"),
+}
+MOST_UPLOADS = 200
+"""Scenarios in the folder."""
+MOST_CELLS = 1_000_000
+MOST_TREES = 50_000
+MOST_TRIANGLES = 2_000_000
+FARTHEST_M = 5_000.0
+"""From the map's origin."""
+
+
+def kind_of_upload(name: str) -> Kind:
+    """Kind by its name. `RefusedError` tells which there are."""
+    kind = KINDS.get(name)
+    if kind is None:
+        known = ", ".join(KINDS)
+        raise RefusedError(400, f"kind must be one of {known}, not '{name[:40]}'")
+    return kind
+
+
+def suffix_of(file_name: str, kind: Kind) -> str:
+    """Ending of a client's file name, one of those that are read; `RefusedError` otherwise."""
+    suffix = PurePosixPath(file_name.replace("\\", "/")).suffix.lower()
+    if suffix not in kind.suffixes:
+        allowed = ", ".join(kind.suffixes)
+        raise RefusedError(415, f"{kind.what} is read from {allowed}, not from '{suffix[:20]}'")
+    return suffix

@@ -1,0 +1,85 @@
+"""`POST ./api/uploads?kind=...&name=...`: a file becomes a scenario that can be loaded."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path, PurePosixPath
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+
+from volery.scenario import library
+from volery.scenario.shelf import Shelf
+from volery.server.bodies import check_pilot, save_body
+from volery.server.replies import RefusedError
+from volery.server.site import Site
+from volery.server.uploads.kinds import MOST_UPLOADS, kind_of_upload, suffix_of
+
+LONGEST_CHECK_S = 300.0
+"""Of wall time, on a machine that has much else to do; see `check` for that of the processor."""
+_MOST_CHARACTERS = 30
+"""Of a scenario's name, before its number."""
+_BROKEN = "the file cannot be read: its reader broke off"
+_MOST_WORDS = 600
+"""Of a message, in characters."""
+
+
+async def upload(request: Request) -> Response:
+    """Take a file, check it by building its world, answer with the name of its scenario."""
+    check_pilot(request)
+    site: Site = request.app.state.site
+    kind_name = request.query_params.get("kind", "")
+    kind = kind_of_upload(kind_name)
+    called = request.query_params.get("name", "")[:200]
+    suffix = suffix_of(called, kind)
+    folder = site.shelf.folder
+    if folder is None:
+        raise RefusedError(409, "this server takes no files; start it with `volery serve`")
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".upload_", dir=folder) as made:
+        path = Path(made) / f"{kind_name}{suffix}"
+        await save_body(request, path, kind.most_bytes)
+        lock: asyncio.Lock = request.app.state.upload_lock
+        async with lock:  # one after the other
+            if len(site.shelf.added()) >= MOST_UPLOADS:
+                raise RefusedError(507, f"there are {MOST_UPLOADS} uploads already; remove some")
+            name = name_for(called, site.shelf)
+            await asyncio.to_thread(_check, kind_name, path, name, called)
+            await asyncio.to_thread(shutil.copytree, made, folder / name)
+    return JSONResponse({"scenario": name}, 201)
+
+
+def name_for(called: str, shelf: Shelf) -> str:
+    """A free name of a scenario that reminds of the client's file name."""
+    stem = PurePosixPath(called.replace("\\", "/")).stem.lower()
+    words = re.sub(r"[^a-z0-9]+", "_", stem).strip("_")
+    base = re.sub(r"^[^a-z]*", "", words)[:_MOST_CHARACTERS].strip("_") or "upload"
+    taken = {*library.names(), *shelf.added()}
+    names = (base if number == 1 else f"{base}_{number}" for number in range(1, MOST_UPLOADS + 100))
+    return next(name for name in names if name not in taken)
+
+
+def _check(kind: str, path: Path, name: str, called: str) -> None:
+    """Build the world in a process of its own. `RefusedError` tells what is wrong with the file."""
+    words = [sys.executable, "-m", f"{__package__}.check", kind, str(path), name, called]
+    try:
+        ran = subprocess.run(
+            words, capture_output=True, text=True, timeout=LONGEST_CHECK_S, check=False
+        )
+    except subprocess.TimeoutExpired:
+        raise RefusedError(422, "it takes too long to build") from None
+    try:
+        told = json.loads(ran.stdout)
+    except ValueError:
+        why = "it takes too long to build" if ran.returncode == -signal.SIGXCPU else _BROKEN
+        raise RefusedError(422, why) from None
+    if "error" in told:
+        plain = str(told["error"]).replace(str(path), called).replace(str(path.parent), "")
+        raise RefusedError(422, plain[:_MOST_WORDS])

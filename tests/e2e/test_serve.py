@@ -1,0 +1,245 @@
+"""`volery serve` and `volery run --page`: one address, and worlds that change behind it."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+roslibpy = pytest.importorskip("roslibpy")
+VOLERY = [sys.executable, "-m", "volery.cli"]
+OWN = """
+name = "{name}"
+duration_s = 0.4
+[types.f450]
+airframe = "f450"
+[[types.f450.sensors]]
+kind = "ground_truth"
+[[uavs]]
+type = "f450"
+position_m = [0.0, 0.0, {height}]
+"""
+
+
+class Server:
+    """A process with a page; `lines` are what it says."""
+
+    def __init__(self, *words, cwd=None):
+        self.process = subprocess.Popen(
+            [*VOLERY, *map(str, words)], stderr=subprocess.PIPE, text=True, cwd=cwd
+        )
+        self.lines = []
+        self._told = threading.Event()
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+        assert self._told.wait(120), self.lines
+        self.url = re.search(r"http://\S+:(\d+)/", "\n".join(self.lines))
+        assert self.url, self.lines
+        self.port = int(self.url[1])
+
+    def _read(self):
+        for line in self.process.stderr:
+            self.lines.append(line.rstrip())
+            if line.startswith("page"):
+                self._told.set()
+        self._told.set()
+
+    def ask(self, path, body=None):
+        request = urllib.request.Request(f"http://127.0.0.1:{self.port}{path}", body)
+        try:
+            with urllib.request.urlopen(request, timeout=320) as answer:
+                return answer.status, answer.read()
+        except urllib.error.HTTPError as error:
+            with error:
+                return error.code, error.read()
+
+    @property
+    def status(self):
+        return json.loads(self.ask("/api/status")[1])
+
+    def wait_for(self, **wanted):
+        end = time.monotonic() + 200.0
+        while (wanted.items() - self.status.items()) and time.monotonic() < end:
+            time.sleep(0.05)
+        assert not wanted.items() - self.status.items(), (self.status, self.lines)
+
+    def end(self, how=signal.SIGINT):
+        if self.process.poll() is None:
+            self.process.send_signal(how)
+        code = self.process.wait(60)
+        self._reader.join()
+        self.process.stderr.close()
+        return code
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("served")
+    server = Server("serve", "--port", 0, "--uavs", 2, "--recordings", folder, "--threads", 1)
+    server.wait_for(state="flying")
+    yield server
+    server.end(signal.SIGKILL)
+
+
+class Ros:
+    """A roslibpy client of the page's rosbridge."""
+
+    def __init__(self, server):
+        self.ros = roslibpy.Ros(f"ws://127.0.0.1:{server.port}/rosbridge")
+        self.ros.run(20)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_exception):
+        self.ros.close()
+
+    def call(self, service, srvtype, **fields):
+        asked = roslibpy.Service(self.ros, service, srvtype)
+        return asked.call(roslibpy.ServiceRequest(fields), timeout=30)
+
+    def load(self, name):
+        source = {"world_resource": {"uri": name}}
+        answer = self.call("/load_world", "simulation_interfaces/LoadWorld", **source)
+        return answer["result"]
+
+    def first(self, topic, msgtype, good=lambda message: True, seconds=20.0):
+        """The first message that is good."""
+        found, there = [], threading.Event()
+
+        def take(message):
+            if good(message):
+                found.append(message)
+                there.set()
+
+        listener = roslibpy.Topic(self.ros, topic, msgtype)
+        listener.subscribe(take)
+        assert there.wait(seconds), topic
+        listener.unsubscribe()
+        return found[0]
+
+
+def test_the_page_and_the_graph_are_at_one_address(server):
+    assert server.ask("/")[0] == 200
+    assert server.status["scenario"] == "hover"
+    assert server.ask("/api/world.glb")[1].startswith(b"glTF")
+    with Ros(server) as ros:
+        told = ros.first("/uav2/odom", "nav_msgs/Odometry")
+        assert told["child_frame_id"] == "uav2/base_link"
+        assert ros.first("/volery/world", "std_msgs/String")["data"] == server.status["world"]
+
+
+def test_another_world_flies_while_the_page_stays(server):
+    before = server.status["world"]
+    with Ros(server) as ros:
+        assert ros.load("grid_map")["result"] == 1
+    server.wait_for(state="flying", scenario="grid_map")
+    assert server.status["world"] != before
+    with Ros(server) as ros:
+        shown = server.status["world"]
+        changed = ros.call("/volery/set_grid_map", "volery_interfaces/SetGridMap", block_height=9.0)
+        assert changed["success"]
+        ros.first("/volery/world", "std_msgs/String", lambda told: told["data"] != shown)
+        assert server.status["world"] != shown
+        # the file is that of the higher blocks
+        content = server.ask("/api/world.glb")[1]
+        length = int.from_bytes(content[12:16], "little")
+        extras = json.loads(content[20 : 20 + length])["asset"]["extras"]
+        assert extras["bounds_enu_m"]["max"][2] == 9.0
+        assert extras["kind"] == "grid_map"
+
+
+def test_an_uploaded_map_is_flown(server):
+    status, told = server.ask("/api/uploads?kind=grid_map&name=Yard.csv", b"0,0,1\n0,1,0\n")
+    assert (status, json.loads(told)) == (201, {"scenario": "yard"})
+    assert "yard" in [card["name"] for card in json.loads(server.ask("/api/scenarios")[1])]
+    with Ros(server) as ros:
+        assert ros.load("yard")["result"] == 1
+    server.wait_for(state="flying", scenario="yard")
+    status, told = server.ask("/api/uploads?kind=grid_map&name=Yard.csv", b"0,0,7\n")
+    assert status == 422
+    assert "line 1, column 3" in json.loads(told)["error"]
+
+
+def test_a_scenario_that_ends_stays_and_one_that_cannot_be_leads_back(server):
+    folder = server.process.args[server.process.args.index("--recordings") + 1]
+    for name, height in (("short", 0.5), ("buried", -30.0)):
+        made = Path(folder) / "uploads" / name
+        made.mkdir(parents=True, exist_ok=True)
+        (made / "scenario.toml").write_text(OWN.format(name=name, height=height))
+    with Ros(server) as ros:
+        assert ros.load("short")["result"] == 1
+    server.wait_for(state="flying", scenario="short")
+    with Ros(server) as ros:
+
+        def state():
+            answer = ros.call("/get_simulation_state", "simulation_interfaces/GetSimulationState")
+            return answer["state"]["state"]
+
+        end = time.monotonic() + 30
+        while state() != 2 and time.monotonic() < end:
+            time.sleep(0.05)
+        assert state() == 2  # paused, at its end
+        assert ros.call("/uav1/land", "std_srvs/Trigger")  # it is there
+        reset = ros.call("/reset_simulation", "simulation_interfaces/ResetSimulation", scope=255)
+        assert reset["result"]["result"] == 1
+        assert ros.load("nowhere")["result"] != 1
+        assert ros.load("buried")["result"] == 1
+    server.wait_for(state="flying", scenario="short")
+    assert server.status["message"].startswith("buried: ")
+    with Ros(server) as ros:
+        unloaded = ros.call("/unload_world", "simulation_interfaces/UnloadWorld")
+        assert unloaded["result"]["result"] == 1
+    server.wait_for(state="lobby", world=None)
+    with Ros(server) as ros:
+        assert ros.load("hover")["result"] == 1
+    server.wait_for(state="flying", scenario="hover")
+
+
+def test_ctrl_c_ends_it(server):
+    assert server.end() == 0
+    assert server.lines[-1] == "the server has ended"
+    assert not [line for line in server.lines if "Traceback" in line or "ERROR" in line]
+
+
+def test_a_run_shows_its_flight_and_ends_by_itself(tmp_path):
+    words = ("run", "hover", "--seconds", 3, "--speed", 1, "--page=0", "--threads", 1)
+    server = Server(*words, cwd=tmp_path)
+    server.wait_for(state="flying", scenario="hover")
+    assert server.end(0) == 0
+
+
+def test_a_first_scenario_that_is_wrong_ends_the_command(tmp_path):
+    ran = subprocess.run(
+        [*VOLERY, "serve", "nowhere", "--port", "0"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        cwd=tmp_path,
+    )
+    assert ran.returncode == 2
+    assert "no scenario 'nowhere'" in ran.stderr
+    for words, why in (
+        (["--host", "0.0.0.0"], "--allow-remote"),
+        (["--host", "0.0.0.0", "--allow-remote"], "set a --token"),
+    ):
+        ran = subprocess.run(
+            [*VOLERY, "serve", "--port", "0", *words],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+            cwd=tmp_path,
+        )
+        assert ran.returncode == 2
+        assert why in ran.stderr

@@ -1,0 +1,177 @@
+"""Panels of data: what they show is what the simulation says, and what they ask for happens."""
+
+import json
+import re
+import time
+
+import pytest
+from page_browsing import keep_picture
+
+WIDE = {"width": 1000, "height": 600}
+ODOMETRY = "nav_msgs/msg/Odometry"
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory):
+    return tmp_path_factory.mktemp("recordings")
+
+
+@pytest.fixture(scope="module")
+def served(recordings, chromium):
+    from page_serving import Served
+
+    with Served("hover", "--recordings", str(recordings), "--uavs", "2") as server:
+        yield server
+
+
+@pytest.fixture
+def page(browsing, served):
+    return browsing.open(served.url, viewport=WIDE)
+
+
+def open_panel(page, name):
+    """The panel's own part of the page."""
+    page.get_by_role("navigation").get_by_role("button", name=name, exact=True).click()
+    return page.get_by_role("complementary", name=name)
+
+
+def number(text):
+    return float(re.search(r"-?\d+(\.\d+)?", text)[0])
+
+
+def until(fits, timeout_s=60.0):
+    ends = time.monotonic() + timeout_s
+    while not (found := fits()):
+        assert time.monotonic() < ends, "it did not become true"
+        time.sleep(0.2)
+    return found
+
+
+def test_a_topic_unfolds_with_its_rate_and_live_values(page, served):
+    panel = open_panel(page, "Topics")
+    panel.get_by_label("Filter topics").fill("uav1/odom")
+    row = panel.get_by_role("listitem", name="/uav1/odom", exact=True)
+    assert row.locator("[data-kind=rate]").inner_text() == ""  # nothing is received unasked
+    row.get_by_role("button", name="/uav1/odom", exact=True).click()
+    height = row.locator("[data-path='pose.pose.position.z']")
+    height.wait_for()
+    until(lambda: number(row.locator("[data-kind=rate]").inner_text() or "0") > 0)
+    told = served.once("/uav1/odom", ODOMETRY)
+    assert number(height.inner_text()) == pytest.approx(
+        told["pose"]["pose"]["position"]["z"], abs=0.5
+    )
+    assert number(row.locator("[data-kind=size]").inner_text()) > 0
+    keep_picture(page, "topics")
+
+
+def test_a_form_publishes_what_a_subscriber_receives(page, served):
+    panel = open_panel(page, "Topics")
+    panel.get_by_label("Filter topics").fill("uav2/cmd_vel Twist")
+    row = panel.get_by_role("listitem", name="/uav2/cmd_vel", exact=True)
+    row.get_by_role("button", name="/uav2/cmd_vel", exact=True).click()
+    row.get_by_role("button", name="Publish", exact=True).click()
+    row.get_by_label("z", exact=True).first.fill("0.25")
+    send = row.get_by_role("button", name="Publish to /uav2/cmd_vel")
+    before = served.once("/volery/vehicles", "volery_interfaces/msg/VehicleStates")
+    assert before["vehicles"][1]["command_age"] < 0
+    send.click()
+    served.once(
+        "/volery/vehicles",
+        "volery_interfaces/msg/VehicleStates",
+        lambda message: message["vehicles"][1]["command_age"] >= 0,
+    )
+
+
+def test_a_plot_draws_a_field_and_keeps_it_as_csv(page):
+    panel = open_panel(page, "Plots")
+    panel.get_by_label("Topic of a new line").click()
+    panel.get_by_label("Topic of a new line").fill("/uav1/odom")
+    page.get_by_role("option", name="/uav1/odom", exact=True).click()
+    panel.get_by_label("Field of a new line").click()
+    panel.get_by_label("Field of a new line").fill("pose.pose.position.z")
+    page.get_by_role("option", name="pose.pose.position.z", exact=True).click()
+    line = panel.locator("[data-line='/uav1/odom.pose.pose.position.z']")
+    until(lambda: re.search(r" \d", line.inner_text()))
+    page.wait_for_timeout(1500)
+    keep_picture(page, "plots")
+    with page.expect_download() as kept:
+        panel.get_by_role("button", name="Download as CSV").click()
+    head, *rows = kept.value.path().read_text().splitlines()
+    assert head == "time_s,/uav1/odom.pose.pose.position.z"
+    times = [float(row.split(",")[0]) for row in rows]
+    assert len(rows) > 10
+    assert times == sorted(times)
+    assert all(-1.0 < float(row.split(",")[1]) < 5.0 for row in rows)
+
+
+def test_a_service_is_called_by_a_form_of_its_own(page, served):
+    panel = open_panel(page, "Services")
+    panel.get_by_label("Filter services").fill("uav1/take_off_to")
+    panel.get_by_role("button", name="/uav1/take_off_to", exact=True).click()
+    form = panel.get_by_role("form", name="Call /uav1/take_off_to")
+    form.get_by_label("altitude").fill("3")
+    form.get_by_role("button", name="Call", exact=True).click()
+    answer = form.get_by_role("region", name="Answer")
+    answer.locator("[data-path=message]").wait_for()
+    keep_picture(page, "services")
+    assert answer.locator("[data-path=success]").inner_text() in ("true", "false")
+
+
+def test_a_fault_is_injected_and_told_in_the_log(page, served):
+    panel = open_panel(page, "Faults")
+    panel.get_by_label("What fails").click()
+    page.get_by_role("option", name="Displacement").click()
+    for axis, metres in (("east", "3"), ("north", "0"), ("up", "1")):
+        panel.get_by_label(f"Offset, m, {axis}").fill(metres)
+    before = served.once("/volery/vehicles", "volery_interfaces/msg/VehicleStates")
+    panel.get_by_role("button", name="Inject").click()
+    x = before["vehicles"][0]["position"]["x"]
+    served.once(
+        "/volery/vehicles",
+        "volery_interfaces/msg/VehicleStates",
+        lambda message: message["vehicles"][0]["position"]["x"] > x + 2.0,
+    )
+    log = open_panel(page, "Log")
+    log.get_by_role("log").get_by_text("fault", exact=True).first.wait_for()
+    keep_picture(page, "log")
+    log.get_by_label("Filter the log").fill("nothing is called so")
+    assert log.get_by_role("log").inner_text() == ""
+
+
+def test_a_wrong_fault_tells_why(page):
+    panel = open_panel(page, "Faults")
+    panel.get_by_label("Rotor", exact=True).fill("99")
+    panel.get_by_role("button", name="Inject").click()
+    page.get_by_text("The fault was refused").wait_for()
+
+
+def test_a_flight_is_recorded_listed_and_fetched(page, recordings):
+    panel = open_panel(page, "Recordings")
+    panel.get_by_label("Name of the recording").fill("from_the_page")
+    panel.get_by_role("button", name="Record", exact=True).click()
+    panel.get_by_role("button", name="Stop").wait_for()
+    page.wait_for_timeout(1000)
+    panel.get_by_role("button", name="Stop").click()
+    row = panel.get_by_role("row", name=re.compile("from_the_page.mcap"))
+    row.wait_for()
+    with page.expect_download() as kept:
+        row.get_by_role("link", name="Download from_the_page.mcap").click()
+    assert kept.value.path().read_bytes() == (recordings / "from_the_page.mcap").read_bytes()
+    keep_picture(page, "recordings")
+
+
+def test_the_meter_tells_age_load_and_memory(page):
+    meter = page.get_by_role("button", name=re.compile("^Health"))
+    until(lambda: re.search(r"\d+ m?s", meter.get_attribute("aria-label")))
+    meter.click()
+    details = page.get_by_role("dialog", name="Health")
+    details.get_by_text("advance vehicles").wait_for()
+    keep_picture(page, "health")
+    assert "MB" in details.inner_text()
+
+
+def test_the_layout_is_kept_for_the_next_visit(page):
+    open_panel(page, "Log")
+    page.reload()
+    page.get_by_role("complementary", name="Log").wait_for()
+    assert json.loads(page.evaluate("localStorage.getItem('volery.layout')"))["bottom"] == "log"

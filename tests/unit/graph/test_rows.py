@@ -1,0 +1,53 @@
+"""Lists that are made when they are read go over every wire like others."""
+
+import pickle
+
+from volery.graph.json_form import JsonForm
+from volery.graph.messages import (
+    Quaternion,
+    TFMessage,
+    Transform,
+    TransformStamped,
+    Vector3,
+    header,
+    typestore,
+)
+from volery.graph.ros1 import ros1_codec
+from volery.graph.rows import Rows
+
+TYPE = "tf2_msgs/msg/TFMessage"
+
+
+def parts():
+    for k in range(3):
+        transform = Transform(Vector3(float(k), 0.0, -1.0), Quaternion(0.0, 0.0, 0.0, 1.0))
+        yield TransformStamped(header(5, "map"), f"uav{k}/base_link", transform)
+
+
+def test_every_wire_takes_them():
+    plain, lazy = TFMessage(list(parts())), TFMessage(Rows(3, parts))
+    assert lazy == plain
+    store = typestore()
+    assert bytes(store.serialize_cdr(lazy, TYPE)) == bytes(store.serialize_cdr(plain, TYPE))
+    assert ros1_codec().encode(lazy, TYPE) == ros1_codec().encode(plain, TYPE)
+    assert JsonForm().encode(lazy, TYPE) == JsonForm().encode(plain, TYPE)
+
+
+def test_they_read_like_a_list_and_are_not_made_before():
+    made = []
+
+    def make():
+        made.append(1)
+        return parts()
+
+    rows = Rows(3, make)
+    assert len(rows) == 3
+    assert made == []
+    assert rows[1].child_frame_id == "uav1/base_link"
+    assert [t.child_frame_id for t in rows[1:]] == ["uav1/base_link", "uav2/base_link"]
+    assert rows == list(parts())
+    assert rows != list(parts())[:2]
+    assert "uav2/base_link" in repr(rows)
+    kept = pickle.loads(pickle.dumps(rows))
+    assert type(kept) is list
+    assert rows == kept

@@ -1,0 +1,112 @@
+"""Scenarios that clients of the graph load with changes."""
+
+import json
+
+import numpy as np
+import pytest
+from asking import ask
+
+from volery.core.errors import CommandError
+from volery.runtime import Simulation
+from volery.runtime.worlds import build_forest, build_terrain
+from volery.scenario import library
+from volery.scenario.changes import Changes, WorldRequest, apply
+from volery.scenario.load import load_scenario
+
+
+def test_what_can_be_chosen(simulate, flat_data):
+    told = ask(simulate(flat_data), "/volery/get_choices")
+    assert told.success
+    assert list(told.scenarios) == library.names()
+    assert set(told.airframes) == {"crazyflie", "f450", "hummingbird", "iris"}
+    assert list(told.sensor_sets) == ["lidar", "camera", "sonar", "navigation"]
+    assert len(told.sensor_set_descriptions) == 4
+    schema = json.loads(told.changes_schema)
+    assert schema["properties"]["uavs"]["anyOf"][0]["maximum"] == 10_000
+
+
+def test_a_scenario_is_loaded_with_changes(simulate, flat_data):
+    asked = []
+    simulation = simulate(flat_data, on_load=asked.append)
+    changes = {"uavs": 5, "airframe": "crazyflie", "sensors": ["lidar", "camera"], "seed": 3}
+    answer = ask(
+        simulation, "/volery/load_scenario", scenario="longleaf", changes=json.dumps(changes)
+    )
+    assert answer.success, answer.message
+    wanted = Changes(uavs=5, airframe="crazyflie", sensors=("lidar", "camera"), seed=3)
+    assert asked == [WorldRequest("longleaf", wanted)]
+    assert ask(simulation, "/volery/load_scenario", scenario="hover").success
+    assert asked[1] == WorldRequest("hover", Changes())
+
+
+@pytest.mark.parametrize(
+    ("scenario", "changes", "words"),
+    [
+        ("nowhere", {}, ["'nowhere'", "longleaf"]),
+        ("../../etc/passwd", {}, ["known"]),
+        ("", {}, ["known"]),
+        ("hover", {"airframe": "zeppelin"}, ["'zeppelin'", "crazyflie"]),
+        ("hover", {"airframe": "../f450.toml"}, ["known"]),
+        ("hover", {"uavs": -1}, ["key 'uavs'"]),
+        ("hover", {"tree_share": 0.5}, ["tree_share"]),
+        ("swarm_100", {"uavs": 7}, ["10 groups"]),
+    ],
+)
+def test_what_cannot_be_is_refused_before_the_world_goes(
+    simulate, flat_data, scenario, changes, words
+):
+    asked = []
+    simulation = simulate(flat_data, on_load=asked.append)
+    answer = ask(
+        simulation, "/volery/load_scenario", scenario=scenario, changes=json.dumps(changes)
+    )
+    assert not answer.success
+    assert all(word in answer.message for word in words), answer.message
+    assert asked == []
+
+
+def test_loading_is_the_owners_business(simulate, flat_data):
+    answer = ask(simulate(flat_data), "/volery/load_scenario", scenario="hover")
+    assert not answer.success
+    assert "one scenario" in answer.message
+
+    def refuse(request):
+        raise CommandError(f"no memory for {request.name}")
+
+    simulation = simulate(flat_data, on_load=refuse)
+    answer = ask(simulation, "/volery/load_scenario", scenario="hover")
+    assert (answer.success, answer.message) == (False, "no memory for hover")
+
+
+def test_many_uavs_with_other_sensors_are_built():
+    changes = Changes(uavs=30, airframe="iris", sensors=("sonar", "navigation"))
+    scenario = apply(load_scenario("hover"), changes)
+    with Simulation(scenario, threads=1) as simulation:
+        assert len(simulation.uavs) == 30
+        places = np.array([uav.position_map for uav in simulation.uavs.values()])
+        apart = np.linalg.norm(places[:, None] - places[None], axis=2) + 10.0 * np.eye(30)
+        assert apart.min() > 1.0
+        topics = {topic.name for topic in simulation.graph.topics()}
+        assert {"/uav30/gnss", "/uav30/range"} & topics
+        simulation.run(1.0)
+        assert all(uav.airframe.name == "iris" for uav in simulation.uavs.values())
+        assert not any(uav.crashed for uav in simulation.uavs.values())
+
+
+def test_a_thinned_inventory_holds_the_same_trees():
+    def forest(share):
+        scenario = apply(load_scenario("longleaf"), Changes(tree_share=share))
+        return build_forest(scenario, build_terrain(scenario))
+
+    whole, half, few = forest(1.0), forest(0.5), forest(0.2)
+    count = len(whole.position_map)
+    assert len(half.position_map) == pytest.approx(0.5 * count, abs=3.0 * np.sqrt(0.25 * count))
+    assert len(few.position_map) == pytest.approx(0.2 * count, abs=3.0 * np.sqrt(0.16 * count))
+
+    def trees(of):
+        return {
+            (*place, dbh)
+            for place, dbh in zip(of.position_map.tolist(), of.dbh_m.tolist(), strict=True)
+        }
+
+    assert trees(few) < trees(half) < trees(whole)

@@ -1,0 +1,391 @@
+"""What people who watch are told: true poses, vehicles, the state of the run."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+from asking import ask
+from test_pause import InThread, wait_for
+from watching import Watcher
+
+from volery.graph.messages import Twist, Vector3
+from volery.runtime.telling.status import Speedometer
+
+TF = "/ground_truth/tf"
+VEHICLES = "/volery/vehicles"
+STATUS = "/volery/status"
+THING = {
+    "name": "walker",
+    "shape": "person",
+    "motion": {"kind": "outside", "position_m": [30.0, 0.0, 0.0]},
+}
+
+
+def poses(message):
+    return {
+        t.child_frame_id: (
+            [t.transform.translation.x, t.transform.translation.y, t.transform.translation.z],
+            [getattr(t.transform.rotation, axis) for axis in "xyzw"],
+        )
+        for t in message.transforms
+    }
+
+
+def stamp_s(message):
+    stamp = message.transforms[0].header.stamp
+    return stamp.sec + 1e-9 * stamp.nanosec
+
+
+@pytest.fixture
+def three(flat_data):
+    flat_data["uavs"] = [
+        {"type": "f450", "count": 3, "position_m": [0.0, 0.0], "last_position_m": [20.0, 0.0]}
+    ]
+    flat_data["uavs"][0]["on_start"] = "take_off"
+    return flat_data
+
+
+# ------------------------------------------------------------------------------------------ poses
+
+
+def test_true_poses_of_all_in_one_message(simulate, three):
+    simulation = simulate(three)
+    watcher = Watcher(simulation, TF)
+    simulation.run(0.5)
+    told = watcher.take(TF)
+    assert [round(stamp_s(m), 6) for m in told] == [pytest.approx(0.02 * k) for k in range(1, 26)]
+    last = told[-1]
+    assert [t.child_frame_id for t in last.transforms] == [f"uav{k}/base_link" for k in (1, 2, 3)]
+    assert {t.header.frame_id for t in last.transforms} == {"map"}
+    for name, uav in simulation.uavs.items():
+        place, turn = poses(last)[f"{name}/base_link"]
+        assert place == uav.position_map.tolist()
+        assert turn == uav.attitude.tolist()
+
+
+def test_things_come_after_the_uavs(simulate, flat_data):
+    flat_data["world"] = {"things": [THING]}
+    simulation = simulate(flat_data)
+    watcher = Watcher(simulation, TF)
+    simulation.run(0.02)
+    assert list(poses(watcher.last(TF))) == ["uav1/base_link", "walker"]
+    simulation.put_thing("walker", [31.0, 2.0, 0.0])
+    simulation.take_in()
+    time.sleep(0.06)
+    simulation.take_in()
+    assert poses(watcher.last(TF))["walker"][0] == [31.0, 2.0, 0.0]
+
+
+def test_who_comes_and_goes_is_told(simulate, flat_data):
+    simulation = simulate(flat_data)
+    watcher = Watcher(simulation, TF, VEHICLES)
+    simulation.run(0.02)
+    simulation.spawn_uav("scout", "crazyflie", [5.0, 5.0, 0.0])
+    simulation.run(0.2)
+    assert list(poses(watcher.last(TF))) == ["uav1/base_link", "scout/base_link"]
+    scout = watcher.last(VEHICLES).vehicles[1]
+    assert (scout.name, scout.airframe, scout.type) == ("scout", "crazyflie", "crazyflie")
+    simulation.delete_uav("uav1")
+    simulation.run(0.2)
+    assert list(poses(watcher.last(TF))) == ["scout/base_link"]
+    assert [v.name for v in watcher.last(VEHICLES).vehicles] == ["scout"]
+
+
+def test_nothing_is_built_where_nobody_listens(simulate, flat_data):
+    simulation = simulate(flat_data)
+    simulation.run(0.3)
+    told = {t.name: t.messages for t in simulation.graph.topics()}
+    assert (told[TF], told[VEHICLES], told[STATUS]) == (0, 0, 0)
+
+
+# --------------------------------------------------------------------------------------- vehicles
+
+
+def test_vehicles_are_told_as_they_are(simulate, three):
+    simulation = simulate(three)
+    watcher = Watcher(simulation, VEHICLES)
+    simulation.run(0.2)
+    first = watcher.last(VEHICLES)
+    assert first.header.frame_id == "map"
+    assert [v.mode for v in first.vehicles] == ["TAKE_OFF"] * 3
+    simulation.run(1.8)
+    told = watcher.last(VEHICLES)
+    assert (told.header.stamp.sec, told.header.stamp.nanosec) == (2, 0)
+    for vehicle, (name, uav) in zip(told.vehicles, simulation.uavs.items(), strict=True):
+        assert (vehicle.name, vehicle.airframe, vehicle.type) == (name, "f450", "f450")
+        assert vehicle.mode == uav.mode.name
+        assert vehicle.airborne
+        assert not vehicle.crashed
+        assert vehicle.battery == pytest.approx(uav.battery_charge, abs=1e-6)
+        assert vehicle.voltage == pytest.approx(uav.battery_voltage, abs=1e-4)
+        p, v = vehicle.position, vehicle.velocity
+        assert [p.x, p.y, p.z] == uav.position_map.tolist()
+        assert [v.x, v.y, v.z] == uav.velocity_map.tolist()
+        full = uav.airframe.rotors.max_speed_rad_s
+        assert vehicle.rotor_speed == pytest.approx(uav.rotor_speed.mean() / full, rel=1e-6)
+        assert (vehicle.command_age, vehicle.holder) == (-1.0, "")
+
+
+def test_the_ground_the_air_and_a_wreck(simulate, flat_data):
+    simulation = simulate(flat_data)
+    watcher = Watcher(simulation, VEHICLES)
+    simulation.run(0.2)
+    standing = watcher.last(VEHICLES).vehicles[0]
+    assert (standing.mode, standing.airborne, standing.rotor_speed) == ("LANDED", False, 0.0)
+    simulation.place_uav("uav1", [0.0, 0.0, 8.0], [0.0, 0.0, 0.0, 1.0])
+    simulation.run(0.2)
+    assert watcher.last(VEHICLES).vehicles[0].airborne
+    simulation.uavs["uav1"].stop_rotors()
+    simulation.run(0.6)
+    falling = watcher.last(VEHICLES).vehicles[0]
+    assert (falling.mode, falling.airborne, falling.crashed) == ("LOW_LEVEL", True, False)
+    simulation.run(4.0)
+    wreck = watcher.last(VEHICLES).vehicles[0]
+    assert (wreck.mode, wreck.airborne, wreck.crashed) == ("CRASHED", False, True)
+
+
+def test_an_airframe_without_a_battery(simulate, flat_data, tmp_path):
+    from volery.vehicle import airframe
+
+    folder = airframe.__file__.replace("airframe.py", "airframes")
+    with open(f"{folder}/f450.toml", encoding="utf-8") as file:
+        text = file.read()
+    path = tmp_path / "bare.toml"
+    bare = text[: text.index("[battery]")].replace('name = "f450"', 'name = "bare"')
+    path.write_text(bare, encoding="utf-8")
+    flat_data["types"]["f450"]["airframe"] = str(path)
+    simulation = simulate(flat_data)
+    watcher = Watcher(simulation, VEHICLES)
+    simulation.run(0.2)
+    told = watcher.last(VEHICLES).vehicles[0]
+    assert told.airframe == "bare"
+    assert math.isnan(told.battery)
+    assert math.isnan(told.voltage)
+
+
+def test_how_long_nobody_outside_has_commanded(simulate, three):
+    simulation = simulate(three)
+    watcher = Watcher(simulation, VEHICLES)
+    inside = simulation.graph.advertise("/uav3/cmd_vel", Twist)
+    inside.publish(Twist(Vector3(0.1, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)))
+    simulation.run(0.1)
+    watcher.session.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
+    watcher.session.publish("/uav1/cmd_vel", Twist(Vector3(0.1, 0, 0), Vector3(0, 0, 0)))
+    simulation.run(0.1)
+    ages = [v.command_age for v in watcher.last(VEHICLES).vehicles]
+    assert ages == [pytest.approx(0.1), -1.0, -1.0]
+    kept = simulation.snapshot()
+    simulation.run(0.2)
+    answers = []
+    from volery.graph.reply import Reply
+
+    watcher.session.call("/uav2/hold", None, Reply(answers.append, answers.append))
+    simulation.run(0.2)
+    assert len(answers) == 1
+    ages = [v.command_age for v in watcher.last(VEHICLES).vehicles]
+    assert ages == [pytest.approx(0.5), pytest.approx(0.2), -1.0]
+    simulation.restore(kept)
+    time.sleep(0.25)
+    simulation.take_in()
+    ages = [v.command_age for v in watcher.last(VEHICLES).vehicles]
+    assert ages == [pytest.approx(0.1), -1.0, -1.0]
+
+
+# ----------------------------------------------------------------------------------- while paused
+
+
+@pytest.fixture
+def paused(simulate, three):
+    """Three UAVs that stand still in time, in a run of its own thread."""
+    simulation = simulate(three)
+    simulation.run(3.0)
+    simulation.pause()
+    with InThread(simulation, 60.0, speed=1.0):
+        yield simulation
+        simulation.quit()
+
+
+def test_who_comes_while_paused_is_told_at_once(paused):
+    watcher = Watcher(paused, TF, VEHICLES)
+    got = {TF: [], VEHICLES: []}
+
+    def come():
+        for topic, messages in got.items():
+            messages.extend(watcher.take(topic))
+        return all(got.values())
+
+    before = time.monotonic()
+    wait_for(come)
+    assert time.monotonic() - before < 0.5
+    assert stamp_s(got[TF][0]) == 3.0
+    time.sleep(0.4)
+    assert watcher.take(TF) == watcher.take(VEHICLES) == []  # nothing has changed
+
+
+def test_what_changes_while_paused_is_shown(paused):
+    watcher = Watcher(paused, TF, VEHICLES)
+    wait_for(lambda: watcher.take(TF))
+    wait_for(lambda: watcher.take(VEHICLES))
+    seen = []
+
+    def shows(topic, check):
+        def look():
+            seen[:] = watcher.take(topic) or seen
+            return bool(seen) and check(seen[-1])
+
+        seen.clear()
+        wait_for(look)
+
+    moved = [4.0, 7.0, 5.0]
+    paused.post(lambda: paused.place_uav("uav2", moved, [0.0, 0.0, 0.0, 1.0])).result()
+    shows(TF, lambda m: poses(m)["uav2/base_link"][0] == moved)
+    shows(VEHICLES, lambda m: m.vehicles[1].position.z == 5.0)
+    paused.post(paused.uavs["uav1"].land).result()
+    shows(VEHICLES, lambda m: m.vehicles[0].mode == "LAND")
+    paused.single_step(5)
+    shows(TF, lambda m: stamp_s(m) == pytest.approx(3.005))
+    paused.post(lambda: paused.spawn_uav("extra", "crazyflie", [9.0, 9.0, 0.0])).result()
+    shows(TF, lambda m: "extra/base_link" in poses(m))
+    shows(VEHICLES, lambda m: m.vehicles[-1].name == "extra")
+
+
+def test_slow_motion_is_shown_in_between(simulate, three):
+    simulation = simulate(three)
+    simulation.run(1.0)
+    watcher = Watcher(simulation, TF)
+    with InThread(simulation, 0.06, speed=0.06):
+        pass
+    stamps = [stamp_s(m) for m in watcher.take(TF)]
+    assert len(stamps) > 8  # three are on the grid
+    assert stamps == sorted(stamps)
+
+
+# ----------------------------------------------------------------------------------------- status
+
+
+def test_the_status_comes_in_wall_time_also_while_paused(paused):
+    watcher = Watcher(paused, STATUS)
+    time.sleep(1.5)
+    told = watcher.take(STATUS)
+    assert 5 <= len(told) <= 9
+    last = told[-1]
+    assert (last.scenario, last.state, last.speed, last.duration) == ("flat", 2, 1.0, 60.0)
+    assert (last.stamp.sec, last.stamp.nanosec) == (3, 0)
+    assert abs(last.wall.sec + 1e-9 * last.wall.nanosec - time.time()) < 1.0
+    assert last.real_time_factor == 0.0
+    assert not last.load.any()
+    assert last.clients == 1
+    assert 50.0 < last.memory < 10_000.0
+    assert not last.replaying
+    gaps = np.diff([m.wall.sec + 1e-9 * m.wall.nanosec for m in told])
+    assert gaps.min() > 0.15
+    paused.resume()
+    time.sleep(1.4)
+    last = watcher.last(STATUS)
+    assert last.state == 1
+    assert last.real_time_factor == pytest.approx(1.0, abs=0.25)
+    stages = dict(zip(last.stages, last.load, strict=True))
+    assert list(stages) == list(paused.stage_seconds)
+    assert 0.0 < stages["advance_vehicles"] < 1.0
+    assert sum(stages.values()) < 1.0
+    paused.set_speed(None)
+    wait_for(lambda: any(m.speed == 0.0 for m in watcher.take(STATUS)))
+
+
+def test_the_status_knows_of_recordings_and_losses(simulate, flat_data, tmp_path):
+    simulation = simulate(flat_data, recordings=tmp_path)
+    watcher = Watcher(simulation, STATUS)
+    late = Watcher(simulation, TF, depth=2)
+    assert ask(simulation, "/volery/start_recording", path="day/a.mcap").success
+    simulation.run(0.2)  # ten true poses, of which the slow client loses eight
+    simulation._live._status.jumped()
+    simulation.take_in()
+    told = watcher.last(STATUS)
+    assert (told.recording, told.dropped, told.clients) == ("day/a.mcap", 8, 2)
+    late.session.close()
+    assert ask(simulation, "/volery/stop_recording").success
+    simulation._live._status.jumped()
+    simulation.take_in()
+    told = watcher.last(STATUS)
+    assert (told.recording, told.dropped, told.clients) == ("", 8, 1)
+
+
+def test_the_speedometer_looks_back_over_a_second():
+    meter = Speedometer()
+    stages = {"a": 0.0, "b": 0.0}
+    for k in range(21):  # two seconds at half of real time, then two at twice
+        pace = meter.read(0.1 * k, round(0.05e9 * k), {"a": 0.01 * k, "b": 0.0})
+    assert pace.real_time_factor == pytest.approx(0.5)
+    assert pace.load == [pytest.approx(0.2), 0.0]
+    for k in range(1, 21):
+        pace = meter.read(2.0 + 0.1 * k, round(1e9 + 0.2e9 * k), {"a": 0.2, "b": 0.1 * k})
+    assert pace.real_time_factor == pytest.approx(2.0)
+    assert pace.load == [0.0, pytest.approx(0.5)]
+    assert meter.read(4.1, 0, stages) == (0.0, [0.0, 0.0])  # gone back
+    assert meter.read(4.2, 0, stages) == (0.0, [0.0, 0.0])  # paused
+
+
+# ------------------------------------------------------------------------------------- determinism
+
+
+def test_who_watches_changes_nothing(simulate, wood_data):
+    def digest(watched):
+        simulation = simulate(wood_data)
+        simulation.enable_digest()
+        if not watched:
+            simulation.run(1.0)
+            return simulation.digest()
+        watcher = Watcher(simulation, TF, VEHICLES, STATUS, "/uav1/laser/nodding/points")
+        with InThread(simulation, 1.0, speed=2.0):
+            wait_for(lambda: simulation.time_s > 0.2)
+            simulation.pause()
+            wait_for(lambda: watcher.take(STATUS))
+            simulation.single_step(7)
+            late = Watcher(simulation, TF, VEHICLES)
+            wait_for(lambda: late.take(VEHICLES))
+            simulation.set_speed(0.5)
+            simulation.resume()
+        assert watcher.take("/uav1/laser/nodding/points")
+        return simulation.digest()
+
+    assert digest(watched=True) == digest(watched=False)
+
+
+def test_nobody_inside_sees_what_follows_wall_time(paused):
+    heard = []
+    Watcher(paused, STATUS, TF)
+    paused.post(lambda: paused.graph.subscribe_all(lambda m: heard.append(m.topic))).result()
+    paused.post(lambda: paused.place_uav("uav1", [3.0, 3.0, 4.0], [0.0, 0.0, 0.0, 1.0])).result()
+    time.sleep(0.6)
+    assert STATUS not in heard
+    assert TF not in heard
+
+
+# ---------------------------------------------------------------------------------- after a jump
+
+
+@pytest.mark.parametrize("how", ["restore", "reset"])
+def test_after_a_jump_everybody_is_told_again(simulate, flat_data, tmp_path, how):
+    blocks = tmp_path / "blocks.csv"
+    blocks.write_text("1,0\n0,1\n", encoding="utf-8")
+    flat_data["world"] = {"grid_map": {"maps": [{"file": str(blocks)}], "origin_m": [30.0, 30.0]}}
+    simulation = simulate(flat_data)
+    simulation.run(0.1)
+    kept = simulation.snapshot()
+    watcher = Watcher(simulation, "/weather", "/map", TF, VEHICLES)
+    ask(simulation, "/volery/set_weather", only=["rain"], rain=9.0)
+    ask(simulation, "/volery/set_grid_map", cell_size=3.0)
+    simulation.run(0.5)
+    assert watcher.last("/weather").rain == 9.0
+    assert watcher.last("/map").info.resolution == 3.0
+    watcher.take(TF)
+    watcher.take(VEHICLES)
+    simulation.restore(kept) if how == "restore" else simulation.reset()
+    time.sleep(0.25)
+    simulation.post(lambda: None)
+    simulation.take_in()
+    assert watcher.last("/weather").rain == 0.0
+    assert watcher.last("/map").info.resolution == 1.0
+    assert stamp_s(watcher.last(TF)) == (0.1 if how == "restore" else 0.0)
+    assert watcher.last(VEHICLES).header.stamp.sec == 0

@@ -1,0 +1,28 @@
+"""Clients that watch a simulation, as doors let them: a session with mailboxes."""
+
+from volery.graph.messages import typestore
+
+
+class Watcher:
+    """Subscribes to topics from outside; keeps what comes."""
+
+    def __init__(self, simulation, *topics, depth=10_000):
+        self.session = simulation.gateway.open("watcher")
+        self._depth = depth
+        self._boxes = {}
+        for topic in topics:
+            self.watch(topic)
+
+    def watch(self, topic):
+        self._boxes[topic] = self.session.subscribe(topic, depth=self._depth, wake=lambda: None)
+
+    def take(self, topic):
+        """New messages of a topic; they must survive the wire."""
+        return [
+            typestore().deserialize_cdr(published.cdr, published.msgtype)
+            for published in self._boxes[topic].take()
+        ]
+
+    def last(self, topic):
+        """The newest of the new messages."""
+        return self.take(topic)[-1]

@@ -1,0 +1,222 @@
+"""The server itself: state, geometry, clients, and worlds that come and go behind it."""
+
+import gzip
+import json
+import resource
+import socket
+import time
+from contextlib import ExitStack, suppress
+
+import pytest
+from page_bench import TOKENS, VIEWER, Client, ask, eventually, serving
+from websockets.exceptions import ConnectionClosed
+
+from volery.core.errors import BridgeError
+from volery.runtime.lobby import Lobby
+from volery.server.page_server import PageServer
+from volery.server.read_only import READ_ONLY_SERVICES
+from volery.server.settings import PageSettings
+
+
+@pytest.fixture
+def server(flight):
+    with serving(flight.simulation) as server:
+        yield server
+
+
+def test_status_tells_what_flies(server, flight):
+    told = ask(server, "/api/status").json
+    assert told["state"] == "flying"
+    assert told["scenario"] == "hover"
+    assert told["description"].startswith("One F450")
+    assert told["world"] == flight.simulation.geometry.id
+    assert told["role"] == "pilot"
+    assert told["token_needed"] is False
+    assert told["message"] == ""
+
+
+def test_states_between_worlds():
+    lobby = Lobby(lambda _name: None)
+    with serving() as server:
+        assert ask(server, "/api/status").json["state"] == "building"
+        server.building("longleaf", "Pines.", "hover: no place")
+        told = ask(server, "/api/status").json
+        assert (told["state"], told["scenario"]) == ("building", "longleaf")
+        assert (told["message"], told["world"]) == ("hover: no place", None)
+        with Client(server) as client:
+            assert client.to_the_end() == 1012
+        with server.showing(lobby):
+            assert ask(server, "/api/status").json["state"] == "lobby"
+            assert ask(server, "/api/world.glb").status == 404
+        with server.showing(lobby, "longleaf: no place"):
+            told = ask(server, "/api/status").json
+            assert (told["state"], told["message"]) == ("failed", "longleaf: no place")
+
+
+def test_clients_take_part_in_the_graph(server):
+    with Client(server, subprotocols=["rosbridge-cbor"]) as client:
+        assert client.socket.subprotocol == "rosbridge-cbor"
+        client.send("subscribe", topic="/uav2/odom", type="nav_msgs/msg/Odometry")
+        odometry = client.until("publish", topic="/uav2/odom")["msg"]
+        assert odometry["child_frame_id"] == "uav2/base_link"
+        values, success = client.call("/rosapi/services")
+        assert success
+        assert "/volery/take_control" in values["services"]
+
+
+def test_services_that_change_nothing_are_there(server, flight):
+    with Client(server) as client:
+        offered = set(client.call("/rosapi/services")[0]["services"])
+    elsewhere = {"/volery/get_grid_map"}
+    assert READ_ONLY_SERVICES - elsewhere <= offered
+
+
+def test_who_comes_learns_which_world_it_is(server, flight):
+    with Client(server) as client:
+        client.send("subscribe", topic="/volery/world")
+        told = client.until("publish", topic="/volery/world")["msg"]["data"]
+        assert told == flight.simulation.geometry.id
+
+
+def test_a_world_that_goes_sends_its_clients_to_the_next(flight):
+    with serving() as server:
+        with ExitStack() as end:
+            with server.showing(flight.simulation):
+                client = end.enter_context(Client(server))
+                client.send("subscribe", topic="/uav1/odom")
+                client.read()
+            assert client.to_the_end() == 1012
+        with server.showing(flight.simulation), Client(server) as client:
+            client.send("subscribe", topic="/uav1/odom")
+            client.read()
+    names = [session.name for session in flight.simulation.gateway.sessions()]
+    assert not [name for name in names if name.startswith("page")]
+
+
+def test_a_viewer_sees_and_is_told_why_not_more(flight):
+    with (
+        serving(flight.simulation, tokens=TOKENS) as server,
+        Client(server, additional_headers={"Authorization": f"Bearer {VIEWER}"}) as client,
+    ):
+        client.send("subscribe", topic="/uav1/odom")
+        client.until("publish", topic="/uav1/odom")
+        assert client.call("/get_entities")[1]
+        values, success = client.call("/uav1/land")
+        assert (success, values) == (
+            False,
+            "a viewer may not call service /uav1/land; show the pilots' token",
+        )
+        client.send("publish", topic="/uav1/cmd_vel", msg={}, id="p")
+        refused = client.until("status", id="p")
+        assert refused["level"] == "error"
+        assert "viewer" in refused["msg"]
+
+
+def test_one_pilot_at_a_time(server, flight):
+    pilots = flight.simulation.pilots
+    with Client(server, "?pilot=Ben") as ben:
+        with Client(server, "?pilot=Anna") as anna:
+            values, _ = anna.call("/volery/take_control", uav="uav2")
+            assert values == {"success": True, "message": "Anna steers uav2"}
+            assert pilots.holder_of("uav2") == "Anna"
+            values, success = ben.call("/uav2/hold")
+            assert (success, values) == (False, "uav2 is held by Anna, who can hand it over")
+            values, success = ben.call("/volery/take_control", uav="uav2")
+            assert success
+            assert values["success"] is False
+            ben.send("publish", topic="/uav2/cmd_vel", msg={}, id="c")
+            assert "held by Anna" in ben.until("status", id="c")["msg"]
+            assert anna.call("/uav2/hold")[1]
+            assert anna.call("/volery/hand_over", uav="uav2", to="Ben")[0]["success"]
+            assert pilots.holder_of("uav2") == "Ben"
+            assert ben.call("/uav2/hold")[1]
+            anna.call("/volery/take_control", uav="uav1")
+        eventually(lambda: pilots.holder_of("uav1") == "")  # Anna has left
+        assert pilots.holder_of("uav2") == "Ben"
+    eventually(lambda: pilots.holder_of("uav2") == "")
+
+
+def test_the_world_is_fetched_once(server, flight):
+    plain = ask(server, "/api/world.glb")
+    assert plain.headers["Content-Type"] == "model/gltf-binary"
+    assert plain.body.startswith(b"glTF")
+    zipped = ask(server, "/api/world.glb", Accept_Encoding="gzip, br")
+    assert zipped.headers["Content-Encoding"] == "gzip"
+    assert gzip.decompress(zipped.body) == plain.body
+    assert flight.simulation.geometry.id in plain.headers["ETag"]
+    for answer, how in ((plain, {}), (zipped, {"Accept_Encoding": "gzip"})):
+        again = ask(server, "/api/world.glb", If_None_Match=answer.headers["ETag"], **how)
+        assert (again.status, again.body) == (304, b"")
+    assert ask(server, "/api/world.glb", If_None_Match='"other"').status == 200
+    assert plain.headers["Cache-Control"] == "no-cache"
+    named = ask(server, f"/api/world.glb?world={flight.simulation.geometry.id}")
+    assert "immutable" in named.headers["Cache-Control"]
+    other = ask(server, "/api/world.glb?world=other")
+    assert other.headers["Cache-Control"] == "no-cache"
+    assert ask(server, "/api/world.glb?detail=finest").status == 400
+    assert ask(server, "/api/world.glb?detail=coarse").status == 200
+
+
+def test_a_message_that_is_too_large_ends_the_connection(server):
+    megabyte = b"x" * 1024 * 1024
+    with Client(server) as client:
+        with suppress(ConnectionClosed):
+            client.socket.send([megabyte] * 70, text=True)
+        assert client.to_the_end() in (None, 1009)
+    assert ask(server, "/api/status").json["state"] == "flying"
+
+
+def test_who_stops_reading_costs_nothing(server, flight):
+    """A client subscribes to everything at full rate and reads no more; others notice nothing."""
+    with Client(server) as stalled, Client(server) as reader:
+        for uav in ("uav1", "uav2"):
+            for topic in ("imu", "odom", "ground_truth/odom"):
+                stalled.send("subscribe", topic=f"/{uav}/{topic}", queue_length=1000)
+        stalled.socket.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        stalled.socket.recv_bufsize = 1
+        stalled.read()
+        reader.send("subscribe", topic="/uav1/odom", type="nav_msgs/msg/Odometry")
+        reader.until("publish")
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        begin, flown = time.monotonic(), flight.simulation.time_s
+        # the reading thread of the stalled client holds still once its own queue is full
+        count = 0
+        while time.monotonic() < begin + 4.0:
+            reader.read()
+            count += 1
+        passed = time.monotonic() - begin
+        assert flight.simulation.time_s - flown > 0.7 * passed
+        assert count > 0.6 * 50.0 * passed
+        grown_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+        assert grown_kb < 20_000
+
+
+def test_a_taken_port_is_told():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        server = PageServer(PageSettings(port=port))
+        with pytest.raises(BridgeError, match=f"cannot listen on 127.0.0.1:{port}"):
+            server.start()
+        server.stop()
+
+
+def test_without_a_build_the_page_says_how_to_make_one(server, monkeypatch, tmp_path):
+    monkeypatch.setattr("volery.server.page.STATIC", tmp_path)
+    told = ask(server, "/")
+    assert told.status == 200
+    assert b"npm run build" in told.body
+    (tmp_path / "index.html").write_text("<!doctype html><title>the page</title>")
+    assert b"the page" in ask(server, "/").body
+
+
+def test_what_is_not_there_is_told_as_json(server):
+    for path, method, status in (
+        ("/api/nothing", "GET", 404),
+        ("/api/status", "DELETE", 405),
+        ("/api/scenarios/nothing.jpg", "GET", 404),
+    ):
+        answer = ask(server, path, method)
+        assert answer.status == status
+        assert json.loads(answer.body)["error"]

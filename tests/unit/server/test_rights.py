@@ -1,0 +1,55 @@
+"""Tokens, sessions, and addresses beyond this machine."""
+
+import pytest
+
+from volery.core.errors import BridgeError
+from volery.server.rights import Role, Sessions, Tokens, check_rights
+
+
+@pytest.mark.parametrize(
+    ("tokens", "given", "role"),
+    [
+        (Tokens(), None, Role.PILOT),
+        (Tokens(), "anything", Role.PILOT),
+        (Tokens("a"), None, None),
+        (Tokens("a"), "", None),
+        (Tokens("a"), "b", None),
+        (Tokens("a"), "a", Role.PILOT),
+        (Tokens("a", "b"), "b", Role.VIEWER),
+        (Tokens("ä"), "ä", Role.PILOT),
+        (Tokens("a"), "\udcff", None),
+    ],
+)
+def test_what_a_token_is_worth(tokens, given, role):
+    assert tokens.role_of(given) is role
+
+
+def test_a_ticket_is_worth_its_role_here_and_nowhere_else():
+    sessions, others = Sessions(), Sessions()
+    for role in Role:
+        ticket = sessions.ticket(role)
+        assert sessions.role_of(ticket) is role
+        assert others.role_of(ticket) is None
+        forged = ticket.replace(role, Role.PILOT if role is Role.VIEWER else Role.VIEWER)
+        assert sessions.role_of(forged) is None
+    assert sessions.role_of(None) is None
+    assert sessions.role_of("") is None
+
+
+@pytest.mark.parametrize(
+    ("host", "tokens", "anywhere", "why"),
+    [
+        ("0.0.0.0", Tokens("a"), False, "--allow-remote"),
+        ("0.0.0.0", Tokens(), True, "set a --token"),
+        ("127.0.0.1", Tokens(None, "b"), False, "needs a --token"),
+        ("127.0.0.1", Tokens("a", "a"), False, "another one"),
+    ],
+)
+def test_half_rights_are_refused(host, tokens, anywhere, why):
+    with pytest.raises(BridgeError, match=why):
+        check_rights(host, tokens, anywhere=anywhere)
+
+
+def test_whole_rights_pass():
+    check_rights("127.0.0.1", Tokens(), anywhere=False)
+    check_rights("0.0.0.0", Tokens("a", "b"), anywhere=True)

@@ -1,0 +1,65 @@
+"""Cards of scenarios, and their pictures."""
+
+from io import BytesIO
+
+import pytest
+from page_bench import ask, serving
+from PIL import Image
+
+from volery.scenario import library
+from volery.scenario.shelf import Shelf
+from volery.server.cards import CARDS
+from volery.server.draw_cards import HEIGHT, VIEWS, WIDTH
+from volery.server.scenarios import cards_of
+
+
+@pytest.mark.parametrize("name", library.names())
+def test_every_scenario_that_ships_has_a_picture(name):
+    path = CARDS / f"{name}.jpg"
+    with Image.open(path) as picture:
+        assert picture.format == "JPEG"
+        assert picture.size == (WIDTH, HEIGHT)
+        low, high = picture.convert("L").getextrema()
+        assert high - low > 40, "the picture shows nothing"
+    assert path.stat().st_size < 80_000
+
+
+def test_views_are_of_scenarios_that_ship():
+    assert set(VIEWS) <= set(library.names())
+
+
+def test_cards_tell_what_the_scenarios_say():
+    cards = {card["name"]: card for card in cards_of(Shelf())}
+    assert list(cards) == library.names()
+    city, survey, hover = cards["city_flight"], cards["forest_survey"], cards["hover"]
+    assert (city["world"], city["uavs"], city["duration_s"]) == ("city", 3, 120.0)
+    assert city["airframes"] == ["f450"]
+    assert survey["world"] == "forest"
+    assert "lidar" in survey["sensors"]
+    assert (hover["world"], cards["grid_map"]["world"]) == ("open", "grid_map")
+    assert not any(card["uploaded"] for card in cards.values())
+
+
+def test_cards_and_pictures_over_http():
+    with serving() as server:
+        cards = ask(server, "/api/scenarios").json
+        for card in cards[:3]:
+            picture = ask(server, card["picture"].removeprefix("."))
+            assert picture.headers["Content-Type"] == "image/jpeg"
+            Image.open(BytesIO(picture.body)).verify()
+
+
+def test_uploaded_scenarios_stand_behind_and_broken_ones_not_at_all(tmp_path):
+    hover = library.path_of("hover").read_text()
+    for name, text in (("mine", hover.replace('"hover"', '"mine"')), ("broken", "name = 3")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "scenario.toml").write_text(text)
+    (tmp_path / "hover").mkdir()
+    (tmp_path / "hover" / "scenario.toml").write_text("name = 4")  # cannot hide the one that ships
+    (tmp_path / ".upload_x").mkdir()
+    (tmp_path / ".upload_x" / "scenario.toml").write_text(hover)  # is being checked
+    shelf = Shelf(tmp_path)
+    assert shelf.added() == ("broken", "mine")
+    last = cards_of(shelf)[-1]
+    assert (last["name"], last["uploaded"], last["picture"]) == ("mine", True, None)
+    assert shelf.load("hover").uav_count == 1

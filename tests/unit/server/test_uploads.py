@@ -1,0 +1,209 @@
+"""Files of visitors: good ones become scenarios, bad ones a clear message."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+from page_bench import ask, serving
+from PIL import Image
+
+from volery.core.errors import VoleryError
+from volery.runtime.worlds import build_forest, build_solids, build_terrain
+from volery.scenario.load import load_scenario
+from volery.scenario.shelf import Shelf
+from volery.server.uploads import kinds, making
+from volery.server.uploads.check import check
+from volery.server.uploads.kinds import KINDS
+from volery.server.uploads.route import name_for
+
+
+def outlines(*corners):
+    ring = [[24.94, 60.17], [24.9405, 60.17], [24.9405, 60.1703], [24.94, 60.1703], [24.94, 60.17]]
+    geometry = {"type": "Polygon", "coordinates": [list(corners) or ring]}
+    feature = {"type": "Feature", "properties": {"height": "12"}, "geometry": geometry}
+    return json.dumps({"type": "FeatureCollection", "features": [feature]}).encode()
+
+
+def moving_ai():
+    return b"type octile\nheight 3\nwidth 4\nmap\n....\n.@@.\n....\n"
+
+
+def box():
+    return trimesh.creation.box((4.0, 6.0, 8.0)).export(file_type="stl")
+
+
+INVENTORY = b"x_m,y_m,dbh_cm\n0,0,20\n8,3,30\n-6,9,25\n"
+
+
+@pytest.fixture
+def checked(tmp_path):
+    """Makes and builds a scenario of a file's content."""
+
+    def run(kind, suffix, content, name="yard"):
+        path = tmp_path / f"{kind}{suffix}"
+        path.write_bytes(content)
+        check(kind, path, name, f"my yard{suffix}")
+        return load_scenario(tmp_path / Shelf.FILE)
+
+    return run
+
+
+def test_a_matrix_becomes_blocks(checked):
+    scenario = checked("grid_map", ".csv", b"0,0,0\n0,1,0\n0,0,0\n0,0,1\n")
+    (solid,) = build_solids(scenario, build_terrain(scenario))
+    low, high = solid.mesh.bounds
+    # 2 m cells around the origin: x -3..3, y -4..4; the lowest row of the file has the lowest y
+    np.testing.assert_allclose(high, (3.0, 2.0, 5.0))
+    np.testing.assert_allclose(low[:2], (-1.0, -4.0))
+    assert scenario.name == "yard"
+    assert scenario.uav_count == 2
+    assert "my yard.csv" in scenario.description
+
+
+def test_maps_of_movingai_and_pictures(checked, tmp_path):
+    scenario = checked("grid_map", ".map", moving_ai())
+    assert build_solids(scenario, build_terrain(scenario))
+    Image.fromarray(np.array([[255, 0], [255, 255]], np.uint8)).save(tmp_path / "picture.png")
+    scenario = checked("grid_map", ".png", (tmp_path / "picture.png").read_bytes())
+    (solid,) = build_solids(scenario, build_terrain(scenario))
+    np.testing.assert_allclose(solid.mesh.bounds[:, :2], [[0.0, 0.0], [2.0, 2.0]])
+
+
+def test_outlines_become_a_city_around_its_middle(checked):
+    scenario = checked("city", ".geojson", outlines())
+    assert scenario.world.origin.latitude_deg == pytest.approx(60.17015)
+    assert scenario.world.origin.longitude_deg == pytest.approx(24.94025)
+    assert scenario.world.city is not None
+
+
+def test_a_mesh_stands_on_the_ground_around_the_origin(checked):
+    scenario = checked("mesh", ".stl", box())
+    (solid,) = build_solids(scenario, build_terrain(scenario))
+    np.testing.assert_allclose(solid.mesh.bounds, [[-2, -3, 0], [2, 3, 8]], atol=1e-5)
+
+
+def test_an_inventory_becomes_a_forest(checked):
+    scenario = checked("forest", ".csv", INVENTORY)
+    forest = build_forest(scenario, build_terrain(scenario))
+    np.testing.assert_allclose(forest.position_map[:, :2], [[0, 0], [8, 3], [-6, 9]])
+    np.testing.assert_allclose(forest.dbh_m, [0.2, 0.3, 0.25])
+
+
+@pytest.mark.parametrize(
+    ("kind", "suffix", "content", "why"),
+    [
+        ("grid_map", ".csv", b"0,1\n0,2\n", "line 2, column 2: '2'"),
+        ("grid_map", ".csv", b"0,1\n0\n", "line 2 has 1 entries"),
+        ("grid_map", ".png", b"\x89PNG\r\n\x1a\n broken", "grid_map.png"),
+        ("grid_map", ".map", b"type octile\n", "grid_map.map"),
+        ("city", ".geojson", b"{", "not valid JSON"),
+        ("city", ".geojson", b'{"type": "FeatureCollection", "features": []}', "no polygon"),
+        ("city", ".json", outlines([0, 0], [0, 0], [0, 0], [0, 0]), "no building is left"),
+        ("city", ".json", outlines([500, 0], [1, 1], [2, 2], [500, 0]), "within 180 and 90"),
+        ("mesh", ".obj", b"v 0 0 0\n", "no triangle"),
+        ("mesh", ".glb", b"glTF" + b"\0" * 40, "mesh.glb"),
+        ("forest", ".csv", b"x,y\n1,2\n", "unknown column 'x'"),
+        ("forest", ".csv", b"x_m,y_m\n", "0 trees"),
+        ("forest", ".csv", b"x_m,y_m\n385000,6672000\n", "at most 5000 m"),
+        ("forest", ".csv", b"x_m,y_m\n1,nan\n", "row 2"),
+    ],
+)
+def test_what_is_wrong_is_told_in_a_sentence(checked, kind, suffix, content, why):
+    with pytest.raises(VoleryError, match=why):
+        checked(kind, suffix, content)
+
+
+def test_there_are_limits(checked, monkeypatch):
+    monkeypatch.setattr(making, "MOST_CELLS", 3)
+    with pytest.raises(VoleryError, match="4 x 1 cells; at most 3"):
+        checked("grid_map", ".csv", b"0,0,0,1\n")
+    monkeypatch.setattr(making, "MOST_TREES", 2)
+    with pytest.raises(VoleryError, match="3 trees; allowed are 1 to 2"):
+        checked("forest", ".csv", INVENTORY)
+    monkeypatch.setattr(making, "MOST_TRIANGLES", 11)
+    with pytest.raises(VoleryError, match="12 triangles; at most 11"):
+        checked("mesh", ".stl", box())
+
+
+def test_descriptions_hold_no_toml(checked, tmp_path):
+    path = tmp_path / "forest.csv"
+    path.write_bytes(INVENTORY)
+    evil = '"\nname = "other"\n\x00\U0001f600.csv'
+    check("forest", path, "yard", evil)
+    assert load_scenario(tmp_path / Shelf.FILE).name == "yard"
+
+
+@pytest.mark.parametrize(
+    ("called", "name"),
+    [
+        ("My Yard (2).png", "my_yard_2"),
+        ("../../etc/passwd.csv", "passwd"),
+        ("C:\\maps\\Hall.png", "hall"),
+        ("42.csv", "upload"),
+        ("hover.csv", "hover_2"),
+        ("x" * 200 + ".csv", "x" * 30),
+        ("Ω.csv", "upload"),
+    ],
+)
+def test_names_are_ours(called, name, tmp_path):
+    assert name_for(called, Shelf(tmp_path)) == name
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    with serving(uploads=tmp_path_factory.mktemp("run") / "uploads") as server:
+        yield server
+
+
+def test_a_good_file_over_http_can_be_loaded(server):
+    path = "/api/uploads?kind=grid_map&name=My%20Hall.csv"
+    answer = ask(server, path, "POST", b"0,0\n0,1\n")
+    assert (answer.status, answer.json) == (201, {"scenario": "my_hall"}), answer.body
+    card = ask(server, "/api/scenarios").json[-1]
+    assert (card["name"], card["world"], card["uploaded"]) == ("my_hall", "grid_map", True)
+
+
+def test_a_bad_file_over_http_leaves_nothing_behind(server):
+    before = ask(server, "/api/scenarios").json
+    answer = ask(server, "/api/uploads?kind=grid_map&name=hall.csv", "POST", b"0,x\n")
+    assert answer.status == 422
+    assert "hall.csv, line 1, column 2: 'x'; allowed are 0 and 1" in answer.error
+    assert "/" not in answer.error  # no path of the server
+    assert ask(server, "/api/scenarios").json == before
+
+
+@pytest.mark.parametrize(
+    ("query", "body", "status", "why"),
+    [
+        ("kind=virus&name=a.csv", b"x", 400, "kind must be one of grid_map, city, mesh, forest"),
+        ("kind=mesh&name=a.exe", b"x", 415, "'.exe'"),
+        ("kind=mesh", b"x", 415, "is read from"),
+        ("kind=forest&name=a.csv", b"", 400, "empty"),
+    ],
+)
+def test_refusals_over_http(server, query, body, status, why):
+    answer = ask(server, f"/api/uploads?{query}", "POST", body)
+    assert answer.status == status
+    assert why in answer.error
+
+
+def test_too_large_a_file_is_not_read_to_its_end(server, monkeypatch):
+    small = kinds.Kind((".csv",), 1000, "trees")
+    monkeypatch.setitem(KINDS, "forest", small)
+    answer = ask(server, "/api/uploads?kind=forest&name=a.csv", "POST", b"x" * 1001)
+    assert answer.status == 413
+    assert "0.001 MB" in answer.error
+
+    def endless():
+        for _ in range(100):
+            yield b"x" * 100
+
+    answer = ask(server, "/api/uploads?kind=forest&name=a.csv", "POST", endless())
+    assert answer.status == 413
+
+
+def test_a_server_without_a_folder_takes_nothing():
+    with serving() as server:
+        answer = ask(server, "/api/uploads?kind=forest&name=a.csv", "POST", INVENTORY)
+        assert answer.status == 409

@@ -1,0 +1,48 @@
+import { Text } from "@mantine/core";
+import { Upload } from "lucide-react";
+import { useEffect, useState } from "react";
+import { useConnection } from "../state/connection.ts";
+import { offerFile } from "../state/windows.ts";
+
+/** A file that is dropped anywhere on the page is offered as a map. */
+export function DropZone() {
+  const volery = useConnection((connection) => connection.volery);
+  const [over, setOver] = useState(false);
+  useEffect(() => {
+    if (!volery) return;
+    const hasFile = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
+    const drag = (event: DragEvent) => {
+      if (!hasFile(event)) return;
+      event.preventDefault();
+      setOver(true);
+    };
+    const leave = (event: DragEvent) => {
+      if (event.relatedTarget === null) setOver(false);
+    };
+    const drop = (event: DragEvent) => {
+      if (!hasFile(event)) return;
+      event.preventDefault();
+      setOver(false);
+      const file = event.dataTransfer?.files[0];
+      if (file !== undefined) offerFile(file);
+    };
+    window.addEventListener("dragover", drag);
+    window.addEventListener("dragleave", leave);
+    window.addEventListener("drop", drop);
+    return () => {
+      window.removeEventListener("dragover", drag);
+      window.removeEventListener("dragleave", leave);
+      window.removeEventListener("drop", drop);
+    };
+  }, [volery]);
+  if (!over) return null;
+  return (
+    <div className="drop-zone">
+      <Upload size={48} />
+      <Text size="lg" fw={600}>
+        Drop a map to fly in it
+      </Text>
+      <Text c="dimmed">Grid (CSV, PNG, MovingAI), GeoJSON, glTF, OBJ, STL, forest inventory</Text>
+    </div>
+  );
+}

@@ -1,0 +1,100 @@
+import {
+  Button,
+  Group,
+  Loader,
+  Paper,
+  PasswordInput,
+  Progress,
+  Stack,
+  Text,
+  Title,
+} from "@mantine/core";
+import { TriangleAlert } from "lucide-react";
+import { useConnection } from "../state/connection.ts";
+import { useSimulation } from "../state/simulation.ts";
+import { openWindow } from "../state/windows.ts";
+import { Banner } from "./Banner.tsx";
+
+/** What stands between the user and a flight, if anything does: told over the scene. */
+export function Situation() {
+  const server = useSimulation((simulation) => simulation.server);
+  const link = useConnection((connection) => connection.state);
+  if (server?.token_needed === true || link === "refused") return <TokenNeeded />;
+  if (server?.state === "building") return <Building />;
+  if (server?.state === "failed") return <Failed />;
+  if (server?.state === "lobby") return <Lobby />;
+  return <Banner />;
+}
+
+function Building() {
+  const server = useSimulation((simulation) => simulation.server);
+  return (
+    <Paper className="situation" shadow="lg" withBorder p="lg" role="status">
+      <Group>
+        <Loader size="sm" />
+        <Title order={4}>Building {server?.scenario}</Title>
+      </Group>
+      <Text size="sm" c="dimmed" mt={6}>
+        {server?.message || server?.description}
+      </Text>
+      <Progress value={100} animated mt="md" aria-label="Building" />
+    </Paper>
+  );
+}
+
+function Failed() {
+  const server = useSimulation((simulation) => simulation.server);
+  return (
+    <Paper className="situation" shadow="lg" withBorder p="lg" role="alert">
+      <Group>
+        <TriangleAlert size={20} color="var(--mantine-color-red-6)" />
+        <Title order={4}>{server?.scenario || "The scenario"} could not be flown</Title>
+      </Group>
+      <Text size="sm" my="sm" className="reason">
+        {server?.message}
+      </Text>
+      <Button onClick={() => openWindow("scenarios")}>Choose another scenario</Button>
+    </Paper>
+  );
+}
+
+function Lobby() {
+  const message = useSimulation(({ server }) => server?.message);
+  return (
+    <Paper className="situation" shadow="lg" withBorder p="lg">
+      <Title order={4}>Nothing flies</Title>
+      <Text size="sm" c="dimmed" my="sm">
+        {message || "Choose a scenario, or drop a map of your own on this page."}
+      </Text>
+      <Button onClick={() => openWindow("scenarios")}>Choose a scenario</Button>
+    </Paper>
+  );
+}
+
+function TokenNeeded() {
+  const reason = useConnection((connection) => connection.reason);
+  return (
+    <Paper className="situation" shadow="lg" withBorder p="lg">
+      <form
+        onSubmit={(event) => {
+          event.preventDefault();
+          const token = new FormData(event.currentTarget).get("token");
+          const query = new URLSearchParams(location.search);
+          query.set("token", String(token));
+          location.search = query.toString();
+        }}
+      >
+        <Stack gap="sm">
+          <Title order={4}>This server asks for a token</Title>
+          {reason !== "" && (
+            <Text size="sm" c="dimmed">
+              {reason}
+            </Text>
+          )}
+          <PasswordInput label="Token" name="token" required autoComplete="current-password" />
+          <Button type="submit">Enter</Button>
+        </Stack>
+      </form>
+    </Paper>
+  );
+}

@@ -1,0 +1,174 @@
+import { Badge, Button, CloseButton, Group, NumberInput, Paper, Text } from "@mantine/core";
+import { Gamepad2, PlaneTakeoff } from "lucide-react";
+import { useEffect, useRef, useState } from "react";
+import { wishOfSticks, type Speeds, type Wish } from "../../lib/twist.ts";
+import { tell } from "../../link/commands.ts";
+import { addSource, releaseControls, setHaste, setSpeeds, useFlying } from "../../state/flying.ts";
+import { attempt } from "../../state/notices.ts";
+import { useStranger } from "../../state/pilots.ts";
+import { useVehicles } from "../../state/vehicles.ts";
+import { connected, wishOfGamepad } from "./gamepad.ts";
+import { listenToKeys } from "./keys.ts";
+import { Stick } from "./Stick.tsx";
+
+/** Flight by hand: what is pressed, how fast it flies, and sticks on a touch screen. */
+export function HandControls() {
+  const uav = useFlying((flying) => flying.uav);
+  return uav === "" ? null : <Controls uav={uav} />;
+}
+
+function Controls({ uav }: { uav: string }) {
+  const sticks = useSources();
+  const wish = useFlying((flying) => flying.wish);
+  const touch = window.matchMedia("(pointer: coarse)").matches;
+  return (
+    <>
+      <Paper
+        className="hands"
+        shadow="md"
+        withBorder
+        p="xs"
+        role="group"
+        aria-label="Flight by hand"
+      >
+        <Group gap="xs" justify="space-between" wrap="nowrap">
+          <Group gap={6} wrap="nowrap">
+            <Gamepad2 size={18} />
+            <Text fw={600} size="sm">
+              Flying {uav}
+            </Text>
+            {connected() !== undefined && <Badge size="xs">gamepad</Badge>}
+          </Group>
+          <CloseButton size="sm" aria-label="Give the controls back" onClick={releaseControls} />
+        </Group>
+        <Hindrance uav={uav} />
+        {!touch && <PressedKeys wish={wish} />}
+        <SpeedFields />
+      </Paper>
+      {touch && (
+        <div className="sticks">
+          <Stick label="Climb and turn" onMove={(x, y) => (sticks.current.left = [x, y])} />
+          <Stick label="Ahead and aside" onMove={(x, y) => (sticks.current.right = [x, y])} />
+        </div>
+      )}
+    </>
+  );
+}
+
+/** Keys, gamepad and the sticks on the screen ask for velocities while this is shown. */
+function useSources() {
+  const sticks = useRef({ left: [0, 0] as [number, number], right: [0, 0] as [number, number] });
+  useEffect(() => {
+    const keys = listenToKeys();
+    const forget = [
+      addSource(keys.wish),
+      setHaste(keys.haste),
+      addSource(wishOfGamepad),
+      addSource(() => wishOfSticks(sticks.current.left, sticks.current.right)),
+    ];
+    return () => {
+      keys.close();
+      for (const each of forget) each();
+    };
+  }, []);
+  return sticks;
+}
+
+/** Why nothing happens, where that is so. */
+function Hindrance({ uav }: { uav: string }) {
+  const vehicle = useVehicles(({ list }) => list.find(({ name }) => name === uav));
+  const stranger = useStranger(uav);
+  const [busy, setBusy] = useState(false);
+  if (stranger !== "") {
+    return (
+      <Text size="sm" c="red" role="alert">
+        {stranger} has the control of {uav}: your commands are refused.
+      </Text>
+    );
+  }
+  if (vehicle?.crashed)
+    return (
+      <Text size="sm" c="red">
+        {uav} has crashed.
+      </Text>
+    );
+  if (vehicle?.mode !== "LANDED") return null;
+  const takeOff = async () => {
+    setBusy(true);
+    await attempt(`${uav}: take off`, tell(uav, "take_off"));
+    setBusy(false);
+  };
+  return (
+    <Group gap="xs" my={4}>
+      <Text size="sm">It stands on the ground.</Text>
+      <Button
+        size="compact-sm"
+        leftSection={<PlaneTakeoff size={14} />}
+        loading={busy}
+        onClick={() => void takeOff()}
+      >
+        Take off
+      </Button>
+    </Group>
+  );
+}
+
+const CAPS: readonly { row: number; keys: readonly [string, keyof Wish, number][] }[] = [
+  {
+    row: 1,
+    keys: [
+      ["Q", "turn", 1],
+      ["W", "ahead", 1],
+      ["E", "turn", -1],
+      ["R", "up", 1],
+    ],
+  },
+  {
+    row: 2,
+    keys: [
+      ["A", "left", 1],
+      ["S", "ahead", -1],
+      ["D", "left", -1],
+      ["F", "up", -1],
+    ],
+  },
+];
+
+function PressedKeys({ wish }: { wish: Wish }) {
+  return (
+    <div className="keycaps" aria-hidden>
+      {CAPS.flatMap(({ keys }) => keys).map(([cap, axis, sign]) => (
+        <kbd key={cap} className="keycap" data-pressed={wish[axis] * sign > 0 || undefined}>
+          {cap}
+        </kbd>
+      ))}
+    </div>
+  );
+}
+
+function SpeedFields() {
+  const speeds = useFlying((flying) => flying.speeds);
+  const fields: [keyof Speeds, string, string, number][] = [
+    ["level", "Level", "m/s", 20],
+    ["climb", "Climb", "m/s", 10],
+    ["turn", "Turn", "rad/s", 4],
+  ];
+  return (
+    <Group gap={6} wrap="nowrap" mt={6}>
+      {fields.map(([key, label, unit, most]) => (
+        <NumberInput
+          key={key}
+          size="xs"
+          w={86}
+          label={label}
+          suffix={` ${unit}`}
+          min={0.1}
+          max={most}
+          step={0.5}
+          value={speeds[key]}
+          onChange={(value) => setSpeeds({ [key]: Math.max(0.1, Math.min(most, Number(value))) })}
+        />
+      ))}
+    </Group>
+  );
+}

@@ -1,0 +1,146 @@
+import {
+  ActionIcon,
+  Button,
+  Group,
+  Popover,
+  ScrollArea,
+  Stack,
+  Text,
+  TextInput,
+  Tooltip,
+} from "@mantine/core";
+import { Bookmark, Trash2, Undo2 } from "lucide-react";
+import { useState } from "react";
+import { clockText } from "../../lib/time.ts";
+import {
+  forgetState,
+  keepState,
+  keptStates,
+  returnTo,
+  type KeptState,
+} from "../../link/commands.ts";
+import { attempt, succeeds, tellSuccess } from "../../state/notices.ts";
+import { useWhyNot } from "../../state/rights.ts";
+
+/** States of the whole simulation to return to. */
+export function KeptStates() {
+  const [opened, setOpened] = useState(false);
+  const [states, setStates] = useState<KeptState[]>([]);
+  const refresh = async () => setStates((await attempt("Snapshots", keptStates())) ?? []);
+  const open = (next: boolean) => {
+    setOpened(next);
+    if (next) void refresh();
+  };
+  return (
+    <Popover opened={opened} onChange={open} position="bottom-end" withArrow trapFocus>
+      <Popover.Target>
+        <Tooltip label="Snapshots" disabled={opened}>
+          <ActionIcon
+            variant="default"
+            size="lg"
+            aria-label="Snapshots"
+            onClick={() => open(!opened)}
+          >
+            <Bookmark size={18} />
+          </ActionIcon>
+        </Tooltip>
+      </Popover.Target>
+      <Popover.Dropdown w={310}>
+        <Stack gap="xs">
+          <NewState taken={states.map(({ name }) => name)} onKept={() => void refresh()} />
+          {states.length === 0 ? (
+            <Text size="sm" c="dimmed">
+              No snapshot yet. One holds everything: UAVs, weather, noise, and what nodes remember.
+            </Text>
+          ) : (
+            <ScrollArea.Autosize mah={280}>
+              <Stack gap={2} component="ul" p={0} m={0} aria-label="Snapshots">
+                {states.map((state) => (
+                  <State key={state.name} state={state} onForgotten={() => void refresh()} />
+                ))}
+              </Stack>
+            </ScrollArea.Autosize>
+          )}
+        </Stack>
+      </Popover.Dropdown>
+    </Popover>
+  );
+}
+
+function NewState({ taken, onKept }: { taken: string[]; onKept: () => void }) {
+  const [name, setName] = useState("");
+  const whyNot = useWhyNot();
+  const take = async () => {
+    const wished = name.trim() || freeName(taken);
+    if (!(await succeeds("Snapshot", keepState(wished)))) return;
+    setName("");
+    onKept();
+  };
+  return (
+    <form
+      onSubmit={(event) => {
+        event.preventDefault();
+        void take();
+      }}
+    >
+      <Group gap="xs" wrap="nowrap">
+        <TextInput
+          flex={1}
+          aria-label="Name of the snapshot"
+          placeholder={freeName(taken)}
+          maxLength={100}
+          value={name}
+          onChange={(event) => setName(event.currentTarget.value)}
+        />
+        <Button type="submit" disabled={whyNot !== null}>
+          Take
+        </Button>
+      </Group>
+    </form>
+  );
+}
+
+function State({
+  state: { name, timeS },
+  onForgotten,
+}: {
+  state: KeptState;
+  onForgotten: () => void;
+}) {
+  const whyNot = useWhyNot();
+  const goBack = async () => {
+    if (await succeeds("Snapshot", returnTo(name))) tellSuccess(`Back at ${clockText(timeS)}`);
+  };
+  return (
+    <Group component="li" gap="xs" wrap="nowrap" style={{ listStyle: "none" }}>
+      <Button
+        flex={1}
+        variant="subtle"
+        justify="space-between"
+        size="compact-md"
+        disabled={whyNot !== null}
+        leftSection={<Undo2 size={16} />}
+        rightSection={<Text ff="monospace">{clockText(timeS)}</Text>}
+        aria-label={`Return to ${name}`}
+        onClick={() => void goBack()}
+      >
+        {name}
+      </Button>
+      <ActionIcon
+        variant="subtle"
+        color="gray"
+        aria-label={`Forget ${name}`}
+        disabled={whyNot !== null}
+        onClick={() => void succeeds("Snapshot", forgetState(name)).then(onForgotten)}
+      >
+        <Trash2 size={16} />
+      </ActionIcon>
+    </Group>
+  );
+}
+
+function freeName(taken: readonly string[]): string {
+  let number = 1;
+  while (taken.includes(`state ${number}`)) number++;
+  return `state ${number}`;
+}

@@ -1,0 +1,77 @@
+import {
+  ActionIcon,
+  Button,
+  Divider,
+  Group,
+  NumberInput,
+  Popover,
+  Stack,
+  Text,
+  Tooltip,
+} from "@mantine/core";
+import { RotateCcw } from "lucide-react";
+import { useState } from "react";
+import { loadScenario, reset } from "../../link/commands.ts";
+import { succeeds, tellSuccess } from "../../state/notices.ts";
+import { useWhyNot } from "../../state/rights.ts";
+import { useSimulation } from "../../state/simulation.ts";
+
+/** Back to the start: the same flight once more, or one with another seed. */
+export function Reset() {
+  const scenario = useSimulation(({ server, status }) => server?.scenario || status?.scenario);
+  const [opened, setOpened] = useState(false);
+  const [seed, setSeed] = useState<number>(1);
+  const whyNot = useWhyNot();
+  const run = async (what: Promise<void>, done: string) => {
+    setOpened(false);
+    if (await succeeds("Reset", what)) tellSuccess(done);
+  };
+  return (
+    <Popover opened={opened} onChange={setOpened} position="bottom" withArrow trapFocus>
+      <Popover.Target>
+        <Tooltip label={whyNot ?? "Back to the start"} disabled={opened}>
+          <ActionIcon
+            variant="default"
+            size="lg"
+            aria-label="Reset"
+            disabled={whyNot !== null}
+            onClick={() => setOpened(!opened)}
+          >
+            <RotateCcw size={18} />
+          </ActionIcon>
+        </Tooltip>
+      </Popover.Target>
+      <Popover.Dropdown w={290}>
+        <Stack gap="xs">
+          <Button onClick={() => void run(reset(), "Back at the start")}>Reset, same seed</Button>
+          <Text size="xs" c="dimmed">
+            The same flight to the last bit; UAVs that were added go.
+          </Text>
+          <Divider />
+          <Group align="end" gap="xs" wrap="nowrap">
+            <NumberInput
+              label="Seed"
+              min={0}
+              max={Number.MAX_SAFE_INTEGER}
+              allowDecimal={false}
+              value={seed}
+              onChange={(value) => setSeed(Number(value))}
+            />
+            <Button
+              variant="default"
+              disabled={!scenario}
+              onClick={() =>
+                void run(loadScenario(scenario!, { seed }), `Begins anew with seed ${seed}`)
+              }
+            >
+              New seed
+            </Button>
+          </Group>
+          <Text size="xs" c="dimmed">
+            The scenario as it is written, with other noise and another procedural world.
+          </Text>
+        </Stack>
+      </Popover.Dropdown>
+    </Popover>
+  );
+}

@@ -1,0 +1,11 @@
+import { expect, it } from "vitest";
+import { kindOf } from "./fileKinds.ts";
+
+it("files are told apart by their endings, tables by their first line", () => {
+  expect(kindOf("town.GeoJSON", "")).toBe("city");
+  expect(kindOf("hall.v2.glb", "")).toBe("mesh");
+  expect(kindOf("maze.map", "type octile")).toBe("grid_map");
+  expect(kindOf("plot.csv", "\n0,1,0\n1,0,0")).toBe("grid_map");
+  expect(kindOf("plot.csv", "x_m,y_m,dbh_cm,species\n1,2,30,oak")).toBe("forest");
+  expect(kindOf("notes.docx", "")).toBeNull();
+});

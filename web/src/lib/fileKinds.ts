@@ -1,0 +1,23 @@
+import type { UploadKind } from "../link/commands/scenarios.ts";
+
+const BY_ENDING: Readonly<Record<string, UploadKind>> = {
+  png: "grid_map",
+  map: "grid_map",
+  txt: "grid_map",
+  geojson: "city",
+  json: "city",
+  glb: "mesh",
+  gltf: "mesh",
+  obj: "mesh",
+  stl: "mesh",
+};
+
+export const ENDINGS = [...Object.keys(BY_ENDING), "csv"].map((ending) => `.${ending}`).join(",");
+
+/** What a file most likely is; a table with words in its first line lists trees. Null: unknown. */
+export function kindOf(name: string, beginning: string): UploadKind | null {
+  const ending = name.split(".").at(-1)?.toLowerCase() ?? "";
+  if (ending !== "csv") return BY_ENDING[ending] ?? null;
+  const first = beginning.split(/\r?\n/).find((line) => line.trim() !== "") ?? "";
+  return /[a-z]/i.test(first) ? "forest" : "grid_map";
+}

@@ -1,0 +1,7 @@
+import { order } from "./asking.ts";
+
+/** Make something fail; `fault` as in a scenario. */
+export async function injectFault(fault: Record<string, unknown>): Promise<void> {
+  const request = { fault: JSON.stringify(fault) };
+  await order("/volery/inject_fault", "volery_interfaces/srv/InjectFault", request);
+}

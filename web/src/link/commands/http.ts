@@ -1,0 +1,10 @@
+// Answers of the server's own pages.
+
+import { RefusedError } from "./asking.ts";
+
+/** JSON of an answer; a refusal's reason is its `error`. */
+export async function read(answer: Response): Promise<unknown> {
+  const told = (await answer.json().catch(() => null)) as { error?: string } | null;
+  if (answer.ok && told !== null) return told;
+  throw new RefusedError(told?.error ?? `the server answered ${answer.status}`);
+}

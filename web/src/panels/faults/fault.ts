@@ -1,0 +1,79 @@
+// Faults as the simulation takes them: the same tables as in a scenario.
+
+export const KINDS = [
+  { value: "motor", label: "Rotor" },
+  { value: "sensor", label: "Sensor" },
+  { value: "gnss_loss", label: "No satellites" },
+  { value: "gust", label: "Gust" },
+  { value: "displacement", label: "Displacement" },
+] as const;
+export type FaultKind = (typeof KINDS)[number]["value"];
+
+export const EFFECTS = [
+  { value: "dropped", label: "Silent" },
+  { value: "stuck", label: "Repeats itself" },
+  { value: "biased", label: "Biased" },
+];
+
+export type Vector = [number, number, number];
+
+/** What the form holds. */
+export interface FaultForm {
+  kind: FaultKind;
+  uav: string;
+  /** How long it lasts, s; 0: it stays. */
+  lastsS: number;
+  rotor: number;
+  /** Share of the rotor's thrust that is left. */
+  thrustFactor: number;
+  sensor: string;
+  effect: string;
+  /** Numbers with commas between them. */
+  bias: string;
+  /** Wind of a gust, m/s, or displacement, m; map. */
+  vector: Vector;
+  riseS: number;
+  holdS: number;
+}
+
+export const USUAL: FaultForm = {
+  kind: "motor",
+  uav: "",
+  lastsS: 0,
+  rotor: 0,
+  thrustFactor: 0.5,
+  sensor: "imu",
+  effect: "dropped",
+  bias: "0.1, 0, 0",
+  vector: [5, 0, 0],
+  riseS: 0.5,
+  holdS: 1,
+};
+
+/** The fault, beginning at once. */
+export function faultOf(form: FaultForm, nowS: number): Record<string, unknown> {
+  const { kind, uav, lastsS } = form;
+  const own = { kind, uav };
+  const passing = lastsS > 0 ? { ...own, until_s: nowS + lastsS } : own;
+  switch (kind) {
+    case "motor":
+      return { ...passing, rotor: form.rotor, thrust_factor: form.thrustFactor };
+    case "sensor": {
+      const wrong = { ...passing, sensor: form.sensor, effect: form.effect };
+      return form.effect === "biased" ? { ...wrong, bias: numbersOf(form.bias) } : wrong;
+    }
+    case "gnss_loss":
+      return passing;
+    case "gust":
+      return { kind, velocity_m_s: form.vector, rise_s: form.riseS, hold_s: form.holdS };
+    case "displacement":
+      return { ...own, offset_m: form.vector };
+  }
+}
+
+function numbersOf(text: string): number[] {
+  return text
+    .split(/[\s,;]+/)
+    .filter((part) => part !== "")
+    .map(Number);
+}

@@ -1,0 +1,64 @@
+import { ActionIcon, Button, Group, NumberInput, Tooltip } from "@mantine/core";
+import { MousePointerClick, Navigation } from "lucide-react";
+import { useState } from "react";
+import { link } from "../../link/link.ts";
+import { goByClick, sendTo } from "../../state/orders.ts";
+import { useWhyNot } from "../../state/rights.ts";
+import { baseFrame } from "../../state/vehicles.ts";
+import { Section } from "./Section.tsx";
+
+const AXES = ["x", "y", "z"] as const;
+
+/** Fly to a place of the map: by numbers or by a click. */
+export function GoTo({ uav }: { uav: string }) {
+  const whyNot = useWhyNot();
+  const [place, setPlace] = useState(() => rounded(uav));
+  return (
+    <Section title="Go to">
+      <form
+        onSubmit={(event) => {
+          event.preventDefault();
+          void sendTo(uav, place);
+        }}
+      >
+        <Group gap={6} wrap="nowrap" align="end">
+          {AXES.map((axis) => (
+            <NumberInput
+              key={axis}
+              size="xs"
+              label={`${axis}, m`}
+              decimalScale={2}
+              step={1}
+              hideControls
+              value={place[axis]}
+              onChange={(value) => setPlace({ ...place, [axis]: Number(value) })}
+            />
+          ))}
+          <Tooltip label={whyNot ?? "Fly there"}>
+            <Button type="submit" size="xs" px={8} disabled={whyNot !== null} aria-label="Go">
+              <Navigation size={15} />
+            </Button>
+          </Tooltip>
+          <Tooltip label={whyNot ?? "Click on the place (G)"}>
+            <ActionIcon
+              size={30}
+              variant="default"
+              aria-label="Go to a place that is clicked"
+              disabled={whyNot !== null}
+              onClick={() => void goByClick(uav)}
+            >
+              <MousePointerClick size={15} />
+            </ActionIcon>
+          </Tooltip>
+        </Group>
+      </form>
+    </Section>
+  );
+}
+
+/** Where it is now, to begin with. */
+function rounded(uav: string) {
+  const pose = link.frames.pose(baseFrame(uav));
+  const [x, y, z] = (pose ?? [0, 0, 0]).slice(0, 3).map((value) => Math.round(value * 10) / 10);
+  return { x: x!, y: y!, z: Math.max(2, z!) };
+}

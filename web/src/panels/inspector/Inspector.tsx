@@ -1,0 +1,58 @@
+import { Badge, Group, ScrollArea, Select, Stack, Text } from "@mantine/core";
+import { select, useVehicles } from "../../state/vehicles.ts";
+import { colourOf, modeText } from "../vehicles/modes.ts";
+import { Figures } from "./Figures.tsx";
+import { GoTo } from "./GoTo.tsx";
+import { Orders } from "./Orders.tsx";
+import { Pilots } from "./Pilots.tsx";
+import { Removal } from "./Removal.tsx";
+import { Sensors } from "./Sensors.tsx";
+
+/** All of the selected UAV: how it is, what it measures, what it can be told. */
+export default function Inspector() {
+  const names = useVehicles(({ list }) => list.map(({ name }) => name).join(" "));
+  const selected = useVehicles((vehicles) => vehicles.selected);
+  const known = useVehicles(({ list }) => list.some(({ name }) => name === selected));
+  if (!known) {
+    return (
+      <Text p="sm" c="dimmed">
+        No UAV is selected.
+      </Text>
+    );
+  }
+  return (
+    <ScrollArea h="100%" type="auto">
+      <Stack gap="sm" px="sm" pb="md">
+        <Group gap="xs" wrap="nowrap">
+          <Select
+            flex={1}
+            aria-label="Selected UAV"
+            data={names.split(" ")}
+            value={selected}
+            searchable
+            allowDeselect={false}
+            onChange={(name) => name !== null && select(name)}
+          />
+          <Mode />
+        </Group>
+        <Orders key={`orders ${selected}`} uav={selected} />
+        <Figures />
+        <GoTo key={selected} uav={selected} />
+        <Pilots uav={selected} />
+        <Sensors key={`sensors ${selected}`} uav={selected} />
+        <Removal uav={selected} />
+      </Stack>
+    </ScrollArea>
+  );
+}
+
+function Mode() {
+  const mode = useVehicles(
+    ({ list, selected }) => list.find(({ name }) => name === selected)?.mode ?? "",
+  );
+  return (
+    <Badge size="lg" variant="light" tt="none" color={colourOf(mode)} aria-label="Mode">
+      {modeText(mode)}
+    </Badge>
+  );
+}

@@ -1,0 +1,126 @@
+import { Button, Group, SimpleGrid, Text, Tooltip } from "@mantine/core";
+import {
+  CircleCheck,
+  CirclePause,
+  House,
+  OctagonX,
+  PlaneLanding,
+  PlaneTakeoff,
+} from "lucide-react";
+import { useEffect, useState, type ReactNode } from "react";
+import { tell, type Order } from "../../link/commands.ts";
+import { attempt, tellSuccess } from "../../state/notices.ts";
+import { useWhyNot } from "../../state/rights.ts";
+
+const KILL_ASKED_MS = 4000;
+
+const BUTTONS: { order: Order; label: string; hint: string; icon: ReactNode }[] = [
+  {
+    order: "take_off",
+    label: "Take off",
+    hint: "Climb to its take-off altitude (T)",
+    icon: <PlaneTakeoff size={16} />,
+  },
+  { order: "land", label: "Land", hint: "Land where it is (L)", icon: <PlaneLanding size={16} /> },
+  { order: "hold", label: "Hold", hint: "Stay where it is (H)", icon: <CirclePause size={16} /> },
+  {
+    order: "return_home",
+    label: "Return",
+    hint: "Fly home and land (B)",
+    icon: <House size={16} />,
+  },
+  { order: "arm", label: "Arm", hint: "Ask whether it is ready", icon: <CircleCheck size={16} /> },
+];
+
+/** What a UAV can be told by one press. */
+export function Orders({ uav }: { uav: string }) {
+  const whyNot = useWhyNot();
+  const [busy, setBusy] = useState<Order | null>(null);
+  const give = async (order: Order, label: string) => {
+    setBusy(order);
+    const said = await attempt(`${uav}: ${label.toLowerCase()}`, tell(uav, order));
+    setBusy(null);
+    if (order === "arm" && said) tellSuccess(said);
+  };
+  return (
+    <SimpleGrid cols={2} spacing={6} role="group" aria-label="Orders">
+      {BUTTONS.map(({ order, label, hint, icon }) => (
+        <Tooltip key={order} label={whyNot ?? hint}>
+          <Button
+            variant="light"
+            size="compact-md"
+            h={34}
+            leftSection={icon}
+            disabled={whyNot !== null}
+            loading={busy === order}
+            onClick={() => void give(order, label)}
+          >
+            {label}
+          </Button>
+        </Tooltip>
+      ))}
+      <Kill uav={uav} disabled={whyNot !== null} give={() => void give("stop", "Kill")} />
+    </SimpleGrid>
+  );
+}
+
+interface KillProps {
+  uav: string;
+  disabled: boolean;
+  give: () => void;
+}
+
+/** Rotors off: pressed twice, for what flies falls. */
+function Kill({ uav, disabled, give }: KillProps) {
+  const [asked, setAsked] = useState(false);
+  useEffect(() => {
+    if (!asked) return;
+    const timer = setTimeout(() => setAsked(false), KILL_ASKED_MS);
+    return () => clearTimeout(timer);
+  }, [asked]);
+  if (!asked) {
+    return (
+      <Tooltip label="Rotors off at once: it falls">
+        <Button
+          color="red"
+          variant="light"
+          size="compact-md"
+          h={34}
+          leftSection={<OctagonX size={16} />}
+          disabled={disabled}
+          onClick={() => setAsked(true)}
+        >
+          Kill
+        </Button>
+      </Tooltip>
+    );
+  }
+  return (
+    <Group gap={4} wrap="nowrap" role="alertdialog" aria-label={`Kill ${uav}?`}>
+      <Button
+        autoFocus
+        color="red"
+        size="compact-md"
+        h={34}
+        flex={1}
+        px={4}
+        onClick={() => {
+          setAsked(false);
+          give();
+        }}
+      >
+        Rotors off
+      </Button>
+      <Button
+        variant="default"
+        size="compact-md"
+        h={34}
+        px={8}
+        aria-label="Do not kill"
+        onClick={() => setAsked(false)}
+      >
+        <Text size="sm">No</Text>
+      </Button>
+    </Group>
+  );
+}

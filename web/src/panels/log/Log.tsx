@@ -1,0 +1,117 @@
+import { Badge, Button, Group, ScrollArea, SegmentedControl, Text, TextInput } from "@mantine/core";
+import { Search, Trash2 } from "lucide-react";
+import { memo, useState } from "react";
+import { clockText } from "../../lib/time.ts";
+import { clearJournal, useJournal, type Entry, type EntrySort } from "../../state/journal.ts";
+import { select, useVehicles } from "../../state/vehicles.ts";
+import { look } from "../../state/view.ts";
+import classes from "./Log.module.css";
+
+const SORTS = [
+  { value: "all", label: "All" },
+  { value: "trouble", label: "Trouble" },
+  { value: "event", label: "Events" },
+  { value: "command", label: "Commands" },
+];
+const COLOURS: Record<EntrySort, string> = { trouble: "red", event: "gray", command: "cyan" };
+const MOST_SHOWN = 300;
+
+/** What happened and what was commanded, the newest first. */
+export default function Log() {
+  const { entries } = useJournal();
+  const [sort, setSort] = useState("all");
+  const [sought, setSought] = useState("");
+  const words = sought.toLowerCase().split(/\s+/);
+  const fitting = entries.filter(
+    (entry) => (sort === "all" || entry.sort === sort) && holds(entry, words),
+  );
+  return (
+    <div className={classes.panel}>
+      <Group gap="xs" px="sm" pb={4}>
+        <SegmentedControl
+          size="xs"
+          aria-label="What to show"
+          data={SORTS}
+          value={sort}
+          onChange={setSort}
+        />
+        <TextInput
+          size="xs"
+          w={220}
+          leftSection={<Search size={14} />}
+          placeholder="Filter"
+          aria-label="Filter the log"
+          value={sought}
+          onChange={(event) => setSought(event.currentTarget.value)}
+        />
+        <Button
+          size="compact-xs"
+          variant="subtle"
+          leftSection={<Trash2 size={13} />}
+          onClick={clearJournal}
+        >
+          Clear
+        </Button>
+        <Text size="xs" c="dimmed">
+          {fitting.length} of {entries.length}
+        </Text>
+      </Group>
+      <ScrollArea flex={1} mih={0} type="auto">
+        <div role="log" aria-label="Log">
+          {fitting
+            .slice(-MOST_SHOWN)
+            .toReversed()
+            .map((entry) => (
+              <Row key={entry.number} entry={entry} />
+            ))}
+        </div>
+      </ScrollArea>
+    </div>
+  );
+}
+
+function holds({ who, kind, text }: Entry, words: readonly string[]): boolean {
+  const all = `${who} ${kind} ${text}`.toLowerCase();
+  return words.every((word) => all.includes(word));
+}
+
+const Row = memo(function Row({ entry }: { entry: Entry }) {
+  const { timeS, sort, kind, who, text } = entry;
+  return (
+    <div className={classes.row}>
+      <span className={classes.time}>{clockText(timeS)}</span>
+      <Badge size="xs" variant="light" color={COLOURS[sort]} tt="none">
+        {kind}
+      </Badge>
+      {sort === "command" ? (
+        <Text span inherit truncate c="dimmed">
+          {who}
+        </Text>
+      ) : (
+        <JumpTo uav={who} />
+      )}
+      <Text span inherit className={classes.text} title={text}>
+        {text}
+      </Text>
+    </div>
+  );
+});
+
+/** Name of a UAV; a click follows it. */
+function JumpTo({ uav }: { uav: string }) {
+  const known = useVehicles(({ list }) => list.some(({ name }) => name === uav));
+  if (!known) return <span>{uav}</span>;
+  return (
+    <Button
+      size="compact-xs"
+      variant="subtle"
+      aria-label={`Go to ${uav}`}
+      onClick={() => {
+        select(uav);
+        look("chase");
+      }}
+    >
+      {uav}
+    </Button>
+  );
+}

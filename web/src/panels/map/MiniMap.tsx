@@ -1,0 +1,139 @@
+import { useComputedColorScheme } from "@mantine/core";
+import { useEffect, useMemo, useRef, useState, type RefObject } from "react";
+import { fitted, pixelOf, type MapView, type Point, type Size } from "../../lib/mapProjection.ts";
+import { link } from "../../link/link.ts";
+import { useGoals } from "../../state/orders.ts";
+import { baseFrame, useVehicles } from "../../state/vehicles.ts";
+import { useWorldPlan } from "../../state/worldPlan.ts";
+import { FloatingTile } from "../FloatingTile.tsx";
+import { drawPlan, type PlanColours, type PlanPicture } from "./drawPlan.ts";
+import { Pen } from "./drawTraffic.ts";
+import { MapButtons } from "./MapButtons.tsx";
+import { MapCanvas } from "./MapCanvas.tsx";
+import { useTrails } from "./trails.ts";
+import { usePlannedPath } from "./usePlannedPath.ts";
+
+const FRAME_MS = 66;
+
+const LIGHT: PlanColours = {
+  ground: [214, 222, 205],
+  crown: "#7fa56b",
+  trunk: "#5b4a36",
+  roof: "#b3685a",
+  edge: "#7a4a40",
+};
+const DARK: PlanColours = {
+  ground: [64, 72, 66],
+  crown: "#3f6b46",
+  trunk: "#b39a78",
+  roof: "#a35d52",
+  edge: "#d99a8f",
+};
+
+/** The world from above with all UAVs; a click sends the selected one there. */
+export default function MiniMap() {
+  const [view, setView] = useState<MapView | null>(null);
+  const [follows, setFollows] = useState(false);
+  const [clickSends, setClickSends] = useState(false);
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const shown = useRef<MapView | null>(null);
+  useDrawing(canvas, view, setView, follows, shown);
+  const fit = () => {
+    setFollows(false);
+    setView(null);
+  };
+  const move = (next: (view: MapView) => MapView) => {
+    if (shown.current !== null) setView(next(shown.current));
+  };
+  return (
+    <FloatingTile
+      name="map"
+      title="Map"
+      usual={{ x: 1, y: 0, width: 300 }}
+      aspect={1.25}
+      actions={
+        <MapButtons
+          fit={fit}
+          follows={follows}
+          setFollows={setFollows}
+          clickSends={clickSends}
+          setClickSends={setClickSends}
+        />
+      }
+    >
+      <MapCanvas
+        canvas={canvas}
+        shown={shown}
+        move={move}
+        stopFollowing={() => setFollows(false)}
+        clickSends={clickSends}
+      />
+    </FloatingTile>
+  );
+}
+
+/** Draws a dozen times a second, whatever React does. */
+function useDrawing(
+  canvas: RefObject<HTMLCanvasElement | null>,
+  view: MapView | null,
+  setView: (view: MapView) => void,
+  follows: boolean,
+  shownNow: RefObject<MapView | null>,
+): void {
+  const dark = useComputedColorScheme("light") === "dark";
+  const plan = useWorldPlan((world) => world.plan);
+  const picture = useMemo(() => plan && drawPlan(plan, dark ? DARK : LIGHT), [plan, dark]);
+  const trails = useTrails();
+  const selected = useVehicles((vehicles) => vehicles.selected);
+  const path = usePlannedPath(selected);
+  useEffect(() => {
+    const draw = () => {
+      const element = canvas.current;
+      if (element === null || document.hidden || element.clientWidth === 0) return;
+      const size = { width: element.clientWidth, height: element.clientHeight };
+      if (view === null) return setView(fitted(extent(picture), size));
+      let shown = view;
+      const pose = link.frames.pose(baseFrame(selected));
+      if (follows && pose !== null) shown = { ...view, x: pose[0], y: pose[1] };
+      shownNow.current = shown;
+      const context = prepared(element, size);
+      if (picture !== null) {
+        const [left, top] = pixelOf(shown, size, picture.left, picture.top);
+        const width = (picture.right - picture.left) * shown.scale;
+        const height = (picture.top - picture.bottom) * shown.scale;
+        context.drawImage(picture.image, left, top, width, height);
+      }
+      const pen = new Pen(context, shown, size, dark);
+      pen.cone();
+      pen.line(trails.get(selected)?.points ?? [], "rgba(240, 62, 62, 0.75)");
+      pen.line(path.current, "#f59f00", [5, 4]);
+      const goal = useGoals.getState()[selected];
+      if (goal !== undefined) pen.cross(goal.x, goal.y);
+      pen.uavs(link.frames, useVehicles.getState().list, selected);
+      pen.bar();
+    };
+    draw();
+    const timer = setInterval(draw, FRAME_MS);
+    return () => clearInterval(timer);
+  }, [canvas, view, setView, follows, shownNow, picture, selected, trails, path, dark]);
+}
+
+function prepared(element: HTMLCanvasElement, { width, height }: Size): CanvasRenderingContext2D {
+  const ratio = Math.min(2, window.devicePixelRatio);
+  const [across, down] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (element.width !== across || element.height !== down) {
+    element.width = across;
+    element.height = down;
+  }
+  const context = element.getContext("2d")!;
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  return context;
+}
+
+/** What the map shows at first: all UAVs, and the world where it is not vast. */
+function extent(picture: PlanPicture | null): Point[] {
+  const uavs = useVehicles.getState().list.map(({ position: p }): Point => [p.x, p.y]);
+  if (picture === null || picture.right - picture.left > 2000) return uavs;
+  return [...uavs, [picture.left, picture.bottom], [picture.right, picture.top]];
+}

@@ -1,0 +1,41 @@
+import { useEffect, useRef } from "react";
+import { useVehicles } from "../../state/vehicles.ts";
+
+const MOST_POINTS = 600;
+const LEAST_STEP_M = 0.3;
+/** A UAV that was put elsewhere did not fly there. */
+const LONGEST_STEP_M = 50;
+
+/** Where a UAV has been: x y in turn, the newest last. */
+export class Trail {
+  readonly points: number[] = [];
+
+  add(x: number, y: number): void {
+    const { points } = this;
+    const step = Math.hypot(x - (points.at(-2) ?? Infinity), y - (points.at(-1) ?? Infinity));
+    if (step < LEAST_STEP_M) return;
+    if (step > LONGEST_STEP_M) points.length = 0;
+    points.push(x, y);
+    if (points.length > 2 * MOST_POINTS) points.splice(0, 2);
+  }
+}
+
+/** Trails of all UAVs while the map is shown. */
+export function useTrails(): ReadonlyMap<string, Trail> {
+  const trails = useRef(new Map<string, Trail>());
+  useEffect(
+    () =>
+      useVehicles.subscribe(({ list }) => {
+        const known = trails.current;
+        for (const { name, position } of list) {
+          if (!known.has(name)) known.set(name, new Trail());
+          known.get(name)!.add(position.x, position.y);
+        }
+        for (const name of known.keys()) {
+          if (!list.some((vehicle) => vehicle.name === name)) known.delete(name);
+        }
+      }),
+    [],
+  );
+  return trails.current;
+}

@@ -1,0 +1,48 @@
+import { Text } from "@mantine/core";
+import { useState } from "react";
+import { rateText } from "../../lib/rates.ts";
+import { spanText } from "../../lib/time.ts";
+import { showPicture, useLayout, type Tile } from "../../state/layout.ts";
+import { FloatingTile } from "../FloatingTile.tsx";
+import type { CameraTopic } from "./cameraTopics.ts";
+import { usePicture } from "./usePicture.ts";
+
+const LARGE_PX = 360;
+
+/** What one camera sees, how old it is and how often it comes. */
+export function PictureTile({ camera, usual }: { camera: CameraTopic; usual: Tile }) {
+  const [canvas, setCanvas] = useState<HTMLCanvasElement | null>(null);
+  const width = useLayout((layout) => layout.tiles[camera.name]?.width ?? usual.width);
+  const { aspect, hz, ageS, range, trouble } = usePicture(camera, canvas, width >= LARGE_PX);
+  return (
+    <FloatingTile
+      name={camera.name}
+      title={camera.title}
+      usual={usual}
+      aspect={aspect}
+      onClose={() => showPicture(camera.name, false)}
+    >
+      <canvas ref={setCanvas} className="picture" role="img" aria-label={camera.title} />
+      {trouble !== "" && (
+        <Text size="xs" c="red" className="picture-trouble" role="alert">
+          {trouble}
+        </Text>
+      )}
+      <Text size="xs" className="picture-label" aria-label={`${camera.title}: rate and age`}>
+        {rateText(hz)} · {spanText(ageS)} old
+      </Text>
+      {range !== null && <Legend range={range} />}
+    </FloatingTile>
+  );
+}
+
+/** What the colours of depth mean. */
+function Legend({ range: [near, far] }: { range: [number, number] }) {
+  return (
+    <div className="picture-legend" aria-label={`${near.toFixed(1)} m to ${far.toFixed(1)} m`}>
+      <span>{near.toFixed(1)} m</span>
+      <span className="turbo" aria-hidden />
+      <span>{far.toFixed(1)} m</span>
+    </div>
+  );
+}

@@ -1,0 +1,85 @@
+import { Checkbox, Menu, Paper, ActionIcon, ScrollArea, Text, Tooltip } from "@mantine/core";
+import { Images } from "lucide-react";
+import { useEffect } from "react";
+import { showPicture, useLayout, type Tile } from "../../state/layout.ts";
+import { useTopics } from "../../state/topics.ts";
+import { useVehicles } from "../../state/vehicles.ts";
+import { cameraTopics, type CameraTopic } from "./cameraTopics.ts";
+import { PictureTile } from "./PictureTile.tsx";
+
+const FIRST_TILES = 2;
+
+/** Tiles with what cameras see, over the scene. */
+export default function Pictures() {
+  const cameras = cameraTopics(useTopics((topics) => topics.list));
+  const chosen = useLayout((layout) => layout.pictures);
+  const selected = useVehicles((vehicles) => vehicles.selected);
+  const shown = cameras.filter(({ name }) => chosen.includes(name));
+  const some = cameras.length > 0 && shown.length === 0;
+  // Who asks for pictures and has chosen none sees those of the selected UAV.
+  useEffect(() => {
+    if (!some || useLayout.getState().pictures.length > 0) return;
+    const own = cameras.filter(({ name }) => name.startsWith(`/${selected}/`));
+    for (const { name } of own.slice(0, FIRST_TILES)) showPicture(name, true);
+    // oxlint-disable-next-line react-hooks/exhaustive-deps -- only when there begin to be some
+  }, [some, selected]);
+  return (
+    <>
+      {shown.map((camera, i) => (
+        <PictureTile key={camera.name} camera={camera} usual={usualPlace(i)} />
+      ))}
+      <Chooser cameras={cameras} chosen={chosen} />
+    </>
+  );
+}
+
+/** Side by side along the bottom. */
+function usualPlace(i: number): Tile {
+  return { x: Math.min(1, 0.02 + 0.35 * i), y: 0.97, width: 260 };
+}
+
+function Chooser({ cameras, chosen }: { cameras: CameraTopic[]; chosen: string[] }) {
+  return (
+    <Menu position="top-end" closeOnItemClick={false} withinPortal>
+      <Menu.Target>
+        <Tooltip label="Which pictures" position="left">
+          <ActionIcon className="picture-chooser" size="lg" aria-label="Which pictures">
+            <Images size={18} />
+          </ActionIcon>
+        </Tooltip>
+      </Menu.Target>
+      <Menu.Dropdown>
+        <Menu.Label>Pictures</Menu.Label>
+        {cameras.length === 0 ? (
+          <Paper p="xs">
+            <Text size="sm" c="dimmed">
+              No camera is here. Choose a scenario with cameras, or add them when you start one.
+            </Text>
+          </Paper>
+        ) : (
+          <ScrollArea.Autosize mah={320}>
+            {cameras.map(({ name, title }) => (
+              <Menu.Item
+                key={name}
+                onClick={() => showPicture(name, !chosen.includes(name))}
+                leftSection={
+                  <Checkbox
+                    size="xs"
+                    readOnly
+                    tabIndex={-1}
+                    checked={chosen.includes(name)}
+                    aria-hidden
+                  />
+                }
+                aria-checked={chosen.includes(name)}
+                role="menuitemcheckbox"
+              >
+                {title}
+              </Menu.Item>
+            ))}
+          </ScrollArea.Autosize>
+        )}
+      </Menu.Dropdown>
+    </Menu>
+  );
+}

@@ -1,0 +1,30 @@
+import type { TopicName } from "../../link/commands/graph.ts";
+
+const RAW = "sensor_msgs/msg/Image";
+const COMPRESSED = "sensor_msgs/msg/CompressedImage";
+
+/** One picture that can be shown: compressed where there is a choice. */
+export interface CameraTopic extends TopicName {
+  /** `uav1 front`, `uav1 front depth`. */
+  title: string;
+}
+
+/** Pictures of all cameras. `compressedDepth` is left to its raw twin, which browsers can read. */
+export function cameraTopics(topics: readonly TopicName[]): CameraTopic[] {
+  const compressed = new Set(
+    topics.filter(({ type }) => type === COMPRESSED).map(({ name }) => name),
+  );
+  return topics
+    .filter(({ name, type }) => {
+      if (type === RAW) return !compressed.has(`${name}/compressed`);
+      return type === COMPRESSED && !name.endsWith("/compressedDepth");
+    })
+    .map((topic) => ({ ...topic, title: titleOf(topic.name) }));
+}
+
+export function titleOf(topic: string): string {
+  return topic
+    .split("/")
+    .filter((part) => part !== "" && part !== "compressed" && part !== "image_raw")
+    .join(" ");
+}

@@ -1,0 +1,147 @@
+import { useEffect, useState } from "react";
+import { RateMeter } from "../../lib/rates.ts";
+import { nowMs, secondsOf } from "../../lib/time.ts";
+import { link } from "../../link/link.ts";
+import type { sensor_msgs_CompressedImage, sensor_msgs_Image } from "../../messages/generated.ts";
+import { useSimulation } from "../../state/simulation.ts";
+import type { CameraTopic } from "./cameraTopics.ts";
+import { decode } from "./decoding.ts";
+
+export interface PictureState {
+  /** Width over height. */
+  aspect: number;
+  /** True rate, by the pictures' stamps. */
+  hz: number;
+  /** Simulated time since the picture was taken, s. */
+  ageS: number;
+  range: [number, number] | null;
+  trouble: string;
+}
+
+const NOTHING: PictureState = { aspect: 4 / 3, hz: NaN, ageS: NaN, range: null, trouble: "" };
+
+/** Small tiles are content with fewer pictures. */
+const LARGE_MS = 50;
+const SMALL_MS = 100;
+const TELL_MS = 500;
+
+type Picture = sensor_msgs_Image | sensor_msgs_CompressedImage;
+
+/** Receive a camera's pictures while the canvas is seen, and draw them there. */
+export function usePicture(
+  camera: CameraTopic,
+  canvas: HTMLCanvasElement | null,
+  large: boolean,
+): PictureState {
+  const [state, setState] = useState(NOTHING);
+  const { name, type } = camera;
+  useEffect(() => {
+    if (canvas === null) return;
+    return whileSeen(canvas, () =>
+      receive(name, type, canvas, large ? LARGE_MS : SMALL_MS, setState),
+    );
+  }, [name, type, canvas, large]);
+  return state;
+}
+
+function receive(
+  topic: string,
+  type: string,
+  canvas: HTMLCanvasElement,
+  throttleMs: number,
+  setState: (update: (state: PictureState) => PictureState) => void,
+): () => void {
+  const meter = new RateMeter();
+  let [busy, stampS, arrivedMs] = [false, NaN, NaN];
+  const show = async (picture: Picture) => {
+    if (busy) return; // the newest of those that come meanwhile is soon there
+    busy = true;
+    try {
+      const { bitmap, range } = await decode(topic, pixelsIn(picture));
+      draw(canvas, bitmap);
+      const aspect = bitmap.width / bitmap.height;
+      bitmap.close();
+      setState((now) =>
+        now.aspect === aspect && sameRange(now.range, range) && now.trouble === ""
+          ? now
+          : { ...now, aspect, range, trouble: "" },
+      );
+    } catch (error) {
+      const trouble = error instanceof Error ? error.message : String(error);
+      setState((now) => ({ ...now, trouble }));
+    }
+    busy = false;
+  };
+  const end = link.subscribe(
+    topic,
+    type,
+    ({ message, arrivedMs: at }) => {
+      const picture = message as Picture;
+      stampS = secondsOf(picture.header.stamp);
+      arrivedMs = at;
+      meter.add(stampS);
+      void show(picture);
+    },
+    { throttleMs, depth: 1 },
+  );
+  const timer = setInterval(
+    () => setState((now) => ({ ...now, hz: meter.hz, ageS: ageOf(stampS, arrivedMs) })),
+    TELL_MS,
+  );
+  return () => {
+    end();
+    clearInterval(timer);
+  };
+}
+
+/** By the simulated clock where there is one; else since it came. */
+function ageOf(stampS: number, arrivedMs: number): number {
+  const { status } = useSimulation.getState();
+  if (status !== null) return Math.max(0, secondsOf(status.stamp) - stampS);
+  return (nowMs() - arrivedMs) / 1000;
+}
+
+/** Copies of the bytes alone travel to the decoder. */
+function pixelsIn(picture: Picture) {
+  const data = Uint8Array.from(picture.data as ArrayLike<number>);
+  if ("format" in picture) return { format: picture.format, data };
+  const { width, height, encoding, is_bigendian, step } = picture;
+  return { width, height, encoding, is_bigendian, step, data };
+}
+
+function draw(canvas: HTMLCanvasElement, bitmap: ImageBitmap): void {
+  if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) {
+    canvas.width = bitmap.width;
+    canvas.height = bitmap.height;
+  }
+  canvas.getContext("2d")!.drawImage(bitmap, 0, 0);
+}
+
+function sameRange(a: [number, number] | null, b: [number, number] | null): boolean {
+  return a === b || (a !== null && b !== null && a[0] === b[0] && a[1] === b[1]);
+}
+
+/** Runs `begin` while the element is on the screen and the page is not hidden; returns the end. */
+function whileSeen(element: HTMLElement, begin: () => () => void): () => void {
+  let end: (() => void) | null = null;
+  let onScreen = false;
+  const look = () => {
+    const seen = onScreen && !document.hidden;
+    if (seen && end === null) end = begin();
+    else if (!seen && end !== null) {
+      end();
+      end = null;
+    }
+  };
+  const observer = new IntersectionObserver(([entry]) => {
+    onScreen = entry?.isIntersecting ?? false;
+    look();
+  });
+  observer.observe(element);
+  document.addEventListener("visibilitychange", look);
+  return () => {
+    observer.disconnect();
+    document.removeEventListener("visibilitychange", look);
+    end?.();
+  };
+}

@@ -1,0 +1,108 @@
+import uPlot from "uplot";
+import { columnsOf, type Series } from "../../lib/series.ts";
+
+export interface Drawn {
+  name: string;
+  colour: string;
+  series: Series;
+}
+
+export interface Look {
+  text: string;
+  grid: string;
+}
+
+/** One plot on its canvas. However many points come, it is drawn from a few per pixel. */
+export class Drawing {
+  private readonly plot: uPlot;
+  /** What was zoomed to, s; null: the newest. */
+  zoomed: [number, number] | null = null;
+
+  constructor(
+    place: HTMLElement,
+    private readonly lines: readonly Drawn[],
+    look: Look,
+  ) {
+    const { width, height } = place.getBoundingClientRect();
+    const axis = {
+      stroke: look.text,
+      grid: { stroke: look.grid, width: 1 },
+      ticks: { show: false },
+    };
+    this.plot = new uPlot(
+      {
+        width: Math.max(60, width),
+        height: Math.max(60, height),
+        legend: { show: false },
+        scales: { x: { time: false, auto: false, range: (_plot, from, to) => [from, to] } },
+        axes: [
+          { ...axis, size: 26, values: (_plot, marks) => marks.map((mark) => `${round(mark)} s`) },
+          {
+            ...axis,
+            size: 64,
+            values: (_plot, marks, _axis, _space, step) => marks.map((mark) => fixed(mark, step)),
+          },
+        ],
+        cursor: { drag: { x: true, y: false, setScale: false }, points: { size: 5 } },
+        hooks: { setSelect: [(plot) => this.zoom(plot)] },
+        series: [
+          {},
+          ...lines.map(({ name, colour }) => ({
+            label: name,
+            stroke: colour,
+            width: 1.5,
+            spanGaps: true,
+            points: { show: false },
+          })),
+        ],
+      },
+      [[], ...lines.map(() => [])] as unknown as uPlot.AlignedData,
+      place,
+    );
+    place.addEventListener("dblclick", this.showNewest);
+  }
+
+  readonly showNewest = () => {
+    this.zoomed = null;
+  };
+
+  resize(width: number, height: number): void {
+    this.plot.setSize({ width: Math.max(60, width), height: Math.max(60, height) });
+  }
+
+  /** Draw what lies between two times, or what was zoomed to. */
+  draw(from: number, to: number): void {
+    [from, to] = this.zoomed ?? [from, to];
+    const pixels = Math.max(30, Math.round(this.plot.bbox.width / devicePixelRatio));
+    const columns = columnsOf(
+      this.lines.map(({ series }) => series),
+      from,
+      to,
+      pixels,
+    );
+    this.plot.batch(() => {
+      this.plot.setData(columns as unknown as uPlot.AlignedData, false);
+      this.plot.setScale("x", { min: from, max: to });
+    });
+  }
+
+  destroy(): void {
+    this.plot.destroy();
+  }
+
+  private zoom(plot: uPlot): void {
+    const { left, width } = plot.select;
+    if (width < 4) return;
+    this.zoomed = [plot.posToVal(left, "x"), plot.posToVal(left + width, "x")];
+    plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+  }
+}
+
+/** A mark with the digits that tell it from the next one. */
+function fixed(mark: number, step: number): string {
+  return mark.toFixed(Math.min(12, Math.max(0, -Math.floor(Math.log10(step)))));
+}
+
+function round(time: number): string {
+  return String(Math.round(time * 1000) / 1000);
+}

@@ -1,0 +1,52 @@
+import { Badge, Group, Text, UnstyledButton } from "@mantine/core";
+import { Building2, Grid3x3, Mountain, Trees } from "lucide-react";
+import type { ScenarioCard } from "../../link/commands.ts";
+
+const ICONS = { forest: Trees, city: Building2, grid_map: Grid3x3, open: Mountain };
+
+interface CardProps {
+  card: ScenarioCard;
+  present: boolean;
+  choose: () => void;
+}
+
+/** A scenario as a picture, its name and what flies there. */
+export function Card({ card, present, choose }: CardProps) {
+  const { name, description, uavs, airframes, picture, world, uploaded } = card;
+  const Icon = ICONS[world] ?? Mountain;
+  return (
+    <UnstyledButton
+      className="card"
+      onClick={choose}
+      aria-label={`${name}: ${description}`}
+      data-present={present || undefined}
+    >
+      <div className="card-picture">
+        {picture === null ? (
+          <Icon size={44} strokeWidth={1.2} aria-hidden />
+        ) : (
+          <img src={picture} alt="" loading="lazy" />
+        )}
+      </div>
+      <div className="card-text">
+        <Group gap={6} wrap="nowrap" justify="space-between">
+          <Text fw={600} size="sm" truncate>
+            {name}
+          </Text>
+          {present && <Badge size="xs">flies</Badge>}
+          {uploaded && (
+            <Badge size="xs" variant="light">
+              yours
+            </Badge>
+          )}
+        </Group>
+        <Text size="xs" c="dimmed" lineClamp={2}>
+          {description}
+        </Text>
+        <Text size="xs" mt={4}>
+          {uavs} × {airframes.join(", ")}
+        </Text>
+      </div>
+    </UnstyledButton>
+  );
+}

@@ -1,0 +1,97 @@
+import {
+  Button,
+  FileButton,
+  Group,
+  Loader,
+  Modal,
+  SimpleGrid,
+  Stack,
+  Text,
+  TextInput,
+} from "@mantine/core";
+import { Search, Upload } from "lucide-react";
+import { useEffect, useState } from "react";
+import { ENDINGS } from "../../lib/fileKinds.ts";
+import { scenarios, type ScenarioCard } from "../../link/commands.ts";
+import { reasonOf } from "../../state/notices.ts";
+import { useSimulation } from "../../state/simulation.ts";
+import { closeWindow, offerFile, useWindows } from "../../state/windows.ts";
+import { Card } from "./Card.tsx";
+import { Start } from "./Start.tsx";
+
+/** Picture cards of all scenarios; a chosen one is set up and started. */
+export default function Scenarios() {
+  const wanted = useWindows((windows) => windows.scenario);
+  const [cards, setCards] = useState<ScenarioCard[] | null>(null);
+  const [trouble, setTrouble] = useState("");
+  const [chosen, setChosen] = useState(wanted);
+  useEffect(() => {
+    scenarios()
+      .then(setCards)
+      .catch((error: unknown) => setTrouble(reasonOf(error)));
+  }, []);
+  const card = cards?.find(({ name }) => name === chosen);
+  return (
+    <Modal
+      opened
+      onClose={closeWindow}
+      size={card === undefined ? 1100 : "lg"}
+      title={card === undefined ? "Choose a scenario" : card.name}
+    >
+      {trouble !== "" && (
+        <Text c="red" role="alert">
+          {trouble}
+        </Text>
+      )}
+      {cards === null && trouble === "" && <Loader />}
+      {card !== undefined ? (
+        <Start key={card.name} card={card} back={() => setChosen("")} />
+      ) : (
+        cards !== null && <Gallery cards={cards} choose={setChosen} />
+      )}
+    </Modal>
+  );
+}
+
+function Gallery({ cards, choose }: { cards: ScenarioCard[]; choose: (name: string) => void }) {
+  const [filter, setFilter] = useState("");
+  const present = useSimulation(({ server }) => server?.scenario);
+  const words = filter.toLowerCase().split(/\s+/);
+  const shown = cards.filter((card) => {
+    const text = `${card.name} ${card.description} ${card.airframes.join(" ")} ${card.world}`;
+    return words.every((word) => text.toLowerCase().includes(word));
+  });
+  return (
+    <Stack gap="sm">
+      <Group gap="sm" wrap="nowrap">
+        <TextInput
+          flex={1}
+          data-autofocus
+          aria-label="Search"
+          placeholder="Search"
+          leftSection={<Search size={16} />}
+          value={filter}
+          onChange={(event) => setFilter(event.currentTarget.value)}
+        />
+        <FileButton accept={ENDINGS} onChange={(file) => file !== null && offerFile(file)}>
+          {(props) => (
+            <Button variant="default" leftSection={<Upload size={16} />} {...props}>
+              Upload a map
+            </Button>
+          )}
+        </FileButton>
+      </Group>
+      <SimpleGrid cols={{ base: 1, xs: 2, md: 3, lg: 4 }} spacing="sm">
+        {shown.map((card) => (
+          <Card
+            key={card.name}
+            card={card}
+            present={card.name === present}
+            choose={() => choose(card.name)}
+          />
+        ))}
+      </SimpleGrid>
+      {shown.length === 0 && <Text c="dimmed">Nothing has all of these words.</Text>}
+    </Stack>
+  );
+}

@@ -1,0 +1,98 @@
+import { Alert, Button, FileButton, Group, Modal, Radio, Stack, Text } from "@mantine/core";
+import { useEffect, useState } from "react";
+import { ENDINGS, kindOf } from "../../lib/fileKinds.ts";
+import { upload, type UploadKind } from "../../link/commands.ts";
+import { reasonOf } from "../../state/notices.ts";
+import { useWhyNot } from "../../state/rights.ts";
+import { closeWindow, offerFile, offerScenario, useWindows } from "../../state/windows.ts";
+
+const KINDS: { kind: UploadKind; label: string; description: string }[] = [
+  {
+    kind: "grid_map",
+    label: "Grid map",
+    description: "A matrix of 0 and 1: CSV, PNG (dark is blocked) or MovingAI .map",
+  },
+  { kind: "city", label: "City", description: "Outlines of buildings: GeoJSON" },
+  { kind: "mesh", label: "Mesh", description: "Any geometry: glTF (.glb), OBJ, STL" },
+  { kind: "forest", label: "Forest", description: "An inventory of trees: CSV" },
+];
+const PEEK_BYTES = 4096;
+
+/** A map of the user's own becomes a scenario. */
+export default function Upload() {
+  const file = useWindows((windows) => windows.file);
+  const [kind, setKind] = useState<UploadKind | null>(null);
+  const [trouble, setTrouble] = useState("");
+  const [busy, setBusy] = useState(false);
+  const whyNot = useWhyNot();
+  useEffect(() => {
+    setTrouble("");
+    if (file === null) return;
+    void file
+      .slice(0, PEEK_BYTES)
+      .text()
+      .then((beginning) => setKind(kindOf(file.name, beginning)));
+  }, [file]);
+  const send = async () => {
+    if (file === null || kind === null) return;
+    setBusy(true);
+    try {
+      offerScenario(await upload(file, kind));
+    } catch (error) {
+      setTrouble(reasonOf(error));
+    }
+    setBusy(false);
+  };
+  return (
+    <Modal opened onClose={closeWindow} title="Upload a map" size="md">
+      <Stack gap="sm">
+        <Group justify="space-between" wrap="nowrap">
+          <Text truncate fw={600}>
+            {file === null ? "No file" : `${file.name} (${sizeText(file.size)})`}
+          </Text>
+          <FileButton accept={ENDINGS} onChange={(next) => next !== null && offerFile(next)}>
+            {(props) => (
+              <Button variant="default" size="compact-md" {...props}>
+                {file === null ? "Choose a file" : "Another file"}
+              </Button>
+            )}
+          </FileButton>
+        </Group>
+        <Radio.Group
+          label="What is it?"
+          value={kind ?? ""}
+          onChange={(value) => setKind(value as UploadKind)}
+        >
+          <Stack gap={8} mt={6}>
+            {KINDS.map(({ kind: value, label, description }) => (
+              <Radio key={value} value={value} label={label} description={description} />
+            ))}
+          </Stack>
+        </Radio.Group>
+        {trouble !== "" && (
+          <Alert color="red" role="alert" title="The file cannot be flown in">
+            <span className="reason">{trouble}</span>
+          </Alert>
+        )}
+        <Group justify="end">
+          <Button
+            loading={busy}
+            disabled={file === null || kind === null || whyNot !== null}
+            onClick={() => void send()}
+          >
+            Upload
+          </Button>
+        </Group>
+        {whyNot !== null && (
+          <Text size="xs" c="dimmed" ta="right">
+            {whyNot}
+          </Text>
+        )}
+      </Stack>
+    </Modal>
+  );
+}
+
+function sizeText(bytes: number): string {
+  return bytes < 1e6 ? `${Math.ceil(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+}

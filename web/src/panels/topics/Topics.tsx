@@ -1,0 +1,58 @@
+import { Button, Group, ScrollArea, Text, TextInput } from "@mantine/core";
+import { Search } from "lucide-react";
+import { useState } from "react";
+import { useTopics } from "../../state/topics.ts";
+import { TopicRow } from "./TopicRow.tsx";
+import classes from "./Topics.module.css";
+
+const PAGE = 150;
+
+/** Every topic; one that is ticked or unfolded is received, and its true rate and size told. */
+export default function Topics() {
+  const all = useTopics(({ list }) => list);
+  const [sought, setSought] = useState("");
+  const [shown, setShown] = useState(PAGE);
+  const words = sought.toLowerCase().split(/\s+/);
+  const fitting = all.filter(({ name, type }) => {
+    const text = `${name} ${type}`.toLowerCase();
+    return words.every((word) => text.includes(word));
+  });
+  return (
+    <div className={classes.panel}>
+      <Group gap="xs" px="sm" pb={6}>
+        <TextInput
+          size="xs"
+          w={260}
+          leftSection={<Search size={14} />}
+          placeholder="Filter by name or type"
+          aria-label="Filter topics"
+          value={sought}
+          onChange={(event) => setSought(event.currentTarget.value)}
+        />
+        <Text size="xs" c="dimmed">
+          {fitting.length} of {all.length}
+        </Text>
+      </Group>
+      <div className={`${classes.row} ${classes.head}`} aria-hidden>
+        <span />
+        <span>Topic</span>
+        <span className={classes.type}>Type</span>
+        <span className={classes.number}>Rate</span>
+        <span className={classes.number}>Size</span>
+        <span className={classes.number}>Bandwidth</span>
+      </div>
+      <ScrollArea className={classes.list} type="auto">
+        <div role="list" aria-label="Topics">
+          {fitting.slice(0, shown).map((topic) => (
+            <TopicRow key={`${topic.name} ${topic.type}`} {...topic} />
+          ))}
+        </div>
+        {fitting.length > shown && (
+          <Button size="compact-xs" variant="subtle" onClick={() => setShown(shown + 2 * PAGE)}>
+            {fitting.length - shown} more
+          </Button>
+        )}
+      </ScrollArea>
+    </div>
+  );
+}

@@ -1,0 +1,118 @@
+import { Badge, Text } from "@mantine/core";
+import { memo, useEffect, useRef, useState, type KeyboardEvent } from "react";
+import type { volery_interfaces_VehicleState as VehicleState } from "../../messages/generated.ts";
+import { batteryColour, colourOf, modeText } from "./modes.ts";
+
+const ROW_PX = 44;
+/** Rows beside what is seen, so that scrolling finds them there. */
+const SPARE = 6;
+
+interface RowsProps {
+  list: VehicleState[];
+  selected: string;
+  choose: (name: string) => void;
+}
+
+/** Rows of hundreds of UAVs, of which those are made that are seen. */
+export function Rows({ list, selected, choose }: RowsProps) {
+  const box = useRef<HTMLDivElement>(null);
+  const [top, setTop] = useState(0);
+  const height = box.current?.clientHeight ?? 600;
+  const first = Math.max(0, Math.floor(top / ROW_PX) - SPARE);
+  const last = Math.min(list.length, Math.ceil((top + height) / ROW_PX) + SPARE);
+  const at = list.findIndex(({ name }) => name === selected);
+  useEffect(() => {
+    const element = box.current;
+    if (element === null || at < 0) return;
+    const [above, below] = [at * ROW_PX, (at + 1) * ROW_PX];
+    if (above < element.scrollTop) element.scrollTop = above;
+    else if (below > element.scrollTop + element.clientHeight) {
+      element.scrollTop = below - element.clientHeight;
+    }
+  }, [at]);
+  const key = (event: KeyboardEvent) => {
+    const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+    const next = step === undefined ? undefined : list[at + step];
+    if (next === undefined) return;
+    event.preventDefault();
+    event.stopPropagation();
+    choose(next.name);
+  };
+  return (
+    <div
+      ref={box}
+      className="rows"
+      role="listbox"
+      tabIndex={0}
+      aria-label="UAVs"
+      aria-activedescendant={at < 0 ? undefined : `uav-${selected}`}
+      onScroll={(event) => setTop(event.currentTarget.scrollTop)}
+      onKeyDown={key}
+    >
+      <div style={{ height: list.length * ROW_PX, position: "relative" }}>
+        {list.slice(first, last).map((vehicle, i) => (
+          <Row
+            key={vehicle.name}
+            vehicle={vehicle}
+            top={(first + i) * ROW_PX}
+            selected={vehicle.name === selected}
+            choose={choose}
+          />
+        ))}
+      </div>
+    </div>
+  );
+}
+
+interface RowProps {
+  vehicle: VehicleState;
+  top: number;
+  selected: boolean;
+  choose: (name: string) => void;
+}
+
+const Row = memo(function Row({ vehicle, top, selected, choose }: RowProps) {
+  const { name, airframe, mode, holder, battery } = vehicle;
+  return (
+    <div
+      id={`uav-${name}`}
+      className="row"
+      role="option"
+      aria-selected={selected}
+      style={{ top, height: ROW_PX }}
+      onClick={() => choose(name)}
+    >
+      <div className="row-name">
+        <Text size="sm" fw={600} truncate>
+          {name}
+        </Text>
+        <Text size="xs" c="dimmed" truncate>
+          {holder === "" ? airframe : `${airframe} · ${holder}`}
+        </Text>
+      </div>
+      {Number.isFinite(battery) && (
+        <Text size="xs" ff="monospace" c={batteryColour(battery)}>
+          {Math.round(100 * battery)} %
+        </Text>
+      )}
+      <Badge size="sm" variant="light" tt="none" color={colourOf(mode)}>
+        {modeText(mode)}
+      </Badge>
+    </div>
+  );
+}, isSame);
+
+/** Only what a row shows counts: positions change with every message. */
+function isSame(a: RowProps, b: RowProps): boolean {
+  const [v, w] = [a.vehicle, b.vehicle];
+  return (
+    a.top === b.top &&
+    a.selected === b.selected &&
+    a.choose === b.choose &&
+    v.name === w.name &&
+    v.airframe === w.airframe &&
+    v.mode === w.mode &&
+    v.holder === w.holder &&
+    Object.is(Math.round(100 * v.battery), Math.round(100 * w.battery))
+  );
+}

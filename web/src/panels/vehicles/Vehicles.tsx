@@ -1,0 +1,65 @@
+import { ActionIcon, Group, Text, TextInput, Tooltip } from "@mantine/core";
+import { Plus, Search } from "lucide-react";
+import { useState } from "react";
+import { openPanel, useLayout } from "../../state/layout.ts";
+import { useConnection } from "../../state/connection.ts";
+import { select, useVehicles } from "../../state/vehicles.ts";
+import { Rows } from "./Rows.tsx";
+import { Spawn } from "./Spawn.tsx";
+
+const SEARCH_FROM = 12;
+
+/** All UAVs; a click selects one, and they come and go here. */
+export default function Vehicles() {
+  const list = useVehicles((vehicles) => vehicles.list);
+  const selected = useVehicles((vehicles) => vehicles.selected);
+  const volery = useConnection((connection) => connection.volery);
+  const [filter, setFilter] = useState("");
+  const [spawning, setSpawning] = useState(false);
+  const shown = list.filter(({ name, airframe, mode }) =>
+    `${name} ${airframe} ${mode}`.toLowerCase().includes(filter.toLowerCase()),
+  );
+  return (
+    <div className="column">
+      <Group px="sm" pb={6} gap="xs" justify="space-between" wrap="nowrap">
+        <Text size="sm" c="dimmed" aria-label="Number of UAVs">
+          {list.length} {list.length === 1 ? "UAV" : "UAVs"}
+        </Text>
+        {volery && (
+          <Tooltip label="Add UAVs">
+            <ActionIcon
+              variant={spawning ? "filled" : "light"}
+              aria-label="Add UAVs"
+              aria-expanded={spawning}
+              onClick={() => setSpawning(!spawning)}
+            >
+              <Plus size={16} />
+            </ActionIcon>
+          </Tooltip>
+        )}
+      </Group>
+      {spawning && <Spawn close={() => setSpawning(false)} />}
+      {list.length >= SEARCH_FROM && (
+        <TextInput
+          mx="sm"
+          mb={6}
+          size="xs"
+          aria-label="Search UAVs"
+          placeholder="Search"
+          leftSection={<Search size={14} />}
+          value={filter}
+          onChange={(event) => setFilter(event.currentTarget.value)}
+        />
+      )}
+      <Rows list={shown} selected={selected} choose={choose} />
+    </div>
+  );
+}
+
+/** Selecting a UAV twice, as a double click does, shows it in detail. */
+function choose(name: string): void {
+  if (useVehicles.getState().selected === name && useLayout.getState().right !== "inspector") {
+    openPanel("right", "inspector");
+  }
+  select(name);
+}

@@ -1,0 +1,12 @@
+/** Places of a square lattice, ever farther from the middle, m. */
+export function spiral(count: number, spacing: number): [number, number][] {
+  const places: [number, number][] = [];
+  for (let ring = 0; places.length < count; ring++) {
+    for (let x = -ring; x <= ring; x++) {
+      for (let y = -ring; y <= ring; y++) {
+        if (Math.max(Math.abs(x), Math.abs(y)) === ring) places.push([x * spacing, y * spacing]);
+      }
+    }
+  }
+  return places.slice(0, count);
+}

@@ -1,0 +1,42 @@
+import { useThree } from "@react-three/fiber";
+import { useEffect } from "react";
+import { meetGround } from "../lib/heights.ts";
+import { givePlace, useTool } from "../state/tool.ts";
+import { heightAt } from "../state/worldPlan.ts";
+import { rayAt } from "./rayAt.ts";
+
+const CLICK_PX = 4;
+
+/** While a place is being asked for, a click in the scene gives it; dragging looks around as ever. */
+export function GroundPicker() {
+  const asking = useTool((tool) => tool.asking !== null);
+  const { camera, gl } = useThree();
+  useEffect(() => {
+    if (!asking) return;
+    const canvas = gl.domElement;
+    let pressed: [number, number] | null = null;
+    const down = (event: PointerEvent) => {
+      pressed = event.button === 0 ? [event.clientX, event.clientY] : null;
+    };
+    const up = (event: PointerEvent) => {
+      const from = pressed;
+      pressed = null;
+      if (from === null) return;
+      if (Math.hypot(event.clientX - from[0], event.clientY - from[1]) > CLICK_PX) return;
+      const { origin, direction } = rayAt(canvas, camera, event.clientX, event.clientY);
+      const place = meetGround(heightAt, origin, direction);
+      if (place === null) return;
+      event.stopPropagation();
+      givePlace({ x: place[0], y: place[1], z: place[2] });
+    };
+    canvas.style.cursor = "crosshair";
+    canvas.addEventListener("pointerdown", down);
+    canvas.addEventListener("pointerup", up);
+    return () => {
+      canvas.style.cursor = "";
+      canvas.removeEventListener("pointerdown", down);
+      canvas.removeEventListener("pointerup", up);
+    };
+  }, [asking, camera, gl]);
+  return null;
+}

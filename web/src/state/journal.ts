@@ -1,0 +1,124 @@
+// What happened and what was commanded: /events and /volery/log, kept from when the page opens.
+
+import { create } from "zustand";
+import { secondsOf } from "../lib/time.ts";
+import { link } from "../link/link.ts";
+
+export type EntrySort = "event" | "trouble" | "command";
+
+export interface Entry {
+  number: number;
+  /** Simulated time, s. */
+  timeS: number;
+  sort: EntrySort;
+  kind: string;
+  /** UAV of an event, client of a command. */
+  who: string;
+  text: string;
+}
+
+interface EventJson {
+  time_ns: number;
+  uav: string;
+  kind: string;
+  position_map: [number, number, number];
+  speed_m_s: number;
+  partner: string;
+  detail: string;
+}
+
+interface Command {
+  stamp: { sec: number; nanosec: number };
+  client: string;
+  kind: string;
+  name: string;
+  content: string;
+}
+
+const MOST = 5000;
+const SHOW_MS = 200;
+const TROUBLES = new Set(["impact", "collision", "fault", "battery"]);
+
+/** The newest entries, the oldest first; told a few times a second. */
+export const useJournal = create<{ entries: Entry[] }>(() => ({ entries: [] }));
+
+let written: Entry[] = [];
+let next = 0;
+let timer: ReturnType<typeof setTimeout> | null = null;
+
+export function followJournal(): void {
+  const depth = 1000; // many things can happen at once
+  link.subscribe(
+    "/events",
+    "std_msgs/msg/String",
+    ({ message }) => {
+      const entry = entryOfEvent(message.data);
+      if (entry !== null) write(entry);
+    },
+    { depth },
+  );
+  link.subscribe(
+    "/volery/log",
+    "volery_interfaces/msg/CommandRecord",
+    ({ message }: { message: unknown }) => write(entryOfCommand(message as Command)),
+    { depth },
+  );
+}
+
+export function clearJournal(): void {
+  written = [];
+  useJournal.setState({ entries: [] });
+}
+
+/** An event of `/events`; null: the text is none. */
+export function entryOfEvent(text: string): Omit<Entry, "number"> | null {
+  let event: EventJson;
+  try {
+    event = JSON.parse(text) as EventJson;
+  } catch {
+    return null;
+  }
+  if (typeof event?.time_ns !== "number") return null;
+  return {
+    timeS: event.time_ns * 1e-9,
+    sort: TROUBLES.has(event.kind) ? "trouble" : "event",
+    kind: event.kind,
+    who: event.uav,
+    text: textOf(event),
+  };
+}
+
+function textOf({
+  kind,
+  detail,
+  partner,
+  speed_m_s: speed,
+  position_map: place,
+}: EventJson): string {
+  const where = `at (${place.map((metres) => metres.toFixed(1)).join(", ")}) m`;
+  const pace = `at ${speed.toFixed(2)} m/s`;
+  if (kind === "world") return detail;
+  if (kind === "collision") return `hit ${partner} ${pace} ${where}`;
+  if (kind === "impact") return `hit the ground ${pace} ${where}`;
+  if (kind === "touch_down") return `touched down ${pace} ${where}`;
+  return `${detail} ${where}`;
+}
+
+function entryOfCommand({ stamp, client, kind, name, content }: Command): Omit<Entry, "number"> {
+  return {
+    timeS: secondsOf(stamp),
+    sort: "command",
+    kind,
+    who: client,
+    text: `${name} ${content}`,
+  };
+}
+
+function write(entry: Omit<Entry, "number">): void {
+  written.push({ ...entry, number: next++ });
+  if (written.length > 2 * MOST) written = written.slice(-MOST);
+  timer ??= setTimeout(() => {
+    timer = null;
+    useJournal.setState({ entries: written.slice(-MOST) });
+  }, SHOW_MS);
+}

@@ -1,0 +1,28 @@
+import { create } from "zustand";
+import { topics, type TopicName } from "../link/commands/graph.ts";
+import { link } from "../link/link.ts";
+
+/** Topics of the graph; asked for every few seconds while somebody looks at them. */
+export const useTopics = create<{ list: TopicName[] }>(() => ({ list: [] }));
+
+const ASK_MS = 3000;
+
+export function followTopics(): void {
+  let asking = false;
+  const ask = async () => {
+    if (asking || link.state !== "open" || document.hidden) return;
+    asking = true;
+    const list = await topics().catch(() => null);
+    asking = false;
+    if (list !== null && changed(list, useTopics.getState().list)) useTopics.setState({ list });
+  };
+  link.watch(() => void ask());
+  setInterval(() => void ask(), ASK_MS);
+}
+
+function changed(now: readonly TopicName[], before: readonly TopicName[]): boolean {
+  return (
+    now.length !== before.length ||
+    now.some(({ name, type }, i) => name !== before[i]!.name || type !== before[i]!.type)
+  );
+}

@@ -1,0 +1,46 @@
+import { describe, expect, it, vi } from "vitest";
+
+vi.mock("../link/link.ts", () => ({ link: {} }));
+const { troubleOf } = await import("./trouble.ts");
+const { entryOfEvent } = await import("./journal.ts");
+
+describe("trouble", () => {
+  it("is nothing while all is well", () => {
+    expect(troubleOf("open", "", "the simulation", false)).toBeNull();
+  });
+
+  it("tells a lost link, and why", () => {
+    const told = troubleOf("lost", "the world changes", "the simulation", false);
+    expect(told?.what).toBe("No connection to the simulation: the world changes");
+    expect(told?.linked).toBe(false);
+  });
+
+  it("tells silence of a link that stands", () => {
+    const told = troubleOf("open", "", "ws://robot:9090", true);
+    expect(told).toMatchObject({ what: "Nothing comes from ws://robot:9090", linked: true });
+  });
+});
+
+describe("an entry of the log", () => {
+  const EVENT = {
+    time_ns: 2_500_000_000,
+    uav: "uav1",
+    kind: "collision",
+    position_map: [1, 2, 3],
+    speed_m_s: 1.25,
+    partner: "tree 7",
+    detail: "",
+  };
+
+  it("says what was hit, how fast and where", () => {
+    const entry = entryOfEvent(JSON.stringify(EVENT));
+    expect(entry).toMatchObject({ timeS: 2.5, sort: "trouble", who: "uav1" });
+    expect(entry?.text).toBe("hit tree 7 at 1.25 m/s at (1.0, 2.0, 3.0) m");
+  });
+
+  it("is made of events alone", () => {
+    expect(entryOfEvent("hello")).toBeNull();
+    expect(entryOfEvent('{"a": 1}')).toBeNull();
+    expect(entryOfEvent("null")).toBeNull();
+  });
+});
