@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -17,6 +18,7 @@ from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, serving
 from volery.core.errors import VoleryError
 from volery.scenario import changes
+from volery.scenario.changes import LogRequest
 
 if TYPE_CHECKING:
     from volery.scenario.changes import WorldRequest
@@ -66,28 +68,29 @@ class _Wish:
         self.speed = speed
         """Factor of real time to begin with; None: as fast as possible."""
         self.asked = True
-        self.scenario: Scenario | None = scenario
-        """None: no world at all."""
+        self._wanted: Scenario | Path | None = scenario
         self.quit: Callable[[], None] = _nothing
 
-    def ask(self, request: WorldRequest | None) -> None:
-        """End the present flight for another one; `ScenarioError` where that cannot be."""
+    def ask(self, request: WorldRequest | LogRequest | None) -> None:
+        """End the present flight for another one; `VoleryError` where that cannot be."""
         if request is None:
             self.want(None)
+        elif isinstance(request, LogRequest):
+            self.want(request.path)
         else:
             self.want(changes.apply(self._shelf.load(request.name), request.changes))
             speed = request.changes.speed
             self.speed = self.speed if speed is None else speed or None
         self.quit()
 
-    def want(self, scenario: Scenario | None) -> None:
-        """Have this flown next."""
-        self.asked, self.scenario = True, scenario
+    def want(self, what: Scenario | Path | None) -> None:
+        """Have this flown next, or this log played; None: no world at all."""
+        self.asked, self._wanted = True, what
 
-    def take(self) -> Scenario | None:
-        """What to fly now; what is asked for from here on comes after it."""
+    def take(self) -> Scenario | Path | None:
+        """What to do now; what is asked for from here on comes after it."""
         self.asked, self.quit = False, _nothing
-        return self.scenario
+        return self._wanted
 
 
 class _Host:
@@ -99,7 +102,7 @@ class _Host:
         self._options = options
         self._page = page
         self._interrupts = interrupts
-        self._shelf = Shelf(options.page.uploads)
+        self._shelf = Shelf(options.page.uploads, options.page.recordings)
         self._wish = _Wish(_first_scenario(options.first), options.first.speed, self._shelf)
         self._present: Scenario | None = None
         """What was built last."""
@@ -119,7 +122,10 @@ class _Host:
             self._wait()
             return
         try:
-            self._fly(wanted)
+            if isinstance(wanted, Path):
+                self._play(wanted)
+            else:
+                self._fly(wanted)
         except Exception as error:  # a mistake of ours in one world must not end the others
             if self._present is None:
                 raise
@@ -149,6 +155,25 @@ class _Host:
                 typer.echo(f"flying  {scenario.name}", err=True)
                 self._stay(simulation)
             self._quits = simulation.quitting and not self._wish.asked
+
+    def _play(self, log: Path) -> None:
+        """Open a log and stay with it."""
+        from volery.runtime.player import Player
+
+        with Player(log, on_load=self._wish.ask, shelf=self._shelf) as player:
+            if player.scenario is not None:
+                self._page.building(player.scenario, self._trouble)
+            _ = player.geometry  # made here: the server only reads it
+            self._wish.quit = player.quit
+            self._interrupts.be_gentle()
+            first, page = self._options.first, self._page
+            with open_doors(player, first), page.showing(player, self._trouble):
+                self._trouble = ""
+                typer.echo(f"playing {log.name}", err=True)
+                while not (self._wish.asked or player.quitting or self._interrupts.pressed):
+                    player.wait(_GLANCE_S)
+                player.wait(_FAREWELL_S)
+            self._quits = player.quitting and not self._wish.asked
 
     def _stay(self, simulation: Any) -> None:
         """Fly; at the end hold still there, until a reset or something else is asked for."""

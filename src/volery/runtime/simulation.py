@@ -150,7 +150,6 @@ class Simulation:
             self._engine,
             Told(lambda: self._services.state, lambda: self._services.recording),
         )
-        self._live.vehicles.holder = self.pilots.holder_of
         self._weather_topics = WeatherTopics(
             self.graph, scenario.world, lambda: self.weather, self.set_weather
         )

@@ -111,10 +111,12 @@ class PageServer:
         message: what went wrong before, such as that another world could not be built.
         """
         scenario: Scenario | None = getattr(world, "scenario", None)
-        if scenario is None:
+        name: str | None = getattr(world, "name", None) if scenario is None else scenario.name
+        if name is None:
             told = Situation(State.FAILED if message else State.LOBBY, message=message)
         else:
-            told = Situation(State.FLYING, scenario.name, scenario.description.strip(), message)
+            what = "A recorded log." if scenario is None else scenario.description.strip()
+            told = Situation(State.FLYING, name, what, message)
         self._call(self._site.join(world, told))
         try:
             yield
