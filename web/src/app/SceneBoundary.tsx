@@ -20,7 +20,7 @@ export class SceneBoundary extends Component<Props, { reason: string }> {
       <Paper className="situation" withBorder p="lg" role="alert">
         <Title order={4}>The scene cannot be drawn</Title>
         <Text size="sm" mt="xs">
-          This browser gives no WebGL 2: {reason}. Map, pictures and all panels work.
+          Has this browser WebGL 2? It says: “{reason}” All panels work without it.
         </Text>
       </Paper>
     );
