@@ -57,7 +57,10 @@ while row < info["height"] and len(plan) < waypoints and not cells[row * width +
     row += 1
 
 # 4. Take off, then one waypoint after the other: geometry_msgs/PoseStamped on /uavN/goal_pose.
-roslibpy.Service(ros, f"/{uav}/take_off", "std_srvs/srv/Trigger").call(roslibpy.ServiceRequest())
+take_off = roslibpy.Service(ros, f"/{uav}/take_off", "std_srvs/srv/Trigger")
+while place["z"] < 1.0:  # refused while it still lands: say it again until it is up
+    take_off.call(roslibpy.ServiceRequest())
+    threading.Event().wait(0.5)
 goal = roslibpy.Topic(ros, f"/{uav}/goal_pose", "geometry_msgs/msg/PoseStamped")
 for row, column in plan[:waypoints]:
     x, y = corner["x"] + (column + 0.5) * side_m, corner["y"] + (row + 0.5) * side_m

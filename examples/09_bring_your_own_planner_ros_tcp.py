@@ -12,6 +12,7 @@ import json
 import socket
 import struct
 import sys
+import time
 
 port = int(sys.argv[1]) if len(sys.argv) > 1 else 10000
 waypoints = int(sys.argv[2]) if len(sys.argv) > 2 else 4
@@ -91,7 +92,9 @@ plan = [last, first] * waypoints
 
 # 4. Take off, then one waypoint after the other.
 command("ros_service", topic=f"/{uav}/take_off", message_name="std_srvs/Trigger")
-call_trigger(f"/{uav}/take_off", 101)
+while position()[2] < 1.0:  # refused while it still lands: say it again until it is up
+    call_trigger(f"/{uav}/take_off", 101)
+    time.sleep(0.5)
 command("publish", topic=f"/{uav}/goal_pose", message_name="geometry_msgs/PoseStamped")
 header = struct.pack("<III", 0, 0, 0) + struct.pack("<I", 3) + b"map"
 for column in plan[:waypoints]:

@@ -50,7 +50,9 @@ def test_services_and_cmd_vel_fly_it_too(simulate, flat_data):
     assert np.hypot(*uav.position_map[:2]) < 0.5
 
 
-def test_gap_following_crosses_a_wood_and_lands(simulate, wood_data):
+@pytest.mark.parametrize("weather", [{}, {"rain_mm_h": 12.0, "fog_visibility_m": 300.0}])
+def test_gap_following_crosses_a_wood_and_lands(simulate, wood_data, weather):
+    wood_data["world"]["weather"] = weather
     wood_data["duration_s"] = 60.0
     wood_data["ends_when"] = "all_landed"
     simulation = simulate(wood_data, threads=2)

@@ -286,8 +286,10 @@ def free_port():
 
 
 def answer(client, service, **fields):
-    srvtype = "".join(word.capitalize() for word in service.strip("/").split("_"))
-    request = zero_message(f"simulation_interfaces/srv/{srvtype}_Request")
+    place, _, name = service.strip("/").rpartition("/")
+    package = "volery_interfaces" if place == "volery" else "simulation_interfaces"
+    srvtype = "".join(word.capitalize() for word in name.split("_"))
+    request = zero_message(f"{package}/srv/{srvtype}_Request")
     for name, value in fields.items():
         setattr(request, name, value)
     return call_and_wait(client, service, request, 5.0)

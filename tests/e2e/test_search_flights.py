@@ -163,6 +163,7 @@ def open_ros1(doors):
     return "ros1"
 
 
+@pytest.mark.slow
 # rospy uses what is deprecated and forgets to close sockets
 @pytest.mark.filterwarnings("ignore:notifyAll:DeprecationWarning")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import tempfile
 from functools import cache
-from pathlib import Path
 
+from file_place import path_of
 from mcap.writer import CompressionType, Writer
 from rosbags.rosbag1 import Writer as BagWriter
 
@@ -27,24 +26,12 @@ _SHORTEST = 14
 
 
 @cache
-def _folder():
-    """A folder for the process, in memory where there is such a one."""
-    memory = Path("/dev/shm")
-    place = memory if memory.is_dir() else None
-    return tempfile.TemporaryDirectory(prefix="volery-fuzz-", dir=place)
-
-
-def _path(name):
-    return Path(_folder().name, name)
-
-
-@cache
 def _mcaps():
     """Without checksums, else none but the first change would be seen."""
     found = []
     for compression in (CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD):
         for chunks in (True, False):
-            path = _path("seed.mcap")
+            path = path_of("seed.mcap")
             with path.open("wb") as file:
                 writer = Writer(
                     file,
@@ -73,7 +60,7 @@ def _bags():
     found = []
     codec = ros1_codec()
     for compression in (None, BagWriter.CompressionFormat.LZ4, BagWriter.CompressionFormat.BZ2):
-        path = _path("seed.bag")
+        path = path_of("seed.bag")
         path.unlink(missing_ok=True)
         writer = BagWriter(path)
         if compression is not None:
@@ -99,7 +86,7 @@ def bag(mutator):
 
 
 def _read(mutator, seeds, name):
-    path = _path(name)
+    path = path_of(name)
     data = mutator.bytes(seeds)
     path.write_bytes(mutator.pick(seeds)[:_SHORTEST] + data[_SHORTEST:])
     out = path.with_name(f"out-{name}")

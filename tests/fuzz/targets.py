@@ -4,8 +4,10 @@ A target takes a `Mutator`, feeds its parser, checks what must hold and returns 
 were. What it must not let out: any exception but those that its parser documents.
 """
 
+import city_targets
 import grid_map_targets
 import log_targets
+import mesh_targets
 import message_targets
 import rosbridge_targets
 import socket_targets
@@ -35,4 +37,9 @@ TARGETS = {
     "grid_map_moving_ai": grid_map_targets.moving_ai,
     "grid_map_picture": grid_map_targets.picture,
     "grid_map_message": grid_map_targets.occupancy,
+    "city_outlines": city_targets.outlines,
+    "mesh_glb": mesh_targets.glb,
+    "mesh_gltf": mesh_targets.gltf,
+    "mesh_obj": mesh_targets.obj,
+    "mesh_stl": mesh_targets.stl,
 }

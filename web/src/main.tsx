@@ -13,13 +13,15 @@ import { followHealth } from "./state/health.ts";
 import { followJournal } from "./state/journal.ts";
 import { followPlayer } from "./state/player.ts";
 import { tellFailure } from "./state/notices.ts";
+import { followLeaving, usePilot } from "./state/pilots.ts";
 import { followSilence } from "./state/silence.ts";
 import { followSimulation } from "./state/simulation.ts";
 import { followTopics } from "./state/topics.ts";
 import { followVehicles } from "./state/vehicles.ts";
 
 followAddress();
-connectAsAddressed(location);
+connectAsAddressed(location, usePilot.getState().wished);
+followLeaving();
 followSimulation(useConnection.getState().volery);
 followVehicles();
 followHealth();

@@ -4,7 +4,8 @@ The level scan shows the surroundings at flight height 40 times a second, the no
 what is above and below. Returns become points in the odometry frame; the ground's slope is fitted
 to the lowest ones; points near the height of flight are remembered as obstacles; the heading goes
 through the gap that lies best towards the next waypoint, at a speed from which the UAV can stop
-before whatever ends the gap. Height above ground is held by the sonar and the slope ahead.
+before whatever ends the gap. Returns that nothing confirms are left out: rain, snow, fog.
+Height above ground is held by the sonar and the slope ahead.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.gap_steering import Caution, GapSteering
 from volery.autonomy.ground_plane import GroundPlane
+from volery.autonomy.lone_returns import LoneReturns
 from volery.autonomy.obstacle_memory import ObstacleMemory
 from volery.autonomy.scan_points import Pose, ScanProjector
 from volery.core import rotations
@@ -41,6 +43,8 @@ _STATE = (
     "_obstacles",
     "_steering",
     "_low_obstacles",
+    "_level_filter",
+    "_nodding_filter",
     "_settle_at",
 )
 """Everything that changes in flight."""
@@ -95,6 +99,7 @@ class GapFollowing(Node):
         self._ground = GroundPlane()
         self._obstacles = ObstacleMemory()
         self._low_obstacles = ObstacleMemory(half_width_m=10.0, looks_needed=3)
+        self._level_filter, self._nodding_filter = LoneReturns(), LoneReturns()
         self._settle_at: Array | None = None
 
         self.create_subscription(Odometry, "odom", self._on_odometry, 5)
@@ -136,10 +141,12 @@ class GapFollowing(Node):
             self._range = (self.get_clock().now_ns(), message.range)
 
     def _on_level_scan(self, scan: LaserScan) -> None:
+        scan = self._level_filter.left_out(scan)
         if self._pose is not None:
             self._remember(self._level.points(scan, self._pose))
 
     def _on_nodding_scan(self, scan: LaserScan) -> None:
+        scan = self._nodding_filter.left_out(scan)
         if self._pose is not None and self._joint is not None:
             self._remember(self._nodding.points(scan, self._pose, self._joint))
 

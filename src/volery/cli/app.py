@@ -80,6 +80,10 @@ def run(
         Path | None,
         typer.Option(help="Folder in which clients may record: /volery/start_recording."),
     ] = None,
+    replay_commands: Annotated[
+        Path | None,
+        typer.Option(help="Give every command again that clients gave in this recorded flight."),
+    ] = None,
     digest: Annotated[
         bool, typer.Option("--digest", help="Print the SHA-256 over all states and messages.")
     ] = False,
@@ -120,6 +124,7 @@ def run(
         digest=digest,
         overwrite=overwrite,
         page=page,
+        replay_commands=replay_commands,
     )
     code = fly(options)
     if code:
@@ -205,6 +210,42 @@ def serve(
             ),
         )
     )
+
+
+@app.command()
+@guarded
+def play(
+    log: Annotated[Path, typer.Argument(help="A .mcap or .bag log.")],
+    speed: Annotated[str, typer.Option(help="Factor of real time, or max.")] = "1",
+    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
+    paused: Annotated[bool, typer.Option("--paused", help="Wait at the beginning.")] = False,
+    door: Annotated[
+        list[str] | None,
+        typer.Option(help="Open a door to other programs: NAME or NAME=[HOST:]PORT, repeatable."),
+    ] = None,
+    allow_remote: Annotated[
+        bool, typer.Option("--allow-remote", help="Let doors listen beyond this machine.")
+    ] = False,
+    token: Annotated[
+        str | None, typer.Option(envvar="VOLERY_TOKEN", help="What remote clients must show.")
+    ] = None,
+) -> None:
+    """Play a recorded log behind doors, rosbridge unless others are named, until Ctrl-C.
+
+    At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
+    + and - double and halve the speed, m frees it, comma and slash leap 5 s back and forward.
+    """
+    from volery.cli.playing import play as play_log
+    from volery.cli.run import RunOptions, parse_speed
+
+    options = RunOptions(
+        scenario="",
+        speed=parse_speed(speed),
+        doors=tuple(door or ()),
+        allow_remote=allow_remote,
+        token=token,
+    )
+    play_log(log, options, loop=loop, paused=paused)
 
 
 @app.command("list")

@@ -47,6 +47,7 @@ class RunOptions:
     """To the scenario, by the client that loaded it."""
     page: str | None = None
     """`HOST:PORT`, `PORT` or, for the usual place, nothing; None: no page."""
+    replay_commands: Path | None = None
 
 
 class _StoppedError(Exception):
@@ -122,6 +123,7 @@ class Flight:
         if self._log is None:
             return True
         try:
+            self._simulation.commands.end()
             self._log.close()
         except RecordingError as error:
             complain(str(error))

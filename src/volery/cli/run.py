@@ -15,6 +15,7 @@ from volery.cli.guard import INTERRUPTED
 from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, page_of
 from volery.cli.progress import FlightProgress
+from volery.cli.repeating import recorded_flight, recorded_scenario
 from volery.cli.targets import check_record, check_report
 from volery.core.errors import CommandError, ScenarioError
 
@@ -67,7 +68,8 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
     """Exit code, and what a client wants instead."""
     from volery import Simulation
 
-    scenario = _scenario_of(options)
+    flight = recorded_flight(options)
+    scenario = _scenario_of(options) if flight is None else recorded_scenario(flight, options)
     if options.record is not None:
         check_record(options.record, overwrite=options.overwrite)
     if options.report is not None:
@@ -80,6 +82,8 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
             scenario, threads=threads, recordings=options.recordings, on_load=change.ask
         )
         change.quit = simulation.quit
+        if flight is not None:
+            simulation.repeat(flight)
         try:
             interrupts.be_gentle()
             with open_doors(simulation, options), page.showing(simulation):
@@ -144,6 +148,8 @@ class _Change:
                 raise CommandError(f"this run writes a file of one flight ({flag})")
         if options.digest:
             raise CommandError("this run prints the digest of one flight (--digest)")
+        if options.replay_commands is not None:
+            raise CommandError("this run repeats one flight (--replay-commands)")
         if request is not None:
             _scenario_of(_loading(options, request))
         self.asked, self.wanted = True, request

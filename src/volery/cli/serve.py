@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from volery.scenario.schema import Scenario
     from volery.scenario.shelf import Shelf
     from volery.server.settings import PageSettings
+
+_log = logging.getLogger(__name__)
 
 _THREADS = 2
 _GLANCE_S = 0.02
@@ -117,10 +120,11 @@ class _Host:
             return
         try:
             self._fly(wanted)
-        except VoleryError as error:
+        except Exception as error:  # a mistake of ours in one world must not end the others
             if self._present is None:
                 raise
-            self._trouble = f"{wanted.name}: {error}"
+            what = str(error) if isinstance(error, VoleryError) else _unexpected(error)
+            self._trouble = f"{wanted.name}: {what}"
             complain(self._trouble)
             self._wish.want(None if self._present is wanted else self._present)
 
@@ -190,6 +194,12 @@ def _first_scenario(options: RunOptions) -> Scenario:
         seconds=options.seconds,
         seed=options.seed,
     )
+
+
+def _unexpected(error: Exception) -> str:
+    """A sentence for what should not happen; where it did is logged."""
+    _log.error("a world ended with an error", exc_info=error)
+    return f"internal error: {type(error).__name__}: {error}"
 
 
 def _nothing() -> None:

@@ -6,7 +6,28 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any
+from typing import Any, NamedTuple, Protocol
+
+
+class Moment(NamedTuple):
+    """When a command is taken, the same however the run is sliced.
+
+    turn: what has been done since the physics step, counted: ticks, meetings with partners, rounds
+    of commands.
+    """
+
+    step: int
+    turn: int
+
+
+class Repeats(Protocol):
+    """Recorded commands that are taken again at their moments."""
+
+    def next_step(self) -> int | None:
+        """Physics step at which the next one is to be taken, None when no more come."""
+
+    def take(self) -> bool:
+        """Do what was done at the engine's present moment; whether that was anything."""
 
 
 class Inbox:

@@ -17,7 +17,7 @@ from volery.core.errors import CommandError
 from volery.engine import flight_log
 from volery.engine.agenda import Agenda
 from volery.engine.collisions import BOUNCE, CRASH, Collisions
-from volery.engine.commands import Inbox
+from volery.engine.commands import Inbox, Moment, Repeats
 from volery.engine.deadlines import Deadlines
 from volery.engine.events import Event, EventKind
 from volery.engine.partners import Partner
@@ -92,6 +92,11 @@ class Engine:
         self.terrain = terrain.grid
         self.sink = sink
         self.inbox = Inbox()
+        self.repeats: Repeats | None = None
+        """Recorded commands to be taken again."""
+        self.turn = 0
+        """Of the present moment; see `Moment`."""
+        self._commanded = False
         self.stands = True
         """Whether nothing is half done: states may be kept and taken back."""
         self.dt_ns = fleet.dt_ns
@@ -118,6 +123,15 @@ class Engine:
     def time_ns(self) -> int:
         """Simulated time."""
         return self.fleet.step * self.dt_ns
+
+    @property
+    def moment(self) -> Moment:
+        """Where between two ticks, or in a meeting, the engine is."""
+        return Moment(self.fleet.step, self.turn)
+
+    def count_command(self) -> None:
+        """Note that a command which may change results is taken at this moment."""
+        self._commanded = True
 
     def set_weather(self, weather: Weather) -> None:
         """Let `weather` blow from the next guidance tick on."""
@@ -165,17 +179,29 @@ class Engine:
 
     def take_in(self) -> None:
         """Do what was posted and hand out what that published; between ticks."""
-        if not self.inbox.work_off():
-            return
+        if self.inbox.work_off():
+            self._hand_out()
+        self.take_repeats()
+
+    def take_repeats(self) -> None:
+        """Take the recorded commands of this moment, round by round as they were taken."""
+        while self.repeats is not None and self.repeats.take():
+            self._hand_out()
+
+    def _hand_out(self) -> None:
+        """End a round of commands."""
         stood, self.stands = self.stands, False
         try:
             self.sink.deliver()
         finally:
             self.stands = stood
+        self.turn += self._commanded
+        self._commanded = False
 
     def wait(self, timeout_s: float) -> None:
         """Wait for something to take in, or a `wake`, at most `timeout_s` of wall time."""
-        self.inbox.wait(timeout_s)
+        comes = self.repeats is not None and self.repeats.next_step() == self.fleet.step
+        self.inbox.wait(0.0 if comes else timeout_s)
 
     def wake(self) -> None:
         """End a `wait`; from any thread."""
@@ -184,7 +210,9 @@ class Engine:
     def horizon(self, step: int) -> int:
         """How far a tick may go that shall not pass `step`."""
         now = self.fleet.step
-        return min(max(min(step, self._due_step()), now), now + _MOST_STEPS_A_TICK)
+        wanted = None if self.repeats is None else self.repeats.next_step()
+        step = min(step, self._due_step(), step if wanted is None else wanted)
+        return min(max(step, now), now + _MOST_STEPS_A_TICK)
 
     def note(self, uav: int, kind: EventKind, detail: str) -> None:
         """Let something that happens to a UAV now be an event."""
@@ -280,6 +308,7 @@ class Engine:
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state of this engine."""
+        self.turn = 0
         self.fleet.set_state(state["fleet"])
         self.collisions.set_state(state["collisions"])
         for bank, kept in zip(self.banks, state["banks"], strict=True):
@@ -343,3 +372,4 @@ class Engine:
                 before = after
         finally:
             self.stands = True
+            self.turn += 1

@@ -41,6 +41,7 @@ def advance_vehicles(engine: Engine, tick: Tick) -> None:
     steps = engine.horizon(tick.last_step) - first
     if steps > 0:
         engine.fleet.advance(steps, engine.terrain, event_ends=True)
+        engine.turn = 0
         engine.sink.advanced(first + 1, engine.fleet.step)
 
 
@@ -81,6 +82,7 @@ def meet_partners(engine: Engine, _tick: Tick) -> None:
     """Wait for the lock-step partners whose instant has come, and do what they ask."""
     due = engine.partner_agenda.pop_due(engine.fleet.step)
     if due:
+        engine.turn += 1
         meet([entry.what for entry in due], engine.time_ns, engine)
         engine.sink.deliver()
 

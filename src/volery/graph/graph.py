@@ -74,6 +74,11 @@ class Publisher:
         self._graph = graph
         self._topic = topic
         self.latched = latched
+        self.lasting = False
+        """Whether what it publishes is no part of kept states.
+
+        It comes although another state is restored before its delivery, and never twice.
+        """
         self.cancelled = False
         """Whether it publishes no more."""
 
@@ -97,6 +102,12 @@ class Publisher:
         if not self.cancelled:
             self._graph.enqueue(self, self._topic, message)
 
+    def check(self, message: Any) -> None:
+        """`GraphError` for a message that is not of the topic's type."""
+        name = getattr(message, "__msgtype__", None)
+        if name != self.msgtype:
+            raise GraphError(f"topic '{self.topic}' carries {self.msgtype}, not {name}")
+
     def publish_posted(self, message: Any) -> None:
         """Queue a message that was published before `cancel`, even if it gets here after that."""
         self._graph.enqueue(self, self._topic, message)
@@ -118,7 +129,7 @@ class Publisher:
         cannot come to depend on it.
         """
         if not self.cancelled:
-            self._graph.show(self._topic, message)
+            self._graph.show(self, self._topic, message)
 
     @property
     def keeps(self) -> bool:
@@ -303,15 +314,15 @@ class Graph:
 
     def enqueue(self, sender: Publisher, topic: _Topic, message: Any) -> None:
         """Queue a message; used by `Publisher`."""
-        _check_type(topic, message)
+        sender.check(message)
         topic.messages += 1
         if sender.wanted:
             published = Published(topic.name, topic.msgtype, self._now_ns(), message)
             self._queue.append(_Letter(topic, published, sender))
 
-    def show(self, topic: _Topic, message: Any) -> None:
+    def show(self, sender: Publisher, topic: _Topic, message: Any) -> None:
         """Hand a message to clients outside alone; used by `Publisher`."""
-        _check_type(topic, message)
+        sender.check(message)
         topic.messages += 1
         published = Published(topic.name, topic.msgtype, self._now_ns(), message)
         for put in tuple(topic.outside):
@@ -345,11 +356,13 @@ class Graph:
         """What a snapshot keeps: undelivered and latched messages, how many each topic has seen."""
         with self._members:
             topics = {name: (t.messages, dict(t.kept)) for name, t in self._topics.items()}
-        return {"queue": list(self._queue), "topics": topics}
+        queue = [letter for letter in self._queue if not letter.sender.lasting]
+        return {"queue": queue, "topics": topics}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state; topics, subscribers and services stay as they are."""
-        self._queue = deque(state["queue"])
+        lasting = [letter for letter in self._queue if letter.sender.lasting]
+        self._queue = deque([*lasting, *state["queue"]])
         with self._members:
             for name, topic in self._topics.items():
                 messages, kept = state["topics"].get(name, (0, {}))
@@ -431,6 +444,10 @@ class Graph:
         """Whether the service is offered."""
         return service in self._services
 
+    def service_type(self, service: str) -> str:
+        """Type of a service. `GraphError` if nobody offers it."""
+        return self._service(service).srvtype
+
     def services(self) -> dict[str, str]:
         """Service names and their types."""
         with self._members:
@@ -448,12 +465,6 @@ class Graph:
         if found is None:
             raise GraphError(f"nobody offers service '{name}'")
         return found
-
-
-def _check_type(topic: _Topic, message: Any) -> None:
-    name = getattr(message, "__msgtype__", None)
-    if name != topic.msgtype:
-        raise GraphError(f"topic '{topic.name}' carries {topic.msgtype}, not {name}")
 
 
 def _request(service: _Service, request: Any | None) -> Any:

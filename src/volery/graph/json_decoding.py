@@ -18,7 +18,7 @@ from rosbags.interfaces import Nodetype
 from volery.core.errors import GraphError
 from volery.graph.definition_files import INTEGER_RANGES, NUMBERS
 from volery.graph.definition_store import EMPTY_MEMBER
-from volery.graph.messages import typestore
+from volery.graph.messages import single, typestore
 from volery.graph.zero import DTYPES, value_maker
 
 Convert = Callable[[Any], Any]
@@ -248,7 +248,7 @@ def _decode_float32(value: Any) -> float:
     number = _decode_float(value)
     if abs(number) > _LARGEST_FLOAT32 and not math.isinf(number):
         raise _Mismatch(f"does not fit float32: {_shown(value)}")
-    return number
+    return single(number)
 
 
 def _integer_decoder(base: str) -> Convert:

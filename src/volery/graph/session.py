@@ -14,11 +14,12 @@ newest. A client that does not read loses messages of its own and delays nobody.
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from volery.core.errors import GraphError
 from volery.graph.graph import Graph, Publisher, Subscription
@@ -36,6 +37,27 @@ _MOST_NAMES = 20_000
 """Of UAVs that are remembered as commanded; more than any fleet has."""
 
 
+class Taken(NamedTuple):
+    """What a client did, told in the simulation's thread just before it takes effect.
+
+    kind: `call`, `publish`, `advertise`, ... as in `volery_interfaces/msg/CommandRecord`.
+    """
+
+    client: str
+    kind: str
+    name: str
+    type: str
+    content: Any = None
+    """The message, request or response; the reason of a failure."""
+    latched: bool = False
+    request: int = 0
+    """Which request to that service is answered."""
+
+
+Watch = Callable[[Taken], None]
+"""Is told what clients do; the `GraphError` that it raises refuses it."""
+
+
 @dataclass(frozen=True)
 class SessionInfo:
     """Who is connected, and to what."""
@@ -47,10 +69,11 @@ class SessionInfo:
 
 
 class Gateway:
-    """Where doors open sessions for their clients."""
+    """Where doors open sessions for their clients; `watch` is told what those do."""
 
-    def __init__(self, graph: Graph, post: Post) -> None:
+    def __init__(self, graph: Graph, post: Post, watch: Watch | None = None) -> None:
         self.graph = graph
+        self.watch: Watch = watch or _look_away
         self._post = post
         self._sessions: list[Session] = []
         self._lock = threading.Lock()
@@ -60,9 +83,12 @@ class Gateway:
         self.commanded_ns: dict[str, int] = {}
         """When that was last the case, by the name, such as a UAV's."""
 
-    def open(self, name: str) -> Session:
-        """Begin the session of one client; `name` tells people who it is."""
-        session = Session(self, name)
+    def open(self, name: str, *, inside: bool = False) -> Session:
+        """Begin the session of one client; `name` tells people who it is.
+
+        inside: it is no client but a part of Volery, whose doings follow from those of clients.
+        """
+        session = Session(self, name, None if inside else self.watch)
         with self._lock:
             self._sessions.append(session)
         return session
@@ -110,8 +136,10 @@ class Gateway:
 class Session:
     """One outside client's part in the graph; `close` takes everything back."""
 
-    def __init__(self, gateway: Gateway, name: str) -> None:
+    def __init__(self, gateway: Gateway, name: str, watch: Watch | None) -> None:
         self.name = name
+        self._watch = watch or _look_away
+        self._note = _look_away if watch is None else gateway.note_command
         self._gateway = gateway
         self._graph = gateway.graph
         self._lock = threading.RLock()
@@ -140,6 +168,7 @@ class Session:
             self._publishers[topic] = self._graph.advertise(topic, msgtype, latched=latched)
             if old is not None:
                 old.cancel()
+        self.tell("advertise", topic, msgtype, latched=latched)
 
     def unadvertise(self, topic: str) -> None:
         """Publish on `topic` no more. `GraphError` if it did not."""
@@ -147,6 +176,7 @@ class Session:
             publisher = self._publishers.pop(topic, None)
         if publisher is None:
             raise GraphError(f"{self.name} does not publish '{topic}'")
+        self.tell("unadvertise", topic, publisher.msgtype)
         publisher.cancel()
 
     def published_type(self, topic: str) -> str | None:
@@ -160,11 +190,13 @@ class Session:
         if publisher is None:
             raise GraphError(f"{self.name} has not advertised '{topic}'")
 
-        def take() -> None:
-            self._gateway.note_command(topic)
+        def publish() -> None:
+            publisher.check(message)
+            self._note(topic)
+            self._watch(Taken(self.name, "publish", topic, publisher.msgtype, message))
             publisher.publish_posted(message)
 
-        self._gateway.post(take)
+        self._gateway.post(publish)
 
     def subscribe(
         self,
@@ -202,8 +234,10 @@ class Session:
         """Call a service; `reply` gets the response or a `GraphError`, in some other thread."""
 
         def ask() -> None:
-            self._gateway.note_command(service)
+            self._note(service)
             try:
+                srvtype = self._graph.service_type(service)
+                self._watch(Taken(self.name, "call", service, srvtype, request))
                 self._graph.call_async(service, request, reply)
             except GraphError as error:
                 reply.fail(error)
@@ -222,14 +256,17 @@ class Session:
             if service in self._offers:
                 raise GraphError(f"{self.name} offers service '{service}' already")
             pending: set[Reply] = set()
+            numbers = itertools.count()
 
             def handle(request: Any, reply: Reply) -> None:
-                pending.add(reply)
-                reply.when_done(lambda: pending.discard(reply))
-                handler(request, reply)
+                relayed = self._relay(service, srvtype, reply, next(numbers))
+                pending.add(relayed)
+                relayed.when_done(lambda: pending.discard(relayed))
+                handler(request, relayed)
 
             self._graph.offer_async(service, srvtype, handle)
             self._offers[service] = pending
+        self.tell("offer", service, srvtype)
 
     def withdraw(self, service: str) -> None:
         """Offer a service no more; its open requests fail. `GraphError` if it was not offered."""
@@ -237,11 +274,43 @@ class Session:
             pending = self._offers.pop(service, None)
         if pending is None:
             raise GraphError(f"{self.name} does not offer service '{service}'")
+        srvtype = self._graph.services().get(service, "")
         self._graph.withdraw(service)
         for reply in tuple(pending):
             reply.fail(GraphError(f"service '{service}': {self.name} has left"))
+        self.tell("withdraw", service, srvtype)
+
+    def _relay(self, service: str, srvtype: str, reply: Reply, request: int) -> Reply:
+        """A reply whose answer reaches `reply` between two ticks, as all that comes from outside.
+
+        One that is given in the simulation's thread at once, as inside, goes on at once.
+        """
+        here = threading.get_ident()
+
+        def come(settle: Callable[[], None], kind: str, content: Any) -> None:
+            def take() -> None:
+                self._watch(Taken(self.name, kind, service, srvtype, content, request=request))
+                settle()
+
+            if threading.get_ident() == here:
+                take()
+            else:
+                self._gateway.post(take)
+
+        return Reply(
+            lambda response: come(lambda: reply.answer(response), "answer", response),
+            lambda error: come(lambda: reply.fail(error), "failure", str(error)),
+        )
 
     # --------------------------------------------------------------------------------------- end
+
+    def tell(
+        self, kind: str, name: str, msgtype: str, content: Any = None, *, latched: bool = False
+    ) -> None:
+        """Have the watch told what the client does, where that is not posted anyway."""
+        self._gateway.post(
+            lambda: self._watch(Taken(self.name, kind, name, msgtype, content, latched))
+        )
 
     def close(self) -> None:
         """Take back everything; a second time nothing happens."""
@@ -273,6 +342,10 @@ class Session:
     def _check_open(self) -> None:
         if self._closed:
             raise GraphError(f"{self.name} has left")
+
+
+def _look_away(_what: object) -> None:
+    """Watch nothing."""
 
 
 def _tell_failure(asked: Future[Any], reply: Reply) -> None:

@@ -35,9 +35,24 @@ _BYTES = {"uint8", "byte", "octet", "char"}
 _LONG = {"int64", "uint64"}
 _TEXT = {"string", "wstring"}
 _PACKAGES = frozenset(
-    """builtin_interfaces diagnostic_msgs geometry_msgs nav_msgs octomap_msgs rosapi_msgs
-    rosgraph_msgs sensor_msgs simulation_interfaces std_msgs std_srvs tf2_msgs trajectory_msgs
-    unique_identifier_msgs visualization_msgs volery_interfaces""".split()
+    {
+        "builtin_interfaces",
+        "diagnostic_msgs",
+        "geometry_msgs",
+        "nav_msgs",
+        "octomap_msgs",
+        "rosapi_msgs",
+        "rosgraph_msgs",
+        "sensor_msgs",
+        "simulation_interfaces",
+        "std_msgs",
+        "std_srvs",
+        "tf2_msgs",
+        "trajectory_msgs",
+        "unique_identifier_msgs",
+        "visualization_msgs",
+        "volery_interfaces",
+    }
 )
 """What the page speaks; other types it reads by their own descriptions (rosapi)."""
 

@@ -39,12 +39,12 @@ def speed_chart(flight: FlightData) -> str:
 
 
 def clearance_chart(flight: FlightData) -> str:
-    """Distance to the nearest tree over time, up to the reach that was searched."""
+    """Distance to the nearest tree or solid over time, up to the reach that was searched."""
     reach = flight.clearance_reach_m
     return _over_time(
         flight,
         lambda uav: np.minimum(uav.clearance_m, reach),
-        "distance to the nearest tree, m",
+        "distance to the nearest obstacle, m",
         floor=0.0,
         ceiling=reach * 1.03,
         lowest=True,

@@ -90,7 +90,7 @@ def _tiles(flight: FlightData, fleet: str) -> str:
         (f"{flight.simulated_s:.1f} s", f"flown by {fleet}"),
         (_length(flown), "distance in all"),
         (f"{fastest:.1f} m/s", "greatest speed"),
-        (_clearance(nearest, flight), "closest to a tree"),
+        (_clearance(nearest, flight), "closest to an obstacle"),
         (str(flight.contacts), "contact" if flight.contacts == 1 else "contacts"),
         (f"{flight.real_time_factor:.1f} ×", "real time"),
     ]
@@ -157,8 +157,8 @@ def _figures(flight: FlightData) -> list[str]:
     found.append(
         chart(
             charts.clearance_chart(flight),
-            "Distance from the UAV's middle to the nearest tree, exact to the leaf; searched up "
-            f"to {flight.clearance_reach_m:g} m, where the line stays if there is none.",
+            "Distance from the UAV's middle to the nearest obstacle, exact to the leaf; searched "
+            f"up to {flight.clearance_reach_m:g} m, where the line stays if there is none.",
         )
     )
     found.append(chart(charts.speed_chart(flight), "Speed over the ground and upward together."))
@@ -176,7 +176,7 @@ def _figures(flight: FlightData) -> list[str]:
 
 
 def _uav_table(flight: FlightData) -> str:
-    head = ("UAV", "distance", "mean speed", "max speed", "mean height", "closest to a tree")
+    head = ("UAV", "distance", "mean speed", "max speed", "mean height", "closest to an obstacle")
     rows = "".join(_uav_row(k, uav, flight) for k, uav in enumerate(flight.uavs))
     names = "".join(f"<th>{name}</th>" for name in head)
     return (

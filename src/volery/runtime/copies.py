@@ -31,7 +31,7 @@ from volery.runtime.building import place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.copy_block import CopyBlock, CopyEvent, Reading
 from volery.runtime.uav import Uav
-from volery.runtime.warm_up import compile_kernels
+from volery.runtime.warm_up import compiled_kernels
 from volery.runtime.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.scenario.schema import Scenario
 from volery.vehicle.fleet import FleetState
@@ -61,12 +61,12 @@ class Copies:
             seeds = range(scenario.seed, scenario.seed + count)
         if len(seeds) != count:
             raise ScenarioError(f"{count} copies need as many seeds, not {len(seeds)}")
-        compile_kernels()
         self.scenario = scenario
-        self.terrain = build_terrain(scenario)
-        self.city = build_city(scenario, self.terrain)
-        self.forest = build_forest(scenario, self.terrain, self.city)
-        self.scene = build_scene(scenario, self.terrain, self.forest, self.city)
+        with compiled_kernels():
+            self.terrain = build_terrain(scenario)
+            self.city = build_city(scenario, self.terrain)
+            self.forest = build_forest(scenario, self.terrain, self.city)
+            self.scene = build_scene(scenario, self.terrain, self.forest, self.city)
         self._starts = place(scenario, self.scene, self.terrain)
         ends = np.linspace(0, count, min(threads, count) + 1).round().astype(int).tolist()
         self._blocks = [

@@ -54,7 +54,7 @@ class RunLoop:
         start_ns = engine.time_ns
         left = self._duration_s - s_from_ns(start_ns) if seconds is None else seconds
         end_step = engine.fleet.step + self._whole_steps(left, seconds is None)
-        until = self._has_ended if seconds is None else None
+        until = self._ends_here if seconds is None else None
         pacer.begin(speed, start_ns)
         teller = ProgressTeller(on_progress, left, pacer)
         over = engine.fleet.step >= end_step or self.quitting
@@ -73,6 +73,11 @@ class RunLoop:
             teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns), last=over)
         if self.finished:
             pacer.drop_steps("the scenario has come to its end")
+
+    def _ends_here(self) -> bool:
+        """Whether the run has ended, a recorded one by the last of its commands."""
+        self._engine.take_repeats()
+        return self._has_ended()
 
     def _advance(self, end_step: int, until: Callable[[], bool] | None) -> None:
         fleet = self._engine.fleet

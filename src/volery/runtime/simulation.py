@@ -28,17 +28,20 @@ from volery.graph.session import Gateway
 from volery.runtime.assembly import assemble
 from volery.runtime.building import place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
+from volery.runtime.command_log import CommandLog
 from volery.runtime.crew import Crew
 from volery.runtime.geometry import Geometry, WorldTopic
 from volery.runtime.graph_building import all_down, plan_faults
 from volery.runtime.grid_world import GridWorld
 from volery.runtime.keeping import Keeper
 from volery.runtime.lock_step import open_lock_step
+from volery.runtime.origin import tell_origin
 from volery.runtime.outlet import Outlet
 from volery.runtime.pilots import Pilots
 from volery.runtime.placement import Start
 from volery.runtime.progress import Progress
 from volery.runtime.relocation import Relocator
+from volery.runtime.repetition import Repetition
 from volery.runtime.run_loop import RunLoop
 from volery.runtime.sensor_fitting import lidar_mounts
 from volery.runtime.services import Services, open_services
@@ -48,9 +51,9 @@ from volery.runtime.spawning import Spawner
 from volery.runtime.telling import LiveTopics
 from volery.runtime.telling.status import Told
 from volery.runtime.uav import Uav
-from volery.runtime.warm_up import compile_kernels
+from volery.runtime.warm_up import compiled_kernels
 from volery.runtime.weather_messages import WeatherTopics
-from volery.runtime.worlds import build_city, build_forest, build_scene, build_terrain
+from volery.runtime.worlds import build_world
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario, UavType
 from volery.scenario.shelf import Shelf
@@ -60,6 +63,7 @@ from volery.world.things import MovingThings
 from volery.world.weather import Weather
 
 if TYPE_CHECKING:
+    from volery.bridges.logs.flights import RecordedFlight
     from volery.bridges.logs.replay import Replay
 
 _CLOCK_PERIOD_S = 0.01
@@ -90,12 +94,9 @@ class Simulation:
     ) -> None:
         if threads < 1:
             raise ScenarioError(f"threads must be at least 1 (found {threads})")
-        compile_kernels()
         self.scenario = scenario
-        self.terrain = build_terrain(scenario)
-        self.city = build_city(scenario, self.terrain)
-        self.forest = build_forest(scenario, self.terrain, self.city)
-        self.scene = build_scene(scenario, self.terrain, self.forest, self.city, threads=threads)
+        with compiled_kernels():
+            self.terrain, self.city, self.forest, self.scene = build_world(scenario, threads)
         self._geometry: Geometry | None = None
         self._closed = False
         self._pacer = Pacer()
@@ -118,6 +119,11 @@ class Simulation:
             crash_on_contact=scenario.physics.on_contact == "crash",
             estimation=parts.estimation,
         )
+        self.commands = CommandLog(self.graph, self._engine)
+        """What clients do, told on `/volery/log`."""
+        self.gateway.watch = self.commands.watch
+        self._repetition: Repetition | None = None
+        tell_origin(self.graph, scenario)
         self.grid_world = GridWorld(scenario, self._engine)
         """The grid map whose blocks stand in the world, and how it is changed."""
         self._world_topic = WorldTopic(self.graph, lambda: self.geometry)
@@ -312,6 +318,19 @@ class Simulation:
     def replaying(self) -> bool:
         """Whether a recorded log is speaking into the graph."""
         return any(replay.info.running for replay in self._replays)
+
+    def repeat(self, flight: RecordedFlight) -> None:
+        """Take the commands of a recorded flight again, each at its moment; see `repetition`.
+
+        `run` ends where that flight did. `CommandError` where the simulation has begun.
+        """
+        self._check_open()
+        if self._engine.moment > (0, 0):
+            raise CommandError("a flight is repeated from its start; make a new simulation")
+        self._repetition = self._engine.repeats = Repetition(
+            flight, self.gateway, self._engine, self._pacer, self.commands
+        )
+        self.commands.repeats = True
 
     def take_in(self) -> None:
         """Do what other threads have posted, and hand out what that published, without a step.
@@ -582,5 +601,10 @@ class Simulation:
         return self.uav_names.index(name)
 
     def _has_ended(self) -> bool:
-        """Whether every UAV has flown and is down for good, where the scenario ends with that."""
+        """Whether every UAV has flown and is down for good, where the scenario ends with that.
+
+        Or whether a flight that is repeated ended here.
+        """
+        if self._repetition is not None and self._repetition.over:
+            return True
         return self.scenario.ends_when == "all_landed" and all_down(self.uavs, self.outlet.events)

@@ -20,15 +20,11 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from volery.autonomy.ground_plane import GroundPlane
-from volery.autonomy.obstacle_memory import ObstacleMemory
-from volery.autonomy.scan_points import Pose, ScanProjector
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.clock import Schedule
 from volery.core.compiled import cache_dir
 from volery.core.geodesy import LocalFrame
-from volery.graph.zero import zero_message
 from volery.sensors.gnss import GnssBank, load_gnss_model
 from volery.sensors.imu import ImuBank, load_imu_model
 from volery.sensors.joints import JointBank
@@ -48,6 +44,14 @@ from volery.world.terrain import Terrain
 from volery.world.weather import Particles, Weather
 
 _IS_HELPER = "VOLERY_COMPILES_SENSORS"
+_HELPER = """
+import sys
+sys.modules["scipy"] = None
+from volery.runtime import warm_up
+warm_up.compile_sensors()
+"""
+"""What the helper runs. Where scipy is installed, numba imports its linear algebra, a third of a
+second, for products of matrices: no sensor's kernel has one."""
 
 
 def kernels_are_compiled() -> bool:
@@ -55,12 +59,17 @@ def kernels_are_compiled() -> bool:
     return (cache_dir() / "complete").exists()
 
 
-def compile_kernels() -> None:
-    """Compile what the cache lacks; returns at once where it is complete."""
+@contextmanager
+def compiled_kernels() -> Iterator[None]:
+    """Compile what the cache lacks, if anything; the helper goes on while the body runs.
+
+    All is compiled at its end. It should not measure: sensors' kernels would compile twice.
+    """
     if kernels_are_compiled() or os.environ.get(_IS_HELPER):
+        yield
         return
     helper = subprocess.Popen(
-        [sys.executable, "-c", "from volery.runtime import warm_up; warm_up.compile_sensors()"],
+        [sys.executable, "-c", _HELPER],
         env={**os.environ, _IS_HELPER: "1"},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
@@ -69,6 +78,7 @@ def compile_kernels() -> None:
     try:
         compile_dynamics()
         compile_guidance()
+        yield
         # A helper that failed costs time, nothing else: the kernels compile when they are called.
         if helper.wait() == 0:
             (cache_dir() / "complete").touch()
@@ -85,6 +95,11 @@ def compile_dynamics() -> None:
 
 def compile_guidance() -> None:
     """Compile what places UAVs on the ground and lets them follow gaps."""
+    from volery.autonomy.ground_plane import GroundPlane
+    from volery.autonomy.obstacle_memory import ObstacleMemory
+    from volery.autonomy.scan_points import Pose, ScanProjector
+    from volery.graph.zero import zero_message
+
     origin, level = np.zeros(3), np.array(rotations.IDENTITY)
     pose = Pose(0, origin, level, origin, origin)
     scan = zero_message("sensor_msgs/msg/LaserScan")
@@ -172,5 +187,6 @@ def _fleet(plant: Plant | None = None) -> Fleet:
 
 
 if __name__ == "__main__":
-    compile_kernels()
+    with compiled_kernels():
+        pass
     compile_the_rest()

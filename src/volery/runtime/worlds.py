@@ -166,6 +166,16 @@ def build_scene(
     return scene
 
 
+def build_world(
+    scenario: Scenario, threads: int
+) -> tuple[Terrain, City | None, Forest | None, Scene]:
+    """Everything that stands in the world of a scenario, and the scene that holds it."""
+    terrain = build_terrain(scenario)
+    city = build_city(scenario, terrain)
+    forest = build_forest(scenario, terrain, city)
+    return terrain, city, forest, build_scene(scenario, terrain, forest, city, threads=threads)
+
+
 def build_weather(scenario: Scenario) -> Weather:
     """Air of the scenario. Raises `DataFileError` where its wind field cannot be read."""
     wind = scenario.world.wind

@@ -31,7 +31,7 @@ class Shelf:
             return ()
         found = (path.parent.name for path in self.folder.glob(f"*/{self.FILE}"))
         shipped = set(library.names())
-        return tuple(sorted(name for name in found if name not in shipped))
+        return tuple(sorted(n for n in found if n not in shipped and not n.startswith(".")))
 
     def load(self, name: str) -> Scenario:
         """A scenario by its name. `ScenarioError` where there is none, or it is broken."""

@@ -14,6 +14,7 @@ from volery.core.errors import BridgeError
 from volery.runtime.pilots import MOST_CHARACTERS, Pilots
 from volery.runtime.services.piloting import HAND_OVER, RELEASE, TAKE
 from volery.server.crew_list import CrewList
+from volery.server.read_only import READ_ONLY_SERVICES
 
 _LOOKING = {"subscribe", "unsubscribe", "set_level", "status", "auth"}
 """Operations that change nothing for others."""
@@ -22,54 +23,6 @@ _DEEPEST = 8
 _TOLD_AGAIN_S = 1.0
 """How often the sender of a stream of commands learns that it is refused."""
 _MOST_TOLD = 1000
-READ_ONLY_SERVICES = frozenset(
-    {
-        *(
-            f"/rosapi/{name}"
-            for name in (
-                "topics",
-                "topics_for_type",
-                "topic_type",
-                "topics_and_raw_types",
-                "services",
-                "services_for_type",
-                "service_type",
-                "service_providers",
-                "service_node",
-                "nodes",
-                "node_details",
-                "publishers",
-                "subscribers",
-                "message_details",
-                "service_request_details",
-                "service_response_details",
-                "get_param",
-                "has_param",
-                "get_param_names",
-                "get_time",
-                "get_ros_version",
-                "action_servers",
-                "interfaces",
-            )
-        ),
-        "/get_available_worlds",
-        "/get_current_world",
-        "/get_entities",
-        "/get_entities_states",
-        "/get_entity_bounds",
-        "/get_entity_info",
-        "/get_entity_state",
-        "/get_named_pose_bounds",
-        "/get_named_poses",
-        "/get_simulation_state",
-        "/get_simulator_features",
-        "/get_spawnables",
-        "/volery/get_grid_map",
-        "/volery/get_weather",
-        "/volery/list_snapshots",
-    }
-)
-"""Services that change nothing; a new one joins this list, or is for pilots."""
 
 
 class ViewerGate:

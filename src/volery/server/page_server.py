@@ -21,19 +21,19 @@ import uvicorn
 from volery.bridges.origins import LOOPBACK, Origins
 from volery.bridges.rosbridge.wire import MOST_MESSAGE_BYTES
 from volery.core.errors import BridgeError
-from volery.runtime.lobby import Lobby
-from volery.runtime.simulation import Simulation
+from volery.scenario.schema import Scenario
 from volery.scenario.shelf import Shelf
 from volery.server.app import make_app
 from volery.server.rights import check_rights
 from volery.server.settings import PageSettings
-from volery.server.site import Site, Situation, State
+from volery.server.site import Site, Situation, State, World
 
 _SWITCH_INTERVAL_S = 0.0005
 """Python's own 5 ms would be the latency of every answer while the engine computes."""
 _KEEPALIVE_S = 20.0
 """Between two pings, and how long an answer may take."""
-_LONGEST_START_S, _LONGEST_FAREWELL_S = 30.0, 10.0
+_LONGEST_CALL_S = 30.0
+"""Of the server's own work on a busy machine; nothing in it waits for a client longer."""
 
 
 class PageServer:
@@ -98,24 +98,24 @@ class PageServer:
         )
         sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL_S))
         self._thread.start()
-        self._call(self._begin(self._server, self._socket), _LONGEST_START_S)
+        self._call(self._begin(self._server, self._socket))
 
     def building(self, scenario: str, description: str = "", message: str = "") -> None:
         """Tell that a scenario is being built; `message`: what went wrong before."""
         self._leave(Situation(State.BUILDING, scenario, description.strip(), message))
 
     @contextmanager
-    def showing(self, world: Simulation | Lobby, message: str = "") -> Iterator[None]:
+    def showing(self, world: World, message: str = "") -> Iterator[None]:
         """Let clients into a world, and send them out of it at the end.
 
         message: what went wrong before, such as that another world could not be built.
         """
-        if isinstance(world, Simulation):
-            scenario = world.scenario
-            told = Situation(State.FLYING, scenario.name, scenario.description.strip(), message)
-        else:
+        scenario: Scenario | None = getattr(world, "scenario", None)
+        if scenario is None:
             told = Situation(State.FAILED if message else State.LOBBY, message=message)
-        self._call(self._site.join(world, told), _LONGEST_FAREWELL_S)
+        else:
+            told = Situation(State.FLYING, scenario.name, scenario.description.strip(), message)
+        self._call(self._site.join(world, told))
         try:
             yield
         finally:
@@ -124,19 +124,25 @@ class PageServer:
     def stop(self) -> None:
         """Let everybody go and end the thread; a second time nothing happens."""
         if not self._thread.is_alive():
+            if self._socket is not None:
+                self._socket.close()
             self._loop.close()
             return
         self._leave(Situation(State.LOBBY, message="the server ends"))
         if self._server is not None:
             self._server.should_exit = True
-        self._call(self._end(), _LONGEST_FAREWELL_S)
+        self._call(self._end())
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
 
     def __enter__(self) -> PageServer:
         """Start it."""
-        self.start()
+        try:
+            self.start()
+        except BaseException:
+            self.stop()
+            raise
         return self
 
     def __exit__(self, *_exception: object) -> None:
@@ -168,10 +174,10 @@ class PageServer:
             await asyncio.gather(self._serving, return_exceptions=True)
 
     def _leave(self, situation: Situation) -> None:
-        self._call(self._site.leave(situation), _LONGEST_FAREWELL_S)
+        self._call(self._site.leave(situation))
 
-    def _call(self, work: Coroutine[Any, Any, Any], timeout_s: float) -> None:
-        asyncio.run_coroutine_threadsafe(work, self._loop).result(timeout_s)
+    def _call(self, work: Coroutine[Any, Any, Any]) -> None:
+        asyncio.run_coroutine_threadsafe(work, self._loop).result(_LONGEST_CALL_S)
 
 
 def _listen(host: str, port: int) -> socket.socket:

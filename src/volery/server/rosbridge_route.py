@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from starlette.types import Message
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -59,21 +61,28 @@ async def serve_rosbridge(websocket: WebSocket) -> None:
     if len(site.clients) >= MOST_CLIENTS:
         await websocket.close(_TRY_AGAIN_LATER, "too many clients")
         return
-    address = websocket.client
+    world, address = site.world, websocket.client
     name = f"page {address.host}:{address.port}" if address else "page"
-    if websocket.state.role is Role.VIEWER or site.world.simulation is None:
-        gate = ViewerGate() if websocket.state.role is Role.VIEWER else None
-        await _serve(site, site.world, _Channel(websocket), name, gate)
+    with _gate_of(websocket, site, world) as gate:
+        await _serve(site, world, _Channel(websocket), name, gate)
+
+
+@contextmanager
+def _gate_of(websocket: WebSocket, site: Site, world: JoinedWorld) -> Iterator[Gate | None]:
+    """What the client may do, as long as it is there; a pilot who leaves lets go of his UAVs."""
+    if websocket.state.role is not Role.PILOT:
+        yield ViewerGate()
         return
-    pilots = site.world.simulation.pilots
-    pilot = site.crew.sign_in(websocket.query_params.get("pilot", ""))
-    pilot_gate = PilotGate(pilot, site.crew, pilots)
-    world = site.world
+    pilots = world.pilots
+    if pilots is None:
+        yield None
+        return
+    gate = PilotGate(site.crew.sign_in(websocket.query_params.get("pilot", "")), site.crew, pilots)
     try:
-        await _serve(site, world, _Channel(websocket), name, pilot_gate)
+        yield gate
     finally:
-        site.crew.sign_out(pilot_gate.name)
-        world.gateway.post(lambda: pilots.leave(pilot_gate.name))
+        site.crew.sign_out(gate.name)
+        world.gateway.post(lambda: pilots.leave(gate.name))
 
 
 async def _serve(

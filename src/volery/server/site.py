@@ -10,14 +10,17 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
+from typing import Protocol
 
 from volery.bridges.rosbridge.conversation import SERVICE_RESTART, Channel
 from volery.bridges.rosbridge.forms import Forms
 from volery.bridges.rosbridge.protocol import Shared
 from volery.bridges.rosbridge.rosapi import RosApi
+from volery.graph.graph import Graph
 from volery.graph.session import Gateway
-from volery.runtime.lobby import Lobby
-from volery.runtime.simulation import Simulation
+from volery.runtime.geometry import Geometry
+from volery.runtime.pilots import Pilots
+from volery.scenario.schema import Scenario
 from volery.scenario.shelf import Shelf
 from volery.server.crew_list import CrewList
 
@@ -46,16 +49,37 @@ class Situation:
     """What went wrong, if something did."""
 
 
-class JoinedWorld:
-    """A simulation, or a lobby, that clients join: what their conversations have in common."""
+class World(Protocol):
+    """What clients can join: a simulation, a lobby, a recording.
 
-    def __init__(self, world: Simulation | Lobby) -> None:
+    Where it has a `scenario`, `geometry` and `pilots`, as a `Simulation` has, they are served too.
+    """
+
+    graph: Graph
+    gateway: Gateway
+
+    def be_prompt(self) -> None:
+        """Answer clients soon."""
+
+
+class JoinedWorld:
+    """A world that clients have joined: what their conversations have in common."""
+
+    def __init__(self, world: World) -> None:
         graph = world.graph
-        self.gateway: Gateway = world.gateway
-        self.simulation = world if isinstance(world, Simulation) else None
+        self.gateway = world.gateway
+        self.scenario: Scenario | None = getattr(world, "scenario", None)
+        self.pilots: Pilots | None = getattr(world, "pilots", None)
         self.shared = Shared(Forms("ros2"), graph.now_ns)
+        self._world = world
         self._rosapi = RosApi(world.gateway, "ros2", graph.now_ns)
         self._rosapi.start()
+
+    @property
+    def geometry(self) -> Geometry | None:
+        """What stands there at present; None: nothing that could be shown."""
+        geometry: Geometry | None = getattr(self._world, "geometry", None)
+        return geometry
 
     def leave(self) -> None:
         """Take back what is offered to clients."""
@@ -91,7 +115,7 @@ class Site:
     clients: set[Client] = field(default_factory=set)
     crew: CrewList = field(default_factory=CrewList)
 
-    async def join(self, world: Simulation | Lobby, situation: Situation) -> None:
+    async def join(self, world: World, situation: Situation) -> None:
         """Let clients into a world."""
         self.world, self.situation = JoinedWorld(world), situation
 

@@ -25,12 +25,12 @@ def _told(site: Site, role: Role | None) -> dict[str, Any]:
         nothing = {"state": None, "scenario": None, "description": "", "message": "", "world": None}
         return nothing | told
     now, world = site.situation, site.world
-    simulation = None if world is None else world.simulation
+    geometry = None if world is None else world.geometry
     return {
         "state": now.state,
         "scenario": now.scenario,
         "description": now.description,
         "message": now.message,
-        "world": None if simulation is None else simulation.geometry.id,
+        "world": None if geometry is None else geometry.id,
         **told,
     }

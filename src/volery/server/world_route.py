@@ -10,6 +10,8 @@ from volery.server.site import Site
 from volery.server.world_files import WorldFiles
 from volery.world.trees.model import DetailLevel
 
+_FOR_GOOD = "private, max-age=31536000, immutable"
+"""Where the address has the id (`?world=`): another world has another address."""
 _TYPE = "model/gltf-binary"
 
 
@@ -18,16 +20,18 @@ async def world_glb(request: Request) -> Response:
     site: Site = request.app.state.site
     files: WorldFiles = request.app.state.world_files
     detail = _detail_of(request.query_params.get("detail", DetailLevel.SENSING))
-    simulation = None if site.world is None else site.world.simulation
-    if simulation is None:
+    scenario = None if site.world is None else site.world.scenario
+    geometry = None if site.world is None else site.world.geometry
+    if scenario is None or geometry is None:
         raise RefusedError(404, "no world is loaded")
-    geometry = simulation.geometry
     zips = "gzip" in request.headers.get("accept-encoding", "")
     tag = f'"{geometry.id}-{detail}{"-gz" if zips else ""}"'
-    headers = {"ETag": tag, "Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
+    named = request.query_params.get("world") == geometry.id
+    kept = _FOR_GOOD if named else "no-cache"
+    headers = {"ETag": tag, "Cache-Control": kept, "Vary": "Accept-Encoding"}
     if tag in request.headers.get("if-none-match", ""):
         return Response(None, 304, headers)
-    file = await files.get(simulation.scenario, geometry, detail)
+    file = await files.get(scenario, geometry, detail)
     if zips:
         return Response(file.zipped, 200, {**headers, "Content-Encoding": "gzip"}, _TYPE)
     return Response(file.plain, 200, headers, _TYPE)

@@ -66,9 +66,14 @@ class Mesh:
         return np.asarray(np.divide(sums, length, out=up.copy(), where=length > 0.0))
 
     @property
+    def areas(self) -> NDArray[np.float64]:
+        """Areas of the triangles (T,), one side each, m^2."""
+        return np.asarray(0.5 * np.linalg.norm(_crosses(self), axis=1))
+
+    @property
     def area(self) -> float:
-        """Sum of the triangles' areas, one side each, m^2."""
-        return float(0.5 * np.linalg.norm(_crosses(self), axis=1).sum())
+        """Sum of the triangles' areas, m^2."""
+        return float(self.areas.sum())
 
     @property
     def bounds(self) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Meshes of the user's own: glTF, OBJ and STL through trimesh, checked before anything uses them.
+"""Meshes of the user's own: glTF, OBJ and STL, checked before anything uses them.
 
 Textures are left out; the base colour of the file's largest part is kept. All parts become one mesh
 in the file's units, z up.
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
 from volery.core.frames import enu_from_gltf
+from volery.world.gltf_reading import Part, read_gltf
 from volery.world.mesh import Mesh
 
 MOST_BYTES = 128_000_000
@@ -28,6 +29,8 @@ FARTHEST_M = 100_000.0
 _LARGEST = 1e15
 """Of a coordinate in a file's own units; products of three of them fit 64-bit numbers well."""
 FORMATS = (".glb", ".gltf", ".obj", ".stl")
+_GLTF = (".glb", ".gltf")
+_MOST_MATERIAL_BYTES = 4_000_000
 _GREY = (0.5, 0.5, 0.5)
 
 
@@ -58,46 +61,58 @@ def read_mesh(path: str | Path, *, up: Literal["y", "z"] | None = None) -> MeshF
         raise DataFileError(
             f"{path} has {size / 1e6:.0f} MB; at most {MOST_BYTES / 1e6:.0f} MB are read"
         )
-    parts = _load(path)
-    count = sum(len(part.faces) for part in parts)
+    parts = _load(path, kind)
+    count = sum(len(part.triangles) for part in parts)
     if not count:
         raise DataFileError(f"{path} has no triangle")
-    is_y_up = (up or ("y" if kind in (".glb", ".gltf") else "z")) == "y"
+    is_y_up = (up or ("y" if kind in _GLTF else "z")) == "y"
     points, triangles = _joined(path, parts)
     mesh = Mesh((enu_from_gltf(points) if is_y_up else points).astype(np.float32), triangles)
     flat = ~(mesh.face_normals != 0.0).any(axis=1)
     if flat.all():
         raise DataFileError(f"{path}: none of its {count} triangles has an area")
-    largest = max(parts, key=lambda part: float(part.area))
-    return MeshFile(Mesh(mesh.vertices, mesh.triangles[~flat]), _colour(largest), int(flat.sum()))
+    colour = _colour_of_largest(mesh, parts)
+    return MeshFile(Mesh(mesh.vertices, mesh.triangles[~flat]), colour, int(flat.sum()))
 
 
-def _load(path: Path) -> list[Any]:
-    """The file's meshes in its world frame."""
-    import trimesh
-
+def _load(path: Path, kind: str) -> list[Part]:
+    """The file's parts in its own axes."""
     try:
+        if kind in _GLTF:
+            with np.errstate(all="ignore"):
+                return read_gltf(path, MOST_BYTES, MOST_TRIANGLES)
         with _quiet():
-            scene = trimesh.load_scene(path, process=False)
-            # counted before parts that stand many times are copied
-            drawn = (scene.graph[node][1] for node in scene.graph.nodes_geometry)
-            count = sum(len(getattr(scene.geometry[name], "faces", ())) for name in drawn)
-            if count > MOST_TRIANGLES:
-                raise DataFileError(
-                    f"{path} has {count:,} triangles; at most {MOST_TRIANGLES:,} are read"
-                )
-            return [part for part in scene.dump() if isinstance(part, trimesh.Trimesh)]
-    except DataFileError:
-        raise
+            return _read_other(path)
     except Exception as error:  # the parsers raise whatever a broken file makes them stumble over
         told = " ".join(str(error).split())[:200] or type(error).__name__
-        raise DataFileError(f"{path} is no sound {path.suffix[1:]} file: {told}") from None
+        raise DataFileError(f"{path} cannot be read as a mesh: {told}") from None
+
+
+def _read_other(path: Path) -> list[Part]:
+    """OBJ and STL, by trimesh."""
+    import trimesh
+
+    materials: Any = _Materials(path.parent)
+    scene = trimesh.load_scene(path, process=False, resolver=materials)
+    meshes = [part for part in scene.geometry.values() if isinstance(part, trimesh.Trimesh)]
+    count = sum(len(part.faces) for part in meshes)
+    if count > MOST_TRIANGLES:
+        raise ValueError(f"it has {count:,} triangles; at most {MOST_TRIANGLES:,} are read")
+    return [
+        Part(
+            np.asarray(part.vertices, dtype=np.float64),
+            np.asarray(part.faces, dtype=np.int64),
+            _colour_of(part),
+        )
+        for part in meshes
+        if len(part.faces)
+    ]
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Without trimesh's log: what matters comes as an error."""
-    log = logging.getLogger("trimesh")
+    log = logging.getLogger("trimesh.util")
     was_off, log.disabled = log.disabled, True
     try:
         with np.errstate(all="ignore"):
@@ -106,20 +121,39 @@ def _quiet() -> Iterator[None]:
         log.disabled = was_off
 
 
-def _joined(path: Path, parts: list[Any]) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
+class _Materials:
+    """What an OBJ file may read besides itself: material files next to it, no pictures."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __getitem__(self, name: str) -> bytes:
+        return self.get(name)
+
+    def get(self, name: str) -> bytes:
+        """Content of a material file; `OSError` for any other."""
+        path = (self._folder / name).resolve()
+        is_material = path.suffix.lower() == ".mtl" and path.is_file()
+        if not (is_material and path.is_relative_to(self._folder.resolve())):
+            raise FileNotFoundError(name)
+        if path.stat().st_size > _MOST_MATERIAL_BYTES:
+            raise OSError(f"{name} is too large")
+        return path.read_bytes()
+
+
+def _joined(path: Path, parts: list[Part]) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
     """All parts' vertices and triangles, checked."""
-    points, triangles, first = [], [], 0
-    for part in parts:
-        corners = np.asarray(part.vertices, dtype=np.float64).reshape(-1, 3)
-        faces = np.asarray(part.faces, dtype=np.int64).reshape(-1, 3)
-        if len(faces) and (faces.min() < 0 or faces.max() >= len(corners)):
+    triangles, first = [], 0
+    for points, own, _ in parts:
+        if points.shape[1:] != (3,) or own.shape[1:] != (3,):
+            raise DataFileError(f"{path}: corners or triangles do not have three numbers each")
+        if len(own) and (own.min() < 0 or own.max() >= len(points)):
             raise DataFileError(
-                f"{path}: a triangle names vertex {faces.max()}; there are {len(corners)}"
+                f"{path}: a triangle names vertex {own.max()}; there are {len(points)}"
             )
-        points.append(corners)
-        triangles.append(faces + first)
-        first += len(corners)
-    corners = np.concatenate(points)
+        triangles.append(own + first)
+        first += len(points)
+    corners = np.concatenate([part.points for part in parts])
     wrong = np.flatnonzero(~(np.abs(corners) < _LARGEST).all(axis=1))
     if len(wrong):
         raise DataFileError(
@@ -129,26 +163,20 @@ def _joined(path: Path, parts: list[Any]) -> tuple[NDArray[np.float64], NDArray[
     return corners, np.concatenate(triangles).astype(np.uint32)
 
 
-def _colour(part: Any) -> tuple[float, float, float]:
-    """Base colour of a part; glTF's is linear already, others are coded as sRGB."""
-    material = getattr(part.visual, "material", None)
-    factor = getattr(material, "baseColorFactor", None)
-    try:
-        if factor is not None:
-            rgb = np.asarray(factor, dtype=np.float64)[:3]
-            rgb = rgb / 255.0 if np.asarray(factor).dtype.kind in "iu" else rgb
-            return _checked(rgb)
-        main = getattr(material, "main_color", None)
-        if main is None:
-            return _GREY
-        coded = np.asarray(main, dtype=np.float64)[:3] / 255.0
-        return _checked(np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4))
-    except (TypeError, ValueError):
+def _colour_of_largest(mesh: Mesh, parts: list[Part]) -> tuple[float, float, float]:
+    """Colour of the part with the largest area; grey where the file tells none."""
+    owner = np.repeat(np.arange(len(parts)), [len(part.triangles) for part in parts])
+    largest = parts[int(np.argmax(np.bincount(owner, mesh.areas)))].colour
+    if largest is None or largest.shape != (3,) or not np.isfinite(largest).all():
         return _GREY
-
-
-def _checked(rgb: NDArray[np.float64]) -> tuple[float, float, float]:
-    if rgb.shape != (3,) or not np.isfinite(rgb).all():
-        return _GREY
-    r, g, b = rgb.clip(0.0, 1.0).tolist()
+    r, g, b = largest.clip(0.0, 1.0).tolist()
     return r, g, b
+
+
+def _colour_of(part: Any) -> NDArray[np.float64] | None:
+    """Linear diffuse colour of a material of trimesh, which codes it as sRGB."""
+    main = getattr(getattr(part.visual, "material", None), "main_color", None)
+    if main is None:
+        return None
+    coded = np.asarray(main, dtype=np.float64)[:3] / 255.0
+    return np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)

@@ -29,6 +29,7 @@ class FakeSimulation:
         self.threads = threads
         self.time_ns = 0
         self.graph = Graph(lambda: self.time_ns)
+        self.commands = SimpleNamespace(end=lambda: None)
         self.uav_names = tuple(f"uav{k + 1}" for k in range(scenario.uav_count))
         self.mounts = {SCAN: make_mount((0.0, 0.0, 0.1))}
         self.cloud_mounts = {}

@@ -27,7 +27,8 @@ def forest(seed=1):
 
 
 def solid(shift=0.0, **changes):
-    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]) + (shift, 0, 0)
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    corners[:, 0] += shift
     mesh = Mesh(corners.astype(np.float32), np.array([[0, 2, 1], [0, 1, 3]], np.uint32))
     return replace(Solid(mesh, Material.WALL, "wall"), **changes)
 

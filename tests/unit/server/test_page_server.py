@@ -14,6 +14,7 @@ from websockets.exceptions import ConnectionClosed
 from volery.core.errors import BridgeError
 from volery.runtime.lobby import Lobby
 from volery.server.page_server import PageServer
+from volery.server.read_only import READ_ONLY_SERVICES
 from volery.server.settings import PageSettings
 
 
@@ -61,6 +62,13 @@ def test_clients_take_part_in_the_graph(server):
         values, success = client.call("/rosapi/services")
         assert success
         assert "/volery/take_control" in values["services"]
+
+
+def test_services_that_change_nothing_are_there(server, flight):
+    with Client(server) as client:
+        offered = set(client.call("/rosapi/services")[0]["services"])
+    elsewhere = {"/volery/get_grid_map"}
+    assert READ_ONLY_SERVICES - elsewhere <= offered
 
 
 def test_who_comes_learns_which_world_it_is(server, flight):
@@ -140,6 +148,11 @@ def test_the_world_is_fetched_once(server, flight):
         again = ask(server, "/api/world.glb", If_None_Match=answer.headers["ETag"], **how)
         assert (again.status, again.body) == (304, b"")
     assert ask(server, "/api/world.glb", If_None_Match='"other"').status == 200
+    assert plain.headers["Cache-Control"] == "no-cache"
+    named = ask(server, f"/api/world.glb?world={flight.simulation.geometry.id}")
+    assert "immutable" in named.headers["Cache-Control"]
+    other = ask(server, "/api/world.glb?world=other")
+    assert other.headers["Cache-Control"] == "no-cache"
     assert ask(server, "/api/world.glb?detail=finest").status == 400
     assert ask(server, "/api/world.glb?detail=coarse").status == 200
 

@@ -56,6 +56,8 @@ def test_uploaded_scenarios_stand_behind_and_broken_ones_not_at_all(tmp_path):
         (tmp_path / name / "scenario.toml").write_text(text)
     (tmp_path / "hover").mkdir()
     (tmp_path / "hover" / "scenario.toml").write_text("name = 4")  # cannot hide the one that ships
+    (tmp_path / ".upload_x").mkdir()
+    (tmp_path / ".upload_x" / "scenario.toml").write_text(hover)  # is being checked
     shelf = Shelf(tmp_path)
     assert shelf.added() == ("broken", "mine")
     last = cards_of(shelf)[-1]

@@ -5,6 +5,7 @@ import struct
 
 import numpy as np
 import pytest
+import trimesh
 from scene_samples import cylinder
 
 from volery.core.frames import gltf_from_enu
@@ -12,6 +13,7 @@ from volery.sensors.cameras.light import base_colours
 from volery.world.forest import procedural_forest
 from volery.world.gltf import glb_of, instanced_glb_of
 from volery.world.materials import Material
+from volery.world.mesh import Mesh
 from volery.world.scene import Look, Solid
 from volery.world.terrain import Terrain
 
@@ -62,11 +64,13 @@ def world():
         terrain=terrain,
         seed=2,
     )
+    block = trimesh.creation.box((8.0, 6.0, 9.0))
+    house = Mesh(np.asarray(block.vertices, np.float32), np.asarray(block.faces, np.uint32))
     solids = (
         Solid(cylinder(3.0, 12.0, 8, 5.0, -4.0), Material.PAINTED, "a", look=Look((0.8, 0.1, 0.2))),
         Solid(cylinder(2.0, 6.0, 8, -5.0, 9.0), Material.PAINTED, "b", look=Look((0.1, 0.4, 1.0))),
         Solid(
-            cylinder(4.0, 9.0, 8, 15.0, 9.0),
+            house,
             Material.FACADE,
             "house",
             top=Material.ROOF,

@@ -114,21 +114,21 @@ def ascii_stl(corner):
     ("name", "content", "message"),
     [
         ("a.ply", b"ply", "meshes are read from"),
-        ("a.stl", b"", "is no sound stl file|no triangle"),
+        ("a.stl", b"", "cannot be read|no triangle"),
         ("a.stl", ascii_stl("nan"), "vertices are not finite numbers"),
         ("a.stl", ascii_stl("1e300"), "vertices are not finite numbers below 1e"),
         ("a.stl", ascii_stl("0"), "has an area"),
         (
             "a.stl",
             bytes(80) + struct.pack("<I", 4_000_000_000) + bytes(50),
-            "no sound stl file|no triangle",
+            "cannot be read|no triangle",
         ),
-        ("a.obj", b"v 0 0 0\nv 1 0 0\n", "no triangle|no sound obj"),
-        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "no sound obj|names vertex"),
-        ("a.obj", b"\xff\xfe\x00\x01" * 50, "no sound obj|no triangle"),
-        ("a.glb", b"glTF" + bytes(4), "no sound glb file"),
-        ("a.gltf", b'{"asset": {"version": "2.0"}}', "no triangle|no sound gltf"),
-        ("a.gltf", b"{", "no sound gltf file"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\n", "no triangle|cannot be read"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot be read|names vertex"),
+        ("a.obj", b"\xff\xfe\x00\x01" * 50, "cannot be read|no triangle"),
+        ("a.glb", b"glTF" + bytes(4), "cannot be read"),
+        ("a.gltf", b'{"asset": {"version": "2.0"}}', "no triangle|cannot be read"),
+        ("a.gltf", b"{", "cannot be read"),
     ],
 )
 def test_broken_files_are_one_clear_error(tmp_path, name, content, message):
@@ -157,7 +157,7 @@ def test_a_small_file_that_draws_millions_of_triangles(tmp_path, box_file, monke
     content["nodes"] = [{"mesh": mesh, "name": f"n{k}"} for k in range(100)]
     content["scenes"] = [{"nodes": list(range(100))}]
     (tmp_path / "many.gltf").write_text(json.dumps(content))
-    with pytest.raises(DataFileError, match="1,200 triangles; at most 1,000"):
+    with pytest.raises(DataFileError, match="more than 1,000 triangles"):
         read_mesh(tmp_path / "many.gltf")
 
 

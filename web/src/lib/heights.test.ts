@@ -2,10 +2,7 @@ import { describe, expect, it } from "vitest";
 import { heightIn, heightsOf, meetGround } from "./heights.ts";
 
 /** A slope of 1 in 10 towards the east over 100 m x 50 m, as two triangles. */
-const SLOPE = new Float32Array([
-  ...[0, 0, 0, 100, 0, 10, 100, 50, 10],
-  ...[0, 0, 0, 100, 50, 10, 0, 50, 0],
-]);
+const SLOPE = new Float32Array([0, 0, 0, 100, 0, 10, 100, 50, 10, 0, 0, 0, 100, 50, 10, 0, 50, 0]);
 
 describe("heights", () => {
   const slope = heightsOf(SLOPE, 100)!;

@@ -7,6 +7,7 @@ export * from "./commands/environment.ts";
 export * from "./commands/faults.ts";
 export * from "./commands/flight.ts";
 export * from "./commands/graph.ts";
+export * from "./commands/pilots.ts";
 export * from "./commands/recordings.ts";
 export * from "./commands/scenarios.ts";
 export * from "./commands/simulation.ts";

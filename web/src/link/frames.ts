@@ -49,6 +49,11 @@ export class Frames {
     return this.rows.get(name) ?? -1;
   }
 
+  /** Names of all frames, moving ones and those that hang on them. */
+  frameNames(): string[] {
+    return [...this.names, ...[...this.fixed.keys()].filter((name) => !this.rows.has(name))];
+  }
+
   /** Newest pose of any frame in the map; null where it is not known. */
   pose(name: string): Pose | null {
     return this.climb(name, 0);

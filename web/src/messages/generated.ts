@@ -1642,12 +1642,37 @@ export interface visualization_msgs_UVCoordinate {
   v: number;
 }
 
+export interface volery_interfaces_CommandRecord {
+  stamp: builtin_interfaces_Time;
+  number: number | bigint;
+  step: number | bigint;
+  turn: number;
+  client: string;
+  kind: string;
+  name: string;
+  type: string;
+  content: string;
+  cdr: Uint8Array | string;
+  follows: boolean;
+  latched: boolean;
+  request: number | bigint;
+}
+
 export interface volery_interfaces_Gust {
   amplitude: geometry_msgs_Vector3;
   start: number;
   rise: number;
   end: number;
   front: geometry_msgs_Vector3;
+}
+
+export interface volery_interfaces_PlayerState {
+  position: number;
+  start: number;
+  end: number;
+  state: number;
+  speed: number;
+  loop: boolean;
 }
 
 export interface volery_interfaces_SearchState {
@@ -1847,12 +1872,45 @@ export interface volery_interfaces_LoadScenario_Response {
   message: string;
 }
 
+export type volery_interfaces_PlayerInfo_Request = Record<string, never>;
+
+export interface volery_interfaces_PlayerInfo_Response {
+  success: boolean;
+  message: string;
+  file: string;
+  format: string;
+  size: number | bigint;
+  start: number;
+  end: number;
+  position: number;
+  state: number;
+  speed: number;
+  loop: boolean;
+  topics: string[];
+  types: string[];
+  counts: (number | bigint)[];
+  refused: string[];
+  reasons: string[];
+  trouble: string;
+  scenario: string;
+  seed: number | bigint;
+}
+
 export interface volery_interfaces_ReleaseControl_Request {
   uav: string;
   pilot: string;
 }
 
 export interface volery_interfaces_ReleaseControl_Response {
+  success: boolean;
+  message: string;
+}
+
+export interface volery_interfaces_Seek_Request {
+  time: number;
+}
+
+export interface volery_interfaces_Seek_Response {
   success: boolean;
   message: string;
 }
@@ -2078,7 +2136,9 @@ export interface Messages {
   "visualization_msgs/msg/MenuEntry": visualization_msgs_MenuEntry;
   "visualization_msgs/msg/MeshFile": visualization_msgs_MeshFile;
   "visualization_msgs/msg/UVCoordinate": visualization_msgs_UVCoordinate;
+  "volery_interfaces/msg/CommandRecord": volery_interfaces_CommandRecord;
   "volery_interfaces/msg/Gust": volery_interfaces_Gust;
+  "volery_interfaces/msg/PlayerState": volery_interfaces_PlayerState;
   "volery_interfaces/msg/SearchState": volery_interfaces_SearchState;
   "volery_interfaces/msg/SimulationStatus": volery_interfaces_SimulationStatus;
   "volery_interfaces/msg/VehicleState": volery_interfaces_VehicleState;
@@ -2155,7 +2215,9 @@ export interface Services {
   "volery_interfaces/srv/JoinSearch": { request: volery_interfaces_JoinSearch_Request; response: volery_interfaces_JoinSearch_Response };
   "volery_interfaces/srv/ListSnapshots": { request: volery_interfaces_ListSnapshots_Request; response: volery_interfaces_ListSnapshots_Response };
   "volery_interfaces/srv/LoadScenario": { request: volery_interfaces_LoadScenario_Request; response: volery_interfaces_LoadScenario_Response };
+  "volery_interfaces/srv/PlayerInfo": { request: volery_interfaces_PlayerInfo_Request; response: volery_interfaces_PlayerInfo_Response };
   "volery_interfaces/srv/ReleaseControl": { request: volery_interfaces_ReleaseControl_Request; response: volery_interfaces_ReleaseControl_Response };
+  "volery_interfaces/srv/Seek": { request: volery_interfaces_Seek_Request; response: volery_interfaces_Seek_Response };
   "volery_interfaces/srv/SetCommandTimeout": { request: volery_interfaces_SetCommandTimeout_Request; response: volery_interfaces_SetCommandTimeout_Response };
   "volery_interfaces/srv/SetGridMap": { request: volery_interfaces_SetGridMap_Request; response: volery_interfaces_SetGridMap_Response };
   "volery_interfaces/srv/SetSpeed": { request: volery_interfaces_SetSpeed_Request; response: volery_interfaces_SetSpeed_Response };

@@ -1,6 +1,7 @@
 import { Canvas, useFrame, useThree } from "@react-three/fiber";
 import { useEffect, useRef } from "react";
 import { NeutralToneMapping, Object3D, PCFShadowMap, type PerspectiveCamera } from "three";
+import { ViewMenu } from "../views/ViewMenu.tsx";
 import { DragHandle } from "./DragHandle.tsx";
 import { EyeProbe } from "./EyeProbe.tsx";
 import { GroundPicker } from "./GroundPicker.tsx";
@@ -12,18 +13,25 @@ Object3D.DEFAULT_UP.set(0, 0, 1);
 /** The picture: the world, what flies in it, and from where it is seen. */
 export function Scene() {
   return (
-    <Canvas
-      shadows={{ type: PCFShadowMap }}
-      camera={{ fov: 55, near: 0.05, far: 6000, position: [-9, -5, 5] }}
-      gl={{ antialias: true, powerPreference: "high-performance", toneMapping: NeutralToneMapping }}
-      tabIndex={0}
-      aria-label="Scene"
-    >
-      <Pictures />
-      <DragHandle />
-      <EyeProbe />
-      <GroundPicker />
-    </Canvas>
+    <>
+      <Canvas
+        shadows={{ type: PCFShadowMap }}
+        camera={{ fov: 55, near: 0.05, far: 6000, position: [-9, -5, 5] }}
+        gl={{
+          antialias: true,
+          powerPreference: "high-performance",
+          toneMapping: NeutralToneMapping,
+        }}
+        tabIndex={0}
+        aria-label="Scene"
+      >
+        <Pictures />
+        <DragHandle />
+        <EyeProbe />
+        <GroundPicker />
+      </Canvas>
+      <ViewMenu />
+    </>
   );
 }
 

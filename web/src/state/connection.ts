@@ -18,8 +18,11 @@ export const useConnection = create<Connection>(() => ({
   volery: true,
 }));
 
-/** Connect to what the page's address names: `?ros=ws://robot:9090`, else the own server. */
-export function connectAsAddressed(address: Location): void {
+/**
+ * Connect to what the page's address names: `?ros=ws://robot:9090`, else the own server.
+ * `pilot` is what the user wants to be called there; empty: as the server likes.
+ */
+export function connectAsAddressed(address: Location, pilot: string): void {
   const query = new URLSearchParams(address.search);
   const robot = query.get("ros");
   const own = new URL("./rosbridge", address.href);
@@ -27,6 +30,7 @@ export function connectAsAddressed(address: Location): void {
   own.search = own.hash = "";
   const token = query.get("token");
   if (token !== null) own.searchParams.set("token", token);
+  if (pilot !== "") own.searchParams.set("pilot", pilot);
   useConnection.setState({ volery: robot === null });
   link.watch(() => {
     const { state, reason, url } = link;

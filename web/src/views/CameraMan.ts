@@ -1,17 +1,19 @@
 import { Group, Quaternion, Vector3, type PerspectiveCamera } from "three";
 import { POSE } from "../link/protocol.ts";
-import { pickUav } from "../scene/stage/picking.ts";
+import { pickGround, pickUav } from "../scene/stage/picking.ts";
 import type { Moment, Part } from "../scene/stage/part.ts";
 import { shown } from "../scene/stage/shown.ts";
 import { cameraOfUav } from "../scene/sensing/cameras.ts";
 import { shapeOf } from "../scene/uavs/airframeGeometry.ts";
 import { fleet } from "../scene/uavs/fleet.ts";
 import { standing } from "../scene/world/standing.ts";
+import { givePlace, useTool } from "../state/tool.ts";
 import { select, useVehicles } from "../state/vehicles.ts";
 import { look, putCamera, useView, VIEWS, type ViewName } from "../state/view.ts";
 import { Blend } from "./Blend.ts";
 import { Chase } from "./Chase.ts";
 import { Fly } from "./Fly.ts";
+import { Mover } from "./Mover.ts";
 import { Hands, isTyping } from "./input.ts";
 import { Onboard } from "./Onboard.ts";
 import { Orbit } from "./Orbit.ts";
@@ -53,6 +55,7 @@ export class CameraMan implements Part {
   private restedS = 0;
   private unsaved = false;
   private screen = { width: 1, height: 1 };
+  private readonly mover = new Mover();
   private readonly ended = new AbortController();
 
   constructor(
@@ -70,6 +73,9 @@ export class CameraMan implements Part {
       spread: 0,
     };
     this.hands = new Hands(element, {
+      grab: (x, y) => this.mover.grab(x, y, this.camera, this.screen),
+      dragTo: (x, y) => this.mover.dragTo(x, y, this.camera, this.screen),
+      drop: () => this.mover.drop(),
       click: (x, y) => this.pick(x, y),
       doubleClick: (x, y) => {
         this.pick(x, y);
@@ -180,6 +186,11 @@ export class CameraMan implements Part {
   }
 
   private pick(x: number, y: number): void {
+    if (useTool.getState().asking !== null) {
+      const place = pickGround(x, y, this.camera, this.screen);
+      if (place !== null) givePlace({ x: place[0], y: place[1], z: place[2] });
+      return;
+    }
     const name = pickUav(x, y, this.camera, this.screen);
     if (name !== "") select(name);
   }

@@ -32,6 +32,15 @@ class LogDecoder:
     def __init__(self) -> None:
         self._types: dict[LogTopic, str | GraphError] = {}
 
+    def type_of(self, topic: LogTopic) -> str:
+        """Type of a topic's messages, learned where nobody knows it. `GraphError` as `decode`."""
+        found = self._types.get(topic)
+        if found is None:
+            found = self._types[topic] = _type_of(topic)
+        if isinstance(found, GraphError):
+            raise found
+        return found
+
     def decode(self, record: LogRecord) -> Decoded:
         """Message of a record; its arrays are read-only.
 
@@ -41,11 +50,7 @@ class LogDecoder:
             The type is unknown or not the one of that name here, or the bytes do not fit it.
 
         """
-        found = self._types.get(record.topic)
-        if found is None:
-            found = self._types[record.topic] = _type_of(record.topic)
-        if isinstance(found, GraphError):
-            raise found
+        found = self.type_of(record.topic)
         if record.topic.encoding == "ros1":
             return Decoded(found, ros1_codec().decode(record.data, found))
         return Decoded(found, decode_cdr(record.data, found))

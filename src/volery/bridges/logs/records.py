@@ -24,8 +24,8 @@ from volery.core.errors import RecordingError
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 BAG_MAGIC = b"#ROSBAG V2.0\n"
 
-_NO_INDEX = "cut off: the index at its end is missing"
-_PART_CHUNK = "cut off in the middle of a chunk"
+CUT_OFF = "cut off: the index at its end is missing"
+PART_CHUNK = "cut off in the middle of a chunk"
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,29 @@ class LogTopic:
     schema_encoding: str = ""
     digest: str = ""
     """MD5 of the definition (ROS 1)."""
+
+    @classmethod
+    def of_mcap(cls, channel: Channel, schema: Schema | None) -> LogTopic:
+        """Topic of an MCAP channel."""
+        return cls(
+            channel.topic,
+            schema.name if schema else "",
+            schema.data.decode(errors="replace") if schema else "",
+            channel.message_encoding,
+            schema.encoding if schema else "",
+        )
+
+    @classmethod
+    def of_bag(cls, head: dict[bytes, bytes], details: dict[bytes, bytes]) -> LogTopic:
+        """Topic of a bag's connection: fields of its record's header and data."""
+        return cls(
+            head[b"topic"].decode(),
+            _ros2_name(details[b"type"].decode()),
+            details[b"message_definition"].decode(errors="replace"),
+            "ros1",
+            "ros1msg",
+            details[b"md5sum"].decode(),
+        )
 
 
 class LogRecord(NamedTuple):
@@ -77,21 +100,21 @@ class LogWalk:
             file.seek(position)
             head = file.read(9)
             if len(head) < 9:
-                self.trouble = _NO_INDEX
+                self.trouble = CUT_OFF
                 return
             opcode, length = struct.unpack("<BQ", head)
             position += 9 + length
             if position > size:
-                self.trouble = _PART_CHUNK
+                self.trouble = PART_CHUNK
                 return
             if opcode in (Opcode.DATA_END, Opcode.FOOTER):
                 file.seek(size - len(MCAP_MAGIC))
                 if file.read() != MCAP_MAGIC:
-                    self.trouble = _NO_INDEX
+                    self.trouble = CUT_OFF
                 return
             if opcode in (Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
                 try:
-                    records = _mcap_records(opcode, file.read(length))
+                    records = mcap_records(opcode, file.read(length))
                 except Exception:  # whatever a decoder makes of damaged bytes
                     self.damaged_chunks += 1
                     continue
@@ -103,13 +126,7 @@ class LogWalk:
                 schemas[record.id] = record
             elif isinstance(record, Channel):
                 schema = schemas.get(record.schema_id)
-                self._topics[record.id] = LogTopic(
-                    record.topic,
-                    schema.name if schema else "",
-                    schema.data.decode(errors="replace") if schema else "",
-                    record.message_encoding,
-                    schema.encoding if schema else "",
-                )
+                self._topics[record.id] = LogTopic.of_mcap(record, schema)
             elif isinstance(record, Message) and record.channel_id in self._topics:
                 topic = self._topics[record.channel_id]
                 yield LogRecord(topic, record.log_time, record.data, record.sequence)
@@ -121,7 +138,7 @@ class LogWalk:
         while file.tell() < size:
             record = _bag_record(file, size)
             if record is None:
-                self.trouble = _PART_CHUNK
+                self.trouble = PART_CHUNK
                 return
             head, data = record
             kind = head.get(b"op")
@@ -136,7 +153,7 @@ class LogWalk:
                     continue
                 yield from messages
         if not indexed:
-            self.trouble = _NO_INDEX
+            self.trouble = CUT_OFF
 
     def _bag_messages(self, chunk: bytes) -> Iterator[LogRecord]:
         inner = io.BytesIO(chunk)
@@ -144,15 +161,7 @@ class LogWalk:
             head, data = record
             if head[b"op"] == b"\x07":
                 (number,) = struct.unpack("<I", head[b"conn"])
-                details = _bag_fields(data)
-                self._topics[number] = LogTopic(
-                    head[b"topic"].decode(),
-                    _ros2_name(details[b"type"].decode()),
-                    details[b"message_definition"].decode(errors="replace"),
-                    "ros1",
-                    "ros1msg",
-                    details[b"md5sum"].decode(),
-                )
+                self._topics[number] = LogTopic.of_bag(head, bag_fields(data))
             elif head[b"op"] == b"\x02":
                 (number,) = struct.unpack("<I", head[b"conn"])
                 seconds, nanoseconds = struct.unpack("<II", head[b"time"])
@@ -186,7 +195,8 @@ def log_format(path: Path) -> str:
     raise RecordingError(f"{path}: neither an MCAP log nor a ROS 1 bag (version 2.0)")
 
 
-def _mcap_records(opcode: int, data: bytes) -> list[Any]:
+def mcap_records(opcode: int, data: bytes) -> list[Any]:
+    """The record of an opcode, those in it where it is a chunk."""
     stream = ReadDataStream(io.BytesIO(data))
     if opcode == Opcode.CHUNK:
         return breakup_chunk(Chunk.read(stream), validate_crc=True)
@@ -211,10 +221,11 @@ def _bag_record(file: BinaryIO, size: int) -> tuple[dict[bytes, bytes], bytes] |
         if length > size - file.tell():
             return None
         parts.append(file.read(length))
-    return _bag_fields(parts[0]), parts[1]
+    return bag_fields(parts[0]), parts[1]
 
 
-def _bag_fields(data: bytes) -> dict[bytes, bytes]:
+def bag_fields(data: bytes) -> dict[bytes, bytes]:
+    """The fields of a record's header."""
     fields: dict[bytes, bytes] = {}
     position = 0
     while position + 4 <= len(data):

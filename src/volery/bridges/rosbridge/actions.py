@@ -25,9 +25,9 @@ from volery.bridges.rosbridge.services import Post, Send
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.actions import Goal, GoalStatus
-from volery.graph.graph import Graph
 from volery.graph.json_decoding import decode_plain
 from volery.graph.ros1_names import ros2_name
+from volery.graph.session import Session
 from volery.graph.zero import zero_message
 
 MOST_GOALS = 1000
@@ -62,8 +62,9 @@ class _Acting:
 class Actions:
     """The actions of one client. Its methods belong to the client's thread."""
 
-    def __init__(self, graph: Graph, forms: Forms, send: Send, post: Post) -> None:
-        self._graph = graph
+    def __init__(self, session: Session, forms: Forms, send: Send, post: Post) -> None:
+        self._session = session
+        self._graph = session.graph
         self._forms = forms
         self._send = send
         self._post = post
@@ -120,6 +121,7 @@ class Actions:
             self._post(lambda: self._tell_result(key, asked, status, result))
 
         name = absolute(asked.action)
+        self._session.tell("goal", name, asked.action_type, request)
         try:
             asked.goal = self._graph.actions.send(name, request, on_feedback, on_result)
         except Exception as error:  # whoever takes goals may break; this client shall know
@@ -145,6 +147,7 @@ class Actions:
         asked = self._asked.get(read_id(operation))
         if asked is None:
             raise BridgeError("cancel_action_goal: no open goal has this 'id'")
+        self._session.tell("cancel", absolute(asked.action), asked.action_type)
         self._graph.post(lambda: _cancel(asked))
 
     # ------------------------------------------------------------------------------------ acting

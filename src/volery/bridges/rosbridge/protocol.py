@@ -110,7 +110,7 @@ class RosbridgePeer:
         self._topics = Topics(session, wake, shared.now_ns, self._complain)
         guarded = self._poster(post)
         self._services = Services(session, shared.forms, self.send, guarded)
-        self._actions = Actions(session.graph, shared.forms, self.send, guarded)
+        self._actions = Actions(session, shared.forms, self.send, guarded)
         self._handlers: dict[str, Callable[[Operation], None]] = {
             "advertise": self._topics.advertise,
             "unadvertise": self._topics.unadvertise,

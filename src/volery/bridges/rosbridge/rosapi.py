@@ -68,7 +68,7 @@ class RosApi:
         missing = [(k, v) for k, v in table if not self._graph.has_service(PREFIX + k)]
         if not missing:
             return
-        session = self._session = self._gateway.open("rosapi")
+        session = self._session = self._gateway.open("rosapi", inside=True)
         for name, (base, answer) in missing:
             srvtype = f"rosapi_msgs/srv/{base}"
             session.offer(PREFIX + name, srvtype, self._handler(srvtype, answer))

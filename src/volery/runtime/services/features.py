@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from enum import IntEnum
 
 import numpy as np
@@ -49,9 +50,28 @@ class Feature(IntEnum):
 _ON_CONDITION = {Feature.WORLD_LOADING, Feature.WORLD_UNLOADING}
 
 
-def offer_features(graph: Graph, *, loads_worlds: bool) -> None:
+PLAYER_FEATURES = frozenset(
+    {
+        Feature.SIMULATION_STATE_GETTING,
+        Feature.SIMULATION_STATE_SETTING,
+        Feature.SIMULATION_STATE_PAUSE,
+        Feature.STEP_SIMULATION_SINGLE,
+        Feature.STEP_SIMULATION_MULTIPLE,
+        Feature.WORLD_LOADING,
+        Feature.WORLD_TAGS,
+        Feature.WORLD_UNLOADING,
+        Feature.WORLD_INFO_GETTING,
+        Feature.AVAILABLE_WORLDS,
+    }
+)
+"""What can be done with a flight that is over."""
+
+
+def offer_features(
+    graph: Graph, *, loads_worlds: bool, offered: Collection[Feature] = tuple(Feature)
+) -> None:
     """Offer `/get_simulator_features`."""
-    features = [f for f in Feature if f not in _ON_CONDITION or loads_worlds]
+    features = [f for f in Feature if f in offered and (f not in _ON_CONDITION or loads_worlds)]
     told = filled(
         "simulation_interfaces/msg/SimulatorFeatures",
         {

@@ -76,6 +76,6 @@ def open_services(
         offer_grid_maps(graph, simulation.grid_world, settings, lambda: simulation.time_ns)
     offer_piloting(graph, simulation.pilots)
     KeptStates(simulation).offer()
-    recording = Recording(graph, recordings)
+    recording = Recording(graph, recordings, simulation.commands)
     recording.offer()
     return Services(playing, recording)

@@ -9,6 +9,7 @@ from volery.bridges.logs.bag import Log, open_log
 from volery.core.errors import RecordingError
 from volery.graph.graph import Graph, Subscription
 from volery.graph.messages import Published
+from volery.runtime.command_log import CommandLog
 from volery.runtime.services.offering import Fields, offer_command
 
 _OURS = "volery_interfaces/srv"
@@ -17,8 +18,9 @@ _OURS = "volery_interfaces/srv"
 class Recording:
     """Offers `/volery/start_recording` and `/volery/stop_recording`: one log at a time."""
 
-    def __init__(self, graph: Graph, folder: Path | None) -> None:
+    def __init__(self, graph: Graph, folder: Path | None, commands: CommandLog) -> None:
         self._graph = graph
+        self._commands = commands
         self._folder = None if folder is None else Path(folder)
         self._log: Log | None = None
         self._subscription: Subscription | None = None
@@ -41,6 +43,7 @@ class Recording:
         """End a recording that is still running."""
         if self._log is not None:
             try:
+                self._commands.end()
                 self._end()
             except RecordingError:
                 return  # nobody is left to be told; whole chunks are in the file
@@ -51,6 +54,8 @@ class Recording:
         path = self._checked(request.path)
         self._failure = None
         self._log = open_log(path)
+        for earlier in self._commands.earlier():
+            self._log.write(earlier)
         self._subscription = self._graph.subscribe_all(self._write)
         return {"path": str(path)}
 

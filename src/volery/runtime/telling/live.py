@@ -19,8 +19,10 @@ class LiveTopics:
 
     def __init__(self, simulation: Simulation, engine: Engine, told: Told) -> None:
         self._graph = simulation.graph
-        self.vehicles = Vehicles(engine, simulation.uavs, simulation.gateway)
-        self._present = (tell_poses(simulation.graph, engine), self.vehicles.present)
+        vehicles = Vehicles(
+            engine, simulation.uavs, simulation.gateway, simulation.pilots.holder_of
+        )
+        self._present = (tell_poses(simulation.graph, engine), vehicles.present)
         self._status = Status(simulation, told)
         for present in self._present:
             present.begin(engine.every)

@@ -26,7 +26,6 @@ _ALL = "volery_interfaces/msg/VehicleStates"
 _PERIOD_S = 0.2
 _LEAST_S = 0.2
 _MODES = tuple(FlightMode(k).name for k in range(len(FlightMode)))
-NOBODY = ""
 NEVER_S = -1.0
 
 
@@ -42,15 +41,23 @@ class _Build:
 
 
 class Vehicles:
-    """Tells of all UAVs of an engine; `uavs` are their handles, `gateway` knows their clients."""
+    """Tells of all UAVs of an engine.
 
-    def __init__(self, engine: Engine, uavs: Mapping[str, Uav], gateway: Gateway) -> None:
+    `uavs` are their handles, `gateway` knows their clients, `holder` tells who steers a UAV.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        uavs: Mapping[str, Uav],
+        gateway: Gateway,
+        holder: Callable[[str], str],
+    ) -> None:
         self._engine = engine
         self._uavs = uavs
         self._gateway = gateway
         self._build = _build_of(engine.fleet)
-        self.holder: Callable[[str], str] = lambda _uav: NOBODY
-        """Tells who steers a UAV; see `VehicleState.holder`."""
+        self._holder = holder
         publisher = gateway.graph.advertise(TOPIC, _ALL)
         self.present = Present(publisher, self.message, self.content, _PERIOD_S, _LEAST_S)
 
@@ -74,7 +81,7 @@ class Vehicles:
             np.hstack([state.position_map, state.velocity_map]),
             rotors.astype(np.float32).tolist(),
             [self._command_age_s(name) for name in self._engine.names],
-            [self.holder(name) for name in self._engine.names],
+            [self._holder(name) for name in self._engine.names],
         )
         vehicles = Rows(len(build.airframes), lambda: _vehicles(*columns))
         return message_type(_ALL)(header(self._engine.time_ns, "map"), vehicles)
@@ -91,7 +98,7 @@ class Vehicles:
             state.velocity_map.tobytes(),
             state.battery_charge.tobytes(),
             self._gateway.commands,
-            tuple(self.holder(name) for name in engine.names),
+            tuple(self._holder(name) for name in engine.names),
         )
 
     def _command_age_s(self, name: str) -> float:

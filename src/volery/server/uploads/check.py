@@ -2,8 +2,8 @@
 
     python -m volery.server.uploads.check grid_map FOLDER/map.png yard yard.png
 
-Files of strangers are read here, with a bound on memory and without a simulation beside it that
-could suffer. Prints one JSON object: `{}` or `{"error": "one clear message"}`.
+Files of strangers are read here, with bounds on memory and time, and without a simulation beside it
+that could suffer. Prints one JSON object: `{}` or `{"error": "one clear message"}`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from volery.core.errors import VoleryError
 from volery.scenario.shelf import Shelf
 from volery.server.uploads.making import toml_of
 
-_NICENESS = 10
+_NICENESS = 5
+"""A run beside it, at full speed on all cores, keeps three quarters of them."""
+_MOST_CPU_S = 90
 _MOST_MEMORY = 8 * 1024**3
 """Of addresses; Embree and the compiler reserve about a gigabyte that they do not use."""
 
@@ -49,6 +51,7 @@ def main(kind: str, file: str, name: str, called: str) -> None:
     """Check, and print what came of it."""
     os.nice(_NICENESS)
     resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY, _MOST_MEMORY))
+    resource.setrlimit(resource.RLIMIT_CPU, (_MOST_CPU_S, 2 * _MOST_CPU_S))
     told: dict[str, str] = {}
     try:
         check(kind, Path(file), name, called)

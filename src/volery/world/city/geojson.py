@@ -8,7 +8,6 @@ or drops it.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,12 +79,12 @@ def _load(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise DataFileError(f"outlines {path} do not exist") from None
-    except json.JSONDecodeError as error:
-        raise DataFileError(f"{path}: not valid JSON: {error}") from None
-    except RecursionError:
-        raise DataFileError(f"{path}: not GeoJSON: nested too deeply") from None
     except (OSError, UnicodeDecodeError) as error:
         raise DataFileError(f"outlines {path} cannot be read: {error}") from None
+    except RecursionError:
+        raise DataFileError(f"{path}: not GeoJSON: nested too deeply") from None
+    except ValueError as error:  # of JSON, or of an integer with thousands of digits
+        raise DataFileError(f"{path}: not valid JSON: {error}") from None
 
 
 def _check_crs(path: Path, crs: Any) -> None:
@@ -106,7 +105,8 @@ def _id_of(feature: Mapping[str, Any], number: int) -> str:
         for key in _ID_KEYS:
             own = holder.get(key)
             if isinstance(own, str | int) and not isinstance(own, bool) and str(own).strip():
-                return str(own).strip()[:80]
+                shown = str(own).strip()[:80]  # also in messages and on terminals
+                return "".join(c if c.isprintable() else "?" for c in shown)
     return f"#{number}"
 
 
@@ -147,7 +147,7 @@ def _ring(ring: Any) -> Ring:
             raise ValueError(f"a position is [longitude, latitude], not {position!r}"[:200])
         for j, (number, limit) in enumerate(zip(position, (180.0, 90.0), strict=False)):
             is_number = isinstance(number, int | float) and not isinstance(number, bool)
-            if not is_number or not math.isfinite(number) or abs(number) > limit:
+            if not is_number or not abs(number) <= limit:  # nor is it nan
                 raise ValueError(
                     f"longitude and latitude are degrees within 180 and 90, not {position!r}"[:200]
                 )

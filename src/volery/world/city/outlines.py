@@ -27,6 +27,8 @@ LEAST_AREA_M2 = 1.0
 """Smaller footprints are slips of the mapper (modelling choice)."""
 FARTHEST_M = 50_000.0
 """From the map's origin: beyond it a flat map is wrong by 200 m of height."""
+_MOST_MENDED = 1000
+"""Corners of an outline that crosses itself: its parts can be as many as this squared."""
 _SAME = 0.999
 """Share of two footprints that must agree for one to count as the other once more."""
 
@@ -161,6 +163,9 @@ def _footprint(feature: Feature, frame: LocalFrame) -> tuple[Any, str, str]:
     shape: Any = shapely.MultiPolygon(polygons)
     if not shape.is_valid:
         reason = shapely.is_valid_reason(shape).split("[")[0].lower()
+        corners = shapely.get_num_coordinates(shape)
+        if corners > _MOST_MENDED:
+            return None, "", f"{reason}: {corners} corners are too many to be mended"
         mended.append(f"{reason}: rebuilt from the area it encloses")
         shape = shapely.make_valid(shape, method="structure", keep_collapsed=False)
     parts = [
@@ -198,22 +203,42 @@ def _without_hidden(
 
     if not outlines:
         return (), []
-    shapes = [outline.footprint for outline in outlines]
-    first, second = shapely.STRtree(shapes).query(shapes, predicate="intersects")
-    gone: dict[int, str] = {}
-    for inner, outer in sorted(zip(first.tolist(), second.tolist(), strict=True)):
-        a, b = outlines[inner], outlines[outer]
-        if inner == outer or outer in gone or a.height.height_m > b.height.height_m:
+    tree = shapely.STRtree([outline.footprint for outline in outlines])
+    gone = _exact_twins(outlines)
+    for inner, own in enumerate(outlines):
+        if inner in gone:
             continue
-        size, other = a.footprint.area, b.footprint.area
-        if size > other * (2.0 - _SAME):
-            continue
-        if a.footprint.intersection(b.footprint).area < _SAME * size:
-            continue
-        twins = size > _SAME * other and a.height.height_m == b.height.height_m
-        if not twins:
-            gone[inner] = f"hidden inside {b.id}, which is as tall"
-        elif inner > outer:
-            gone[inner] = f"the same as {b.id}"
+        for outer in sorted(tree.query(own.footprint).tolist()):
+            why = "" if outer in gone else _hidden(outlines, inner, outer)
+            if why:
+                gone[inner] = why
+                break
     kept = tuple(outline for k, outline in enumerate(outlines) if k not in gone)
     return kept, [(outlines[k].id, why) for k, why in sorted(gone.items())]
+
+
+def _exact_twins(outlines: Sequence[Outline]) -> dict[int, str]:
+    """Whose footprint and height were there before: a file may hold a building a thousand times."""
+    first: dict[tuple[bytes, float], int] = {}
+    gone = {}
+    for k, outline in enumerate(outlines):
+        same = first.setdefault((outline.footprint.wkb, outline.height.height_m), k)
+        if same != k:
+            gone[k] = f"the same as {outlines[same].id}"
+    return gone
+
+
+def _hidden(outlines: Sequence[Outline], inner: int, outer: int) -> str:
+    """Why the one building need not be there beside the other; empty if it must."""
+    a, b = outlines[inner], outlines[outer]
+    if inner == outer or a.height.height_m > b.height.height_m:
+        return ""
+    size, other = a.footprint.area, b.footprint.area
+    if size > other * (2.0 - _SAME):
+        return ""
+    twins = size > _SAME * other and a.height.height_m == b.height.height_m
+    if twins and inner < outer:  # the first of them stays
+        return ""
+    if a.footprint.intersection(b.footprint).area < _SAME * size:
+        return ""
+    return f"the same as {b.id}" if twins else f"hidden inside {b.id}, which is as tall"

@@ -36,9 +36,10 @@ def block_mesh(grid: GridMap, bottom_m: float, top_m: float) -> Mesh:
 
     Raises `CommandError` where the map is so ragged that its mesh would be too large.
     """
-    walls = [_runs(edges) for edges in _walls(grid.blocked)]
+    edges = _walls(grid.blocked)
+    _check_faces(grid, sum(_run_count(cells) for cells in edges))  # before memory is taken
+    walls = [_runs(cells) for cells in edges]
     tops = _runs(grid.blocked)
-    _check_faces(grid, sum(len(runs.row) for runs in walls))
     corners = [_top_corners(*_merged(tops))]
     corners += [_wall_corners(side, runs) for side, runs in enumerate(walls)]
     cells = np.concatenate(corners)
@@ -78,6 +79,12 @@ def _runs(cells: NDArray[np.bool_]) -> _Runs:
     row, first = np.nonzero(step > 0)
     end = np.nonzero(step < 0)[1]
     return _Runs(row, first, end)
+
+
+def _run_count(cells: NDArray[np.bool_]) -> int:
+    """How many runs `_runs` finds."""
+    begins = np.count_nonzero(cells[:, 1:] > cells[:, :-1])
+    return int(begins + np.count_nonzero(cells[:, 0]))
 
 
 def _merged(runs: _Runs) -> tuple[_Runs, NDArray[np.int64]]:

@@ -105,6 +105,29 @@ def test_what_is_no_building_is_dropped_with_the_reason(read):
     assert len(why) == 6
 
 
+def test_a_building_mapped_a_thousand_times(read):
+    """Its twins are found without comparing each with each; almost twins are compared."""
+    many = [feature(square(), own=f"b{k}") for k in range(1000)]
+    many += [feature(square(0.001 * k), own=f"c{k}") for k in range(1, 4)]
+    outlines, report = read(*many)
+    assert [o.id for o in outlines] == ["b0"]
+    assert set(dict(report.dropped).values()) == {"the same as b0"}
+    assert len(report.dropped) == 1002
+
+
+def test_an_outline_that_crosses_itself_a_million_times_is_dropped(read):
+    star = [[30.0 * math.cos(2.5 * k), 30.0 * math.sin(2.5 * k)] for k in range(1500)]
+    outlines, report = read(feature(star, own="star"), feature(square(50.0)))
+    assert [o.id for o in outlines] == ["b"]
+    assert "1501 corners are too many to be mended" in dict(report.dropped)["star"]
+
+
+def test_ids_can_be_shown(read):
+    (outline,), report = read(feature(square()[:-1], own="a\n\x1b[31m\ud800b"))
+    assert outline.id == "a??[31m?b"
+    str(report).encode()
+
+
 def test_a_region_crops(read):
     outlines, report = read(
         feature(square()), feature(square(90.0), own="far"), region=(-20.0, -20.0, 50.0, 50.0)
@@ -158,6 +181,7 @@ def _set(key, value):
     [
         ("{", "not valid JSON"),
         ("[" * 100_000, "nested too deeply"),
+        ("9" * 5000, "not valid JSON"),
         ("[]", "FeatureCollection"),
         ('{"type": "FeatureCollection"}', "'features' must be a list"),
         (spoilt(lambda d: d.update(features=[3])), "feature 1: it must be an object"),
@@ -168,6 +192,7 @@ def _set(key, value):
         (spoilt(_set("coordinates", [[["a", 1.0]]])), r"\(id way/7\): longitude and latitude"),
         (spoilt(_set("coordinates", [[[200.0, 1.0]]])), r"\(id way/7\): longitude and latitude"),
         (spoilt(_set("coordinates", [[[math.nan, 1.0]]])), r"\(id way/7\): longitude and lat"),
+        (spoilt(_set("coordinates", [[[10**400, 1.0]]])), r"\(id way/7\): longitude and latitude"),
         (spoilt(_set("coordinates", [[1.0, 2.0]])), r"\(id way/7\): a position is"),
         (spoilt(_set("coordinates", [[[0.0, 0.0]]])), r"km from the map's origin"),
     ],

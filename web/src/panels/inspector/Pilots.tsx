@@ -1,15 +1,95 @@
-import { Text } from "@mantine/core";
+import { Autocomplete, Button, Group, Text, TextInput } from "@mantine/core";
+import { useState } from "react";
+import { handOver, releaseControl } from "../../link/commands.ts";
+import { useConnection } from "../../state/connection.ts";
+import { succeeds } from "../../state/notices.ts";
+import { callMe, take, usePilot, useStranger } from "../../state/pilots.ts";
+import { useWhyNot } from "../../state/rights.ts";
 import { useVehicles } from "../../state/vehicles.ts";
 import { Section } from "./Section.tsx";
 
-/** Who steers this UAV. */
+/** Who steers this UAV: take it, let it go, hand it to another pilot. */
 export function Pilots({ uav }: { uav: string }) {
   const holder = useVehicles(({ list }) => list.find(({ name }) => name === uav)?.holder ?? "");
+  const stranger = useStranger(uav);
+  const volery = useConnection((connection) => connection.volery);
+  if (!volery) return null;
   return (
     <Section title="Control">
-      <Text size="sm" aria-label="Holder">
-        {holder === "" ? "Nobody has taken the control: every pilot may command it." : holder}
+      <Text size="sm" aria-label="Holder" c={stranger === "" ? "bright" : "orange"}>
+        {holder === ""
+          ? "Nobody has taken it: every pilot may command it."
+          : stranger === ""
+            ? `You have it, as ${holder}.`
+            : `${holder} has it: your commands are refused.`}
       </Text>
+      {holder === "" && <Take uav={uav} />}
+      {holder !== "" && stranger === "" && <Held uav={uav} />}
     </Section>
+  );
+}
+
+function Take({ uav }: { uav: string }) {
+  const wished = usePilot((pilot) => pilot.wished);
+  const whyNot = useWhyNot();
+  return (
+    <Group gap={6} wrap="nowrap">
+      <TextInput
+        size="xs"
+        flex={1}
+        aria-label="Your name"
+        placeholder="Your name"
+        maxLength={40}
+        value={wished}
+        onChange={(event) => callMe(event.currentTarget.value)}
+      />
+      <Button
+        size="xs"
+        variant="light"
+        disabled={whyNot !== null}
+        onClick={() => void succeeds("Take control", take(uav))}
+      >
+        Take control
+      </Button>
+    </Group>
+  );
+}
+
+function Held({ uav }: { uav: string }) {
+  const others = useVehicles(({ list }) => list.map(({ holder }) => holder).join("\n"));
+  const own = usePilot(({ name }) => name);
+  const whyNot = useWhyNot();
+  const [to, setTo] = useState("");
+  const known = [...new Set(others.split("\n"))].filter((name) => name !== "" && name !== own);
+  return (
+    <>
+      <Button
+        size="xs"
+        variant="light"
+        disabled={whyNot !== null}
+        onClick={() => void succeeds("Release control", releaseControl(uav))}
+      >
+        Release control
+      </Button>
+      <Group gap={6} wrap="nowrap">
+        <Autocomplete
+          size="xs"
+          flex={1}
+          aria-label="Pilot to hand it to"
+          placeholder="Another pilot's name"
+          data={known}
+          value={to}
+          onChange={setTo}
+        />
+        <Button
+          size="xs"
+          variant="default"
+          disabled={whyNot !== null || to === ""}
+          onClick={() => void succeeds("Hand over", handOver(uav, to))}
+        >
+          Hand over
+        </Button>
+      </Group>
+    </>
   );
 }

@@ -4,15 +4,23 @@ import type { Air } from "../air/air.ts";
 import { Falling } from "../air/Falling.ts";
 import { Sky } from "../air/Sky.ts";
 import { Sun } from "../air/Sun.ts";
+import { OccupancyMaps } from "../maps/OccupancyMaps.ts";
+import { Voxels } from "../maps/Voxels.ts";
+import { Markers } from "../markers/Markers.ts";
+import { Frusta } from "../sensing/Frusta.ts";
+import { Returns } from "../sensing/Returns.ts";
+import { Things } from "../things/Things.ts";
 import { Airframes } from "../uavs/Airframes.ts";
 import { Labels } from "../uavs/Labels.ts";
 import { Lamps } from "../uavs/Lamps.ts";
 import { Marks } from "../uavs/Marks.ts";
 import { Paths } from "../uavs/Paths.ts";
+import { Sensors } from "../uavs/Sensors.ts";
 import { Smoke } from "../uavs/Smoke.ts";
 import { Trails } from "../uavs/Trails.ts";
 import { standing } from "../world/standing.ts";
 import { World } from "../world/World.ts";
+import { Axes } from "./Axes.ts";
 import type { Part } from "./part.ts";
 import { LEVELS } from "./quality.ts";
 
@@ -38,11 +46,19 @@ export function makeParts(
     ["view", new CameraMan(camera, renderer.domElement)],
     ["world", world],
     ["uavs", new Airframes()],
+    ["sensors", new Sensors()],
+    ["things", new Things()],
     ["lamps", new Lamps(air)],
     ["smoke", new Smoke(air)],
     ["marks", new Marks()],
     ["trails", new Trails()],
     ["paths", new Paths()],
+    ["returns", new Returns()],
+    ["frusta", new Frusta()],
+    ["voxels", new Voxels()],
+    ["maps", new OccupancyMaps()],
+    ["markers", new Markers()],
+    ["axes", new Axes()],
     ["sky", new Sky(air)],
     ["rain", new Falling("rain", air, most)],
     ["snow", new Falling("snow", air, most)],

@@ -28,6 +28,16 @@ export class Follower {
     this.look();
   }
 
+  /** Go on with those topics alone that are wanted; others may begin with the next look. */
+  choose(wanted: (topic: string) => boolean): void {
+    for (const [topic, end] of this.ends) {
+      if (wanted(topic)) continue;
+      end();
+      this.ends.delete(topic);
+      this.gone(topic);
+    }
+  }
+
   /** Begin with what is new, end what is gone. */
   look(): void {
     for (const [topic, end] of this.ends) {

@@ -1,0 +1,178 @@
+"""Any place of a log at once: where its chunks are, when they are of, and what is in each.
+
+The index is built by hopping over the file from record to record, so that a log that was cut off is
+as good as a whole one; what is compressed is read only where nothing else tells what it holds.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from abc import ABC, abstractmethod
+from collections import Counter, OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.bridges.logs.records import LogRecord, LogTopic
+
+_CHUNKS_KEPT = 8
+"""Decompressed ones, in memory."""
+
+
+class Span(NamedTuple):
+    """A piece of the file that is read at once: position and length."""
+
+    position: int
+    length: int
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Messages that are stored together: from when to when, and how many of each channel."""
+
+    span: Span
+    start_ns: int
+    end_ns: int
+    counts: Mapping[int, int]
+    falls_ns: int
+    """By how much a message is at most earlier than one before it in the chunk."""
+
+    @classmethod
+    def of_times(cls, span: Span, counts: Mapping[int, int], times_ns: NDArray[np.int64]) -> Chunk:
+        """A chunk with messages at `times_ns` (N,), N > 0, in their order."""
+        falls = np.maximum.accumulate(times_ns) - times_ns
+        first, last = int(times_ns.min()), int(times_ns.max())
+        return cls(span, first, last, counts, int(falls.max()))
+
+
+class Head(NamedTuple):
+    """A message in a chunk's bytes."""
+
+    channel: int
+    time_ns: int
+    begin: int
+    end: int
+    sequence: int
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a chunk holds, in the order of the log."""
+
+    heads: tuple[Head, ...] = ()
+    data: bytes = b""
+
+
+class Unindexed(NamedTuple):
+    """A chunk of which the file's index does not tell what is in it."""
+
+    span: Span
+
+
+class ChunkedLog(ABC):
+    """The chunks of one file; a damaged one is empty, and `trouble` tells of it."""
+
+    format = ""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.trouble = ""
+        self.topics: dict[int, LogTopic] = {}
+        """By channel."""
+        self.damaged = 0
+        self._file = path.open("rb", buffering=0)
+        self.size = os.fstat(self._file.fileno()).st_size
+        self._kept: OrderedDict[Span, Content] = OrderedDict()
+        self._found: list[Chunk | Unindexed] = []
+        try:
+            self._scan()
+        except (KeyError, ValueError, struct.error) as error:  # what stands there is no record
+            self.trouble = f"damaged: {error}"
+        self.chunks = [chunk for found in self._found if (chunk := self._told(found)).counts]
+        self._learn_channels()
+
+    def counts(self) -> Counter[int]:
+        """Messages of each channel."""
+        total: Counter[int] = Counter()
+        for chunk in self.chunks:
+            total.update(chunk.counts)
+        return total
+
+    def content(self, chunk: Chunk) -> Content:
+        """What a chunk holds."""
+        return self._content(chunk.span)
+
+    def record(self, content: Content, head: Head) -> LogRecord:
+        """One message of it."""
+        data = content.data[head.begin : head.end]
+        return LogRecord(self.topics[head.channel], head.time_ns, data, head.sequence)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+        self._kept.clear()
+
+    # ------------------------------------------------------------------------------------ inside
+
+    @abstractmethod
+    def _scan(self) -> None:
+        """Put all chunks into `_found`, in the order of the file; learn what stands outside."""
+
+    @abstractmethod
+    def _parse(self, data: bytes) -> Content:
+        """The messages of a span, whatever is raised for damaged bytes; learns its channels."""
+
+    def _read(self, position: int, length: int) -> bytes:
+        return os.pread(self._file.fileno(), length, position)
+
+    def _content(self, span: Span) -> Content:
+        kept = self._kept.get(span)
+        if kept is None:
+            try:
+                kept = self._parse(self._read(*span))
+            except Exception:  # whatever a decoder makes of damaged bytes
+                kept = Content()
+                self.damaged += 1
+            self._kept[span] = kept
+            if len(self._kept) > _CHUNKS_KEPT:
+                self._kept.popitem(last=False)
+        else:
+            self._kept.move_to_end(span)
+        return kept
+
+    def _told(self, found: Chunk | Unindexed) -> Chunk:
+        """The chunk with its times and counts, read where the index does not tell them."""
+        if isinstance(found, Chunk):
+            return found
+        heads = self._content(found.span).heads
+        if not heads:
+            return Chunk(found.span, 0, 0, {}, 0)
+        counts = Counter(head.channel for head in heads)
+        times = np.array([head.time_ns for head in heads], np.int64)
+        return Chunk.of_times(found.span, counts, times)
+
+    def _learn_channels(self) -> None:
+        """Read the chunks that tell of channels which nothing outside of them does."""
+        for chunk in self.chunks:
+            if not chunk.counts.keys() <= self.topics.keys():
+                self._content(chunk.span)
+        known = self.topics.keys()
+        whole = (
+            replace(c, counts={k: n for k, n in c.counts.items() if k in known})
+            for c in self.chunks
+        )
+        self.chunks = [chunk for chunk in whole if chunk.counts]
+
+
+def open_chunks(path: Path) -> ChunkedLog:
+    """The chunks of a log. `RecordingError` where there is no such file, or it is no log."""
+    from volery.bridges.logs.bag_chunks import BagChunks
+    from volery.bridges.logs.mcap_chunks import McapChunks
+    from volery.bridges.logs.records import log_format
+
+    return McapChunks(path) if log_format(path) == "mcap" else BagChunks(path)

@@ -1,0 +1,186 @@
+"""A log as one line of time, also where its own time went back.
+
+A flight that was reset, or taken back to a kept state, tells some times twice. On the line what
+came after such a jump follows what came before: its times are shifted by as much as the clock went
+back. A log without jumps keeps its own times.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Set
+from functools import partial
+from typing import NamedTuple
+
+from volery.bridges.logs.chunks import Chunk, ChunkedLog, Content, Head
+from volery.bridges.logs.records import LogRecord
+from volery.core.clock import NS_PER_S
+
+_JUMP_NS = NS_PER_S // 10
+"""Messages may be out of order by less (modelling choice): publishers have their own clocks."""
+
+
+_FOREVER_NS = 1 << 62
+
+
+class _Piece(NamedTuple):
+    """Messages `first` to before `last` of a chunk (None: to its end), where on the line."""
+
+    chunk: Chunk
+    first: int
+    last: int | None
+    shift_ns: int
+    start_ns: int
+    end_ns: int
+    """Latest time on the line up to here, which never falls."""
+
+
+class Place(NamedTuple):
+    """Of a message on the line: piece, and message in it."""
+
+    piece: int
+    message: int
+
+
+class Shown(NamedTuple):
+    """A message, where it stands on the line, and the number of its channel."""
+
+    time_ns: int
+    channel: int
+    record: LogRecord
+
+
+class Passage(NamedTuple):
+    """Some messages, the place behind them, and whether no more are to come there."""
+
+    shown: list[Shown]
+    place: Place
+    over: bool
+
+
+class Timeline:
+    """The messages of a log, one after the other or from any time on."""
+
+    def __init__(self, log: ChunkedLog) -> None:
+        self.log = log
+        self._pieces = _pieces_of(log)
+        self._ends = [piece.end_ns for piece in self._pieces]
+        self.start_ns = min((piece.start_ns for piece in self._pieces), default=0)
+        self.end_ns = self._ends[-1] if self._pieces else 0
+
+    @property
+    def shifted(self) -> bool:
+        """Whether the log's own time went back somewhere."""
+        return any(piece.shift_ns for piece in self._pieces)
+
+    def shift_ns(self, place: Place) -> int:
+        """How far the line is ahead of the log's own time, before a place."""
+        number = min(place.piece, len(self._pieces) - 1)
+        at_its_start = number == place.piece and place.message <= self._pieces[number].first
+        return self._pieces[max(number - at_its_start, 0)].shift_ns
+
+    def after(self, time_ns: int) -> Place:
+        """Place of the first message that is later than `time_ns`."""
+        number = bisect_left(self._ends, time_ns + 1)
+        return self.take(Place(number, 0), time_ns, frozenset()).place
+
+    def take(self, place: Place, until_ns: int, channels: Set[int]) -> Passage:
+        """Messages of `channels` from a place on, up to `until_ns`, at most those of one chunk."""
+        shown: list[Shown] = []
+        number, message = place
+        while number < len(self._pieces):
+            piece = self._pieces[number]
+            if piece.end_ns > until_ns or not channels.isdisjoint(piece.chunk.counts):
+                content = self.log.content(piece.chunk)
+                shift_ns = piece.shift_ns
+                heads = content.heads if piece.last is None else content.heads[: piece.last]
+                for k in range(max(message, piece.first), len(heads)):
+                    head = heads[k]
+                    if head.time_ns + shift_ns > until_ns:
+                        return Passage(shown, Place(number, k), over=True)
+                    if head.channel in channels:
+                        record = self.log.record(content, head)
+                        shown.append(Shown(head.time_ns + shift_ns, head.channel, record))
+            number, message = number + 1, 0
+            if shown:
+                break
+        return Passage(shown, Place(number, 0), over=number == len(self._pieces))
+
+    def last_before(self, place: Place, channels: Set[int]) -> list[Shown]:
+        """The last message of each channel before a place, in the order of the log."""
+        missing = set(channels)
+        found: list[Shown] = []
+        for piece, content, heads in self._backwards(place):
+            if not missing:
+                break
+            if missing.isdisjoint(piece.chunk.counts):
+                continue
+            for head in reversed(heads()):
+                if head.channel in missing:
+                    missing.discard(head.channel)
+                    record = self.log.record(content(), head)
+                    found.append(Shown(head.time_ns + piece.shift_ns, head.channel, record))
+        return found[::-1]
+
+    def since(self, place: Place, time_ns: int, channels: Set[int]) -> list[Shown]:
+        """All messages of `channels` before a place and after `time_ns`, in their order."""
+        found: list[Shown] = []
+        for piece, content, heads in self._backwards(place):
+            if piece.end_ns <= time_ns:
+                break
+            if channels.isdisjoint(piece.chunk.counts):
+                continue
+            for head in reversed(heads()):
+                at_ns = head.time_ns + piece.shift_ns
+                if head.channel in channels and at_ns > time_ns:
+                    found.append(Shown(at_ns, head.channel, self.log.record(content(), head)))
+        return found[::-1]
+
+    def _backwards(
+        self, place: Place
+    ) -> Iterator[tuple[_Piece, Callable[[], Content], Callable[[], tuple[Head, ...]]]]:
+        """Pieces before a place, the last one first, each with what gives its messages."""
+        for number in range(min(place.piece, len(self._pieces) - 1), -1, -1):
+            piece = self._pieces[number]
+            content = partial(self.log.content, piece.chunk)
+            last = piece.last
+            if number == place.piece:
+                last = place.message if last is None else min(last, place.message)
+            yield piece, content, partial(_heads, content, piece.first, last)
+
+
+def _heads(content: Callable[[], Content], first: int, last: int | None) -> tuple[Head, ...]:
+    return content().heads[first:last]
+
+
+def _pieces_of(log: ChunkedLog) -> list[_Piece]:
+    """The pieces of the line; chunks in which the clock went back are looked through."""
+    pieces: list[_Piece] = []
+    shift_ns, front_ns = 0, -_FOREVER_NS
+    for chunk in log.chunks:
+        if chunk.start_ns >= front_ns - _JUMP_NS and chunk.falls_ns <= _JUMP_NS:
+            front_ns = max(front_ns, chunk.end_ns)
+            line = (shift_ns, chunk.start_ns + shift_ns, front_ns + shift_ns)
+            pieces.append(_Piece(chunk, 0, None, *line))
+        else:
+            cut, shift_ns, front_ns = _cut(log, chunk, shift_ns, front_ns)
+            pieces += cut
+    return pieces
+
+
+def _cut(
+    log: ChunkedLog, chunk: Chunk, shift_ns: int, front_ns: int
+) -> tuple[list[_Piece], int, int]:
+    """Pieces of a chunk between jumps; shift and latest time behind them."""
+    pieces = []
+    first, low_ns = 0, _FOREVER_NS
+    for k, head in enumerate(log.content(chunk).heads):
+        if head.time_ns < front_ns - _JUMP_NS:
+            if k > first:
+                line = (shift_ns, low_ns + shift_ns, front_ns + shift_ns)
+                pieces.append(_Piece(chunk, first, k, *line))
+            shift_ns += front_ns - head.time_ns
+            first, front_ns, low_ns = k, head.time_ns, head.time_ns
+        front_ns, low_ns = max(front_ns, head.time_ns), min(low_ns, head.time_ns)
+    pieces.append(_Piece(chunk, first, None, shift_ns, low_ns + shift_ns, front_ns + shift_ns))
+    return pieces, shift_ns, front_ns

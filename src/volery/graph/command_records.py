@@ -1,0 +1,142 @@
+"""Commands of clients as messages: `volery_interfaces/msg/CommandRecord`.
+
+A record holds its content twice: shortened JSON for people, and CDR, from which it can be repeated
+to the bit. A large published message is not written twice: its record says that it follows.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
+
+from volery.graph.cdr import decode_cdr, encode_cdr
+from volery.graph.json_form import JsonForm
+from volery.graph.mailbox import array_bytes
+from volery.graph.messages import message_type, time_from_ns, typestore
+from volery.graph.session import Taken
+
+TOPIC = "/volery/log"
+TYPE = "volery_interfaces/msg/CommandRecord"
+
+_INLINE_BYTES = 4096
+"""A published message that holds more in arrays and texts follows its record (modelling choice)."""
+_ITEMS_SHOWN = 16
+_CHARACTERS_SHOWN = 400
+_MOST_CHARACTERS = 8000
+"""Of the JSON text."""
+
+_PARTS = {
+    "call": "_Request",
+    "answer": "_Response",
+    "goal": "_Goal",
+}
+"""What is behind the type's name where the content is a part of it."""
+
+
+def content_type(kind: str, name: str) -> str:
+    """Type of a record's content, from its kind and type."""
+    return name + _PARTS.get(kind, "")
+
+
+def is_large(taken: Taken) -> bool:
+    """Whether a command is a published message that rather follows its record."""
+    if taken.kind != "publish" or not _grows(taken.type):
+        return False
+    return array_bytes(taken.content) > _INLINE_BYTES
+
+
+def content_bytes(taken: Taken) -> bytes:
+    """The content of a command, exactly. `GraphError` where it does not fit its type."""
+    if taken.content is None:
+        return b""
+    if isinstance(taken.content, str):
+        return taken.content.encode()
+    return encode_cdr(taken.content, content_type(taken.kind, taken.type))
+
+
+def content_of(kind: str, type_name: str, cdr: bytes) -> Any:
+    """The content that `content_bytes` made into bytes. `GraphError` where it is none such."""
+    if not cdr:
+        return None
+    if kind == "failure":
+        return cdr.decode(errors="replace")
+    return decode_cdr(cdr, content_type(kind, type_name))
+
+
+def record_of(
+    taken: Taken, cdr: bytes | None, *, number: int, time_ns: int, step: int, turn: int
+) -> Any:
+    """The message that tells of a command; `cdr` as of `content_bytes`, None: it follows."""
+    return message_type(TYPE)(
+        stamp=time_from_ns(time_ns),
+        number=number,
+        step=step,
+        turn=turn,
+        client=taken.client,
+        kind=taken.kind,
+        name=taken.name,
+        type=taken.type,
+        content=_for_people(taken),
+        cdr=np.frombuffer(cdr or b"", np.uint8),
+        follows=cdr is None,
+        latched=taken.latched,
+        request=taken.request,
+    )
+
+
+def _for_people(taken: Taken) -> str:
+    if taken.content is None:
+        return ""
+    if isinstance(taken.content, str):
+        return taken.content
+    plain = _form().encode(taken.content, content_type(taken.kind, taken.type))
+    text = json.dumps(_shortened(plain), ensure_ascii=False)
+    if len(text) > _MOST_CHARACTERS:
+        text = json.dumps({"shortened": text[:_MOST_CHARACTERS]}, ensure_ascii=False)
+    return text
+
+
+@cache
+def _grows(msgtype: str) -> bool:
+    """Whether messages of a type have no fixed size: whether it holds a sequence or a text."""
+    fields: Any = typestore().fielddefs[msgtype][1]
+    for _, (kind, detail) in fields:
+        if kind == Nodetype.SEQUENCE or (kind == Nodetype.BASE and detail[0] == "string"):
+            return True
+        inner, name = detail[0] if kind == Nodetype.ARRAY else (kind, detail)
+        if inner == Nodetype.NAME and _grows(name):
+            return True
+    return False
+
+
+@cache
+def _form() -> JsonForm:
+    return JsonForm(arrays=_array_for_people)
+
+
+def _array_for_people(array: NDArray[Any], base: str) -> Any:
+    if len(array) > _ITEMS_SHOWN:
+        return f"{len(array)} x {base}"
+    return [_number(value) for value in array.tolist()]
+
+
+def _number(value: Any) -> Any:
+    """JSON has no word for what is not finite."""
+    return value if not isinstance(value, float) or np.isfinite(value) else None
+
+
+def _shortened(plain: Any) -> Any:
+    if isinstance(plain, dict):
+        return {key: _shortened(value) for key, value in plain.items()}
+    if isinstance(plain, list):
+        shown = [_shortened(value) for value in plain[:_ITEMS_SHOWN]]
+        more = len(plain) - len(shown)
+        return [*shown, f"and {more} more"] if more else shown
+    if isinstance(plain, str) and len(plain) > _CHARACTERS_SHOWN:
+        return f"{plain[:_CHARACTERS_SHOWN]}... ({len(plain)} characters)"
+    return plain

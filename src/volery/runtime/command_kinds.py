@@ -1,0 +1,47 @@
+"""What clients do, by what it means for the flight."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from volery.graph.session import Taken
+
+_STOPPED = 0
+"""Of `simulation_interfaces/msg/SimulationState`: setting it resets, the others change the pace."""
+
+_PACE = {
+    f"{package}/srv/{name}"
+    for package, names in {
+        "simulation_interfaces": ("StepSimulation", "LoadWorld", "UnloadWorld"),
+        "volery_interfaces": ("SetSpeed", "StartRecording", "StopRecording", "LoadScenario"),
+    }.items()
+    for name in names
+}
+_SET_STATE = "simulation_interfaces/srv/SetSimulationState"
+_ASKING = {"simulation_interfaces": ("Get",), "volery_interfaces": ("Get", "List")}
+_SETS_PARAMETERS = {"rosapi_msgs/srv/SetParam", "rosapi_msgs/srv/DeleteParam"}
+
+
+class Weight(Enum):
+    """What a command may do to the flight."""
+
+    ASKS = "nothing: it only asks"
+    PACES = "its pace, its files, its end, its audience, but no result"
+    CHANGES = "its results"
+
+
+def weight_of(taken: Taken) -> Weight:
+    """How much hangs on a command; of services that nobody knows: the results."""
+    if taken.kind in ("publish", "answer", "failure"):
+        return Weight.CHANGES
+    if taken.kind != "call":
+        return Weight.PACES
+    package, _, name = taken.type.partition("/srv/")
+    if name.startswith(_ASKING.get(package, ())):
+        return Weight.ASKS
+    if package == "rosapi_msgs" and taken.type not in _SETS_PARAMETERS:
+        return Weight.ASKS
+    if taken.type == _SET_STATE:
+        state = _STOPPED if taken.content is None else int(taken.content.state.state)
+        return Weight.CHANGES if state == _STOPPED else Weight.PACES
+    return Weight.PACES if taken.type in _PACE else Weight.CHANGES

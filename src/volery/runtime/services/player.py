@@ -1,0 +1,119 @@
+"""What clients can ask of a log that is being played: `/volery/player/...`, and the standard's."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from volery.core.errors import CommandError
+from volery.runtime.services.features import PLAYER_FEATURES, offer_features
+from volery.runtime.services.offering import (
+    Code,
+    Fields,
+    Handler,
+    RefusedError,
+    filled,
+    offer_command,
+    offer_result,
+)
+from volery.runtime.services.playing import WRONG_TRANSITION, State
+from volery.runtime.services.worlds import OnLoad, offer_worlds
+
+if TYPE_CHECKING:
+    from volery.runtime.player import Player
+
+__all__ = ["PlayerServices", "State"]
+
+_SRV = "simulation_interfaces/srv"
+_OURS = "volery_interfaces"
+_ALREADY_THERE = 101
+_STATE = f"{_OURS}/msg/PlayerState"
+_MOST_STEPS = 1_000_000_000
+
+
+class PlayerServices:
+    """The services of one player, and the topic that tells how it stands."""
+
+    def __init__(self, player: Player, on_load: OnLoad | None) -> None:
+        self._player = player
+        graph = player.graph
+        self._state = graph.advertise("/volery/player/state", _STATE, latched=True)
+        loads = on_load is not None
+        offer_features(graph, loads_worlds=loads, offered=PLAYER_FEATURES)
+        offer_worlds(graph, player.scenario, on_load)
+        standard: tuple[tuple[str, str, Handler], ...] = (
+            ("get_simulation_state", "GetSimulationState", self._get_state),
+            ("set_simulation_state", "SetSimulationState", self._set_state),
+            ("step_simulation", "StepSimulation", self._step),
+        )
+        for name, srvtype, handler in standard:
+            offer_result(graph, f"/{name}", f"{_SRV}/{srvtype}", handler)
+        ours: tuple[tuple[str, str, Handler], ...] = (
+            ("set_speed", f"{_OURS}/srv/SetSpeed", self._set_speed),
+            ("player/seek", f"{_OURS}/srv/Seek", self._seek),
+            ("player/set_loop", "std_srvs/srv/SetBool", self._set_loop),
+            ("player/info", f"{_OURS}/srv/PlayerInfo", self._info),
+        )
+        for name, srvtype, handler in ours:
+            offer_command(graph, f"/volery/{name}", srvtype, handler)
+
+    def tell_state(self) -> None:
+        """Publish how it stands."""
+        self._state.publish(filled(_STATE, self._present()))
+
+    def _present(self) -> Fields:
+        player = self._player
+        return {
+            "position": player.time_s,
+            "start": player.start_s,
+            "end": player.end_s,
+            "state": int(player.state),
+            "speed": player.speed or 0.0,
+            "loop": player.loop,
+        }
+
+    def _get_state(self, _request: Any) -> Fields:
+        state = {"state": int(self._player.state)}
+        return {"state": filled("simulation_interfaces/msg/SimulationState", state)}
+
+    def _set_state(self, request: Any) -> None:
+        player, wanted = self._player, int(request.state.state)
+        if wanted == player.state:
+            raise RefusedError(_ALREADY_THERE, f"the player is {player.state.name} already")
+        if wanted == State.PLAYING:
+            player.resume()
+        elif wanted == State.PAUSED:
+            player.pause()
+        elif wanted == State.STOPPED:
+            player.pause()
+            player.seek(player.start_s)
+        elif wanted == State.QUITTING:
+            player.quit()
+        else:
+            raise RefusedError(WRONG_TRANSITION, f"state {wanted} cannot be asked for")
+
+    def _step(self, request: Any) -> None:
+        steps = int(request.steps)
+        if not 1 <= steps <= _MOST_STEPS:
+            reason = f"steps must be 1 to {_MOST_STEPS}, not {steps}"
+            raise RefusedError(Code.OPERATION_FAILED, reason)
+        try:
+            self._player.single_step(steps)
+        except CommandError as error:
+            raise RefusedError(Code.INCORRECT_STATE, str(error)) from None
+
+    def _set_speed(self, request: Any) -> None:
+        self._player.set_speed(request.factor if request.factor > 0.0 else None)
+
+    def _seek(self, request: Any) -> Fields:
+        self._player.seek(request.time)
+        return {"message": f"at {self._player.time_s:.3f} s"}
+
+    def _set_loop(self, request: Any) -> None:
+        self._player.loop = bool(request.data)
+        self.tell_state()
+
+    def _info(self, _request: Any) -> Fields:
+        told = {**self._present(), **self._player.describe()}
+        return {**told, "counts": np.array(told["counts"], np.uint64)}

@@ -1,0 +1,187 @@
+"""The bytes of glTF 2.0 files: JSON, buffers, and the arrays that lie in them.
+
+No size that a file tells is believed: memory is taken for what is there. What is wrong is a
+`ValueError` without the file's name.
+
+Khronos Group, glTF 2.0 Specification, sections 3.6 (binary data storage) and 4 (GLB).
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import struct
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+_HEAD, _CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
+_JSON, _BINARY = 0x4E4F534A, 0x004E4942
+_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC3": 3}
+"""Components of an element; meshes without their paint need no others."""
+
+
+def field(holder: dict[str, Any], key: str, kind: type, default: Any = None) -> Any:
+    """A value of an object of the JSON, of the type `kind`; without a default it must be there."""
+    value = holder.get(key, default)
+    if not isinstance(value, kind) or isinstance(value, bool):
+        raise ValueError(f"'{key}' is {str(value)[:40]!r}, not {_NAMES[kind]}")
+    return value
+
+
+def entry(holder: dict[str, Any], key: str, number: Any) -> dict[str, Any]:
+    """Object `number` of the list `key`."""
+    entries = field(holder, key, list, [])
+    if not isinstance(number, int) or not 0 <= number < len(entries):
+        raise ValueError(f"'{key}' has {len(entries)} entries; there is none of number {number!r}")
+    found = entries[number]
+    if not isinstance(found, dict):
+        raise ValueError(f"'{key}' {number} is no object")
+    return found
+
+
+_NAMES = {int: "an integer", list: "a list", dict: "an object", str: "text"}
+
+
+class Container:
+    """A file's JSON, and the arrays that its accessors describe."""
+
+    def __init__(self, path: Path, most_bytes: int) -> None:
+        self._folder = path.parent
+        self._bytes_left = most_bytes
+        self._buffers: dict[int, bytes] = {}
+        data = path.read_bytes()
+        if path.suffix.lower() == ".glb":
+            data = self._unpack(data)
+        document = json.loads(data.decode("utf-8-sig"))
+        if not isinstance(document, dict):
+            raise ValueError("its JSON is no object")
+        version = field(field(document, "asset", dict), "version", str)
+        if version.split(".")[0] != "2":
+            raise ValueError(f"glTF 2 is read, this is version '{version[:20]}'")
+        self.document = document
+
+    def count(self, number: Any) -> int:
+        """How many elements accessor `number` says it has."""
+        count: int = field(entry(self.document, "accessors", number), "count", int)
+        if count < 0:
+            raise ValueError(f"accessor {number} has {count} elements")
+        return count
+
+    def array(self, number: Any, form: str) -> NDArray[Any]:
+        """(count, width) elements of accessor `number`, which must be of the type `form`."""
+        accessor = entry(self.document, "accessors", number)
+        count, kind = self.count(number), _component(accessor)
+        if accessor.get("type") != form:
+            raise ValueError(f"accessor {number} is {accessor.get('type')!r}, not {form}")
+        width = _WIDTHS[form]
+        if "bufferView" in accessor:
+            found = self._elements(accessor, count, kind, width)
+        elif "sparse" in accessor:
+            found = np.zeros((count, width), kind)
+        else:
+            raise ValueError(f"accessor {number} has no data")
+        if "sparse" in accessor:
+            found = self._replaced(found, field(accessor, "sparse", dict))
+        is_share = accessor.get("normalized", False) and kind.kind != "f"
+        if not is_share:
+            return found
+        return np.asarray(np.maximum(found / np.float64(np.iinfo(kind).max), -1.0))
+
+    # ------------------------------------------------------------------------------------ buffers
+
+    def _unpack(self, data: bytes) -> bytes:
+        """The JSON of a GLB; its binary chunk becomes buffer 0."""
+        if len(data) < _HEAD.size:
+            raise ValueError("it ends within its head")
+        magic, version, _ = _HEAD.unpack_from(data)
+        if magic != b"glTF" or version != 2:
+            raise ValueError(f"it begins with {magic!r} and version {version}, not b'glTF' and 2")
+        at = _HEAD.size
+        chunks: list[tuple[int, bytes]] = []
+        while at + _CHUNK.size <= len(data) and len(chunks) < 2:
+            length, name = _CHUNK.unpack_from(data, at)
+            at += _CHUNK.size
+            if at + length > len(data):
+                raise ValueError(f"a chunk of {length} bytes has {len(data) - at}")
+            chunks.append((name, data[at : at + length]))
+            at += length
+        if not chunks or chunks[0][0] != _JSON:
+            raise ValueError("its first chunk is not JSON")
+        if len(chunks) > 1 and chunks[1][0] == _BINARY:
+            self._buffers[0] = chunks[1][1]
+        return chunks[0][1]
+
+    def _buffer(self, number: Any) -> bytes:
+        buffer = entry(self.document, "buffers", number)
+        if number not in self._buffers:
+            self._buffers[number] = self._fetched(field(buffer, "uri", str))
+            self._bytes_left -= len(self._buffers[number])
+        return self._buffers[number]
+
+    def _fetched(self, uri: str) -> bytes:
+        """Bytes of a data URI, or of a file in the folder of the glTF file or below."""
+        if uri.startswith("data:"):
+            head, comma, code = uri.partition(",")
+            if not comma or not head.endswith(";base64"):
+                raise ValueError(f"a buffer's URI begins with '{uri[:40]}', not 'data:...;base64,'")
+            try:
+                return base64.b64decode(code, validate=True)
+            except binascii.Error as error:
+                raise ValueError(f"a buffer is no base64: {error}") from None
+        path = (self._folder / unquote(uri)).resolve()
+        if not path.is_relative_to(self._folder.resolve()):
+            raise ValueError(f"buffer '{uri[:80]}' lies outside of the file's folder")
+        try:
+            size = path.stat().st_size
+            if size > self._bytes_left:
+                raise ValueError(f"buffer '{uri[:80]}' has {size / 1e6:.0f} MB, too many")
+            return path.read_bytes()
+        except OSError as error:
+            raise ValueError(f"buffer '{uri[:80]}' cannot be read: {error.strerror}") from None
+
+    # ------------------------------------------------------------------------------------- arrays
+
+    def _elements(
+        self, holder: dict[str, Any], count: int, kind: np.dtype[Any], width: int
+    ) -> NDArray[Any]:
+        """(count, width) elements of the buffer view that an accessor or its like names."""
+        number = holder.get("bufferView")
+        view = entry(self.document, "bufferViews", number)
+        packed = kind.itemsize * width
+        stride = field(view, "byteStride", int, packed)
+        begin, length = field(view, "byteOffset", int, 0), field(view, "byteLength", int)
+        offset = field(holder, "byteOffset", int, 0)
+        if stride < packed or min(begin, length, offset) < 0:
+            raise ValueError(f"the stride or an offset of buffer view {number} cannot be")
+        data = memoryview(self._buffer(view.get("buffer")))[begin : begin + length]
+        if count and offset + (count - 1) * stride + packed > len(data):
+            raise ValueError(f"buffer view {number} has {len(data)} bytes: too few for {count}")
+        if not count:
+            return np.empty((0, width), kind)
+        return np.ndarray((count, width), kind, data, offset, (stride, kind.itemsize))
+
+    def _replaced(self, found: NDArray[Any], sparse: dict[str, Any]) -> NDArray[Any]:
+        """The array with some of its elements replaced."""
+        count = field(sparse, "count", int)
+        places, values = field(sparse, "indices", dict), field(sparse, "values", dict)
+        if not 0 <= count <= len(found):
+            raise ValueError(f"{count} of {len(found)} elements are replaced")
+        at = self._elements(places, count, _component(places), 1)[:, 0]
+        if count and not (at.dtype.kind == "u" and at.max() < len(found)):
+            raise ValueError("an element is replaced that is not there")
+        changed = found.copy()
+        changed[at] = self._elements(values, count, found.dtype, found.shape[1])
+        return changed
+
+
+def _component(holder: dict[str, Any]) -> np.dtype[Any]:
+    code = field(holder, "componentType", int)
+    if code not in _COMPONENTS:
+        raise ValueError(f"component type {code} is none of {sorted(_COMPONENTS)}")
+    return np.dtype(_COMPONENTS[code])

@@ -1,0 +1,78 @@
+import { DynamicDrawUsage, Group, InstancedMesh, MeshStandardMaterial } from "three";
+import { link } from "../../link/link.ts";
+import { POSE } from "../../link/protocol.ts";
+import { useConnection } from "../../state/connection.ts";
+import type { Moment, Part } from "../stage/part.ts";
+import { putMatrix, rotationOf } from "../stage/poses.ts";
+import { shown } from "../stage/shown.ts";
+import { bodyOfThing } from "./bodies.ts";
+import { kindOf, KINDS, kindsVersion, type ThingKind } from "./kinds.ts";
+
+/** Wings beat: the whole bird is tilted a little to and fro. */
+const BEAT_RAD_S = 9;
+const rotation = new Float64Array(9);
+
+/** People, cars and birds: frames of the simulation's own that belong to no UAV. */
+export class Things implements Part {
+  readonly object = new Group();
+  private version = "";
+  private readonly material = new MeshStandardMaterial({ vertexColors: true, roughness: 0.7 });
+  private kinds: { mesh: InstancedMesh; rows: number[]; kind: ThingKind }[] = [];
+
+  update({ nowMs }: Moment): void {
+    const version = `${link.frames.version} ${kindsVersion} ${useConnection.getState().volery}`;
+    if (version !== this.version) {
+      this.version = version;
+      this.rebuild();
+    }
+    for (const { mesh, rows, kind } of this.kinds) {
+      const beat = kind === "bird" ? 1 + 0.12 * Math.sin((nowMs / 1000) * BEAT_RAD_S) : 1;
+      rows.forEach((row, i) => place(mesh, i, row * POSE, beat));
+      mesh.instanceMatrix.needsUpdate = true;
+    }
+  }
+
+  dispose(): void {
+    for (const { mesh } of this.kinds) {
+      mesh.geometry.dispose();
+      mesh.dispose();
+    }
+    this.object.clear();
+    this.kinds = [];
+  }
+
+  private rebuild(): void {
+    this.dispose();
+    if (!useConnection.getState().volery) return; // a robot's frames are parts of itself
+    const rows = new Map<ThingKind, number[]>(KINDS.map((kind) => [kind, []]));
+    link.frames.names.forEach((name, row) => {
+      if (!name.includes("/") && name !== "map" && name !== "base_link")
+        rows.get(kindOf(name))!.push(row);
+    });
+    for (const [kind, those] of rows) {
+      if (those.length === 0) continue;
+      const mesh = new InstancedMesh(bodyOfThing(kind), this.material, those.length);
+      mesh.instanceMatrix.setUsage(DynamicDrawUsage);
+      mesh.castShadow = mesh.receiveShadow = true;
+      mesh.frustumCulled = false;
+      this.object.add(mesh);
+      this.kinds.push({ mesh, rows: those, kind });
+    }
+  }
+}
+
+function place(mesh: InstancedMesh, i: number, at: number, beat: number): void {
+  const { poses } = shown;
+  const known = Number.isFinite(poses[at]! + poses[at + 6]!);
+  if (known) rotationOf(poses, at, rotation);
+  for (const k of [2, 5, 8]) rotation[k]! *= beat;
+  putMatrix(
+    mesh.instanceMatrix.array,
+    i,
+    rotation,
+    known ? 1 : 0,
+    known ? poses[at]! : 0,
+    known ? poses[at + 1]! : 0,
+    known ? poses[at + 2]! : 0,
+  );
+}

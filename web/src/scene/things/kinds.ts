@@ -1,0 +1,39 @@
+// What moves besides UAVs, and what it is: from its tags (simulation_interfaces), else its name.
+
+import { link } from "../../link/link.ts";
+
+export const KINDS = ["person", "car", "bird", "thing"] as const;
+export type ThingKind = (typeof KINDS)[number];
+
+const NAMES: readonly (readonly [ThingKind, RegExp])[] = [
+  ["person", /person|people|pedestrian|walker|hiker|\bman\b|woman|child/i],
+  ["car", /car|vehicle|truck|van|bus|jeep/i],
+  ["bird", /bird|gull|crow|pigeon|hawk|eagle/i],
+];
+
+const told = new Map<string, ThingKind>();
+const asked = new Set<string>();
+
+export function kindOf(name: string): ThingKind {
+  const known = told.get(name);
+  if (known !== undefined) return known;
+  ask(name);
+  return NAMES.find(([, pattern]) => pattern.test(name))?.[0] ?? "thing";
+}
+
+/** Grows when a kind has been told. */
+export let kindsVersion = 0;
+
+function ask(name: string): void {
+  if (asked.has(name) || link.state !== "open") return;
+  asked.add(name);
+  link
+    .call("/get_entity_info", "simulation_interfaces/srv/GetEntityInfo", { entity: name })
+    .then(({ info }) => {
+      const kind = KINDS.find((kind) => info.tags.includes(kind));
+      if (kind === undefined) return;
+      told.set(name, kind);
+      kindsVersion++;
+    })
+    .catch(() => undefined); // other graphs have no such service: the name must do
+}
