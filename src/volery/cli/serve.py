@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -64,8 +65,8 @@ class _Wish:
     def __init__(self, scenario: Scenario, shelf: Shelf, speed: float | None) -> None:
         self._shelf = shelf
         self.asked = True
-        self.scenario: Scenario | None = scenario
-        """None: no world at all."""
+        self.world: Scenario | Path | None = scenario
+        """A scenario to fly, a log to play; None: no world at all."""
         self.speed = speed
         """Factor of real time; None: as fast as possible."""
         self.quit: Callable[[], None] = _nothing
@@ -80,14 +81,19 @@ class _Wish:
                 self.speed = request.changes.speed or None
         self.quit()
 
-    def want(self, scenario: Scenario | None) -> None:
-        """Have this flown next."""
-        self.asked, self.scenario = True, scenario
+    def play(self, log: Path) -> None:
+        """End what is there for a log."""
+        self.want(log)
+        self.quit()
 
-    def take(self) -> Scenario | None:
-        """What to fly now; what is asked for from here on comes after it."""
+    def want(self, world: Scenario | Path | None) -> None:
+        """Have this flown or played next."""
+        self.asked, self.world = True, world
+
+    def take(self) -> Scenario | Path | None:
+        """What to show now; what is asked for from here on comes after it."""
         self.asked, self.quit = False, _nothing
-        return self.scenario
+        return self.world
 
 
 class _Host:
@@ -102,7 +108,7 @@ class _Host:
         self._shelf = Shelf(options.page.uploads)
         self._wish = _Wish(_first_scenario(options.first), self._shelf, options.first.speed)
         self._present: Scenario | None = None
-        """What was built last."""
+        """What was flown last."""
         self._trouble = ""
         """What went wrong last, for the page."""
         self._quits = False
@@ -119,7 +125,10 @@ class _Host:
             self._wait()
             return
         try:
-            self._fly(wanted)
+            if isinstance(wanted, Path):
+                self._play(wanted)
+            else:
+                self._fly(wanted)
         except Exception as error:  # a mistake of ours in one world must not end the others
             if self._present is None:
                 raise
@@ -145,10 +154,33 @@ class _Host:
             self._present, self._wish.quit = scenario, simulation.quit
             self._interrupts.be_gentle()
             with open_doors(simulation, first), page.showing(simulation, self._trouble):
+                self._offer_recordings(simulation)
                 self._trouble = ""
                 typer.echo(f"flying  {scenario.name}", err=True)
                 self._stay(simulation)
             self._quits = simulation.quitting and not self._wish.asked
+
+    def _play(self, log: Path) -> None:
+        """Play a log until something else is asked for."""
+        from volery.runtime.player import Player
+        from volery.runtime.recorded import Recorded
+
+        with Player(log, on_load=self._wish.ask) as player:
+            shown, self._wish.quit = Recorded(player), player.quit
+            self._interrupts.be_gentle()
+            with open_doors(player, self._options.first), self._page.showing(shown):
+                self._offer_recordings(player)
+                typer.echo(f"playing {log.name}", err=True)
+                while not (player.quitting or self._interrupts.pressed):
+                    player.wait(_GLANCE_S)
+                player.wait(_FAREWELL_S)
+            self._quits = player.quitting and not self._wish.asked
+
+    def _offer_recordings(self, world: Any) -> None:
+        """Let clients of a world ask for a log."""
+        from volery.runtime.recorded import offer_recordings
+
+        offer_recordings(world.graph, self._options.first.recordings, self._wish.play)
 
     def _stay(self, simulation: Any) -> None:
         """Fly; at the end hold still there, until a reset or something else is asked for."""
@@ -176,6 +208,7 @@ class _Host:
 
         lobby = Lobby(self._wish.ask, self._shelf)
         with open_doors(lobby, self._options.first), self._page.showing(lobby, self._trouble):
+            self._offer_recordings(lobby)
             typer.echo("no world is loaded", err=True)
             self._trouble = ""
             while not (self._wish.asked or lobby.quitting or self._interrupts.pressed):

@@ -13,7 +13,13 @@ _PACE = {
     f"{package}/srv/{name}"
     for package, names in {
         "simulation_interfaces": ("StepSimulation", "LoadWorld", "UnloadWorld"),
-        "volery_interfaces": ("SetSpeed", "StartRecording", "StopRecording", "LoadScenario"),
+        "volery_interfaces": (
+            "SetSpeed",
+            "StartRecording",
+            "StopRecording",
+            "PlayRecording",
+            "LoadScenario",
+        ),
     }.items()
     for name in names
 }

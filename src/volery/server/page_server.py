@@ -21,6 +21,7 @@ import uvicorn
 from volery.bridges.origins import LOOPBACK, Origins
 from volery.bridges.rosbridge.wire import MOST_MESSAGE_BYTES
 from volery.core.errors import BridgeError
+from volery.runtime.lobby import Lobby
 from volery.scenario.schema import Scenario
 from volery.scenario.shelf import Shelf
 from volery.server.app import make_app
@@ -111,8 +112,10 @@ class PageServer:
         message: what went wrong before, such as that another world could not be built.
         """
         scenario: Scenario | None = getattr(world, "scenario", None)
-        if scenario is None:
+        if isinstance(world, Lobby):
             told = Situation(State.FAILED if message else State.LOBBY, message=message)
+        elif scenario is None:  # a recording of something else
+            told = Situation(State.FLYING, message=message)
         else:
             told = Situation(State.FLYING, scenario.name, scenario.description.strip(), message)
         self._call(self._site.join(world, told))

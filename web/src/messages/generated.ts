@@ -1872,6 +1872,15 @@ export interface volery_interfaces_LoadScenario_Response {
   message: string;
 }
 
+export interface volery_interfaces_PlayRecording_Request {
+  name: string;
+}
+
+export interface volery_interfaces_PlayRecording_Response {
+  success: boolean;
+  message: string;
+}
+
 export type volery_interfaces_PlayerInfo_Request = Record<string, never>;
 
 export interface volery_interfaces_PlayerInfo_Response {
@@ -2215,6 +2224,7 @@ export interface Services {
   "volery_interfaces/srv/JoinSearch": { request: volery_interfaces_JoinSearch_Request; response: volery_interfaces_JoinSearch_Response };
   "volery_interfaces/srv/ListSnapshots": { request: volery_interfaces_ListSnapshots_Request; response: volery_interfaces_ListSnapshots_Response };
   "volery_interfaces/srv/LoadScenario": { request: volery_interfaces_LoadScenario_Request; response: volery_interfaces_LoadScenario_Response };
+  "volery_interfaces/srv/PlayRecording": { request: volery_interfaces_PlayRecording_Request; response: volery_interfaces_PlayRecording_Response };
   "volery_interfaces/srv/PlayerInfo": { request: volery_interfaces_PlayerInfo_Request; response: volery_interfaces_PlayerInfo_Response };
   "volery_interfaces/srv/ReleaseControl": { request: volery_interfaces_ReleaseControl_Request; response: volery_interfaces_ReleaseControl_Response };
   "volery_interfaces/srv/Seek": { request: volery_interfaces_Seek_Request; response: volery_interfaces_Seek_Response };

@@ -48,7 +48,7 @@ export async function uploadRecording(file: File): Promise<string> {
 
 /** Play a log in place of the present world; the link is made anew meanwhile. */
 export async function playRecording(name: string): Promise<void> {
-  const type = "volery_interfaces/srv/ByName";
+  const type = "volery_interfaces/srv/PlayRecording";
   await order("/volery/play_recording", type, { name }, LONGEST_START_S);
 }
 
