@@ -169,6 +169,8 @@ function publish(name: string, type: string, message: unknown): void {
 
 const frameTopics: Topic[] = [];
 let toldVersion = -1;
+/** Whether the simulation itself tells true poses, which win over estimates. */
+let truthHeard = false;
 let names: string[] = [];
 
 function followFrames(): void {
@@ -188,10 +190,12 @@ function followFrames(): void {
   });
   listen("/tf", 0, (message) => {
     tree.move(message.transforms);
-    if (!truth) tellPoses(message);
+    if (!truthHeard) tellPoses(message);
   });
+  truthHeard = false; // a recording may lack it
   if (!truth) return;
   listen("/ground_truth/tf", throttleMs, (message) => {
+    truthHeard = true;
     tree.moveTruly(message.transforms);
     tellPoses(message);
   });

@@ -30,6 +30,10 @@ export function followSimulation(ownServer: boolean): void {
   link.subscribe("/volery/status", "volery_interfaces/msg/SimulationStatus", ({ message }) =>
     useSimulation.setState({ status: message }),
   );
+  link.watch(() => {
+    // It may be another world, and a recording has no status.
+    if (link.state === "open") useSimulation.setState({ status: null });
+  });
   if (!ownServer) return;
   const ask = async () => {
     try {

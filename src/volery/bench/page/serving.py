@@ -15,7 +15,7 @@ from typing import Any
 
 from volery.core.errors import VoleryError
 
-_STARTING_S = 300.0
+_STARTING_S = 600.0
 """The first start compiles, and the machine may be busy."""
 _ENDING_S = 20.0
 _URL = re.compile(r"http://127\.0\.0\.1:(\d+)/")
@@ -73,9 +73,13 @@ class PageProcess:
             target=self._read, args=(self._process, listening), daemon=True
         )
         self._reader.start()
-        if not listening.wait(_STARTING_S) or self._process.poll() is not None:
-            raise VoleryError(f"the server did not start: {''.join(self._said)}")
-        self.wait_until_flying()
+        try:
+            if not listening.wait(_STARTING_S) or self._process.poll() is not None:
+                raise VoleryError(f"the server did not start: {''.join(self._said)}")
+            self.wait_until_flying()
+        except BaseException:
+            self.stop()
+            raise
 
     def stop(self) -> None:
         """End it."""

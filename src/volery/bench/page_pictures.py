@@ -1,0 +1,151 @@
+"""The README's pictures of the page: scenarios played in headless Chromium.
+
+    python -m volery.bench.page_pictures [FOLDER] [NAME...]
+
+WebGL is drawn in software, so a simulation waits, paused, until its picture is done.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from websockets.sync.client import connect
+
+from volery.bench.page.browser import open_browser
+from volery.bench.page.looking import wait_for_picture
+from volery.bench.page.serving import PageProcess
+from volery.core.errors import VoleryError
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+_SIZE = {"width": 1440, "height": 810}
+_PATIENCE_MS = 600_000
+_FRAMES = 12
+"""Drawn after the simulation was paused: details and smooth turns come to an end."""
+_PAUSED = 2
+_JPEG_QUALITY = 85
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One picture.
+
+    at_s: simulated time. view: of the page's address. layout: as the page keeps it. lines: fields
+    that are drawn as plots.
+    """
+
+    name: str
+    scenario: str
+    at_s: float
+    view: str
+    layout: dict[str, Any] = field(default_factory=dict)
+    lines: tuple[tuple[str, str, str], ...] = ()
+    options: tuple[str, ...] = ()
+    scheme: str = "light"
+
+
+_ODOMETRY = "nav_msgs/msg/Odometry"
+SHOTS = (
+    Shot(
+        "page_forest",
+        "forest_survey",
+        25.0,
+        "view=chase&uav=uav2&quality=high",
+        {"left": "vehicles", "right": "inspector"},
+    ),
+    Shot(
+        "page_city",
+        "city_flight",
+        15.0,
+        "view=chase&uav=uav1&quality=high",
+        {"left": "", "right": "environment"},
+        scheme="dark",
+    ),
+    Shot(
+        "page_data",
+        "forest_survey",
+        30.0,
+        "view=orbit&uav=uav1&quality=medium",
+        {"left": "", "bottom": "plots"},
+        tuple(
+            (f"/uav{number}/odom", _ODOMETRY, f"twist.twist.linear.{axis}")
+            for number, axis in ((1, "x"), (2, "x"), (3, "x"))
+        ),
+        scheme="dark",
+    ),
+    Shot(
+        "page_cameras",
+        "forest_cameras",
+        12.0,
+        "view=chase&uav=uav1&quality=high",
+        {"left": "vehicles", "shown": {"map": True, "pictures": True}},
+    ),
+)
+
+
+def main(folder: Path, names: list[str]) -> None:
+    """Take all pictures, or those of the given names."""
+    wanted = [shot for shot in SHOTS if not names or shot.name in names]
+    folder.mkdir(parents=True, exist_ok=True)
+    with open_browser() as browser:
+        for shot in wanted:
+            path = folder / f"{shot.name}.jpg"
+            _take(browser, shot, path)
+            print(path)  # noqa: T201
+
+
+def _take(browser: Browser, shot: Shot, path: Path) -> None:
+    with PageProcess(shot.scenario, "--seconds", "1e6", *shot.options) as server:
+        context = browser.new_context(viewport=_SIZE, color_scheme=shot.scheme)  # type: ignore[arg-type]
+        context.set_default_timeout(_PATIENCE_MS)
+        context.add_init_script(_kept(shot))
+        try:
+            page = context.new_page()
+            page.goto(f"{server.url}#{shot.view}")
+            wait_for_picture(page)
+            _pause_at(server, shot.at_s)
+            _settle(page)
+            page.screenshot(path=path, type="jpeg", quality=_JPEG_QUALITY)
+        finally:
+            context.close()
+
+
+def _kept(shot: Shot) -> str:
+    """What a browser keeps of a former visit."""
+    lines = [{"topic": topic, "type": kind, "path": path} for topic, kind, path in shot.lines]
+    kept = {"volery.layout": shot.layout}
+    if lines:
+        kept["volery.plots"] = {"plots": [{"id": 1, "lines": lines}], "windowS": 30}
+    return "".join(
+        f"localStorage.setItem({json.dumps(key)}, {json.dumps(json.dumps(value))});"
+        for key, value in kept.items()
+    )
+
+
+def _pause_at(server: PageProcess, time_s: float) -> None:
+    """Pause the simulation when its time has come."""
+    with connect(server.rosbridge) as socket:
+        socket.send(json.dumps({"op": "subscribe", "topic": "/volery/status", "queue_length": 1}))
+        ends = time.monotonic() + _PATIENCE_MS / 1000
+        while json.loads(socket.recv(timeout=60))["msg"]["stamp"]["sec"] < time_s:
+            if time.monotonic() > ends:
+                raise VoleryError(f"the simulation did not come to {time_s} s")
+        call = {"op": "call_service", "service": "/set_simulation_state", "id": "pause"}
+        socket.send(json.dumps({**call, "args": {"state": {"state": _PAUSED}}}))
+        while json.loads(socket.recv(timeout=60)).get("id") != "pause":
+            pass
+
+
+def _settle(page: Page) -> None:
+    seen = page.evaluate("window.volery.frames")
+    page.wait_for_function(f"window.volery.frames >= {seen + _FRAMES}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/pictures"), sys.argv[2:])
