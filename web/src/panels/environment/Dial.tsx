@@ -13,14 +13,16 @@ interface DialProps {
   onChange: (value: number) => void;
 }
 
-/** After so long the slider is again where the simulation has it, ms. */
-const SETTLE_MS = 1000;
+/** After so long the slider is where the simulation has it, though that is not what was wished, ms. */
+const SETTLE_MS = 3000;
 
 /** A slider that shows what is confirmed, and while it is held what is wished. */
 export function Dial({ name, min, max, step, value, text, disabled, onChange }: DialProps) {
   const [wish, setWish] = useState<number | null>(null);
   const [timer, setTimer] = useState<ReturnType<typeof setTimeout>>();
-  const shown = wish ?? value;
+  // What is wished is shown until the simulation has confirmed it.
+  const open = wish !== null && Math.abs(wish - value) > step / 2;
+  const shown = open ? wish : value;
   const settle = () => {
     clearTimeout(timer);
     setTimer(setTimeout(() => setWish(null), SETTLE_MS));
@@ -29,7 +31,7 @@ export function Dial({ name, min, max, step, value, text, disabled, onChange }: 
     <div>
       <Group justify="space-between" gap="xs" wrap="nowrap">
         <Text size="sm">{name}</Text>
-        <Text size="sm" c={wish === null ? "bright" : "dimmed"} aria-label={`${name} now`}>
+        <Text size="sm" c={open ? "dimmed" : "bright"} aria-label={`${name} now`}>
           {text(shown)}
         </Text>
       </Group>

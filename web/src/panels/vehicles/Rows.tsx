@@ -11,10 +11,12 @@ interface RowsProps {
   list: VehicleState[];
   selected: string;
   choose: (name: string) => void;
+  /** Of who is clicked twice. */
+  open: () => void;
 }
 
 /** Rows of hundreds of UAVs, of which those are made that are seen. */
-export function Rows({ list, selected, choose }: RowsProps) {
+export function Rows({ list, selected, choose, open }: RowsProps) {
   const box = useRef<HTMLDivElement>(null);
   const [top, setTop] = useState(0);
   const height = box.current?.clientHeight ?? 600;
@@ -33,6 +35,7 @@ export function Rows({ list, selected, choose }: RowsProps) {
   const key = (event: KeyboardEvent) => {
     const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
     const next = step === undefined ? undefined : list[at + step];
+    if (event.key === "Enter") open();
     if (next === undefined) return;
     event.preventDefault();
     event.stopPropagation();
@@ -48,6 +51,7 @@ export function Rows({ list, selected, choose }: RowsProps) {
       aria-activedescendant={at < 0 ? undefined : `uav-${selected}`}
       onScroll={(event) => setTop(event.currentTarget.scrollTop)}
       onKeyDown={key}
+      onDoubleClick={open}
     >
       <div style={{ height: list.length * ROW_PX, position: "relative" }}>
         {list.slice(first, last).map((vehicle, i) => (

@@ -1,7 +1,7 @@
 import { ActionIcon, Group, Text, TextInput, Tooltip } from "@mantine/core";
 import { Plus, Search } from "lucide-react";
 import { useState } from "react";
-import { openPanel, useLayout } from "../../state/layout.ts";
+import { openPanel } from "../../state/layout.ts";
 import { useConnection } from "../../state/connection.ts";
 import { select, useVehicles } from "../../state/vehicles.ts";
 import { Rows } from "./Rows.tsx";
@@ -51,15 +51,11 @@ export default function Vehicles() {
           onChange={(event) => setFilter(event.currentTarget.value)}
         />
       )}
-      <Rows list={shown} selected={selected} choose={choose} />
+      <Rows list={shown} selected={selected} choose={select} open={inspect} />
     </div>
   );
 }
 
-/** Selecting a UAV twice, as a double click does, shows it in detail. */
-function choose(name: string): void {
-  if (useVehicles.getState().selected === name && useLayout.getState().right !== "inspector") {
-    openPanel("right", "inspector");
-  }
-  select(name);
+function inspect(): void {
+  openPanel("right", "inspector");
 }
