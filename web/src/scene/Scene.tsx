@@ -5,6 +5,7 @@ import { ViewMenu } from "../views/ViewMenu.tsx";
 import { DragHandle } from "./DragHandle.tsx";
 import { EyeProbe } from "./EyeProbe.tsx";
 import { GroundPicker } from "./GroundPicker.tsx";
+import { isSoftware } from "./stage/quality.ts";
 import { Stage } from "./stage/Stage.ts";
 
 // Coordinates of the picture are those of the map: ENU, metres.
@@ -18,7 +19,7 @@ export function Scene() {
         shadows={{ type: PCFShadowMap }}
         camera={{ fov: 55, near: 0.05, far: 6000, position: [-9, -5, 5] }}
         gl={{
-          antialias: true,
+          antialias: !isSoftware(),
           powerPreference: "high-performance",
           toneMapping: NeutralToneMapping,
         }}

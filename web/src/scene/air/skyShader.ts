@@ -53,7 +53,7 @@ void main() {
   // glow around the sun, wide and narrow, and its disc
   light += sun * clear * (0.05 * pow(towards, 6.0) + 0.14 * pow(towards, 60.0));
   light += sun * clear * 12.0 * smoothstep(0.99985, 0.99995, towards);
-  light += vec3(0.9, 0.95, 1.0) * stars(way) * night * clear * smoothstep(0.02, 0.25, way.z);
+  if (night > 0.0) light += vec3(0.9, 0.95, 1.0) * stars(way) * night * clear * smoothstep(0.02, 0.25, way.z);
 #ifdef CLOUDS
   if (way.z > 0.02) {
     vec2 over = way.xy / (way.z + 0.12) * 1.6 + drift;

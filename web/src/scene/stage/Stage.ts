@@ -17,6 +17,7 @@ import { shown } from "./shown.ts";
 const LONGEST_STEP_S = 0.1;
 const MEDIUM = 2;
 const LOW = 1;
+const SHORTEST_FRAME_MS = 28;
 
 /** The picture's parts, brought up to date and drawn once a frame. */
 export class Stage {
@@ -34,9 +35,8 @@ export class Stage {
     renderer: WebGLRenderer,
     private readonly setPixelRatio: (ratio: number) => void,
   ) {
-    const software = isSoftware(renderer.getContext());
-    prepareMaterials(software);
-    this.governor = new QualityGovernor(software ? LOW : MEDIUM);
+    prepareMaterials(isSoftware());
+    this.governor = new QualityGovernor(isSoftware() ? LOW : MEDIUM);
     scene.fog = this.fog;
     renderer.info.autoReset = true;
     this.parts = makeParts(scene, camera, renderer, this.air);
@@ -51,6 +51,8 @@ export class Stage {
   /** One frame: the whole of the page's work for it. */
   frame(width: number, height: number): void {
     const begun = performance.now();
+    // A processor that draws has other work too: the simulation's, more often than not.
+    if (isSoftware() && begun - this.lastMs < SHORTEST_FRAME_MS) return;
     const { moment } = this;
     debugging.frameMs = begun - this.lastMs;
     this.lastMs = begun;

@@ -74,10 +74,20 @@ export class QualityGovernor {
   }
 }
 
-/** Whether WebGL is drawn by the processor. */
-export function isSoftware(gl: WebGLRenderingContext | WebGL2RenderingContext): boolean {
+let software: boolean | null = null;
+
+/** Whether the processor draws WebGL: asked once, before the picture's own context is made. */
+export function isSoftware(): boolean {
+  software ??= asked();
+  return software;
+}
+
+function asked(): boolean {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  if (gl === null) return false;
   const names = gl.getExtension("WEBGL_debug_renderer_info");
   const name = names === null ? "" : String(gl.getParameter(names.UNMASKED_RENDERER_WEBGL));
+  gl.getExtension("WEBGL_lose_context")?.loseContext();
   return /swiftshader|llvmpipe|software|basic render/i.test(name);
 }
 

@@ -13,7 +13,6 @@ export function makeLeaves(): CanvasTexture {
   const texture = new CanvasTexture(canvas);
   texture.colorSpace = SRGBColorSpace;
   texture.minFilter = LinearMipmapLinearFilter;
-  texture.anisotropy = 2;
   return texture;
 }
 

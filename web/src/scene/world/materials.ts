@@ -27,7 +27,7 @@ let plain = false;
 /** Once, before the first world: `software` for pictures that the processor draws. */
 export function prepareMaterials(software: boolean): void {
   plain = software;
-  worldUniforms.noiseMap.value ??= makeNoise();
+  worldUniforms.noiseMap.value ??= makeNoise(software ? 1 : 4);
   worldUniforms.leafMap.value ??= makeLeaves();
 }
 

@@ -12,7 +12,7 @@ const SIDE = 256;
  * Four channels of noise that repeats without a seam, made once: r clouds, g fine grains, b streaks
  * along v, a cells. A texture costs a fraction of noise in the shader and fades with the distance.
  */
-export function makeNoise(): DataTexture {
+export function makeNoise(anisotropy: number): DataTexture {
   const data = new Uint8Array(SIDE * SIDE * 4);
   const clouds = layers([4, 8, 16, 32, 64]);
   const grains = layers([48, 96, 128]);
@@ -29,7 +29,7 @@ export function makeNoise(): DataTexture {
   texture.magFilter = LinearFilter;
   texture.minFilter = LinearMipmapLinearFilter;
   texture.generateMipmaps = true;
-  texture.anisotropy = 4;
+  texture.anisotropy = anisotropy;
   texture.needsUpdate = true;
   return texture;
 }
