@@ -355,6 +355,7 @@ def test_a_flight_of_the_command_line_is_repeated(tmp_path):
 def test_a_recording_begun_late_holds_what_came_before(tmp_path):
     with Simulation(parse_scenario(DATA), threads=1, recordings=tmp_path) as simulation:
         session = simulation.gateway.open("pilot")
+        session.subscribe("/volery/log", wake=lambda: None)  # so that records are on their way
         session.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
         session.publish("/uav1/cmd_vel", Twist(Vector3(1.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)))
         simulation.run(0.5)

@@ -166,8 +166,13 @@ def test_an_uploaded_map_is_flown(server):
     assert (status, json.loads(told)) == (201, {"scenario": "yard"})
     assert "yard" in [card["name"] for card in json.loads(server.ask("/api/scenarios")[1])]
     with Ros(server) as ros:
-        assert ros.load("yard")["result"] == 1
+        wanted = {"scenario": "yard", "changes": '{"uavs": 3}'}
+        answer = ros.call("/volery/load_scenario", "volery_interfaces/LoadScenario", **wanted)
+        assert answer["success"], answer
     server.wait_for(state="flying", scenario="yard")
+    with Ros(server) as ros:
+        told = ros.first("/volery/vehicles", "volery_interfaces/VehicleStates")
+        assert [vehicle["name"] for vehicle in told["vehicles"]] == ["uav1", "uav2", "uav3"]
     status, told = server.ask("/api/uploads?kind=grid_map&name=Yard.csv", b"0,0,7\n")
     assert status == 422
     assert "line 1, column 3" in json.loads(told)["error"]

@@ -23,7 +23,7 @@ followAddress();
 connectAsAddressed(location, usePilot.getState().wished);
 followLeaving();
 followSimulation(useConnection.getState().volery);
-followVehicles();
+followVehicles(useConnection.getState().volery);
 followHealth();
 followJournal();
 followPlayer();

@@ -18,6 +18,7 @@ from volery.cli.progress import FlightProgress
 from volery.cli.repeating import recorded_flight, recorded_scenario
 from volery.cli.targets import check_record, check_report
 from volery.core.errors import CommandError, ScenarioError
+from volery.scenario.changes import LogRequest
 
 if TYPE_CHECKING:
     from volery.scenario.changes import WorldRequest
@@ -140,7 +141,7 @@ class _Change:
         """None: no world at all."""
         self.quit: Callable[[], None] = _nothing
 
-    def ask(self, request: WorldRequest | None) -> None:
+    def ask(self, request: WorldRequest | LogRequest | None) -> None:
         """End the present flight for another one; `CommandError` where it must not end."""
         options = self._options
         for flag, given in (("--record", options.record), ("--report", options.report)):
@@ -150,6 +151,8 @@ class _Change:
             raise CommandError("this run prints the digest of one flight (--digest)")
         if options.replay_commands is not None:
             raise CommandError("this run repeats one flight (--replay-commands)")
+        if isinstance(request, LogRequest):
+            raise CommandError("this run flies; `volery serve` and `volery play` play logs")
         if request is not None:
             _scenario_of(_loading(options, request))
         self.asked, self.wanted = True, request

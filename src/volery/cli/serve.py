@@ -18,6 +18,7 @@ from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, serving
 from volery.core.errors import VoleryError
 from volery.scenario import changes
+from volery.scenario.changes import LogRequest
 
 if TYPE_CHECKING:
     from volery.scenario.changes import WorldRequest
@@ -62,38 +63,34 @@ def serve(options: ServeOptions) -> None:
 class _Wish:
     """What is to be flown next: the first scenario, then what clients ask for."""
 
-    def __init__(self, scenario: Scenario, shelf: Shelf, speed: float | None) -> None:
+    def __init__(self, scenario: Scenario, speed: float | None, shelf: Shelf) -> None:
         self._shelf = shelf
-        self.asked = True
-        self.world: Scenario | Path | None = scenario
-        """A scenario to fly, a log to play; None: no world at all."""
         self.speed = speed
-        """Factor of real time; None: as fast as possible."""
+        """Factor of real time to begin with; None: as fast as possible."""
+        self.asked = True
+        self._wanted: Scenario | Path | None = scenario
         self.quit: Callable[[], None] = _nothing
 
-    def ask(self, request: WorldRequest | None) -> None:
-        """End the present flight for another one; `ScenarioError` where that cannot be read."""
+    def ask(self, request: WorldRequest | LogRequest | None) -> None:
+        """End the present flight for another one; `VoleryError` where that cannot be."""
         if request is None:
             self.want(None)
+        elif isinstance(request, LogRequest):
+            self.want(request.path)
         else:
             self.want(changes.apply(self._shelf.load(request.name), request.changes))
-            if request.changes.speed is not None:
-                self.speed = request.changes.speed or None
+            speed = request.changes.speed
+            self.speed = self.speed if speed is None else speed or None
         self.quit()
 
-    def play(self, log: Path) -> None:
-        """End what is there for a log."""
-        self.want(log)
-        self.quit()
-
-    def want(self, world: Scenario | Path | None) -> None:
-        """Have this flown or played next."""
-        self.asked, self.world = True, world
+    def want(self, what: Scenario | Path | None) -> None:
+        """Have this flown next, or this log played; None: no world at all."""
+        self.asked, self._wanted = True, what
 
     def take(self) -> Scenario | Path | None:
-        """What to show now; what is asked for from here on comes after it."""
+        """What to do now; what is asked for from here on comes after it."""
         self.asked, self.quit = False, _nothing
-        return self.world
+        return self._wanted
 
 
 class _Host:
@@ -105,10 +102,10 @@ class _Host:
         self._options = options
         self._page = page
         self._interrupts = interrupts
-        self._shelf = Shelf(options.page.uploads)
-        self._wish = _Wish(_first_scenario(options.first), self._shelf, options.first.speed)
+        self._shelf = Shelf(options.page.uploads, options.page.recordings)
+        self._wish = _Wish(_first_scenario(options.first), options.first.speed, self._shelf)
         self._present: Scenario | None = None
-        """What was flown last."""
+        """What was built last."""
         self._trouble = ""
         """What went wrong last, for the page."""
         self._quits = False
@@ -154,33 +151,29 @@ class _Host:
             self._present, self._wish.quit = scenario, simulation.quit
             self._interrupts.be_gentle()
             with open_doors(simulation, first), page.showing(simulation, self._trouble):
-                self._offer_recordings(simulation)
                 self._trouble = ""
                 typer.echo(f"flying  {scenario.name}", err=True)
                 self._stay(simulation)
             self._quits = simulation.quitting and not self._wish.asked
 
     def _play(self, log: Path) -> None:
-        """Play a log until something else is asked for."""
+        """Open a log and stay with it."""
         from volery.runtime.player import Player
-        from volery.runtime.recorded import Recorded
 
-        with Player(log, on_load=self._wish.ask) as player:
-            shown, self._wish.quit = Recorded(player), player.quit
+        with Player(log, on_load=self._wish.ask, shelf=self._shelf) as player:
+            if player.scenario is not None:
+                self._page.building(player.scenario, self._trouble)
+            _ = player.geometry  # made here: the server only reads it
+            self._wish.quit = player.quit
             self._interrupts.be_gentle()
-            with open_doors(player, self._options.first), self._page.showing(shown):
-                self._offer_recordings(player)
+            first, page = self._options.first, self._page
+            with open_doors(player, first), page.showing(player, self._trouble):
+                self._trouble = ""
                 typer.echo(f"playing {log.name}", err=True)
-                while not (player.quitting or self._interrupts.pressed):
+                while not (self._wish.asked or player.quitting or self._interrupts.pressed):
                     player.wait(_GLANCE_S)
                 player.wait(_FAREWELL_S)
             self._quits = player.quitting and not self._wish.asked
-
-    def _offer_recordings(self, world: Any) -> None:
-        """Let clients of a world ask for a log."""
-        from volery.runtime.recorded import offer_recordings
-
-        offer_recordings(world.graph, self._options.first.recordings, self._wish.play)
 
     def _stay(self, simulation: Any) -> None:
         """Fly; at the end hold still there, until a reset or something else is asked for."""
@@ -208,7 +201,6 @@ class _Host:
 
         lobby = Lobby(self._wish.ask, self._shelf)
         with open_doors(lobby, self._options.first), self._page.showing(lobby, self._trouble):
-            self._offer_recordings(lobby)
             typer.echo("no world is loaded", err=True)
             self._trouble = ""
             while not (self._wish.asked or lobby.quitting or self._interrupts.pressed):

@@ -24,8 +24,6 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba
 
-from volery.core.part_compiler import PartCompiler
-
 F = TypeVar("F", bound=Callable[..., Any])
 
 _CONFIG: Any = numba.config
@@ -117,8 +115,7 @@ def inner_kernel(function: F, **options: Any) -> F:
     option `_nrt`), for the counts lie in memory that all threads share, and each change of one
     is an atomic instruction. For a part that makes arrays: `owning_kernel`.
     """
-    fixed = {"no_cpython_wrapper": True, "_nrt": False, "pipeline_class": PartCompiler}
-    choices = {**fixed, **options}
+    choices = {"no_cpython_wrapper": True, "_nrt": False, **options}
     part: Any = _decorate(function, **choices)
 
     def refuse(*_arguments: Any, **_keywords: Any) -> None:
@@ -147,12 +144,15 @@ def _ignore(*_arguments: Any, **_keywords: Any) -> None:
 
 
 def _decorate(function: F, **options: Any) -> F:
+    # What is not said numba takes from whichever kernel first asks for a part, and keeps it for all
+    # others: results would depend on the order in which a cache was filled.
+    said: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": False}
     # Nobody hands kernels to C code: entries for it would take a tenth of the time to compile.
-    choices: dict[str, Any] = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
+    choices = {**said, "nogil": True, "no_cfunc_wrapper": True, **options}
     saved = _CONFIG.CACHE_DIR
     _CONFIG.CACHE_DIR = str(cache_dir())
     try:
-        compiled: F = numba.njit(cache=True, **choices, **options)(function)
+        compiled: F = numba.njit(cache=True, **choices)(function)
     finally:
         _CONFIG.CACHE_DIR = saved
     return compiled

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,8 +104,8 @@ def _for_people(taken: Taken) -> str:
 @cache
 def _grows(msgtype: str) -> bool:
     """Whether messages of a type have no fixed size: whether it holds a sequence or a text."""
-    fields: Any = typestore().fielddefs[msgtype][1]
-    for _, (kind, detail) in fields:
+    for _, described in typestore().fielddefs[msgtype][1]:
+        kind, detail = cast("tuple[Any, Any]", described)
         if kind == Nodetype.SEQUENCE or (kind == Nodetype.BASE and detail[0] == "string"):
             return True
         inner, name = detail[0] if kind == Nodetype.ARRAY else (kind, detail)

@@ -17,8 +17,8 @@ _PACE = {
             "SetSpeed",
             "StartRecording",
             "StopRecording",
-            "PlayRecording",
             "LoadScenario",
+            "PlayRecording",
         ),
     }.items()
     for name in names

@@ -14,6 +14,7 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +26,14 @@ from volery.engine.commands import Inbox
 from volery.graph.graph import Graph
 from volery.graph.messages import Clock, time_from_ns
 from volery.graph.session import Gateway
+from volery.runtime.geometry import Geometry
 from volery.runtime.origin import scenario_of
 from volery.runtime.progress import Progress
 from volery.runtime.services.player import PlayerServices, State
 from volery.runtime.services.worlds import OnLoad
+from volery.runtime.worlds import geometry_of
 from volery.scenario.schema import Scenario
+from volery.scenario.shelf import Shelf
 
 _SLICE_S = 0.004
 """Wall time between two looks at what is due, while it plays."""
@@ -48,7 +52,8 @@ class Player:
 
     `speed` is a factor of real time, None plays as fast as possible; with `loop` it begins again at
     the end, else it pauses there. `on_load` is called with the name of a scenario that a client
-    wants to see flown instead, or with None where it wants no world. Methods belong to one thread,
+    wants to see flown instead, or with None where it wants no world; `shelf` has what there is to
+    choose from. Methods belong to one thread,
     which calls `wait` or `run`; others use `Gateway.post`. Raises `RecordingError` where there is
     no log, or nothing in it.
     """
@@ -61,6 +66,7 @@ class Player:
         loop: bool = False,
         paused: bool = False,
         on_load: OnLoad | None = None,
+        shelf: Shelf | None = None,
     ) -> None:
         _check_speed(speed)
         self.path = Path(path)
@@ -82,7 +88,7 @@ class Player:
         self._clock = self.graph.advertise("/clock", Clock)
         self._clock_due = self._state_due = 0.0
         self._playback.open(self.graph)
-        self._services = PlayerServices(self, on_load)
+        self._services = PlayerServices(self, on_load, shelf)
         self._rebase()
 
     # -------------------------------------------------------------------------------------- time
@@ -98,6 +104,11 @@ class Player:
         return s_from_ns(self.time_ns)
 
     @property
+    def name(self) -> str:
+        """Of the log's file."""
+        return self.path.name
+
+    @property
     def start_s(self) -> float:
         """Beginning of the log."""
         return s_from_ns(self._playback.start_ns)
@@ -111,6 +122,11 @@ class Player:
     def finished(self) -> bool:
         """Whether it stands at the end, or somebody quit."""
         return self.quitting or self.time_ns >= self._playback.end_ns
+
+    @cached_property
+    def geometry(self) -> Geometry | None:
+        """What stood in the world at the beginning; None where the scenario is not known."""
+        return None if self.scenario is None else geometry_of(self.scenario)
 
     @property
     def paused(self) -> bool:

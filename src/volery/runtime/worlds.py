@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
 from volery.core.geodesy import LocalFrame
+from volery.runtime.geometry import Geometry
 from volery.runtime.grid_map_building import starting_blocks
 from volery.runtime.thing_building import build_things
 from volery.runtime.user_meshes import mesh_solids
@@ -174,6 +175,15 @@ def build_world(
     city = build_city(scenario, terrain)
     forest = build_forest(scenario, terrain, city)
     return terrain, city, forest, build_scene(scenario, terrain, forest, city, threads=threads)
+
+
+def geometry_of(scenario: Scenario) -> Geometry:
+    """What stands in the world of a scenario at its beginning, for a picture of it."""
+    terrain = build_terrain(scenario)
+    city = build_city(scenario, terrain)
+    forest = build_forest(scenario, terrain, city)
+    cover = BARE_GROUND if city is None else city.cover
+    return Geometry(terrain, forest, tuple(build_solids(scenario, terrain, city)), cover)
 
 
 def build_weather(scenario: Scenario) -> Weather:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field, ValidationError
@@ -46,6 +47,13 @@ class WorldRequest:
 
     name: str
     changes: Changes = field(default_factory=Changes)
+
+
+@dataclass(frozen=True)
+class LogRequest:
+    """A recorded log that a client wants to see played."""
+
+    path: Path
 
 
 def parse_changes(text: str) -> Changes:

@@ -1,25 +1,31 @@
-"""Scenarios that can be asked for by name: those that ship, and those of a folder."""
+"""Scenarios and logs that can be asked for by name."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
-from volery.core.errors import ScenarioError
+from volery.core.errors import RecordingError, ScenarioError
 from volery.scenario import library
 from volery.scenario.load import load_scenario
 from volery.scenario.schema import Scenario
+
+_LOG_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_. -]{0,99}\.(mcap|bag)")
+"""No folder, no file that hides."""
 
 
 class Shelf:
     """The library and, where there is one, a folder with more: `FOLDER/NAME/scenario.toml`.
 
     Names of the library come first. A shipped scenario cannot be hidden by one of the folder.
+    `logs` is the folder of recorded logs that may be played; None: none.
     """
 
     FILE = "scenario.toml"
 
-    def __init__(self, folder: Path | None = None) -> None:
+    def __init__(self, folder: Path | None = None, logs: Path | None = None) -> None:
         self.folder = folder
+        self._logs = logs
 
     def names(self) -> tuple[str, ...]:
         """All names that can be loaded."""
@@ -40,3 +46,12 @@ class Shelf:
         if self.folder is None or name not in self.added():
             raise ScenarioError(f"no scenario '{name}'; known: {', '.join(self.names())}")
         return load_scenario(self.folder / name / self.FILE)
+
+    def log(self, name: str) -> Path:
+        """A log by the name of its file. `RecordingError` where there is none."""
+        if self._logs is None:
+            raise RecordingError("this process keeps no folder of recordings")
+        path = self._logs / name
+        if not _LOG_NAME.fullmatch(name) or path.is_symlink() or not path.is_file():
+            raise RecordingError(f"there is no recording '{name[:100]}'")
+        return path

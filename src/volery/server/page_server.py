@@ -21,7 +21,6 @@ import uvicorn
 from volery.bridges.origins import LOOPBACK, Origins
 from volery.bridges.rosbridge.wire import MOST_MESSAGE_BYTES
 from volery.core.errors import BridgeError
-from volery.runtime.lobby import Lobby
 from volery.scenario.schema import Scenario
 from volery.scenario.shelf import Shelf
 from volery.server.app import make_app
@@ -112,12 +111,12 @@ class PageServer:
         message: what went wrong before, such as that another world could not be built.
         """
         scenario: Scenario | None = getattr(world, "scenario", None)
-        if isinstance(world, Lobby):
+        name: str | None = getattr(world, "name", None) if scenario is None else scenario.name
+        if name is None:
             told = Situation(State.FAILED if message else State.LOBBY, message=message)
-        elif scenario is None:  # a recording of something else
-            told = Situation(State.FLYING, message=message)
         else:
-            told = Situation(State.FLYING, scenario.name, scenario.description.strip(), message)
+            what = "A recorded log." if scenario is None else scenario.description.strip()
+            told = Situation(State.FLYING, name, what, message)
         self._call(self._site.join(world, told))
         try:
             yield

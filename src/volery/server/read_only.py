@@ -46,8 +46,10 @@ READ_ONLY_SERVICES = frozenset(
         "/get_simulation_state",
         "/get_simulator_features",
         "/get_spawnables",
+        "/volery/get_choices",
         "/volery/get_grid_map",
         "/volery/get_weather",
         "/volery/list_snapshots",
+        "/volery/player/info",
     }
 )

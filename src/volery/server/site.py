@@ -53,6 +53,7 @@ class World(Protocol):
     """What clients can join: a simulation, a lobby, a recording.
 
     Where it has a `scenario`, `geometry` and `pilots`, as a `Simulation` has, they are served too.
+    Where it has no scenario but a `name`, as a log of unknown origin has, that is told.
     """
 
     graph: Graph

@@ -8,6 +8,7 @@ import { DropZone } from "./DropZone.tsx";
 import { HandControls } from "./hands/HandControls.tsx";
 import { Picking } from "./Picking.tsx";
 import { Rail } from "./Rail.tsx";
+import { SceneBoundary } from "./SceneBoundary.tsx";
 import { Situation } from "./Situation.tsx";
 import { TopBar } from "./top/TopBar.tsx";
 import { useHotkeys } from "./useHotkeys.ts";
@@ -27,7 +28,9 @@ export function App() {
       <Rail />
       <DockArea dock="left" />
       <main className="scene">
-        <Scene />
+        <SceneBoundary>
+          <Scene />
+        </SceneBoundary>
         <PlayerBar />
         <Overlays />
         <Situation />

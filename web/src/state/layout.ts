@@ -41,7 +41,8 @@ const USUAL: Layout = {
 export const useLayout = create<Layout>(() => {
   const layout = readKept(KEY, USUAL);
   // On a phone panels cover the scene: it begins without them.
-  return isNarrow() ? { ...layout, left: "", right: "", bottom: "" } : layout;
+  if (!isNarrow()) return layout;
+  return { ...layout, left: "", right: "", bottom: "", shown: { map: false, pictures: false } };
 });
 
 useLayout.subscribe((layout) => keep(KEY, layout));

@@ -1,19 +1,18 @@
 import { Group, Quaternion, Vector3, type PerspectiveCamera } from "three";
 import { POSE } from "../link/protocol.ts";
-import { pickGround, pickUav } from "../scene/stage/picking.ts";
+import { pickUav } from "../scene/stage/picking.ts";
 import type { Moment, Part } from "../scene/stage/part.ts";
 import { shown } from "../scene/stage/shown.ts";
 import { cameraOfUav } from "../scene/sensing/cameras.ts";
 import { shapeOf } from "../scene/uavs/airframeGeometry.ts";
 import { fleet } from "../scene/uavs/fleet.ts";
 import { standing } from "../scene/world/standing.ts";
-import { givePlace, useTool } from "../state/tool.ts";
+import { useTool } from "../state/tool.ts";
 import { select, useVehicles } from "../state/vehicles.ts";
 import { look, putCamera, useView, VIEWS, type ViewName } from "../state/view.ts";
 import { Blend } from "./Blend.ts";
 import { Chase } from "./Chase.ts";
 import { Fly } from "./Fly.ts";
-import { Mover } from "./Mover.ts";
 import { Hands, isTyping } from "./input.ts";
 import { Onboard } from "./Onboard.ts";
 import { Orbit } from "./Orbit.ts";
@@ -27,6 +26,8 @@ const HEAD_M = 1.75;
 const REST_S = 0.6;
 /** UAVs as near as this to the selected one belong into its first picture, m. */
 const NEIGHBOURS_M = 40;
+/** So long a page waits for the first UAV before it shows the world without, s. */
+const LONGEST_WAIT_S = 1;
 
 /** Moves the camera: one view at a time, changed by menu, number keys and links. */
 export class CameraMan implements Part {
@@ -53,9 +54,9 @@ export class CameraMan implements Part {
   private selected = "";
   private standingVersion = 0;
   private restedS = 0;
+  private waitedS = 0;
   private unsaved = false;
   private screen = { width: 1, height: 1 };
-  private readonly mover = new Mover();
   private readonly ended = new AbortController();
 
   constructor(
@@ -73,9 +74,6 @@ export class CameraMan implements Part {
       spread: 0,
     };
     this.hands = new Hands(element, {
-      grab: (x, y) => this.mover.grab(x, y, this.camera, this.screen),
-      dragTo: (x, y) => this.mover.dragTo(x, y, this.camera, this.screen),
-      drop: () => this.mover.drop(),
       click: (x, y) => this.pick(x, y),
       doubleClick: (x, y) => {
         this.pick(x, y);
@@ -92,10 +90,13 @@ export class CameraMan implements Part {
     this.lookAround();
     const { name, cameraVersion, camera: kept } = useView.getState();
     if (name !== this.entered || cameraVersion !== this.cameraVersion) {
-      const fromLink = cameraVersion !== this.cameraVersion;
-      this.enter(name, fromLink ? kept : null);
+      const given = cameraVersion !== this.cameraVersion ? kept : null;
+      if (this.entered === null && given === null && this.waits(stepS)) return;
+      if (this.entered === null) this.prepare();
+      this.enter(name, given);
       this.cameraVersion = cameraVersion;
     }
+    if (this.entered === null) return; // nobody is there to look at yet
     this.blendLeaps();
     this.rigs[name].update(this.hands, this.around, stepS, this.eye);
     this.blend.apply(this.eye, stepS);
@@ -107,6 +108,18 @@ export class CameraMan implements Part {
   dispose(): void {
     this.hands.dispose();
     this.ended.abort();
+  }
+
+  /** Whether the first picture had better wait for the first UAV. */
+  private waits(stepS: number): boolean {
+    this.waitedS += stepS;
+    return this.around.uav === null && this.waitedS < LONGEST_WAIT_S;
+  }
+
+  /** Every view begins from somewhere: the first one from where orbit would. */
+  private prepare(): void {
+    this.rigs.orbit.enter(this.eye, this.around, null);
+    this.rigs.orbit.update(this.hands, this.around, 0, this.eye);
   }
 
   private enter(name: ViewName, kept: Parameters<Rig["enter"]>[2]): void {
@@ -186,11 +199,7 @@ export class CameraMan implements Part {
   }
 
   private pick(x: number, y: number): void {
-    if (useTool.getState().asking !== null) {
-      const place = pickGround(x, y, this.camera, this.screen);
-      if (place !== null) givePlace({ x: place[0], y: place[1], z: place[2] });
-      return;
-    }
+    if (useTool.getState().asking !== null) return; // the click is an answer
     const name = pickUav(x, y, this.camera, this.screen);
     if (name !== "") select(name);
   }

@@ -19,10 +19,6 @@ const CLICK_PX = 5;
 const DOUBLE_MS = 350;
 
 export interface Clicks {
-  /** Whether a press here is the beginning of something else than looking around. */
-  grab: (x: number, y: number) => boolean;
-  dragTo: (x: number, y: number) => void;
-  drop: () => void;
   click: (x: number, y: number) => void;
   doubleClick: (x: number, y: number) => void;
   hover: (x: number, y: number) => void;
@@ -41,7 +37,6 @@ export class Hands implements Input {
   busy = false;
 
   private readonly fingers = new Map<number, { x: number; y: number; button: number }>();
-  private grabbed = -1;
   private start = { x: 0, y: 0, moved: false };
   private clickedMs = -Infinity;
   private readonly ended = new AbortController();
@@ -78,11 +73,6 @@ export class Hands implements Input {
   private readonly down = (event: PointerEvent): void => {
     this.element.focus({ preventScroll: true });
     this.element.setPointerCapture?.(event.pointerId);
-    const { x, y } = this.inPicture(event);
-    if (event.button === 0 && this.fingers.size === 0 && this.clicks.grab(x, y)) {
-      this.grabbed = event.pointerId;
-      return;
-    }
     if (this.fingers.size === 0) this.start = { x: event.clientX, y: event.clientY, moved: false };
     this.fingers.set(event.pointerId, {
       x: event.clientX,
@@ -95,8 +85,7 @@ export class Hands implements Input {
     const finger = this.fingers.get(event.pointerId);
     if (finger === undefined) {
       const { x, y } = this.inPicture(event);
-      if (event.pointerId === this.grabbed) this.clicks.dragTo(x, y);
-      else this.clicks.hover(x, y);
+      this.clicks.hover(x, y);
       return;
     }
     const [dx, dy] = [event.clientX - finger.x, event.clientY - finger.y];
@@ -123,7 +112,6 @@ export class Hands implements Input {
   };
 
   private readonly up = (event: PointerEvent): void => {
-    if (event.pointerId === this.grabbed) this.letGo();
     const finger = this.fingers.get(event.pointerId);
     this.fingers.delete(event.pointerId);
     if (finger === undefined || this.start.moved || finger.button !== 0 || this.fingers.size > 0)
@@ -135,13 +123,7 @@ export class Hands implements Input {
     else this.clicks.click(x, y);
   };
 
-  private letGo(): void {
-    this.grabbed = -1;
-    this.clicks.drop();
-  }
-
   private readonly cancel = (event: PointerEvent): void => {
-    if (event.pointerId === this.grabbed) this.letGo();
     this.fingers.delete(event.pointerId);
   };
 

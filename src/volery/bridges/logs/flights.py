@@ -131,7 +131,9 @@ def _commands_of(log: ChunkedLog) -> tuple[Command, ...]:
             commands.append(_command(message, content))
     if waiting is not None:
         commands.append(_command(waiting, None))
-    return tuple(commands)
+    # What was on its way when a log was begun is in it twice: as it came, and as an earlier one.
+    once = {command.number: command for command in reversed(commands)}
+    return tuple(once[number] for number in sorted(once))
 
 
 def _command(message: Any, content: Any) -> Command:

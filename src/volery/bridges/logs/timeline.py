@@ -18,8 +18,6 @@ from volery.core.clock import NS_PER_S
 
 _JUMP_NS = NS_PER_S // 10
 """Messages may be out of order by less (modelling choice): publishers have their own clocks."""
-
-
 _FOREVER_NS = 1 << 62
 
 

@@ -22,6 +22,7 @@ from volery.runtime.services.worlds import OnLoad, offer_worlds
 
 if TYPE_CHECKING:
     from volery.runtime.player import Player
+    from volery.scenario.shelf import Shelf
 
 __all__ = ["PlayerServices", "State"]
 
@@ -35,13 +36,13 @@ _MOST_STEPS = 1_000_000_000
 class PlayerServices:
     """The services of one player, and the topic that tells how it stands."""
 
-    def __init__(self, player: Player, on_load: OnLoad | None) -> None:
+    def __init__(self, player: Player, on_load: OnLoad | None, shelf: Shelf | None) -> None:
         self._player = player
         graph = player.graph
         self._state = graph.advertise("/volery/player/state", _STATE, latched=True)
         loads = on_load is not None
         offer_features(graph, loads_worlds=loads, offered=PLAYER_FEATURES)
-        offer_worlds(graph, player.scenario, on_load)
+        offer_worlds(graph, player.scenario, on_load, shelf)
         standard: tuple[tuple[str, str, Handler], ...] = (
             ("get_simulation_state", "GetSimulationState", self._get_state),
             ("set_simulation_state", "SetSimulationState", self._set_state),

@@ -10,10 +10,17 @@ from volery.core.errors import ScenarioError, VoleryError
 from volery.graph.graph import Graph
 from volery.runtime.services.choosing import offer_choices
 from volery.runtime.services.filters import tag_filter
-from volery.runtime.services.offering import Code, Fields, RefusedError, filled, offer_result
+from volery.runtime.services.offering import (
+    Code,
+    Fields,
+    RefusedError,
+    filled,
+    offer_command,
+    offer_result,
+)
 from volery.runtime.services.spawning import resource
 from volery.scenario import library
-from volery.scenario.changes import WorldRequest
+from volery.scenario.changes import LogRequest, WorldRequest
 from volery.scenario.load import load_scenario
 from volery.scenario.schema import Scenario
 from volery.scenario.shelf import Shelf
@@ -24,8 +31,8 @@ _NO_RESOURCE = 102
 _PARSE_ERROR = 103
 _NO_WORLD = 101
 
-OnLoad = Callable[[WorldRequest | None], None]
-"""Has another scenario of the library flown instead of the present one, or, for None, no one."""
+OnLoad = Callable[[WorldRequest | LogRequest | None], None]
+"""Has another scenario flown, or a log played, instead of the present one; for None nothing."""
 
 
 def offer_worlds(
@@ -34,7 +41,7 @@ def offer_worlds(
     """Offer what is known of worlds, and loading and unloading them where `on_load` does that.
 
     That is the owner's business: the process builds another simulation, or none. `loaded`: the
-    present scenario. `shelf`: where scenarios come from, None: the library alone.
+    present scenario. `shelf`: where scenarios and logs come from, None: the library alone.
     """
     shelf = shelf or Shelf()
 
@@ -61,7 +68,11 @@ def offer_worlds(
             raise RefusedError(_NO_WORLD, "no world is loaded")
         change(None)
 
-    def change(request: WorldRequest | None) -> None:
+    def play(request: Any) -> Fields:
+        change(LogRequest(shelf.log(request.name)))
+        return {"message": f"{request.name} is being opened"}
+
+    def change(request: WorldRequest | LogRequest | None) -> None:
         if on_load is None:
             reason = "this process simulates one scenario; start another one for another world"
             raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
@@ -74,6 +85,7 @@ def offer_worlds(
     offer_result(graph, "/get_current_world", f"{_SRV}/GetCurrentWorld", current)
     offer_result(graph, "/load_world", f"{_SRV}/LoadWorld", load)
     offer_result(graph, "/unload_world", f"{_SRV}/UnloadWorld", unload)
+    offer_command(graph, "/volery/play_recording", "volery_interfaces/srv/PlayRecording", play)
     offer_choices(graph, shelf.names, lambda name: _read(shelf, name), change)
 
 

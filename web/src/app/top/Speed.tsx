@@ -71,7 +71,7 @@ function SpeedSlider({ wanted }: { wanted: number }) {
         step={0.5}
         marks={MARKS}
         value={positionOf(dragged ?? wanted)}
-        label={(position) => speedText(speedOf(position))}
+        label={null}
         thumbProps={{ "aria-valuetext": speedText(dragged ?? wanted) }}
         onChange={(position) => {
           setDragged(speedOf(position));

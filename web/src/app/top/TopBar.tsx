@@ -31,6 +31,7 @@ export function TopBar() {
           <ActionIcon
             variant="subtle"
             size="lg"
+            visibleFrom="xs"
             aria-label="Keys"
             onClick={() => openWindow("help")}
           >

@@ -96,5 +96,6 @@ function Battery({ vehicle: { battery, voltage } }: { vehicle: VehicleState }) {
 }
 
 function decimal(value: number): string {
+  if (Number.isNaN(value)) return "–";
   return (Object.is(value.toFixed(2), "-0.00") ? 0 : value).toFixed(2);
 }

@@ -12,6 +12,9 @@ const TELL_MS = 1000;
 /** Too large to be received only to be counted: their tiles and layers tell their rates. */
 const LARGE = /\/(Image|CompressedImage|PointCloud2|OccupancyGrid|Octomap|MarkerArray)$/;
 
+/** What a UAV listens to, and tells nothing of. */
+const COMMANDS = /\/(cmd_vel|goal_pose|trajectory|pose_command)$/;
+
 interface Stamped {
   header?: { stamp: { sec: number; nanosec: number } };
 }
@@ -19,7 +22,10 @@ interface Stamped {
 /** What a UAV publishes, with the true rates by its stamps. */
 export function Sensors({ uav }: { uav: string }) {
   const all = useTopics((topics) => topics.list);
-  const own = useMemo(() => all.filter(({ name }) => name.startsWith(`/${uav}/`)), [all, uav]);
+  const own = useMemo(
+    () => all.filter(({ name }) => name.startsWith(`/${uav}/`) && !COMMANDS.test(name)),
+    [all, uav],
+  );
   const rates = useRates(own);
   return (
     <Section title="Sensors and topics">

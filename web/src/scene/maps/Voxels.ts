@@ -13,7 +13,8 @@ import type {
   octomap_msgs_OctomapWithPose,
 } from "../../messages/generated.ts";
 import { useView } from "../../state/view.ts";
-import { frameOf, toMap } from "../stage/frames.ts";
+import { frameOf } from "../stage/frames.ts";
+import { toMap } from "../stage/placing.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { putMatrix, rotationOf } from "../stage/poses.ts";
 import { followTopics, type Follower } from "../stage/topics.ts";

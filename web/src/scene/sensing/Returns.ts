@@ -13,7 +13,8 @@ import type { sensor_msgs_LaserScan, sensor_msgs_PointCloud2 } from "../../messa
 import { useVehicles } from "../../state/vehicles.ts";
 import { useView } from "../../state/view.ts";
 import { FADE } from "../air/fog.ts";
-import { frameOf, toMap } from "../stage/frames.ts";
+import { frameOf } from "../stage/frames.ts";
+import { toMap } from "../stage/placing.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { LEVELS } from "../stage/quality.ts";
 import { shown } from "../stage/shown.ts";
@@ -39,7 +40,6 @@ export class Returns implements Part {
   private readonly wanted = new Set<string>();
   private lookedMs = 0;
   private selected = "";
-  private begunMs = 0;
   private nowS = 0;
   private next = 0;
   private capacity = LEVELS[0]!.returns;
@@ -64,9 +64,8 @@ export class Returns implements Part {
     );
   }
 
-  update({ nowMs, quality, height, camera, renderer }: Moment): void {
-    if (this.begunMs === 0) this.begunMs = nowMs;
-    this.nowS = (nowMs - this.begunMs) / 1000;
+  update({ nowMs, stepS, quality, height, camera, renderer }: Moment): void {
+    this.nowS += stepS; // steps are bounded: where frames are slow returns are still seen in some
     this.capacity = quality.returns;
     const { lidar } = useView.getState().show;
     this.object.visible = lidar;

@@ -2,7 +2,8 @@ import { Group } from "three";
 import { link } from "../../link/link.ts";
 import { useView } from "../../state/view.ts";
 import { SegmentLines } from "../lines/SegmentLines.ts";
-import { frameOf, toMap } from "./frames.ts";
+import { frameOf } from "./frames.ts";
+import { toMap } from "./placing.ts";
 import type { Moment, Part } from "./part.ts";
 
 const MOST = 600;

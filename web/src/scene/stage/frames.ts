@@ -1,5 +1,6 @@
 import { link } from "../../link/link.ts";
-import { rotate, type Pose } from "../../lib/pose.ts";
+import type { Pose } from "../../lib/pose.ts";
+import { toMap } from "./placing.ts";
 
 const AT_MAP: Readonly<Pose> = [0, 0, 0, 0, 0, 0, 1];
 
@@ -21,14 +22,4 @@ export function inMap(
     if (Number.isFinite(x + y + z)) out.push(x, y, z);
   }
   return Float64Array.from(out);
-}
-
-export function toMap(
-  [px, py, pz, qx, qy, qz, qw]: Readonly<Pose>,
-  x: number,
-  y: number,
-  z: number,
-): [number, number, number] {
-  const [rx, ry, rz] = rotate(qx, qy, qz, qw, x, y, z);
-  return [px + rx, py + ry, pz + rz];
 }

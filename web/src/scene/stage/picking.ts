@@ -1,7 +1,6 @@
 import { Vector3, type PerspectiveCamera } from "three";
 import { POSE } from "../../link/protocol.ts";
 import { fleet } from "../uavs/fleet.ts";
-import { standing } from "../world/standing.ts";
 import { shown } from "./shown.ts";
 
 /** A click so close to a UAV's middle means it, CSS pixels; a large one has more. */
@@ -34,36 +33,4 @@ export function pickUav(
     name = uav.name;
   }
   return name;
-}
-
-const way = new Vector3();
-
-/** Where the ground is at a place of the picture, map; null where the sky is. */
-export function pickGround(
-  x: number,
-  y: number,
-  camera: PerspectiveCamera,
-  { width, height }: { width: number; height: number },
-): [number, number, number] | null {
-  way.set((2 * x) / width - 1, 1 - (2 * y) / height, 0.5).unproject(camera);
-  way.sub(camera.position).normalize();
-  const { ground } = standing;
-  const heightAbove = (d: number) => {
-    point.copy(camera.position).addScaledVector(way, d);
-    return point.z - ground.heightAt(point.x, point.y);
-  };
-  let near = 0;
-  for (let far = 0.5; far < 4000; far *= 1.02) {
-    if (heightAbove(far) > 0) {
-      near = far;
-      continue;
-    }
-    for (let i = 0; i < 24; i++) {
-      const middle = 0.5 * (near + far);
-      if (heightAbove(middle) > 0) near = middle;
-      else far = middle;
-    }
-    return [point.x, point.y, ground.heightAt(point.x, point.y)];
-  }
-  return null;
 }

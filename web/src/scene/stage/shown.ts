@@ -18,15 +18,16 @@ export class ShownPoses {
   /** Grows when the rows have other names. */
   version = -1;
 
+  /** Whether anything has moved with the last update. */
+  moved = false;
+
   private from = new Float64Array(0);
   private to = new Float64Array(0);
   private arrivedMs = 0;
   private periodMs = 33;
 
-  /** Whether anything has moved since the last call. */
-  moved = false;
-
   update(frames: Frames, nowMs: number): void {
+    this.moved = false;
     if (frames.version !== this.version || frames.now.length !== this.poses.length)
       this.restart(frames);
     else if (frames.now !== this.to) this.turnTo(frames);
@@ -49,6 +50,7 @@ export class ShownPoses {
   }
 
   private turnTo(frames: Frames): void {
+    this.moveOn(frames.arrivedMs); // as far as it has come when the message arrived
     const gapMs = Math.min(LONGEST_MS, Math.max(SHORTEST_MS, frames.arrivedMs - this.arrivedMs));
     this.periodMs += 0.15 * (gapMs - this.periodMs);
     this.arrivedMs = frames.arrivedMs;
@@ -68,7 +70,6 @@ export class ShownPoses {
   private moveOn(nowMs: number): void {
     const share = this.share(nowMs);
     const { from, to, poses } = this;
-    this.moved = false;
     if (to.length !== poses.length) return;
     for (let at = 0; at < poses.length; at += POSE) {
       const before = poses[at]! + poses[at + 1]! + poses[at + 2]!;

@@ -18,7 +18,7 @@ const GROUND = /* glsl */ `
   float grass = smoothstep(0.36, 0.62, 0.5 * wide.r + 0.35 * middle.r + 0.15 * close.g);
   grass *= smoothstep(0.55, 0.8, facing.z);
   vec3 soil = colour * mix(vec3(0.75, 0.62, 0.6), vec3(1.5, 1.2, 1.1), close.g * 0.6 + middle.g * 0.4);
-  vec3 blades = mix(vec3(0.045, 0.085, 0.018), vec3(0.14, 0.2, 0.045), close.b * 0.6 + close.g * 0.4);
+  vec3 blades = mix(vec3(0.045, 0.085, 0.018), vec3(0.14, 0.2, 0.045), close.g * 0.7 + middle.g * 0.3);
   blades = mix(blades, vec3(0.2, 0.19, 0.07), 0.5 * smoothstep(0.55, 0.9, middle.a));
   colour = mix(soil, blades, grass);
   height = 0.05 * close.g + 0.02 * noise(place.xy / 0.41).g;
@@ -27,7 +27,7 @@ const GROUND = /* glsl */ `
 const COVER = /* glsl */ `
   vec4 middle = noise(place.xy / 11.0), close = noise(place.xy / 1.3);
   float green = smoothstep(0.02, 0.1, colour.g - 0.5 * (colour.r + colour.b));
-  colour *= mix(0.85 + 0.3 * close.g, 0.55 + 0.6 * close.b + 0.35 * middle.r, green);
+  colour *= mix(0.85 + 0.3 * close.g, 0.6 + 0.5 * close.g + 0.35 * middle.r, green);
   height = mix(0.004, 0.04, green) * close.g;
 `;
 

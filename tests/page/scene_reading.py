@@ -1,0 +1,54 @@
+"""What tests read of the picture: its pixels and `window.volery`."""
+
+from __future__ import annotations
+
+import io
+import time
+
+import numpy as np
+from PIL import Image
+
+DRAWN_S = 90.0
+"""A loaded machine draws WebGL slowly."""
+
+
+def wait_for_picture(page):
+    """Until the world is in the picture."""
+    page.wait_for_function(
+        "() => window.volery !== undefined && window.volery.firstPictureMs > 0",
+        timeout=1000 * DRAWN_S,
+    )
+
+
+def wait_for_frames(page, count=3):
+    """Until so many more frames are drawn."""
+    page.wait_for_function(
+        "([from, count]) => window.volery.frames >= from + count",
+        arg=[page.evaluate("window.volery.frames"), count],
+        timeout=1000 * DRAWN_S,
+    )
+
+
+def wait_until(page, condition, timeout_s=DRAWN_S):
+    """Until a Python condition of the page is true; the last value that it gave."""
+    ends = time.monotonic() + timeout_s
+    while not (value := condition(page)):
+        assert time.monotonic() < ends, "it has not happened in the picture"
+        page.wait_for_timeout(100)
+    return value
+
+
+def pixels(page):
+    """(height, width, 3) the scene as it is on the screen, 0 to 1."""
+    picture = page.get_by_label("Scene", exact=True).screenshot()
+    return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), dtype=float) / 255.0
+
+
+def eye(page):
+    """(3,) m, map: where the camera is."""
+    return np.array(page.evaluate("window.volery.camera.position"))
+
+
+def on_screen(page, uav):
+    """What `window.volery` says of a UAV."""
+    return next(one for one in page.evaluate("window.volery.uavs()") if one["name"] == uav)

@@ -1,0 +1,110 @@
+"""The picture follows the simulation: weather, places, links."""
+
+import numpy as np
+from page_browsing import keep_picture
+from scene_reading import eye, on_screen, pixels, wait_for_frames, wait_for_picture, wait_until
+
+LOW_OVER_GROUND = "#view=fly&camera=-30_0_2.5_0_-0.12_0&quality=low"
+
+
+def set_weather(served, **changes):
+    request = {"only": list(changes), **changes}
+    told = served.call("/volery/set_weather", "volery_interfaces/srv/SetWeather", request)
+    assert told["success"], told["message"]
+
+
+def contrast(picture, top, bottom):
+    """Standard deviation of the brightness of a band, in shares of the height; its middle half."""
+    height, width, _ = picture.shape
+    band = picture[int(top * height) : int(bottom * height), width // 3 : -width // 8]
+    return float(np.std(band.mean(axis=2)))
+
+
+def test_fog_takes_far_contrast_before_near_one(browsing, served):
+    set_weather(served, fog_visibility=0.0)
+    page = browsing.open(served.url + LOW_OVER_GROUND, viewport={"width": 640, "height": 360})
+    wait_for_picture(page)
+    wait_for_frames(page)
+    clear = pixels(page)
+    keep_picture(page, "clear")
+    set_weather(served, fog_visibility=40.0)
+    wait_until(page, lambda page: np.abs(pixels(page) - clear).mean() > 0.05)
+    wait_for_frames(page, 12)
+    foggy = pixels(page)
+    keep_picture(page, "fog")
+    set_weather(served, fog_visibility=0.0)
+    far = contrast(foggy, 0.45, 0.62) / contrast(clear, 0.45, 0.62)
+    near = contrast(foggy, 0.88, 1.0) / contrast(clear, 0.88, 1.0)
+    assert far < 0.35
+    assert near > 1.5 * far
+    horizon = foggy[int(0.36 * len(foggy)), -200:-60]
+    assert np.ptp(horizon, axis=0).max() < 0.04  # nothing but haze
+
+
+def test_night_is_dark(browsing, served):
+    page = browsing.open(served.url + LOW_OVER_GROUND, viewport={"width": 640, "height": 360})
+    wait_for_picture(page)
+    wait_for_frames(page)
+    set_weather(served, hour_of_day=12.0)
+    wait_for_frames(page, 12)
+    noon = pixels(page).mean()
+    set_weather(served, hour_of_day=24.0)
+    wait_until(page, lambda page: pixels(page).mean() < 0.6 * noon)
+    keep_picture(page, "night")
+    set_weather(served, hour_of_day=12.0)
+
+
+def test_a_moved_uav_moves_on_the_screen(browsing, served):
+    page = browsing.open(
+        served.url + "#view=fly&camera=-12_0_4_0_-0.1_0&quality=minimal&uav=uav1",
+        viewport={"width": 640, "height": 360},
+    )
+    wait_for_picture(page)
+    wait_until(page, lambda page: page.evaluate("window.volery.uavs().length") > 0)
+    pose = {"position": {"x": 0.0, "y": 0.0, "z": 4.0}, "orientation": {"w": 1.0}}
+    put(served, pose)
+    before = wait_until(page, lambda page: placed(on_screen(page, "uav1"), 0.0))
+    pose["position"]["y"] = 3.0
+    put(served, pose)
+    after = wait_until(page, lambda page: placed(on_screen(page, "uav1"), 3.0))
+    # Looking east, what goes north goes to the left, by its angle.
+    assert before["x"] - after["x"] > 40.0
+
+
+def put(served, pose):
+    request = {
+        "entity": "uav1",
+        "state": {"header": {"frame_id": "map"}, "pose": pose},
+        "set_pose": True,
+        "set_twist": True,
+    }
+    told = served.call("/set_entity_state", "simulation_interfaces/srv/SetEntityState", request)
+    assert told["result"]["result"] == 1, told
+
+
+def placed(seen, y):
+    return seen if abs(seen["position"][1] - y) < 0.6 else None
+
+
+def test_number_keys_and_the_menu_choose_views(browsing, served):
+    page = browsing.open(served.url + "#quality=minimal", viewport={"width": 640, "height": 360})
+    wait_for_picture(page)
+    page.keyboard.press("4")
+    page.get_by_role("button", name="Chase", pressed=True).wait_for()
+    page.get_by_role("button", name="Walk", exact=True).click()
+    wait_until(
+        page,
+        lambda page: abs(eye(page)[2] - page.evaluate("window.volery.groundAt(0, 0)") - 1.7) < 0.05,
+    )
+    assert "view=walk" in page.url
+
+
+def test_a_link_shows_the_same_picture(browsing, served):
+    first = browsing.open(served.url + "#quality=minimal&view=fly&camera=-9_4_6_-0.5_-0.3_0")
+    wait_for_picture(first)
+    wait_for_frames(first, 3)
+    second = browsing.open(first.url)
+    wait_for_picture(second)
+    wait_for_frames(second, 3)
+    np.testing.assert_allclose(eye(second), eye(first), atol=0.02)
+    np.testing.assert_allclose(eye(first), [-9.0, 4.0, 6.0], atol=0.02)

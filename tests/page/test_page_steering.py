@@ -1,0 +1,247 @@
+"""What the page steers: each control is worked, and its effect looked up on the graph."""
+
+import json
+import re
+import time
+
+import pytest
+from page_browsing import keep_picture
+
+WIDE = {"width": 1000, "height": 600}
+TWIST = "geometry_msgs/msg/Twist"
+VEHICLES = "volery_interfaces/msg/VehicleStates"
+STATUS = "volery_interfaces/msg/SimulationStatus"
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory, chromium):
+    from page_serving import Served
+
+    folder = tmp_path_factory.mktemp("recordings")
+    with Served("hover", "--recordings", str(folder), "--uavs", "3") as server:
+        yield server
+
+
+@pytest.fixture
+def page(browsing, served):
+    opened = browsing.open(served.url, viewport=WIDE)
+    opened.get_by_role("option", name="uav1").wait_for()
+    return opened
+
+
+def open_panel(page, name):
+    page.get_by_role("navigation").get_by_role("button", name=name, exact=True).click()
+    return page.get_by_role("complementary", name=name)
+
+
+def inspect(page, uav):
+    """The inspector with this UAV selected."""
+    page.get_by_role("option", name=uav).click()
+    return open_panel(page, "Inspector")
+
+
+def vehicle(served, uav, fits, timeout_s=60.0):
+    """The UAV, once it is so."""
+    found = {}
+
+    def look(message):
+        found.update({each["name"]: each for each in message["vehicles"]})
+        return uav in found and fits(found[uav])
+
+    served.once("/volery/vehicles", VEHICLES, look, timeout_s)
+    return found[uav]
+
+
+def status(served, fits, timeout_s=60.0):
+    return served.once("/volery/status", STATUS, fits, timeout_s)
+
+
+def weather(served, fits, timeout_s=60.0):
+    ends = time.monotonic() + timeout_s
+    while not fits(told := served.call("/volery/get_weather", "volery_interfaces/srv/GetWeather")):
+        assert time.monotonic() < ends, f"the weather stayed {told}"
+        time.sleep(0.2)
+    return told
+
+
+def set_slider(page, name, key, times):
+    slider = page.get_by_role("slider", name=name, exact=True)
+    slider.focus()
+    for _ in range(times):
+        slider.press(key)
+
+
+# ------------------------------------------------------------------------------------------- time
+
+
+def test_pause_step_and_play(page, served):
+    page.get_by_role("button", name="Pause", exact=True).click()
+    paused = status(served, lambda told: told["state"] == 2)
+    page.get_by_role("button", name="Step", exact=True).click()
+    stepped = status(served, lambda told: told["stamp"] != paused["stamp"])
+    ns = [told["stamp"]["sec"] * 10**9 + told["stamp"]["nanosec"] for told in (paused, stepped)]
+    assert 0 < ns[1] - ns[0] <= 4_000_000  # one physics step
+    page.get_by_role("button", name="Many steps").click()
+    page.get_by_label("Physics steps").fill("500")
+    page.get_by_role("dialog").get_by_role("button", name="Step", exact=True).click()
+    status(served, lambda told: _ns(told) == ns[1] + 500 * (ns[1] - ns[0]))
+    page.keyboard.press("Escape")
+    page.get_by_role("button", name="Play", exact=True).click()
+    status(served, lambda told: told["state"] == 1)
+
+
+def test_the_speed_slider_goes_from_slow_to_unbounded(page, served):
+    page.get_by_role("button", name="Speed").click()
+    set_slider(page, "Speed", "Home", 1)
+    status(served, lambda told: told["speed"] == pytest.approx(0.1))
+    set_slider(page, "Speed", "End", 1)
+    status(served, lambda told: told["speed"] == 0.0)
+    page.keyboard.press("Escape")
+    served.call("/volery/set_speed", "volery_interfaces/srv/SetSpeed", {"factor": 1.0})
+
+
+def test_a_snapshot_is_taken_returned_to_and_forgotten(page, served):
+    page.get_by_role("button", name="Snapshots").click()
+    page.get_by_label("Name of the snapshot").fill("before")
+    page.get_by_role("button", name="Take", exact=True).click()
+    page.get_by_role("button", name="Return to before").wait_for()
+    listed = served.call("/volery/list_snapshots", "volery_interfaces/srv/ListSnapshots")
+    assert listed["names"] == ["before"]
+    kept_s = listed["stamps"][0]["sec"]
+    status(served, lambda told: told["stamp"]["sec"] >= kept_s + 3)
+    page.get_by_role("button", name="Return to before").click()
+    status(served, lambda told: told["stamp"]["sec"] <= kept_s + 2)
+    page.get_by_role("button", name="Forget before").click()
+    page.get_by_text("No snapshot yet").wait_for()
+
+
+def test_a_reset_goes_back_to_the_start(page, served):
+    status(served, lambda told: told["stamp"]["sec"] >= 3)
+    page.get_by_role("button", name="Reset", exact=True).click()
+    page.get_by_role("button", name="Reset, same seed").click()
+    status(served, lambda told: told["stamp"]["sec"] <= 2)
+
+
+# ------------------------------------------------------------------------------------------- UAVs
+
+
+def test_orders_and_a_place_to_go_to(page, served):
+    panel = inspect(page, "uav1")
+    vehicle(served, "uav1", lambda uav: uav["mode"] == "HOLD")  # after its own take-off
+    panel.get_by_label("x, m").fill("6")
+    panel.get_by_label("y, m").fill("-3")
+    panel.get_by_label("z, m").fill("4")
+    panel.get_by_role("button", name="Go", exact=True).click()
+    there = vehicle(served, "uav1", lambda uav: abs(uav["position"]["x"] - 6.0) < 0.3)
+    assert there["position"]["y"] == pytest.approx(-3.0, abs=1.0)
+    panel.get_by_role("button", name="Land", exact=True).click()
+    vehicle(served, "uav1", lambda uav: uav["mode"] in ("LAND", "LANDED"))
+    keep_picture(page, "inspector")
+
+
+def test_a_kill_is_asked_twice(page, served):
+    panel = inspect(page, "uav3")
+    vehicle(served, "uav3", lambda uav: uav["airborne"])
+    panel.get_by_role("button", name="Kill", exact=True).click()
+    panel.get_by_role("button", name="Do not kill").click()
+    panel.get_by_role("button", name="Kill", exact=True).click()
+    panel.get_by_role("button", name="Rotors off").click()
+    vehicle(served, "uav3", lambda uav: not uav["airborne"])
+
+
+def test_flight_by_keyboard(page, served):
+    page.get_by_role("option", name="uav2").click()
+    flying = vehicle(served, "uav2", lambda uav: uav["mode"] == "HOLD")
+    page.get_by_role("button", name="Fly by hand").click()
+    page.get_by_role("group", name="Flight by hand").wait_for()
+    page.keyboard.down("KeyW")
+    ahead = vehicle(served, "uav2", lambda uav: uav["velocity"]["x"] > 1.0)
+    assert ahead["mode"] == "VELOCITY"
+    page.keyboard.up("KeyW")
+    vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["x"]) < 0.2)
+    page.keyboard.press("Escape")
+    assert page.get_by_role("group", name="Flight by hand").count() == 0
+    assert ahead["position"]["x"] > flying["position"]["x"]
+
+
+def test_uavs_come_and_go(page, served):
+    page.get_by_role("button", name="Add UAVs").click()
+    group = page.get_by_role("group", name="Add UAVs")
+    group.get_by_label("Airframe or type").click()
+    page.get_by_role("option", name="crazyflie", exact=True).click()
+    group.get_by_label("How many").fill("2")
+    group.get_by_role("button", name="Add", exact=True).click()
+    came = vehicle(served, "uav5", lambda uav: True)
+    assert came["airframe"] == "crazyflie"
+    panel = inspect(page, "uav5")
+    panel.get_by_role("button", name="Remove uav5").click()
+    served.once(
+        "/volery/vehicles",
+        VEHICLES,
+        lambda message: "uav5" not in [uav["name"] for uav in message["vehicles"]],
+    )
+
+
+def test_control_is_taken_and_let_go(page, served):
+    panel = inspect(page, "uav1")
+    panel.get_by_label("Your name").fill("Anna")
+    panel.get_by_role("button", name="Take control").click()
+    vehicle(served, "uav1", lambda uav: uav["holder"] == "Anna")
+    refused = served.call("/uav1/hold", "std_srvs/srv/Trigger")
+    assert "Anna" in json.dumps(refused)
+    panel.get_by_text("You have it, as Anna.").wait_for()
+    panel.get_by_role("button", name="Release control").click()
+    vehicle(served, "uav1", lambda uav: uav["holder"] == "")
+
+
+# ------------------------------------------------------------------------------------------ world
+
+
+def test_weather_follows_its_sliders(page, served):
+    open_panel(page, "Environment")
+    set_slider(page, "Rain", "ArrowRight", 8)
+    weather(served, lambda told: told["rain"] == pytest.approx(8.0))
+    set_slider(page, "Fog", "End", 1)
+    weather(served, lambda told: told["fog_visibility"] == pytest.approx(10.0))
+    page.get_by_label("Fog now").get_by_text("10 m").wait_for()
+    set_slider(page, "Wind", "ArrowRight", 6)
+    told = weather(served, lambda told: told["wind"]["y"] == pytest.approx(-3.0))  # from the north
+    assert told["rain"] == pytest.approx(8.0)
+    page.get_by_role("button", name="Calm and clear").click()
+    weather(served, lambda told: told["rain"] == told["fog_visibility"] == 0.0)
+
+
+def test_a_wrong_upload_is_answered_with_the_reason(page):
+    page.get_by_role("button", name=re.compile("choose another one")).click()
+    page.locator("input[type=file]").set_input_files(
+        {"name": "field.csv", "mimeType": "text/csv", "buffer": b"0,1\n1,x\n"}
+    )
+    page.get_by_role("radio", name="Grid map").check()
+    page.get_by_role("button", name="Upload", exact=True).click()
+    refused = page.get_by_role("alert").filter(has_text="cannot be flown in")
+    refused.wait_for()
+    assert "field.csv" in refused.inner_text()
+
+
+def test_a_map_is_uploaded_and_flown_without_a_new_page(page, served):
+    page.evaluate("window.samePage = true")
+    page.get_by_role("button", name=re.compile("choose another one")).click()
+    rows = "\n".join(
+        ",".join("1" if (x, y) == (8, 8) else "0" for x in range(20)) for y in range(20)
+    )
+    page.locator("input[type=file]").set_input_files(
+        {"name": "field.csv", "mimeType": "text/csv", "buffer": rows.encode()}
+    )
+    page.get_by_role("button", name="Upload", exact=True).click()
+    page.get_by_label("UAVs", exact=True).fill("2")
+    page.get_by_role("button", name="Start", exact=True).click()
+    page.get_by_role("button", name=re.compile(r"Scenario field.*: choose")).wait_for(
+        timeout=120_000
+    )
+    page.get_by_label("Number of UAVs").get_by_text("2 UAVs").wait_for(timeout=120_000)
+    assert page.evaluate("window.samePage") is True
+    keep_picture(page, "uploaded")
+
+
+def _ns(told):
+    return told["stamp"]["sec"] * 10**9 + told["stamp"]["nanosec"]

@@ -1,0 +1,72 @@
+"""Where the page of a run is served."""
+
+import socket
+
+import pytest
+from typer.testing import CliRunner
+
+from volery.cli import run
+from volery.cli.app import app
+from volery.cli.flight import RunOptions
+from volery.cli.pages import _is_taken, _settings_of
+from volery.core.errors import CommandError
+
+
+@pytest.fixture
+def page_of(monkeypatch):
+    """What `volery run` makes of its words."""
+
+    def asked(*words):
+        found = []
+        monkeypatch.setattr(run, "fly", lambda options: found.append(options) or 0)
+        result = CliRunner().invoke(app, ["run", *words])
+        assert result.exit_code == 0, result.output
+        return found[0]
+
+    return asked
+
+
+@pytest.mark.parametrize(
+    ("words", "page", "speed"),
+    [
+        (["hover"], None, None),
+        (["hover", "--page"], "", None),
+        (["--page", "hover"], "", None),
+        (["hover", "--page=127.0.0.1:8081", "--speed", "2"], "127.0.0.1:8081", 2.0),
+        (["hover", "--page", "--door", "rosbridge"], "", 1.0),
+    ],
+)
+def test_the_option_and_its_value_that_may_be_left_away(page_of, words, page, speed):
+    options = page_of(*words)
+    assert (options.scenario, options.page, options.speed) == ("hover", page, speed)
+
+
+@pytest.mark.parametrize(
+    ("page", "host", "port"),
+    [("8081", "127.0.0.1", 8081), ("0.0.0.0:80", "0.0.0.0", 80), ("[::1]:0", "::1", 0)],
+)
+def test_addresses(page, host, port):
+    settings = _settings_of(RunOptions("hover", page=page, token="t", allow_remote=True))
+    assert (settings.host, settings.port) == (host, port)
+    assert settings.anywhere
+    assert settings.tokens.pilot == "t"
+
+
+@pytest.mark.parametrize("page", ["x", "host:", ":80", "1:70000"])
+def test_what_is_no_address(page):
+    with pytest.raises(CommandError, match="PORT or HOST:PORT"):
+        _settings_of(RunOptions("hover", page=page))
+
+
+def test_a_taken_port_gives_way(monkeypatch, capsys):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        assert _is_taken("127.0.0.1", port)
+    assert not _is_taken("127.0.0.1", port)
+    monkeypatch.setattr("volery.cli.pages._is_taken", lambda _host, _port: True)
+    assert _settings_of(RunOptions("hover", page="")).port == 0
+    assert "is taken; the page takes a free one" in capsys.readouterr().err
+    monkeypatch.setattr("volery.cli.pages._is_taken", lambda _host, _port: False)
+    assert _settings_of(RunOptions("hover", page="")).port == 8080
