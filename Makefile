@@ -72,11 +72,13 @@ test: lint page ## install what tests need, check everything, run the tests
 	$(BIN)/python -m volery.runtime.warm_up
 	$(BIN)/pytest -n 2 --dist loadfile -m 'not slow' tests
 
-bench: $(VENV)/.installed-bench ## measure this machine and its peers, rewrite docs/benchmarks.md and docs/bridge_latency.md
+bench: $(VENV)/.installed-bench page ## measure this machine and its peers, rewrite docs/benchmarks.md and docs/bridge_latency.md
 	@mkdir -p runs
 	$(BIN)/volery bench all --out runs/bench.json
 	$(BIN)/volery bench peers --out runs/peers.json
-	$(BIN)/python -m volery.bench.document runs/bench.json runs/peers.json > docs/benchmarks.md
+	@.ci/install_browser
+	$(BIN)/volery bench page --out runs/page.json
+	$(BIN)/python -m volery.bench.document runs/bench.json runs/page.json runs/peers.json > docs/benchmarks.md
 	$(BIN)/python -m volery.bench.bridge.latency_page docs runs/bench.json
 
 clean: ## remove what was built or flown here

@@ -175,3 +175,33 @@ def test_the_layout_is_kept_for_the_next_visit(page):
     page.reload()
     page.get_by_role("complementary", name="Log").wait_for()
     assert json.loads(page.evaluate("localStorage.getItem('volery.layout')"))["bottom"] == "log"
+
+
+def test_a_recording_is_played_with_a_slider_and_left_again(page, served, browsing):
+    browsing.expected += ["WebSocket connection", "Failed to load"]  # while the worlds change
+    panel = open_panel(page, "Recordings")
+    panel.get_by_label("Name of the recording").fill("to_be_played")
+    panel.get_by_role("button", name="Record", exact=True).click()
+    panel.get_by_role("button", name="Stop").wait_for()
+    page.wait_for_timeout(2000)
+    panel.get_by_role("button", name="Stop").click()
+    panel.get_by_role("button", name="Play to_be_played.mcap").click()
+    player = page.get_by_role("group", name="Player")
+    player.wait_for()
+    until(lambda: player.get_by_role("button", name="Play the recording").is_visible())  # its end
+    slider = player.get_by_role("slider")
+    slider.focus()
+    page.keyboard.press("Home")
+    start = float(slider.get_attribute("aria-valuemin"))
+    until(lambda: float(slider.get_attribute("aria-valuenow")) < start + 0.2)
+    keep_picture(page, "player")
+    player.get_by_role("button", name="Play the recording").click()
+    until(lambda: float(slider.get_attribute("aria-valuenow")) > start + 0.2)
+    answer = served.call(
+        "/load_world",
+        "simulation_interfaces/srv/LoadWorld",
+        {"world_resource": {"uri": "hover"}},
+    )
+    assert answer["result"]["result"] == 1
+    player.wait_for(state="detached")
+    page.get_by_label("Simulated time").wait_for()
