@@ -2,8 +2,8 @@
 export function spiral(count: number, spacing: number): [number, number][] {
   const places: [number, number][] = [];
   for (let ring = 0; places.length < count; ring++) {
-    for (let x = -ring; x <= ring; x++) {
-      for (let y = -ring; y <= ring; y++) {
+    for (let x = 0 - ring; x <= ring; x++) {
+      for (let y = 0 - ring; y <= ring; y++) {
         if (Math.max(Math.abs(x), Math.abs(y)) === ring) places.push([x * spacing, y * spacing]);
       }
     }
