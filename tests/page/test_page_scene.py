@@ -14,7 +14,7 @@ def set_weather(served, **changes):
 
 
 def off_haze(picture, haze, top, bottom):
-    """How far the mean colour of a band, in shares of the height, is from the haze; left of the map."""
+    """How far a band (shares of the height, left of the map) is from the haze in the mean."""
     height, width, _ = picture.shape
     band = picture[int(top * height) : int(bottom * height), width // 10 : 2 * width // 5]
     return float(np.abs(band.mean(axis=(0, 1)) - haze).max())
