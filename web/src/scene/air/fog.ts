@@ -1,6 +1,6 @@
 // Distance fog as it is in the air: what is left of a contrast is exp(-extinction distance), with the
 // true distance instead of the depth, mixed as light and before tone mapping. three's own fog is
-// squared and mixed into the finished picture; these three pieces of its shaders are replaced for
+// squared and mixed into the finished picture; these pieces of its shaders are replaced for
 // all materials, before the first of them is compiled.
 
 import { FogExp2, ShaderChunk } from "three";
@@ -8,9 +8,9 @@ import { FogExp2, ShaderChunk } from "three";
 const LIGHT = /* glsl */ `
 #ifdef USE_FOG
 	#ifdef FOG_EXP2
-		float kept = exp( - fogDensity * vFogDepth );
+		float kept = exp( - fogDensity * length( vFogPlace ) );
 	#else
-		float kept = 1.0 - smoothstep( fogNear, fogFar, vFogDepth );
+		float kept = 1.0 - smoothstep( fogNear, fogFar, length( vFogPlace ) );
 	#endif
 	gl_FragColor.rgb = mix( hazeLight, gl_FragColor.rgb, kept );
 #endif
@@ -23,9 +23,15 @@ const HAZE = /* glsl */ `
 #endif
 `;
 
+// Distances are taken at each pixel: along the sides of a large triangle they do not grow evenly.
+for (const chunk of ["fog_pars_vertex", "fog_pars_fragment"] as const)
+  ShaderChunk[chunk] = ShaderChunk[chunk].replace(
+    "varying float vFogDepth",
+    "varying vec3 vFogPlace",
+  );
 ShaderChunk.fog_vertex = /* glsl */ `
 #ifdef USE_FOG
-	vFogDepth = length( mvPosition.xyz );
+	vFogPlace = mvPosition.xyz;
 #endif
 `;
 ShaderChunk.opaque_fragment += HAZE + LIGHT;
