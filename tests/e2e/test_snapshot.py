@@ -1,8 +1,11 @@
 """Going back to a kept state, and to the start, is exact to the bit."""
 
+import time
+
 import numpy as np
 import pytest
 
+from volery import Simulation, load_scenario
 from volery.core.errors import CommandError, SnapshotError
 from volery.graph.messages import Odometry, String
 from volery.graph.node import Node
@@ -187,3 +190,14 @@ def test_a_single_uav_begins_anew_and_the_other_flies_on(simulate, flat_data):
         used.reset_uav("uav1")
     with pytest.raises(CommandError, match="no UAV 'uav7'; known: uav1, uav2"):
         used.reset_uav("uav7")
+
+
+def test_after_a_reset_in_mid_run_the_pace_is_kept():
+    with Simulation(load_scenario("hover"), threads=1) as simulation:
+        simulation.run(1.0)
+        simulation.post(simulation.reset)
+        start = time.perf_counter()
+        simulation.run(0.2, speed=2.0)  # on to where it was to end, from the beginning
+        took_s = time.perf_counter() - start
+        assert simulation.time_s == pytest.approx(1.2)
+    assert took_s > 0.5

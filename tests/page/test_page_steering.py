@@ -160,7 +160,7 @@ def test_flight_by_keyboard(page, served):
     page.keyboard.up("KeyW")
     vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["x"]) < 0.2)
     page.keyboard.press("Escape")
-    assert page.get_by_role("group", name="Flight by hand").count() == 0
+    page.get_by_role("group", name="Flight by hand").wait_for(state="hidden")
     assert ahead["position"]["x"] > flying["position"]["x"]
 
 

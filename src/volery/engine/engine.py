@@ -170,12 +170,16 @@ class Engine:
         """Run ticks until `step` is reached and everything due there has fired.
 
         `until` is asked after each tick and ends the run there: the answer must follow from the
-        simulated world alone, so that the end does not depend on how a run is sliced.
+        simulated world alone, so that the end does not depend on how a run is sliced. A tick in
+        which time went back, to a state that was restored, ends it too: `step` was of another time.
         """
         while self.fleet.step < step or self._due_step() <= self.fleet.step:
             if until is not None and until():
                 return
+            before = self.fleet.step
             self._run_tick(Tick(step))
+            if self.fleet.step < before:
+                return
 
     def take_in(self) -> None:
         """Do what was posted and hand out what that published; between ticks."""

@@ -122,6 +122,12 @@ class Pacer:
             self._reached_ns = time_ns
             self._restart()
 
+    def jumped(self, time_ns: int) -> None:
+        """Go on from simulated `time_ns`, where another state was restored, at the same speed."""
+        with self._changed:
+            self._reached_ns = time_ns
+            self._restart()
+
     def next_steps(self, dt_ns: int) -> int:
         """Physics steps of `dt_ns` to make before the next `wait`; 0 while paused."""
         with self._changed:

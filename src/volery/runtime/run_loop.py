@@ -85,7 +85,7 @@ class RunLoop:
         if steps:
             before = fleet.step
             self._engine.advance_to(min(end_step, before + steps), until=until)
-            self._pacer.made(min(fleet.step - before, steps))
+            self._pacer.made(max(0, min(fleet.step - before, steps)))
 
     def _whole_steps(self, seconds: float, to_the_end: bool) -> int:
         dt_ns = self._engine.dt_ns

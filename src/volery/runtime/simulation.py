@@ -408,6 +408,7 @@ class Simulation:
         self._check_open()
         self._keeper.restore(snapshot)
         self._pacer.drop_steps("another state was restored")
+        self._pacer.jumped(self.time_ns)
         self._live.jumped()
 
     def reset(self, seed: int | None = None) -> None:
@@ -422,6 +423,7 @@ class Simulation:
             check_seed(seed)
         self._keeper.reset(self.scenario.seed if seed is None else seed)
         self._pacer.drop_steps("the simulation was reset")
+        self._pacer.jumped(self.time_ns)
         self._live.jumped()
 
     def reset_uav(self, name: str) -> None:
