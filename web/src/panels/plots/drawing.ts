@@ -12,6 +12,13 @@ export interface Look {
   grid: string;
 }
 
+const DIGIT_PX = 7.5;
+
+/** Room for the longest mark of an axis, px. */
+function widthOf(marks: readonly string[] | null): number {
+  return 20 + DIGIT_PX * Math.max(4, ...(marks ?? []).map((mark) => mark.length));
+}
+
 /** One plot on its canvas. However many points come, it is drawn from a few per pixel. */
 export class Drawing {
   private readonly plot: uPlot;
@@ -39,7 +46,7 @@ export class Drawing {
           { ...axis, size: 26, values: (_plot, marks) => marks.map((mark) => `${round(mark)} s`) },
           {
             ...axis,
-            size: 64,
+            size: (_plot, marks) => widthOf(marks),
             values: (_plot, marks, _axis, _space, step) => marks.map((mark) => fixed(mark, step)),
           },
         ],
