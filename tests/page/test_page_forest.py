@@ -8,6 +8,8 @@ from scene_reading import eye, wait_for_frames, wait_for_picture
 from volery.runtime.worlds import build_city, build_forest, build_terrain
 from volery.scenario.load import load_scenario
 
+pytestmark = pytest.mark.slow
+
 SCENARIO = "forest_procedural"
 MOST_DRAW_CALLS = 250
 SMALL = {"width": 480, "height": 270}

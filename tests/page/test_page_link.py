@@ -12,6 +12,8 @@ from page_browsing import keep_picture
 from page_serving import Served
 from reverse_proxy import ReverseProxy
 
+pytestmark = pytest.mark.slow
+
 WIDE = {"width": 1000, "height": 600}
 
 
@@ -143,7 +145,6 @@ def test_a_topic_of_unknown_type_is_listed_and_harms_nothing(browsing, chromium)
         thread.join(20)
 
 
-@pytest.mark.slow
 def test_256_uavs(browsing, tmp_path):
     from volery.bench.page.worlds import crowd
 

@@ -1,8 +1,11 @@
 """The picture follows the simulation: weather, places, links."""
 
 import numpy as np
+import pytest
 from page_browsing import keep_picture
 from scene_reading import eye, on_screen, pixels, wait_for_frames, wait_for_picture, wait_until
+
+pytestmark = pytest.mark.slow
 
 LOW_OVER_GROUND = "#view=fly&camera=-30_0_2.5_0_-0.12_0&quality=low"
 

@@ -3,6 +3,8 @@
 import pytest
 from page_browsing import keep_picture
 
+pytestmark = pytest.mark.slow
+
 SIZES = {"laptop": {"width": 1366, "height": 768}, "phone": {"width": 390, "height": 844}}
 PANELS = ("Topics", "Plots", "Services", "Log", "Faults", "Recordings")
 

@@ -7,6 +7,8 @@ import time
 import pytest
 from page_browsing import keep_picture
 
+pytestmark = pytest.mark.slow
+
 WIDE = {"width": 1000, "height": 600}
 TWIST = "geometry_msgs/msg/Twist"
 VEHICLES = "volery_interfaces/msg/VehicleStates"
