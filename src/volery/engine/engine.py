@@ -166,19 +166,22 @@ class Engine:
         """Meet `partner` each period of simulated time, first after one period."""
         self.partner_agenda.add(partner, self._from_now(period_s), after_step=self.fleet.step)
 
-    def advance_to(self, step: int, *, until: Callable[[], bool] | None = None) -> None:
+    def advance_to(
+        self, step: int, *, until: Callable[[], bool] | None = None, in_pieces: bool = False
+    ) -> None:
         """Run ticks until `step` is reached and everything due there has fired.
 
         `until` is asked after each tick and ends the run there: the answer must follow from the
-        simulated world alone, so that the end does not depend on how a run is sliced. A tick in
-        which time went back, to a state that was restored, ends it too: `step` was of another time.
+        simulated world alone, so that the end does not depend on how a run is sliced.
+        `in_pieces`: the caller comes again for the rest, so that a tick in which time went back, to
+        a state that was restored, ends the piece: at a pace, the way to `step` is now far.
         """
         while self.fleet.step < step or self._due_step() <= self.fleet.step:
             if until is not None and until():
                 return
             before = self.fleet.step
             self._run_tick(Tick(step))
-            if self.fleet.step < before:
+            if in_pieces and self.fleet.step < before:
                 return
 
     def take_in(self) -> None:

@@ -84,7 +84,7 @@ class RunLoop:
         steps = self._pacer.next_steps(fleet.dt_ns)
         if steps:
             before = fleet.step
-            self._engine.advance_to(min(end_step, before + steps), until=until)
+            self._engine.advance_to(min(end_step, before + steps), until=until, in_pieces=True)
             self._pacer.made(max(0, min(fleet.step - before, steps)))
 
     def _whole_steps(self, seconds: float, to_the_end: bool) -> int:
