@@ -1,7 +1,7 @@
 import { useEffect } from "react";
 import { nextMark } from "../lib/speed.ts";
 import { PLAYING, setPlaying, setSpeed, step, tell, type Order } from "../link/commands.ts";
-import { releaseControls, toggleControls, useFlying } from "../state/flying.ts";
+import { toggleControls } from "../state/flying.ts";
 import { toggleOverlay } from "../state/layout.ts";
 import { attempt, tellFailure } from "../state/notices.ts";
 import { goByClick } from "../state/orders.ts";
@@ -34,7 +34,6 @@ const PAGE: Readonly<Record<string, () => void>> = {
   "?": () => openWindow("help"),
   Escape: () => {
     if (useTool.getState().asking !== null) givePlace(null);
-    else if (useFlying.getState().uav !== "") releaseControls();
     else setMoving(false);
   },
 };

@@ -1,7 +1,7 @@
 // Flight keys. They are heard before anybody else's, so that no view takes them while they fly.
 
 import { isFlightKey, wishOfKeys, type Wish } from "../../lib/twist.ts";
-import { rest } from "../../state/flying.ts";
+import { releaseControls, rest } from "../../state/flying.ts";
 import { isTyped } from "../useHotkeys.ts";
 
 const FAST = 2;
@@ -20,6 +20,8 @@ export function listenToKeys(): KeySource {
   const down = (event: KeyboardEvent) => {
     fast = event.shiftKey;
     if (event.ctrlKey || event.metaKey || event.altKey || isTyped(event)) return;
+    // Whatever else it closes: a tooltip under the pointer would keep it from the page's other keys.
+    if (event.code === "Escape") releaseControls();
     if (!isFlightKey(event.code)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
