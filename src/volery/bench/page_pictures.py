@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from websockets.sync.client import connect
 
 from volery.bench.page.browser import open_browser
-from volery.bench.page.looking import wait_for_picture
+from volery.bench.page.looking import wait_for_picture, wait_until
 from volery.bench.page.serving import PageProcess
 from volery.core.errors import VoleryError
 
@@ -144,7 +144,7 @@ def _pause_at(server: PageProcess, time_s: float) -> None:
 
 def _settle(page: Page) -> None:
     seen = page.evaluate("window.volery.frames")
-    page.wait_for_function(f"window.volery.frames >= {seen + _FRAMES}")
+    wait_until(page, f"window.volery.frames >= {seen + _FRAMES}", _PATIENCE_MS / 1000.0)
 
 
 if __name__ == "__main__":

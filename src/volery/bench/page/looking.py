@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _PATIENCE_MS = 120_000
 _FRAMES = 150
+_GLANCE_MS = 20
 _STATIC = Path(str(files("volery.server") / "static"))
 
 _SCRIPT_OF_FRAMES = """async (frames) => {
@@ -51,7 +52,19 @@ def looking(browser: Browser, url: str, width: int = 640, height: int = 360) -> 
 
 def wait_for_picture(page: Page) -> None:
     """Until the world has been drawn."""
-    page.wait_for_function("window.volery !== undefined && window.volery.firstPictureMs > 0")
+    wait_until(page, "window.volery !== undefined && window.volery.firstPictureMs > 0")
+
+
+def wait_until(page: Page, condition: str, patience_s: float = _PATIENCE_MS / 1000.0) -> None:
+    """Until an expression holds in the page; `VoleryError` where it never does.
+
+    Playwright's own way of waiting is forbidden by the page's content policy.
+    """
+    end = time.monotonic() + patience_s
+    while not page.evaluate(condition):
+        if time.monotonic() > end:
+            raise VoleryError(f"the page took more than {patience_s:g} s until {condition}")
+        page.wait_for_timeout(_GLANCE_MS)
 
 
 def first_picture_s(page: Page) -> float:
