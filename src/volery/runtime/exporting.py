@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from volery.runtime.worlds import build_city, build_forest, build_solids, build_terrain
+from volery.runtime.worlds import geometry_of
 from volery.scenario.schema import Scenario
 from volery.sensors.cameras.light import base_colours
 from volery.world.gltf import glb_of
-from volery.world.ground_cover import BARE_GROUND
 from volery.world.trees.model import DetailLevel
 
 
@@ -20,10 +19,13 @@ def export_world(
     Raises `VoleryError` where the world cannot be built, `OSError` where the file cannot be
     written.
     """
-    terrain = build_terrain(scenario)
-    city = build_city(scenario, terrain)
-    forest = build_forest(scenario, terrain, city)
-    solids = build_solids(scenario, terrain, city)
-    cover = BARE_GROUND if city is None else city.cover
-    content = glb_of(terrain, forest, solids, colours=base_colours(), cover=cover, detail=detail)
+    stands = geometry_of(scenario)
+    content = glb_of(
+        stands.terrain,
+        stands.forest,
+        stands.solids,
+        colours=base_colours(),
+        cover=stands.cover,
+        detail=detail,
+    )
     return path.write_bytes(content)
