@@ -3,9 +3,13 @@
 import copy
 
 import pytest
+from hypothesis import settings
 
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
+
+settings.register_profile("volery", deadline=None)  # busy machines stall for longer than 200 ms
+settings.load_profile("volery")
 
 LIDARS = [
     {"kind": "lidar", "name": "horizontal", "position_m": [0.0, 0.0, 0.18]},

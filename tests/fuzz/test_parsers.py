@@ -24,9 +24,7 @@ def test_valid_frames_with_a_few_changes_do_no_harm(name):
 
 
 @every_parser
-@settings(
-    max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
-)
+@settings(max_examples=50, suppress_health_check=[HealthCheck.too_slow], derandomize=True)
 @given(draws=st.randoms(use_true_random=False))
 def test_chosen_changes_do_no_harm(name, draws):
     TARGETS[name](Mutator(draws))

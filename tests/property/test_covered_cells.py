@@ -38,7 +38,7 @@ def check_tours(plan, free):
     np.testing.assert_array_equal(visits, np.kron(plan.owner >= 0, np.ones((2, 2), np.int64)))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(maps_and_starts(), st.booleans())
 def test_every_free_cell_is_visited_once_by_closed_tours(case, flies_over):
     free, starts = case
@@ -50,7 +50,7 @@ def test_every_free_cell_is_visited_once_by_closed_tours(case, flies_over):
     np.testing.assert_array_equal(plan.owner == UNREACHABLE, free & ~reached & (not flies_over))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(maps_and_starts())
 def test_areas_are_connected_and_hold_their_starts(case):
     free, starts = case
@@ -61,7 +61,7 @@ def test_areas_are_connected_and_hold_their_starts(case):
         assert tuple(plan.routes[uav][0].sub_cells[0] // 2) == (row, column)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(maps_and_starts(), st.data())
 def test_what_is_left_is_visited_once_from_anywhere(case, data):
     free, starts = case

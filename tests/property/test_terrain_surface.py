@@ -15,7 +15,7 @@ heights = arrays(
 share = st.floats(0.001, 0.999)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(heights, st.floats(0.5, 20.0), share, share)
 def test_height_is_continuous_and_inside_the_cell(grid, spacing, u, v):
     terrain = Terrain.from_heights(grid, spacing, (-3.0, 7.0))
@@ -27,7 +27,7 @@ def test_height_is_continuous_and_inside_the_cell(grid, spacing, u, v):
     assert grid.min() - 1e-9 <= near[0] <= grid.max() + 1e-9
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(heights, st.floats(0.5, 20.0), share, share)
 def test_normal_is_unit_upward_and_square_to_the_surface(grid, spacing, u, v):
     terrain = Terrain.from_heights(grid, spacing)

@@ -12,19 +12,16 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import sys
-import threading
 from collections.abc import Callable, Coroutine
 from typing import Any, Protocol, TypeVar
 
+from volery.bridges.loop_thread import LoopThread
 from volery.core.errors import BridgeError
 from volery.graph.session import Gateway
 
 T = TypeVar("T")
 _log = logging.getLogger(__name__)
 
-_SWITCH_INTERVAL_S = 0.0005
-"""Python's own 5 ms would be the latency of every answer while the engine computes."""
 _LONGEST_START_S = 30.0
 
 
@@ -48,10 +45,8 @@ class Doors:
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
         self._doors: list[Door] = []
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._run, name="volery-doors", daemon=True)
+        self._thread = LoopThread("volery-doors")
         self._closed = False
-        sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL_S))
         self._thread.start()
 
     @property
@@ -72,7 +67,7 @@ class Doors:
 
     def call(self, work: Coroutine[Any, Any, T], timeout_s: float | None = None) -> T:
         """Run a coroutine in the doors' thread and wait for its result."""
-        return asyncio.run_coroutine_threadsafe(work, self._loop).result(timeout_s)
+        return self._thread.call(work, timeout_s)
 
     def close(self) -> None:
         """Stop all doors and the thread; a second time nothing happens."""
@@ -84,24 +79,13 @@ class Doors:
                 self.call(door.stop(), _LONGEST_START_S)
             except Exception:
                 _log.exception("%s did not close in good order", door.name)
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
-        self._loop.close()
+        self._thread.end()
 
     def __enter__(self) -> Doors:
         return self
 
     def __exit__(self, *_exception: object) -> None:
         self.close()
-
-    def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        self._loop.run_forever()
-        left = asyncio.all_tasks(self._loop)
-        for task in left:
-            task.cancel()
-        self._loop.run_until_complete(asyncio.gather(*left, return_exceptions=True))
-        self._loop.run_until_complete(self._loop.shutdown_asyncgens())
 
 
 def wake_of(loop: asyncio.AbstractEventLoop, callback: Callable[[], object]) -> Callable[[], None]:

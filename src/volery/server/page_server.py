@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import asyncio
 import socket
-import sys
-import threading
 from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import uvicorn
 
+from volery.bridges.loop_thread import LoopThread
 from volery.bridges.origins import LOOPBACK, Origins
 from volery.bridges.rosbridge.wire import MOST_MESSAGE_BYTES
 from volery.core.errors import BridgeError
@@ -28,8 +27,6 @@ from volery.server.rights import check_rights
 from volery.server.settings import PageSettings
 from volery.server.site import Site, Situation, State, World
 
-_SWITCH_INTERVAL_S = 0.0005
-"""Python's own 5 ms would be the latency of every answer while the engine computes."""
 _KEEPALIVE_S = 20.0
 """Between two pings, and how long an answer may take."""
 _LONGEST_CALL_S = 30.0
@@ -42,8 +39,7 @@ class PageServer:
     def __init__(self, settings: PageSettings) -> None:
         self._settings = settings
         self._site = Site(settings.recordings, Shelf(settings.uploads))
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._run, name="volery-page", daemon=True)
+        self._thread = LoopThread("volery-page")
         self._server: uvicorn.Server | None = None
         self._socket: socket.socket | None = None
         self._serving: asyncio.Task[None] | None = None
@@ -96,7 +92,6 @@ class PageServer:
                 timeout_graceful_shutdown=2,
             )
         )
-        sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL_S))
         self._thread.start()
         self._call(self._begin(self._server, self._socket))
 
@@ -125,18 +120,14 @@ class PageServer:
 
     def stop(self) -> None:
         """Let everybody go and end the thread; a second time nothing happens."""
-        if not self._thread.is_alive():
-            if self._socket is not None:
-                self._socket.close()
-            self._loop.close()
-            return
-        self._leave(Situation(State.LOBBY, message="the server ends"))
-        if self._server is not None:
-            self._server.should_exit = True
-        self._call(self._end())
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
-        self._loop.close()
+        if self._thread.running:
+            self._leave(Situation(State.LOBBY, message="the server ends"))
+            if self._server is not None:
+                self._server.should_exit = True
+            self._call(self._end())
+        elif self._socket is not None:
+            self._socket.close()
+        self._thread.end()
 
     def __enter__(self) -> PageServer:
         """Start it."""
@@ -152,16 +143,6 @@ class PageServer:
         self.stop()
 
     # ------------------------------------------------------------------------------- its own thread
-
-    def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        self._loop.run_forever()
-        left = asyncio.all_tasks(self._loop)
-        for task in left:
-            task.cancel()
-        self._loop.run_until_complete(asyncio.gather(*left, return_exceptions=True))
-        self._loop.run_until_complete(self._loop.shutdown_asyncgens())
-        self._loop.run_until_complete(self._loop.shutdown_default_executor())
 
     async def _begin(self, server: uvicorn.Server, listening: socket.socket) -> None:
         self._serving = asyncio.create_task(server.serve([listening]))
@@ -179,7 +160,7 @@ class PageServer:
         self._call(self._site.leave(situation))
 
     def _call(self, work: Coroutine[Any, Any, Any]) -> None:
-        asyncio.run_coroutine_threadsafe(work, self._loop).result(_LONGEST_CALL_S)
+        self._thread.call(work, _LONGEST_CALL_S)
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -6,7 +6,7 @@ import colorsys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from volery.autonomy.scan_points import Pose
@@ -104,7 +104,6 @@ def seen_at(pose, place):
     return LENS.fx * -left / ahead + LENS.cx, LENS.fy * -up / ahead + LENS.cy
 
 
-@settings(deadline=None)
 @given(metre, metre, st.floats(4.0, 40.0), angle, angle, st.floats(-3.0, 3.0), angle, angle)
 def test_a_place_on_the_ground_is_found_from_its_pixel(x, y, z, roll, pitch, yaw, dx, dy):
     attitude = rotations.from_rpy(roll, pitch, yaw)

@@ -282,9 +282,7 @@ def test_a_cut_log_is_played_up_to_the_cut(tmp_path, flight, suffix):
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-@settings(
-    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(harm=st.lists(st.tuples(st.floats(0, 1), st.binary(min_size=1, max_size=8)), max_size=5))
 def test_no_damage_is_fatal(tmp_path_factory, suffix, harm):
     path = tmp_path_factory.getbasetemp() / f"harmed{suffix}"

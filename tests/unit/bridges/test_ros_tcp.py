@@ -136,7 +136,7 @@ frames = st.lists(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(frames, st.lists(st.integers(1, 70_000), min_size=1, max_size=20))
 def test_frames_come_whole_wherever_the_stream_is_cut(wanted, cuts):
     data = b"".join(ros_tcp.frame(*frame) for frame in wanted)
@@ -148,7 +148,7 @@ def test_frames_come_whole_wherever_the_stream_is_cut(wanted, cuts):
     assert as_bytes(found) == [frame for frame in wanted if frame != ("", b"")]
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(frames)
 def test_frames_come_whole_byte_by_byte(wanted):
     wanted = [(name, payload[:3000]) for name, payload in wanted if name]
@@ -159,7 +159,7 @@ def test_frames_come_whole_byte_by_byte(wanted):
     assert as_bytes(found) == wanted
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.lists(st.binary(max_size=400), max_size=20))
 def test_noise_is_frames_or_an_error(pieces):
     parser = FrameParser(most_payload=1000, most_destination=100)

@@ -119,7 +119,7 @@ def play(bench, session, script):
 
 
 @pytest.mark.parametrize("generation", ["ros1", "ros2"])
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(script=steps)
 def test_no_client_breaks_the_endpoint(generation, script):
     bench = Bench()
@@ -137,7 +137,7 @@ def test_no_client_breaks_the_endpoint(generation, script):
 
 
 @pytest.mark.parametrize("generation", [None, "ros1", "ros2"])
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(script=steps)
 def test_no_endpoint_breaks_the_connector(generation, script):
     bench = Bench()

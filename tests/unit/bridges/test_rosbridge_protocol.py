@@ -427,7 +427,7 @@ OPERATIONS = st.builds(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(OPERATIONS, max_size=12), st.booleans())
 def test_nothing_that_clients_send_does_harm(operations, as_cbor):
     bench = Bench()

@@ -12,7 +12,7 @@ from contextlib import suppress
 import cbor2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -36,7 +36,6 @@ PLAIN = st.recursive(
 )
 
 
-@settings(deadline=None)
 @given(PLAIN)
 def test_cbor_is_read_by_another_coder_and_read_back(value):
     data = encode_cbor(value)
@@ -107,14 +106,12 @@ def test_cbor_that_is_refused(data):
         decode_cbor(data)
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=200))
 def test_no_bytes_do_harm(data):
     with suppress(BridgeError):
         decode_frame(data)
 
 
-@settings(deadline=None)
 @given(st.text(max_size=200))
 def test_no_text_does_harm(text):
     with suppress(BridgeError):

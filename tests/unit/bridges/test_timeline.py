@@ -69,9 +69,7 @@ def on_the_line(times_ns):
     return line
 
 
-QUICK = settings(
-    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+QUICK = settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 TOPICS = st.sampled_from(["/a", "/b", "/rare"])
 ENTRIES = st.lists(st.tuples(TOPICS, st.integers(1, 2000)), min_size=1, max_size=60)
 ALMOST_SORTED = st.lists(st.tuples(TOPICS, st.integers(-30, 200)), min_size=1, max_size=60).map(

@@ -36,7 +36,7 @@ thrusts = st.floats(0.0, 120.0)
 torques = st.tuples(st.floats(-20, 20), st.floats(-20, 20), st.floats(-5, 5))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(names, thrusts, torques)
 def test_every_rotor_stays_in_range(name, thrust, torque):
     forces, _ = mixed(name, thrust, torque)
@@ -45,7 +45,7 @@ def test_every_rotor_stays_in_range(name, thrust, torque):
     assert (forces <= FRAMES[name].max_rotor_thrust * (1 + 1e-9)).all()
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(names, st.floats(0.5, 1.3), st.tuples(*[st.floats(-0.3, 0.3)] * 2, st.floats(-0.1, 0.1)))
 def test_what_fits_is_given_exactly(name, weights, torque):
     thrust = weights * FRAMES[name].weight
@@ -53,7 +53,7 @@ def test_what_fits_is_given_exactly(name, weights, torque):
     np.testing.assert_allclose(made, [thrust, *torque], atol=1e-9)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(names, thrusts, torques)
 def test_roll_and_pitch_never_change_their_direction_or_grow(name, thrust, torque):
     _, made = mixed(name, thrust, torque)

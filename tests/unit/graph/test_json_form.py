@@ -239,7 +239,7 @@ json_values = st.recursive(
         "sensor_msgs/msg/Image",
     ],
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(plain=json_values)
 def test_anything_is_read_or_refused(name: str, plain: Any) -> None:
     """What is read can be sent: it fits CDR."""

@@ -214,7 +214,7 @@ def test_bad_text_and_header(codec: Ros1Codec) -> None:
 
 
 @pytest.mark.parametrize("name", NASTY)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(data=st.binary(max_size=200))
 def test_garbage(name: str, data: bytes) -> None:
     for decode, raw in ((ros1_codec().decode, data), (decode_cdr, b"\0\1\0\0" + data)):
@@ -226,7 +226,7 @@ def test_garbage(name: str, data: bytes) -> None:
 
 
 @pytest.mark.parametrize("name", NASTY)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(0, 2**16), st.integers(0, 2**16), st.integers(0, 255), st.booleans())
 def test_damaged_messages(name: str, seed: int, where: int, byte: int, big: bool) -> None:
     message = filled(name, np.random.default_rng(seed))

@@ -1,11 +1,13 @@
 """`python -m volery.bench.page [SECONDS]`: the bench with a shorter watch over memory."""
 
+import logging
 import sys
 
 from volery.bench.page.measuring import measure
 from volery.bench.registry import find
 
 if __name__ == "__main__":
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
     soak_s = float(sys.argv[1]) if len(sys.argv) > 1 else 60.0
     measured, bounds = measure(soak_s), find("page").bounds
     for figure, value in measured.figures.items():
