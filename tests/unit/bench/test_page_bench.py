@@ -2,7 +2,7 @@
 
 import pytest
 
-from volery.bench.page.clients import lost
+from volery.bench.page.streams import lost
 from volery.bench.page.worlds import crowd, forest
 from volery.scenario.load import load_scenario
 

@@ -11,8 +11,9 @@ import sys
 from collections import defaultdict
 from typing import Any
 
-import numpy as np
 from websockets.asyncio.client import connect
+
+from volery.bench.page.streams import lost, subscription
 
 _SETTLING_S = 1.0
 
@@ -51,19 +52,6 @@ async def _stamps(url: str, seconds: float, topics: list[str]) -> dict[str, list
                 stamp = told["msg"]["header"]["stamp"]
                 stamps[told["topic"]].append(stamp["sec"] * 10**9 + stamp["nanosec"])
     return stamps
-
-
-def subscription(topic: str) -> str:
-    """What subscribes to all messages of a topic."""
-    return json.dumps({"op": "subscribe", "topic": topic, "queue_length": 100})
-
-
-def lost(stamps: list[int]) -> int:
-    """How many messages of a periodic topic are missing between the first and the last."""
-    steps = np.diff(stamps)
-    if steps.size == 0:
-        return 0
-    return int(np.rint(steps / np.median(steps)).sum()) - steps.size
 
 
 if __name__ == "__main__":

@@ -10,8 +10,8 @@ from typing import Any
 
 from websockets.sync.client import connect
 
-from volery.bench.page.clients import subscription
 from volery.bench.page.serving import PageProcess
+from volery.bench.page.streams import subscription
 
 _STALL_S = 30.0
 _CLIENTS = 9
