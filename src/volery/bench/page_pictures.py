@@ -1,14 +1,14 @@
 """The README's pictures of the page: scenarios played in headless Chromium.
 
-    python -m volery.bench.page_pictures [FOLDER] [NAME...]
+    python -m volery.bench.page_pictures [NAME...] [--folder FOLDER]
 
 WebGL is drawn in software, so a simulation waits, paused, until its picture is done.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -148,4 +148,8 @@ def _settle(page: Page) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/pictures"), sys.argv[2:])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(shot.name for shot in SHOTS)}")
+    parser.add_argument("--folder", type=Path, default=Path("docs/pictures"))
+    chosen = parser.parse_args()
+    main(chosen.folder, chosen.names)

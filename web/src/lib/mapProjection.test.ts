@@ -1,5 +1,14 @@
 import { describe, expect, it } from "vitest";
-import { barLength, fitted, panned, pixelOf, placeOf, zoomed } from "./mapProjection.ts";
+import {
+  AutoFit,
+  barLength,
+  fitted,
+  panned,
+  pixelOf,
+  placeOf,
+  zoomed,
+  type Point,
+} from "./mapProjection.ts";
 
 const SIZE = { width: 400, height: 300 };
 const VIEW = { x: 10, y: -5, scale: 8 };
@@ -45,6 +54,21 @@ describe("the map's projection", () => {
       expect(py).toBeGreaterThan(0);
       expect(py).toBeLessThan(SIZE.height);
     }
+  });
+
+  it("fits anew when what is to be seen changes, and holds still between", () => {
+    const auto = new AutoFit();
+    const empty = auto.of([null, 0], () => [], SIZE);
+    const world: Point[] = [
+      [0, 0],
+      [400, 200],
+    ];
+    const fit = auto.of(["world", 1], () => world, SIZE);
+    expect(fit).not.toEqual(empty);
+    expect(fit).toMatchObject({ x: 200, y: 100 });
+    expect(auto.of(["world", 1], () => [[7, 7]], SIZE)).toBe(fit);
+    auto.clear();
+    expect(auto.of(["world", 1], () => [[7, 7]], SIZE)).toMatchObject({ x: 7, y: 7 });
   });
 
   it("has a scale bar of a round length", () => {

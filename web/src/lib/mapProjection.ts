@@ -55,6 +55,24 @@ export function fitted(points: readonly Point[], size: Size, least_m = 20): MapV
   return { x: (left + right) / 2, y: (low + high) / 2, scale };
 }
 
+/** The view of a map that nobody has moved: fitted anew when what is to be seen changes. */
+export class AutoFit {
+  private view: MapView | null = null;
+  private key: readonly unknown[] = [];
+
+  /** key: what has to change for another fit. points: what is to be seen then. */
+  of(key: readonly unknown[], points: () => readonly Point[], size: Size): MapView {
+    const same = key.length === this.key.length && key.every((part, i) => part === this.key[i]);
+    if (this.view === null || !same) this.view = fitted(points(), size);
+    this.key = key;
+    return this.view;
+  }
+
+  clear(): void {
+    this.view = null;
+  }
+}
+
 /** A round length for the scale bar, at most `pixels` long: 1, 2 or 5 times a power of ten, m. */
 export function barLength(scale: number, pixels: number): number {
   const most = pixels / scale;

@@ -4,6 +4,7 @@ import { create } from "zustand";
 import { ClockOffset } from "../lib/clockOffset.ts";
 import { quantile } from "../lib/quantile.ts";
 import { nowMs, secondsOf } from "../lib/time.ts";
+import { PLAYING } from "../link/commands.ts";
 import { link } from "../link/link.ts";
 import { useConnection } from "./connection.ts";
 import { useSimulation } from "./simulation.ts";
@@ -38,7 +39,6 @@ export const useHealth = create<Health>(() => NOTHING);
 
 const TELL_MS = 500;
 const ASK_MS = 2000;
-const PLAYING = 1;
 /** A few seconds at 60 frames a second. */
 const FRAMES = 240;
 const FRAME_MS = 1000 / 60;
@@ -65,7 +65,8 @@ function frame(): void {
   if (!Number.isNaN(frameMs)) keep(intervals, now - frameMs);
   frameMs = now;
   const age = now - shownMs();
-  if (useSimulation.getState().status?.state === PLAYING && !Number.isNaN(age)) keep(ages, age);
+  if (useSimulation.getState().status?.state !== PLAYING) ages.length = 0;
+  else if (!Number.isNaN(age)) keep(ages, age);
   requestAnimationFrame(frame);
 }
 

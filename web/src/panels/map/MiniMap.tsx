@@ -1,6 +1,6 @@
 import { useComputedColorScheme } from "@mantine/core";
 import { useEffect, useMemo, useRef, useState, type RefObject } from "react";
-import { fitted, pixelOf, type MapView, type Point, type Size } from "../../lib/mapProjection.ts";
+import { AutoFit, pixelOf, type MapView, type Point, type Size } from "../../lib/mapProjection.ts";
 import { link } from "../../link/link.ts";
 import { useGoals } from "../../state/orders.ts";
 import { baseFrame, useVehicles } from "../../state/vehicles.ts";
@@ -37,8 +37,10 @@ export default function MiniMap() {
   const [clickSends, setClickSends] = useState(false);
   const canvas = useRef<HTMLCanvasElement>(null);
   const shown = useRef<MapView | null>(null);
-  useDrawing(canvas, view, setView, follows, shown);
+  const auto = useRef(new AutoFit());
+  useDrawing(canvas, view, auto.current, follows, shown);
   const fit = () => {
+    auto.current.clear();
     setFollows(false);
     setView(null);
   };
@@ -72,11 +74,11 @@ export default function MiniMap() {
   );
 }
 
-/** Draws a dozen times a second, whatever React does. */
+/** view: as hands left it; null: nobody has moved it. Draws a dozen times a second, whatever React does. */
 function useDrawing(
   canvas: RefObject<HTMLCanvasElement | null>,
   view: MapView | null,
-  setView: (view: MapView) => void,
+  auto: AutoFit,
   follows: boolean,
   shownNow: RefObject<MapView | null>,
 ): void {
@@ -91,10 +93,10 @@ function useDrawing(
       const element = canvas.current;
       if (element === null || document.hidden || element.clientWidth === 0) return;
       const size = { width: element.clientWidth, height: element.clientHeight };
-      if (view === null) return setView(fitted(extent(picture), size));
-      let shown = view;
+      const uavs = useVehicles.getState().list.length;
+      let shown = view ?? auto.of([picture, uavs], () => extent(picture), size);
       const pose = link.frames.pose(baseFrame(selected));
-      if (follows && pose !== null) shown = { ...view, x: pose[0], y: pose[1] };
+      if (follows && pose !== null) shown = { ...shown, x: pose[0], y: pose[1] };
       shownNow.current = shown;
       const context = prepared(element, size);
       if (picture !== null) {
@@ -115,7 +117,7 @@ function useDrawing(
     draw();
     const timer = setInterval(draw, FRAME_MS);
     return () => clearInterval(timer);
-  }, [canvas, view, setView, follows, shownNow, picture, selected, trails, path, dark]);
+  }, [canvas, view, auto, follows, shownNow, picture, selected, trails, path, dark]);
 }
 
 function prepared(element: HTMLCanvasElement, { width, height }: Size): CanvasRenderingContext2D {

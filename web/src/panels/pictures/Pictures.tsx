@@ -4,7 +4,7 @@ import { useEffect } from "react";
 import { showPicture, useLayout, type Tile } from "../../state/layout.ts";
 import { useTopics } from "../../state/topics.ts";
 import { useVehicles } from "../../state/vehicles.ts";
-import { cameraTopics, type CameraTopic } from "./cameraTopics.ts";
+import { cameraTopics, colourFirst, type CameraTopic } from "./cameraTopics.ts";
 import { PictureTile } from "./PictureTile.tsx";
 
 const FIRST_TILES = 2;
@@ -20,7 +20,7 @@ export default function Pictures() {
   useEffect(() => {
     if (!some || useLayout.getState().pictures.length > 0) return;
     const own = cameras.filter(({ name }) => name.startsWith(`/${selected}/`));
-    for (const { name } of own.slice(0, FIRST_TILES)) showPicture(name, true);
+    for (const { name } of colourFirst(own).slice(0, FIRST_TILES)) showPicture(name, true);
     // oxlint-disable-next-line react-hooks/exhaustive-deps -- only when there begin to be some
   }, [some, selected]);
   return (

@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { cameraTopics } from "./cameraTopics.ts";
+import { cameraTopics, colourFirst } from "./cameraTopics.ts";
 
 const IMAGE = "sensor_msgs/msg/Image";
 const COMPRESSED = "sensor_msgs/msg/CompressedImage";
@@ -19,5 +19,17 @@ it("each camera is shown once, compressed where it can be", () => {
     ["/uav1/front/depth", "uav1 front depth"],
     ["/uav1/front/labels/instance", "uav1 front labels instance"],
     ["/uav1/down/image_raw", "uav1 down"],
+  ]);
+});
+
+it("colours come before depth and labels, otherwise as told", () => {
+  const names = ["/uav1/down/depth", "/uav1/down/image_raw", "/uav1/front/labels/instance"];
+  names.push("/uav1/front/image_raw");
+  const cameras = cameraTopics(names.map((name) => ({ name, type: IMAGE })));
+  expect(colourFirst(cameras).map(({ title }) => title)).toEqual([
+    "uav1 down",
+    "uav1 front",
+    "uav1 down depth",
+    "uav1 front labels instance",
   ]);
 });

@@ -22,6 +22,12 @@ export function cameraTopics(topics: readonly TopicName[]): CameraTopic[] {
     .map((topic) => ({ ...topic, title: titleOf(topic.name) }));
 }
 
+/** What a person looks at first, before depth and classes. */
+export function colourFirst(cameras: readonly CameraTopic[]): CameraTopic[] {
+  const derived = ({ name }: CameraTopic) => Number(/depth|labels/.test(name));
+  return cameras.toSorted((a, b) => derived(a) - derived(b));
+}
+
 export function titleOf(topic: string): string {
   return topic
     .split("/")

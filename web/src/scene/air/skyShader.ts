@@ -41,7 +41,7 @@ float stars(vec3 way) {
   vec3 p = way * 170.0;
   vec3 cell = floor(p);
   float bright = step(0.9965, hash(cell));
-  return bright * smoothstep(0.45, 0.0, length(fract(p) - 0.5)) * (0.4 + hash(cell + 3.0));
+  return bright * (1.0 - smoothstep(0.0, 0.45, length(fract(p) - 0.5))) * (0.4 + hash(cell + 3.0));
 }
 
 void main() {

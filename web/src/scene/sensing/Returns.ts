@@ -7,9 +7,11 @@ import {
   UniformsLib,
   UniformsUtils,
 } from "three";
+import { PLAYING } from "../../link/commands.ts";
 import { link } from "../../link/link.ts";
 import { POSE } from "../../link/protocol.ts";
 import type { sensor_msgs_LaserScan, sensor_msgs_PointCloud2 } from "../../messages/generated.ts";
+import { simulatedS, useSimulation } from "../../state/simulation.ts";
 import { useVehicles } from "../../state/vehicles.ts";
 import { useView } from "../../state/view.ts";
 import { FADE } from "../air/fog.ts";
@@ -41,6 +43,7 @@ export class Returns implements Part {
   private lookedMs = 0;
   private selected = "";
   private nowS = 0;
+  private simulatedS = 0;
   private next = 0;
   private capacity = LEVELS[0]!.returns;
   private readonly room: number;
@@ -65,7 +68,7 @@ export class Returns implements Part {
   }
 
   update({ nowMs, stepS, quality, height, camera, renderer }: Moment): void {
-    this.nowS += stepS; // steps are bounded: where frames are slow returns are still seen in some
+    this.nowS += this.passed(stepS);
     this.capacity = quality.returns;
     const { lidar } = useView.getState().show;
     this.object.visible = lidar;
@@ -80,6 +83,16 @@ export class Returns implements Part {
     const { nowS, size } = this.object.material.uniforms;
     nowS!.value = this.nowS;
     size!.value = (height * renderer.getPixelRatio()) / Math.tan((camera.fov * Math.PI) / 360);
+  }
+
+  /** How much older returns have become, s: in a paused simulation only by what it is stepped. */
+  private passed(stepS: number): number {
+    const simulated = simulatedS();
+    const stepped = Math.max(0, simulated - this.simulatedS);
+    this.simulatedS = simulated;
+    const { status } = useSimulation.getState();
+    if (status !== null && status.state !== PLAYING) return stepped;
+    return stepS; // bounded: where frames are slow returns are still seen in some
   }
 
   dispose(): void {

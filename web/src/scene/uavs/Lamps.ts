@@ -105,7 +105,7 @@ const FRAGMENT = /* glsl */ `
 varying vec3 vTint;
 void main() {
   float far = length(gl_PointCoord - 0.5) * 2.0;
-  float glow = pow(max(0.0, 1.0 - far), 2.0) + smoothstep(0.3, 0.1, far);
+  float glow = pow(max(0.0, 1.0 - far), 2.0) + 1.0 - smoothstep(0.1, 0.3, far);
   gl_FragColor = vec4(vTint * glow, 1.0);
 }
 `;

@@ -46,19 +46,22 @@ const LEAF = /* glsl */ `
   colour = mix(colour, colour * vec3(1.7, 1.25, 0.5), 0.5 * treeHue);
 `;
 
-/** Panes in a lattice of storeys and bays, some of them lit at night. */
+/** Panes in a lattice of storeys and bays as the cameras see them (`facade_kernels.py`), some lit at night. */
 const FACADE = /* glsl */ `
   vec2 level = normalize(facing.yx * vec2(-1.0, 1.0) + 1e-5);
   vec2 wall = vec2(dot(place.xy, level) / 2.6, above / 3.1);
-  vec2 cell = floor(wall), inside = fract(wall);
+  vec2 cell = floor(wall), blur = max(fwidth(wall), 1e-4);
   float steep = 1.0 - smoothstep(0.3, 0.6, abs(facing.z));
-  vec2 edge = smoothstep(vec2(0.2, 0.24), vec2(0.23, 0.27), inside) *
-    smoothstep(vec2(0.2, 0.14), vec2(0.17, 0.11), 1.0 - inside);
-  float far = clamp(length(fwidth(wall)) * 1.2, 0.0, 1.0);
-  float pane = mix(edge.x * edge.y, 0.36, far) * steep * step(0.35, above / 3.1);
+  bool shop = cell.y < 0.5;
+  vec2 half_ = shop ? vec2(0.385, 0.32) : vec2(0.25, 0.26);
+  vec2 away = abs(fract(wall) - vec2(0.5, shop ? 0.45 : 0.55));
+  vec2 within = clamp((half_ - away) / blur + 0.5, 0.0, 1.0);
+  float frame = clamp((0.016 - away.x) / blur.x + 0.5, 0.0, 1.0) * min(1.0, 0.016 / blur.x);
+  float far = clamp(length(blur) * 1.2, 0.0, 1.0);
+  float pane = mix(within.x * within.y * (1.0 - frame), 4.0 * half_.x * half_.y, far) * steep * step(0.0, above);
   float chance = fract(sin(dot(cell + floor(facing.xy * 7.0), vec2(12.9898, 78.233))) * 43758.5453);
   vec4 plaster = noise(wall * 0.7);
-  colour *= 0.85 + 0.25 * plaster.r - 0.12 * smoothstep(0.6, 0.0, above) ;
+  colour *= 0.85 + 0.25 * plaster.r - 0.12 * (1.0 - smoothstep(0.0, 0.6, above));
   vec3 glass = mix(vec3(0.03, 0.045, 0.06), vec3(0.16, 0.2, 0.25), chance * 0.7);
   colour = mix(colour, glass, pane);
   rough = mix(rough, 0.12, pane);
