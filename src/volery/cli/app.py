@@ -9,11 +9,17 @@ import typer
 
 from volery.cli.graph_commands import node, service_app, topic_app
 from volery.cli.guard import guarded
-from volery.cli.options import PageCommand
+from volery.cli.options import (
+    DoorsOption,
+    PageCommand,
+    RemoteOption,
+    ThreadsOption,
+    TokenOption,
+)
 
 app = typer.Typer(
     name="volery",
-    help="Flies many UAVs with LIDARs through forests in lock step.",
+    help="Flies many UAVs with LIDARs and cameras in lock step.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=False,
@@ -43,7 +49,7 @@ def volery(
         ),
     ] = False,
 ) -> None:
-    """Fly many UAVs with LIDARs through forests in lock step."""
+    """Fly many UAVs with LIDARs and cameras in lock step."""
 
 
 @app.command(cls=PageCommand)
@@ -57,25 +63,16 @@ def run(
         str | None,
         typer.Option(help="Factor of real time, such as 1 or 2.5, or max; 1 where doors are open."),
     ] = None,
-    threads: Annotated[
-        int | None, typer.Option(min=1, max=256, help="Threads; results do not depend on it.")
-    ] = None,
+    threads: ThreadsOption = None,
     record: Annotated[
         Path | None, typer.Option(help="Write a log: .mcap (ROS 2) or .bag (ROS 1).")
     ] = None,
     report: Annotated[
         Path | None, typer.Option(help="Write an illustrated report into this folder.")
     ] = None,
-    door: Annotated[
-        list[str] | None,
-        typer.Option(help="Open a door to other programs: NAME or NAME=[HOST:]PORT, repeatable."),
-    ] = None,
-    allow_remote: Annotated[
-        bool, typer.Option("--allow-remote", help="Let doors listen beyond this machine.")
-    ] = False,
-    token: Annotated[
-        str | None, typer.Option(envvar="VOLERY_TOKEN", help="What remote clients must show.")
-    ] = None,
+    door: DoorsOption = None,
+    allow_remote: RemoteOption = False,
+    token: TokenOption = None,
     recordings: Annotated[
         Path | None,
         typer.Option(help="Folder in which clients may record: /volery/start_recording."),
@@ -168,13 +165,8 @@ def serve(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first scenario.")] = None,
     speed: Annotated[str, typer.Option(help="Factor of real time, or max.")] = "1",
-    threads: Annotated[
-        int | None, typer.Option(min=1, max=256, help="Threads; results do not depend on it.")
-    ] = None,
-    door: Annotated[
-        list[str] | None,
-        typer.Option(help="Open a door to other programs: NAME or NAME=[HOST:]PORT, repeatable."),
-    ] = None,
+    threads: ThreadsOption = None,
+    door: DoorsOption = None,
 ) -> None:
     """Serve the page until Ctrl-C: one world after the other, as its visitors choose.
 
@@ -219,16 +211,9 @@ def play(
     speed: Annotated[str, typer.Option(help="Factor of real time, or max.")] = "1",
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
     paused: Annotated[bool, typer.Option("--paused", help="Wait at the beginning.")] = False,
-    door: Annotated[
-        list[str] | None,
-        typer.Option(help="Open a door to other programs: NAME or NAME=[HOST:]PORT, repeatable."),
-    ] = None,
-    allow_remote: Annotated[
-        bool, typer.Option("--allow-remote", help="Let doors listen beyond this machine.")
-    ] = False,
-    token: Annotated[
-        str | None, typer.Option(envvar="VOLERY_TOKEN", help="What remote clients must show.")
-    ] = None,
+    door: DoorsOption = None,
+    allow_remote: RemoteOption = False,
+    token: TokenOption = None,
 ) -> None:
     """Play a recorded log behind doors, rosbridge unless others are named, until Ctrl-C.
 

@@ -1,10 +1,25 @@
-"""An option whose value may be left away."""
+"""Options that several commands take, and one whose value may be left away."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
+import typer
 from typer.core import TyperCommand
+
+DoorsOption = Annotated[
+    list[str] | None,
+    typer.Option(help="Open a door to other programs: NAME or NAME=[HOST:]PORT, repeatable."),
+]
+RemoteOption = Annotated[
+    bool, typer.Option("--allow-remote", help="Let doors listen beyond this machine.")
+]
+TokenOption = Annotated[
+    str | None, typer.Option(envvar="VOLERY_TOKEN", help="What remote clients must show.")
+]
+ThreadsOption = Annotated[
+    int | None, typer.Option(min=1, max=256, help="Threads; results do not depend on it.")
+]
 
 
 class PageCommand(TyperCommand):
