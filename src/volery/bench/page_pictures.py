@@ -71,7 +71,7 @@ SHOTS = (
         "page_data",
         "forest_survey",
         30.0,
-        "view=orbit&uav=uav1&quality=medium",
+        "view=chase&uav=uav2&quality=high",
         {"left": "", "bottom": "plots"},
         tuple(
             (f"/uav{number}/odom", _ODOMETRY, f"twist.twist.linear.{axis}")
