@@ -7,9 +7,15 @@ optimised as numba would: results are the same to the last bit.
 
 from __future__ import annotations
 
+from typing import Any
+
 import llvmlite.binding as llvm
 from numba.core import codegen, compiler
 from numba.core.compiler_machinery import PassManager
+
+_LIBRARY: Any = codegen.JITCodeLibrary
+_COMPILER: Any = compiler.Compiler
+_PASSES: Any = PassManager
 
 _ENVIRONMENT = "_ZN08NumbaEnv"
 """How numba begins the name of the variable that holds a function's Python surroundings."""
@@ -22,8 +28,10 @@ _MAKING_ARRAYS = ("InlineClosureLikes", "NopythonRewrites")
 needs memory of its own, which a part has not unless it counts references."""
 
 
-class PartLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]
+class PartLibrary(_LIBRARY):  # type: ignore[misc]
     """The code of a part, for callers to link and inline; without an address of its own."""
+
+    _final_module: Any
 
     def _finalize_final_module(self) -> None:
         """Translate the surroundings' variables alone, which numba wants to find in memory."""
@@ -34,10 +42,10 @@ class PartLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]
         self._final_module = whole
 
 
-class PartCompiler(compiler.Compiler):  # type: ignore[misc]
+class PartCompiler(_COMPILER):  # type: ignore[misc]
     """numba's compiler, as a part of a kernel needs it."""
 
-    def define_pipelines(self) -> list[PassManager]:
+    def define_pipelines(self) -> list[Any]:
         """Passes of numba, those left out that would find nothing to do."""
         state = self.state
         library = PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
@@ -56,8 +64,8 @@ def _surroundings_of(module: llvm.ModuleRef) -> llvm.ModuleRef:
     return llvm.parse_assembly("\n".join(lines))
 
 
-def _without(needless: tuple[str, ...], pipeline: PassManager) -> PassManager:
-    rest = PassManager(pipeline.pipeline_name)
+def _without(needless: tuple[str, ...], pipeline: Any) -> Any:
+    rest = _PASSES(pipeline.pipeline_name)
     for step, description in pipeline.passes:
         if step.__name__ not in needless:
             rest.add_pass(step, description)

@@ -15,7 +15,7 @@ from typing import Any
 from numba import types
 
 _TYPES: Any = types
-_VALUES: Any = (types.Number, types.Boolean, types.Buffer, types.BaseTuple)
+_VALUES: Any = (_TYPES.Number, _TYPES.Boolean, _TYPES.Buffer, _TYPES.BaseTuple)
 
 
 @contextmanager
