@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -13,15 +14,18 @@ _ORDERS = (
     ("compile_dynamics", "compile_guidance", "compile_sensors"),
     ("compile_sensors", "compile_guidance", "compile_dynamics"),
 )
-_FLY = """
+_COMPILE = """
 import sys
-from volery import Simulation, load_scenario
 from volery.core.compiled import cache_dir
 from volery.runtime import warm_up
 
 for part in sys.argv[1:]:
     getattr(warm_up, part)()
 (cache_dir() / "complete").touch()
+"""
+_FLY = """
+from volery import Simulation, load_scenario
+
 with Simulation(load_scenario("forest_survey"), threads=1) as simulation:
     simulation.enable_digest()
     simulation.run(2.0)
@@ -32,19 +36,25 @@ with Simulation(load_scenario("forest_survey"), threads=1) as simulation:
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_digests_of_caches_filled_in_other_orders_are_equal(tmp_path: Path) -> None:
-    digests = {_digest(tmp_path / f"cache{number}", order) for number, order in enumerate(_ORDERS)}
-    assert len(digests) == 1
+    caches = [tmp_path / f"cache{number}" for number in range(len(_ORDERS))]
+    with ThreadPoolExecutor() as pool:
+        digests = list(pool.map(_digest, caches, _ORDERS))
+    assert len(digests[0]) == 64
+    assert len(set(digests)) == 1
 
 
 def _digest(cache: Path, order: tuple[str, ...]) -> str:
     """Compile in one process, in this order, and fly in another, which reads the cache."""
-    environment = {**os.environ, "VOLERY_CACHE_DIR": str(cache)}
-    for parts in (order, ()):
-        done = subprocess.run(
-            [sys.executable, "-c", _FLY, *parts],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
+    _run(cache, _COMPILE, *order)
+    return _run(cache, _FLY)
+
+
+def _run(cache: Path, script: str, *arguments: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", script, *arguments],
+        env={**os.environ, "VOLERY_CACHE_DIR": str(cache)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     return done.stdout.strip()

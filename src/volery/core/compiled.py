@@ -24,6 +24,8 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba
 
+from volery.core.part_compiler import PartCompiler
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 _CONFIG: Any = numba.config
@@ -115,7 +117,8 @@ def inner_kernel(function: F, **options: Any) -> F:
     option `_nrt`), for the counts lie in memory that all threads share, and each change of one
     is an atomic instruction. For a part that makes arrays: `owning_kernel`.
     """
-    choices = {"no_cpython_wrapper": True, "_nrt": False, **options}
+    fixed = {"no_cpython_wrapper": True, "_nrt": False, "pipeline_class": PartCompiler}
+    choices = {**fixed, **options}
     part: Any = _decorate(function, **choices)
 
     def refuse(*_arguments: Any, **_keywords: Any) -> None:

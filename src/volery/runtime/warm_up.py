@@ -25,6 +25,7 @@ from volery.core import rotations
 from volery.core.clock import Schedule
 from volery.core.compiled import cache_dir
 from volery.core.geodesy import LocalFrame
+from volery.core.quick_typing import remembered_types
 from volery.sensors.gnss import GnssBank, load_gnss_model
 from volery.sensors.imu import ImuBank, load_imu_model
 from volery.sensors.joints import JointBank
@@ -50,8 +51,8 @@ sys.modules["scipy"] = None
 from volery.runtime import warm_up
 warm_up.compile_sensors()
 """
-"""What the helper runs. Where scipy is installed, numba imports its linear algebra, a third of a
-second, for products of matrices: no sensor's kernel has one."""
+"""What the helper runs. Where scipy is installed, numba imports its linear algebra for products of
+matrices: no sensor's kernel has one."""
 
 
 def kernels_are_compiled() -> bool:
@@ -89,12 +90,13 @@ def compiled_kernels() -> Iterator[None]:
 
 def compile_dynamics() -> None:
     """Compile the fused step, for rigid bodies alone."""
-    with _no_garbage_collection():
+    with _quicker():
         _fleet().advance(0, Terrain.flat(extent_m=10.0).grid)
 
 
 def compile_guidance() -> None:
     """Compile what places UAVs on the ground and lets them follow gaps."""
+    from volery.autonomy.gaps import free_distances
     from volery.autonomy.ground_plane import GroundPlane
     from volery.autonomy.obstacle_memory import ObstacleMemory
     from volery.autonomy.scan_points import Pose, ScanProjector
@@ -103,22 +105,28 @@ def compile_guidance() -> None:
     origin, level = np.zeros(3), np.array(rotations.IDENTITY)
     pose = Pose(0, origin, level, origin, origin)
     scan = zero_message("sensor_msgs/msg/LaserScan")
-    with _no_garbage_collection():
+    scan.ranges = np.zeros(1, dtype=np.float32)  # may be written, as those of the sensors
+    with _quicker():
         Terrain.flat(extent_m=10.0).height([0.0], [0.0])
         points = ScanProjector([0.0, 0.0, 0.0]).points(scan, pose)
         GroundPlane().add(points, 0)
         obstacles = ObstacleMemory()
         obstacles.add(points, 0)
         obstacles.around(origin, 0, 1.0)
+        free_distances(np.zeros((0, 2)), 1.0, 1.0)
 
 
 @contextmanager
-def _no_garbage_collection() -> Iterator[None]:
-    """Compiling makes millions of small objects: a sixth of its time would go into searching."""
+def _quicker() -> Iterator[None]:
+    """Compile without what repeats itself, and without searching for garbage.
+
+    Compiling makes millions of small objects: a sixth of its time would go into searching.
+    """
     was_on = gc.isenabled()
     gc.disable()
     try:
-        yield
+        with remembered_types():
+            yield
     finally:
         if was_on:
             gc.enable()
@@ -126,7 +134,7 @@ def _no_garbage_collection() -> Iterator[None]:
 
 def compile_sensors() -> None:
     """Look around as contacts do, and let two sensors of the kinds that most UAVs have measure."""
-    with _no_garbage_collection():
+    with _quicker():
         _look_and_measure()
 
 
@@ -134,6 +142,7 @@ def _look_and_measure() -> None:
     fleet = _fleet()
     scene = Scene(Terrain.flat(extent_m=10.0), None)
     scene.clearance(np.zeros((1, 3)), 1.0, include_terrain=False)
+    scene.enclosing(np.zeros((1, 3)))
     scene.set_bodies([body_shape(fleet.airframes[0])], [0, 0])
     sensors = tuple(SensorId(row, f"uav{row + 1}", "sensor") for row in range(2))
     schedule, mounts = Schedule.from_hz(40.0), 2 * (make_mount(amplitude_rad=0.5, period_s=2.0),)

@@ -12,7 +12,7 @@ holds x = origin_x + j * spacing.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -106,6 +106,8 @@ class Terrain:
     """
 
     grid: TerrainGrid
+    _own: TerrainGrid = field(init=False, repr=False)
+    """The same memory, not marked as read-only: kernels compile once for both kinds of array."""
 
     def __post_init__(self) -> None:
         heights = np.array(self.grid.heights, dtype=np.float64, order="C")
@@ -119,8 +121,10 @@ class Terrain:
         origin = float(self.grid.origin_x), float(self.grid.origin_y)
         if not all(map(math.isfinite, origin)):
             raise ValueError(f"a terrain's origin must be finite, not {origin}")
-        heights.flags.writeable = False
-        object.__setattr__(self, "grid", TerrainGrid(heights, *origin, spacing))
+        object.__setattr__(self, "_own", TerrainGrid(heights, *origin, spacing))
+        shown = heights.view()
+        shown.flags.writeable = False
+        object.__setattr__(self, "grid", TerrainGrid(shown, *origin, spacing))
 
     @classmethod
     def from_heights(
@@ -175,14 +179,14 @@ class Terrain:
         """Heights at map positions; x and y broadcast, the result has their shape, m."""
         x, y = _broadcast(x, y)
         out = np.empty(x.size)
-        _heights_kernel(self.grid, x.ravel(), y.ravel(), out)
+        _heights_kernel(self._own, x.ravel(), y.ravel(), out)
         return out.reshape(x.shape)
 
     def normal(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
         """Unit upward normals at map positions, shape (..., 3)."""
         x, y = _broadcast(x, y)
         out = np.empty((x.size, 3))
-        _normals_kernel(self.grid, x.ravel(), y.ravel(), out)
+        _normals_kernel(self._own, x.ravel(), y.ravel(), out)
         return out.reshape((*x.shape, 3))
 
     def mesh(self) -> Mesh:
