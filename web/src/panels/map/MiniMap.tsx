@@ -6,8 +6,9 @@ import { useGoals } from "../../state/orders.ts";
 import { baseFrame, useVehicles } from "../../state/vehicles.ts";
 import { useWorldPlan } from "../../state/worldPlan.ts";
 import { FloatingTile } from "../FloatingTile.tsx";
-import { drawPlan, type PlanColours, type PlanPicture } from "./drawPlan.ts";
+import { drawPlan, type PlanColours } from "./drawPlan.ts";
 import { Pen } from "./drawTraffic.ts";
+import { extentOf } from "./extent.ts";
 import { MapButtons } from "./MapButtons.tsx";
 import { MapCanvas } from "./MapCanvas.tsx";
 import { useTrails } from "./trails.ts";
@@ -76,12 +77,13 @@ export default function MiniMap() {
 function useDrawing(
   canvas: RefObject<HTMLCanvasElement | null>,
   view: MapView | null,
-  setView: (view: MapView) => void,
+  setView: (view: MapView | null) => void,
   follows: boolean,
   shownNow: RefObject<MapView | null>,
 ): void {
   const dark = useComputedColorScheme("light") === "dark";
   const plan = useWorldPlan((world) => world.plan);
+  useEffect(() => setView(null), [plan, setView]); // another world: another place
   const picture = useMemo(() => plan && drawPlan(plan, dark ? DARK : LIGHT), [plan, dark]);
   const trails = useTrails();
   const selected = useVehicles((vehicles) => vehicles.selected);
@@ -91,10 +93,12 @@ function useDrawing(
       const element = canvas.current;
       if (element === null || document.hidden || element.clientWidth === 0) return;
       const size = { width: element.clientWidth, height: element.clientHeight };
-      if (view === null) return setView(fitted(extent(picture), size));
-      let shown = view;
+      const uavs = places();
+      // Settled once somebody is there: until then the page has only begun.
+      if (view === null && uavs.length > 0) return setView(fitted(extentOf(plan, uavs), size));
+      let shown = view ?? fitted(extentOf(plan, uavs), size);
       const pose = link.frames.pose(baseFrame(selected));
-      if (follows && pose !== null) shown = { ...view, x: pose[0], y: pose[1] };
+      if (follows && pose !== null) shown = { ...shown, x: pose[0], y: pose[1] };
       shownNow.current = shown;
       const context = prepared(element, size);
       if (picture !== null) {
@@ -115,7 +119,7 @@ function useDrawing(
     draw();
     const timer = setInterval(draw, FRAME_MS);
     return () => clearInterval(timer);
-  }, [canvas, view, setView, follows, shownNow, picture, selected, trails, path, dark]);
+  }, [canvas, view, setView, follows, shownNow, plan, picture, selected, trails, path, dark]);
 }
 
 function prepared(element: HTMLCanvasElement, { width, height }: Size): CanvasRenderingContext2D {
@@ -131,9 +135,6 @@ function prepared(element: HTMLCanvasElement, { width, height }: Size): CanvasRe
   return context;
 }
 
-/** What the map shows at first: all UAVs, and the world where it is not vast. */
-function extent(picture: PlanPicture | null): Point[] {
-  const uavs = useVehicles.getState().list.map(({ position: p }): Point => [p.x, p.y]);
-  if (picture === null || picture.right - picture.left > 2000) return uavs;
-  return [...uavs, [picture.left, picture.bottom], [picture.right, picture.top]];
+function places(): Point[] {
+  return useVehicles.getState().list.map(({ position: p }): Point => [p.x, p.y]);
 }
