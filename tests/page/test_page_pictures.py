@@ -9,7 +9,7 @@ from asking import until
 from page_browsing import keep_picture
 from page_serving import Served
 from PIL import Image
-from scene_reading import wait_for_picture
+from scene_reading import wait_for_picture, wait_until
 from working import WIDE, pull
 
 pytestmark = pytest.mark.slow
@@ -65,6 +65,7 @@ def page(browsing, served):
     opened.get_by_role("option", name="uav1").wait_for()
     wait_for_picture(opened)
     opened.keyboard.press("p")
+    opened.keyboard.press("m")
     return opened
 
 
@@ -81,22 +82,21 @@ def titles(page):
 
 
 def shown(page, title):
-    """(height, width, 3) pixels of a tile's canvas; None while nothing has come."""
+    """(height, width, 3) pixels of a tile's canvas, once a picture has come."""
     canvas = page.get_by_role("img", name=title, exact=True)
-    if canvas.evaluate("canvas => canvas.width") != WIDTH:
-        return None
+    wait_until(page, lambda _: canvas.evaluate("canvas => canvas.width") == WIDTH)
     data = canvas.evaluate("canvas => canvas.toDataURL('image/png')").partition(",")[2]
     picture = Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")
     return np.asarray(picture, dtype=float)
 
 
-def sent(served, part):
-    """The raw picture of a camera's topic as a client beside the page receives it."""
+def sent(served, *, depth):
+    """The raw picture of the camera as a client beside the page receives it."""
     topics = served.call("/rosapi/topics", "rosapi_msgs/srv/Topics")
     (name,) = [
         name
         for name, kind in zip(topics["topics"], topics["types"], strict=True)
-        if kind == "sensor_msgs/msg/Image" and part in name
+        if kind == "sensor_msgs/msg/Image" and ("depth" in name) == depth
     ]
     message = served.once(name, "sensor_msgs/msg/Image")
     assert (message["width"], message["height"]) == (WIDTH, HEIGHT)
@@ -106,8 +106,8 @@ def sent(served, part):
 
 def test_colours_are_those_of_the_camera(page, served):
     colour, _ = titles(page)
-    seen = until(lambda: shown(page, colour) is not None and shown(page, colour))
-    true = np.frombuffer(sent(served, "color"), np.uint8).reshape(HEIGHT, WIDTH, 3)
+    seen = shown(page, colour)
+    true = np.frombuffer(sent(served, depth=False), np.uint8).reshape(HEIGHT, WIDTH, 3)
     assert true.std() > 20.0  # there is something to be seen
     assert np.abs(seen - true).mean() < 4.0  # JPEG of the same
     keep_picture(page, "pictures")
@@ -115,8 +115,8 @@ def test_colours_are_those_of_the_camera(page, served):
 
 def test_depth_is_near_red_and_far_blue(page, served):
     _, depth = titles(page)
-    seen = until(lambda: shown(page, depth) is not None and shown(page, depth))
-    true = np.frombuffer(sent(served, "depth"), np.float32).reshape(HEIGHT, WIDTH)
+    seen = shown(page, depth)
+    true = np.frombuffer(sent(served, depth=True), np.float32).reshape(HEIGHT, WIDTH)
     known = np.isfinite(true)
     assert 0.2 < known.mean() < 0.9  # the sky has no depth
     least, most = true[known].min(), true[known].max()
@@ -145,9 +145,11 @@ def test_tiles_are_dragged_resized_and_closed(page):
     after = tile(page, colour).bounding_box()
     assert after["x"] - before["x"] == pytest.approx(90, abs=3)
     assert after["y"] - before["y"] == pytest.approx(-120, abs=3)
-    corner = tile(page, colour).locator(".tile-corner").bounding_box()
-    grip = (corner["x"] + corner["width"] / 2, corner["y"] + corner["height"] / 2)
-    pull(page, grip, (grip[0] + 80, grip[1] + 60))
+    corner = tile(page, colour).locator(".tile-corner")
+    away = -1 if corner.get_attribute("data-side") == "left" else 1
+    box = corner.bounding_box()
+    grip = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    pull(page, grip, (grip[0] + 80 * away, grip[1]))
     larger = tile(page, colour).bounding_box()
     assert larger["width"] - after["width"] == pytest.approx(80, abs=3)
     assert larger["height"] - after["height"] == pytest.approx(60, abs=8)  # 4 to 3
