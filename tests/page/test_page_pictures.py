@@ -159,6 +159,8 @@ def test_tiles_are_dragged_resized_and_closed(page):
     page.locator(".tile canvas.picture").first.wait_for()
     kept = tile(page, colour).bounding_box()
     assert kept["width"] == pytest.approx(larger["width"] - 40, abs=3)
+    # What lies below comes to the front where it is touched.
+    tile(page, depth).get_by_text(depth, exact=True).click(position={"x": 3, "y": 3})
     page.get_by_role("button", name=f"Close {depth}").click()
     tile(page, depth).wait_for(state="detached")
     page.get_by_role("button", name="Which pictures").click()
