@@ -8,7 +8,7 @@ from asking import until, vehicle
 from page_browsing import keep_picture
 from page_serving import Served
 from scene_reading import pixels, wait_for_frames, wait_for_picture, wait_until
-from working import WIDE, choose, open_panel, set_slider
+from working import SMALL, choose, open_panel, set_slider
 
 pytestmark = pytest.mark.slow
 
@@ -22,7 +22,7 @@ extent_m = 60.0
 [world.forest]
 kind = "procedural"
 region_m = [0.0, -20.0, 40.0, 20.0]
-trees = 16
+trees = 4
 [world.forest.species]
 broadleaf = 1.0
 [types.f450]
@@ -59,7 +59,7 @@ def served(chromium, tmp_path_factory):
 @pytest.fixture
 def page(browsing, served):
     browsing.expected += ["WebSocket connection", "Failed to load", "503"]  # while worlds change
-    page = browsing.open(served.url + LOOK, viewport=WIDE)
+    page = browsing.open(served.url + LOOK, viewport=SMALL)
     wait_for_picture(page)
     page.keyboard.press("m")
     return page
@@ -117,6 +117,7 @@ def test_a_card_is_chosen_with_uavs_airframe_and_sensors(page, served):
     page.get_by_role("dialog").wait_for(state="detached")
     page.evaluate("window.samePage = true")
     start_anew(page, served, set_up)
+    page.get_by_label("Number of UAVs").get_by_text("3 UAVs").wait_for()
     last = vehicle(served, "uav3")
     assert last["airframe"] == "crazyflie"
     told = served.call("/rosapi/topics", "rosapi_msgs/srv/Topics")
@@ -125,7 +126,6 @@ def test_a_card_is_chosen_with_uavs_airframe_and_sensors(page, served):
     assert {"sensor_msgs/msg/LaserScan", "sensor_msgs/msg/PointCloud2"} & set(own.values())
     assert "sensor_msgs/msg/Range" not in own.values()
     wait_until(page, lambda page: page.evaluate("window.volery.uavs().length") == 3)
-    page.get_by_label("Number of UAVs").get_by_text("3 UAVs").wait_for()
     assert page.evaluate("window.samePage") is True
 
 
@@ -144,8 +144,8 @@ def start_anew(page, served, work):
 def test_more_trees_a_hectare_are_built_and_seen(page, served):
     clear = standing(page)
     start(page, served, "grove")
-    assert world(served)["asset"]["extras"]["trees"] == 16
-    wait_until(page, lambda page: standing(page) > clear + 0.02)
+    assert world(served)["asset"]["extras"]["trees"] == 4
+    wait_until(page, lambda page: standing(page) > clear + 0.005)
     wait_for_frames(page, 5)
     few = standing(page)
     panel = open_panel(page, "Environment")
