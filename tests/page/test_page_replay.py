@@ -12,7 +12,7 @@ from working import WIDE, choose, inspect, open_panel, set_slider
 from volery.bridges.logs.flights import read_flight
 from volery.bridges.logs.records import LogWalk
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 STATES = ("/ground_truth/tf", "/uav1/odom", "/uav2/odom", "/uav1/imu", "/uav2/imu")
 REPEATED_S = 400.0

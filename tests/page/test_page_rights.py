@@ -13,7 +13,7 @@ from page_serving import Served
 from scene_reading import on_screen, wait_for_picture, wait_until
 from working import WIDE, inspect, open_panel
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 PILOTS, VIEWERS = "pilots-secret-token", "viewers-secret-token"
 WHY_NOT = "You are looking on: the pilots' token is needed to steer"

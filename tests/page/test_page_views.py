@@ -8,7 +8,7 @@ from page_serving import Served
 from scene_reading import eye, pixels, wait_for_frames, wait_for_picture, wait_until
 from working import SMALL, press_canvas, pull
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 SCANNED = """
 name = "scanned"
@@ -157,25 +157,23 @@ def share_of(page, red):
 def test_returns_of_scanners_are_blue_and_red(page, served):
     page.goto(served.url + "#view=fly&quality=minimal&uav=uav1&camera=-6_0_9_0_-0.85_0")
     wait_until(page, lambda page: abs(eye(page)[2] - 9.0) < 0.2)
-    bare = {red: share_without_returns(page, red) for red in (True, False)}
+    show_returns(page, False)
+    bare = {red: share_of(page, red) for red in (True, False)}  # the airframe has both of its own
+    show_returns(page, True)
     for red, share in bare.items():
         wait_until(page, lambda page, red=red, share=share: share_of(page, red) > share + 2e-4)
     keep_picture(page, "returns")
 
 
-def share_without_returns(page, red):
-    """The airframe has red and blue of its own."""
+def show_returns(page, shown):
     page.get_by_role("button", name="What is shown").click()
-    page.get_by_label("LIDAR returns").uncheck()
-    wait_for_frames(page, 3)
-    share = share_of(page, red)
-    page.get_by_label("LIDAR returns").check()
+    page.get_by_label("LIDAR returns").set_checked(shown)
     page.keyboard.press("Escape")
     page.get_by_label("LIDAR returns").wait_for(state="hidden")
-    return share
+    wait_for_frames(page, 3)
 
 
-def test_a_link_keeps_view_camera_and_selection(browsing, served):
+def test_a_link_keeps_scenario_view_camera_and_selection(browsing, served):
     first = browsing.open(served.url + "#quality=minimal&view=fly&camera=-9_4_6_-0.5_-0.3_0")
     wait_for_picture(first)
     second = browsing.open(first.url.replace("view=fly", "view=fly&uav=uav1"))
@@ -186,3 +184,8 @@ def test_a_link_keeps_view_camera_and_selection(browsing, served):
     for page in (first, second):
         wait_until(page, lambda page: page.evaluate("window.volery.uavs()")[0]["position"][1] > 0.5)
     served.call("/uav1/hold", "std_srvs/srv/Trigger")
+    # A link to another scenario offers that one, and leaves alone what flies.
+    assert "scenario=scanned" in first.url
+    third = browsing.open(first.url.replace("scenario=scanned", "scenario=hover"), viewport=SMALL)
+    third.get_by_role("dialog", name="hover").get_by_role("button", name="Start").wait_for()
+    assert served.status()["scenario"] == "scanned"

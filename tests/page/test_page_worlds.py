@@ -10,7 +10,7 @@ from page_serving import Served
 from scene_reading import pixels, wait_for_frames, wait_for_picture, wait_until
 from working import SMALL, choose, open_panel, set_slider
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 GROVE = """
 name = "grove"
