@@ -92,12 +92,9 @@ def shown(page, title):
 
 def sent(served, *, depth):
     """The raw picture of the camera as a client beside the page receives it."""
-    topics = served.call("/rosapi/topics", "rosapi_msgs/srv/Topics")
-    (name,) = [
-        name
-        for name, kind in zip(topics["topics"], topics["types"], strict=True)
-        if kind == "sensor_msgs/msg/Image" and ("depth" in name) == depth
-    ]
+    topics = served.call("/rosapi/topics", "rosapi_msgs/srv/Topics")["topics"]
+    ending = "front/depth" if depth else "front/image_raw"
+    (name,) = [name for name in topics if name.endswith(ending)]
     message = served.once(name, "sensor_msgs/msg/Image")
     assert (message["width"], message["height"]) == (WIDTH, HEIGHT)
     data = message["data"]
