@@ -25,11 +25,13 @@ class Browsing:
         self.expected = []
         """Patterns of complaints that belong to the test."""
 
-    def open(self, url, *, viewport=None, **context):
-        """Open a page and wait until it stands."""
+    def open(self, url, *, viewport=None, init_script=None, **context):
+        """Open a page and wait until it stands; `init_script` runs in it before its own scripts."""
         opened = self._chromium.new_context(viewport=viewport or SMALL, **context)
         opened.set_default_timeout(60_000)
         self._contexts.append(opened)
+        if init_script is not None:
+            opened.add_init_script(init_script)
         page = opened.new_page()
         page.on("console", self._hear)
         page.on("pageerror", lambda error: self.complaints.append(f"uncaught: {error}"))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import threading
+import urllib.request
 
 import roslibpy
 
@@ -12,11 +14,31 @@ ANSWER_S = 60.0
 
 
 class Served(PageProcess):
-    """`volery serve SCENARIO`, for as long as the test lasts; `ros` sees its graph."""
+    """`volery serve SCENARIO`, for as long as the test lasts; `ros` sees its graph.
 
-    def __init__(self, scenario="hover", *options, port=0):
-        super().__init__(scenario, "--seconds", "36000", *options, port=port)
+    token: the pilots', where one is demanded.
+    """
+
+    def __init__(self, scenario="hover", *options, port=0, token=None):
+        shown = () if token is None else ("--token", token)
+        super().__init__(scenario, "--seconds", "36000", *options, *shown, port=port)
+        self._query = "" if token is None else f"?token={token}"
         self._ros = None
+
+    @property
+    def rosbridge(self):
+        """Of the graph, as a pilot."""
+        return super().rosbridge + self._query
+
+    def ask(self, path, query=None):
+        """What an address below `./api/` answers to a pilot, or to who asks with `query`."""
+        url = f"{self.url}api/{path}{self._query if query is None else query}"
+        with urllib.request.urlopen(url, timeout=ANSWER_S) as answer:
+            return answer.read()
+
+    def status(self):
+        """What `./api/status` says."""
+        return json.loads(self.ask("status"))
 
     @property
     def ros(self):

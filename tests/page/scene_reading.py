@@ -52,3 +52,24 @@ def eye(page):
 def on_screen(page, uav):
     """What `window.volery` says of a UAV."""
     return next(one for one in page.evaluate("window.volery.uavs()") if one["name"] == uav)
+
+
+def project(page, point):
+    """(x, y) where a place (m, map) is in the window, CSS pixels; by the camera's pose alone."""
+    camera = page.evaluate("window.volery.camera")
+    box = page.get_by_label("Scene", exact=True).locator("canvas").first.bounding_box()
+    x, y, z, w = camera["quaternion"]
+    axes = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
+            [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
+            [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )  # right, up and back of the camera, in the map
+    right, up, back = axes @ (np.asarray(point, float) - camera["position"])
+    assert back < 0, "it is behind the camera"
+    focal = 0.5 * box["height"] / np.tan(np.radians(camera["fov"]) / 2.0)
+    return (
+        box["x"] + 0.5 * box["width"] - focal * right / back,
+        box["y"] + 0.5 * box["height"] + focal * up / back,
+    )

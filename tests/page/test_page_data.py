@@ -2,14 +2,14 @@
 
 import json
 import re
-import time
 
 import pytest
+from asking import until
 from page_browsing import keep_picture
+from working import WIDE, open_panel
 
 pytestmark = pytest.mark.slow
 
-WIDE = {"width": 1000, "height": 600}
 ODOMETRY = "nav_msgs/msg/Odometry"
 
 
@@ -31,22 +31,8 @@ def page(browsing, served):
     return browsing.open(served.url, viewport=WIDE)
 
 
-def open_panel(page, name):
-    """The panel's own part of the page."""
-    page.get_by_role("navigation").get_by_role("button", name=name, exact=True).click()
-    return page.get_by_role("complementary", name=name)
-
-
 def number(text):
     return float(re.search(r"-?\d+(\.\d+)?", text)[0])
-
-
-def until(fits, timeout_s=60.0):
-    ends = time.monotonic() + timeout_s
-    while not (found := fits()):
-        assert time.monotonic() < ends, "it did not become true"
-        time.sleep(0.2)
-    return found
 
 
 def test_a_topic_unfolds_with_its_rate_and_live_values(page, served):

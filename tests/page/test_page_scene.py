@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from asking import put
 from page_browsing import keep_picture
 from scene_reading import eye, on_screen, pixels, wait_for_frames, wait_for_picture, wait_until
 
@@ -64,25 +65,12 @@ def test_a_moved_uav_moves_on_the_screen(browsing, served):
     )
     wait_for_picture(page)
     wait_until(page, lambda page: page.evaluate("window.volery.uavs().length") > 0)
-    pose = {"position": {"x": 0.0, "y": 0.0, "z": 4.0}, "orientation": {"w": 1.0}}
-    put(served, pose)
+    put(served, "uav1", 0.0, 0.0, 4.0)
     before = wait_until(page, lambda page: placed(on_screen(page, "uav1"), 0.0))
-    pose["position"]["y"] = 3.0
-    put(served, pose)
+    put(served, "uav1", 0.0, 3.0, 4.0)
     after = wait_until(page, lambda page: placed(on_screen(page, "uav1"), 3.0))
     # Looking east, what goes north goes to the left, by its angle.
     assert before["x"] - after["x"] > 40.0
-
-
-def put(served, pose):
-    request = {
-        "entity": "uav1",
-        "state": {"header": {"frame_id": "map"}, "pose": pose},
-        "set_pose": True,
-        "set_twist": True,
-    }
-    told = served.call("/set_entity_state", "simulation_interfaces/srv/SetEntityState", request)
-    assert told["result"]["result"] == 1, told
 
 
 def placed(seen, y):

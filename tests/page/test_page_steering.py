@@ -1,18 +1,14 @@
 """What the page steers: each control is worked, and its effect looked up on the graph."""
 
 import re
-import time
 
 import pytest
 import roslibpy
+from asking import VEHICLES, stamp_ns, status, vehicle, weather
 from page_browsing import keep_picture
+from working import WIDE, inspect, open_panel, set_slider
 
 pytestmark = pytest.mark.slow
-
-WIDE = {"width": 1000, "height": 600}
-TWIST = "geometry_msgs/msg/Twist"
-VEHICLES = "volery_interfaces/msg/VehicleStates"
-STATUS = "volery_interfaces/msg/SimulationStatus"
 
 
 @pytest.fixture(scope="module")
@@ -31,48 +27,6 @@ def page(browsing, served):
     return opened
 
 
-def open_panel(page, name):
-    page.get_by_role("navigation").get_by_role("button", name=name, exact=True).click()
-    return page.get_by_role("complementary", name=name)
-
-
-def inspect(page, uav):
-    """The inspector with this UAV selected."""
-    page.get_by_role("option", name=uav).click()
-    return open_panel(page, "Inspector")
-
-
-def vehicle(served, uav, fits, timeout_s=60.0):
-    """The UAV, once it is so."""
-    found = {}
-
-    def look(message):
-        found.update({each["name"]: each for each in message["vehicles"]})
-        return uav in found and fits(found[uav])
-
-    served.once("/volery/vehicles", VEHICLES, look, timeout_s)
-    return found[uav]
-
-
-def status(served, fits, timeout_s=60.0):
-    return served.once("/volery/status", STATUS, fits, timeout_s)
-
-
-def weather(served, fits, timeout_s=60.0):
-    ends = time.monotonic() + timeout_s
-    while not fits(told := served.call("/volery/get_weather", "volery_interfaces/srv/GetWeather")):
-        assert time.monotonic() < ends, f"the weather stayed {told}"
-        time.sleep(0.2)
-    return told
-
-
-def set_slider(page, name, key, times):
-    slider = page.get_by_role("slider", name=name, exact=True)
-    slider.focus()
-    for _ in range(times):
-        slider.press(key)
-
-
 # ------------------------------------------------------------------------------------------- time
 
 
@@ -81,12 +35,12 @@ def test_pause_step_and_play(page, served):
     paused = status(served, lambda told: told["state"] == 2)
     page.get_by_role("button", name="Step", exact=True).click()
     stepped = status(served, lambda told: told["stamp"] != paused["stamp"])
-    ns = [told["stamp"]["sec"] * 10**9 + told["stamp"]["nanosec"] for told in (paused, stepped)]
+    ns = [stamp_ns(told) for told in (paused, stepped)]
     assert 0 < ns[1] - ns[0] <= 4_000_000  # one physics step
     page.get_by_role("button", name="Many steps").click()
     page.get_by_label("Physics steps").fill("500")
     page.get_by_role("dialog").get_by_role("button", name="Step", exact=True).click()
-    status(served, lambda told: _ns(told) == ns[1] + 500 * (ns[1] - ns[0]))
+    status(served, lambda told: stamp_ns(told) == ns[1] + 500 * (ns[1] - ns[0]))
     page.keyboard.press("Escape")
     page.get_by_role("button", name="Play", exact=True).click()
     status(served, lambda told: told["state"] == 1)
@@ -245,7 +199,3 @@ def test_a_map_is_uploaded_and_flown_without_a_new_page(page, browsing, served):
     page.get_by_label("Number of UAVs").get_by_text("2 UAVs").wait_for(timeout=120_000)
     assert page.evaluate("window.samePage") is True
     keep_picture(page, "uploaded")
-
-
-def _ns(told):
-    return told["stamp"]["sec"] * 10**9 + told["stamp"]["nanosec"]

@@ -16,6 +16,7 @@ from volery.core.errors import CommandError
 
 if TYPE_CHECKING:
     from volery.scenario.schema import Scenario
+    from volery.scenario.shelf import Shelf
     from volery.server.page_server import PageServer
     from volery.server.settings import PageSettings
 
@@ -53,11 +54,11 @@ def page_of(options: RunOptions) -> Iterator[Page]:
 
 
 @contextmanager
-def serving(settings: PageSettings) -> Iterator[Page]:
-    """Serve the page and say where."""
+def serving(settings: PageSettings, shelf: Shelf | None = None) -> Iterator[Page]:
+    """Serve the page, with cards of what is on the shelf, and say where."""
     from volery.server.page_server import PageServer
 
-    with PageServer(settings) as server:
+    with PageServer(settings, shelf) as server:
         needed = "  (it asks for the token)" if settings.tokens.needed else ""
         typer.echo(f"page    {server.url}{needed}", err=True)
         yield Page(server)

@@ -53,8 +53,12 @@ def serve(options: ServeOptions) -> None:
 
     Raises `VoleryError` where the first scenario cannot be built or the server cannot listen.
     """
-    with Interrupts() as interrupts, serving(options.page) as page:
-        host = _Host(options, page, interrupts)
+    from volery.scenario.shelf import Shelf
+
+    first = _first_scenario(options.first)
+    shelf = Shelf(options.page.uploads, options.page.recordings, given=first)
+    with Interrupts() as interrupts, serving(options.page, shelf) as page:
+        host = _Host(options, page, interrupts, _Wish(first, options.first.speed, shelf))
         while host.goes_on:
             host.go_on()
     typer.echo("the server has ended", err=True)
@@ -64,7 +68,8 @@ class _Wish:
     """What is to be flown next: the first scenario, then what clients ask for."""
 
     def __init__(self, scenario: Scenario, speed: float | None, shelf: Shelf) -> None:
-        self._shelf = shelf
+        self.shelf = shelf
+        """What may be flown."""
         self.speed = speed
         """Factor of real time to begin with; None: as fast as possible."""
         self.asked = True
@@ -78,7 +83,7 @@ class _Wish:
         elif isinstance(request, LogRequest):
             self.want(request.path)
         else:
-            self.want(changes.apply(self._shelf.load(request.name), request.changes))
+            self.want(changes.apply(self.shelf.load(request.name), request.changes))
             speed = request.changes.speed
             self.speed = self.speed if speed is None else speed or None
         self.quit()
@@ -96,14 +101,13 @@ class _Wish:
 class _Host:
     """Builds worlds and flies them, one at a time."""
 
-    def __init__(self, options: ServeOptions, page: Page, interrupts: Interrupts) -> None:
-        from volery.scenario.shelf import Shelf
-
+    def __init__(
+        self, options: ServeOptions, page: Page, interrupts: Interrupts, wish: _Wish
+    ) -> None:
         self._options = options
         self._page = page
         self._interrupts = interrupts
-        self._shelf = Shelf(options.page.uploads, options.page.recordings)
-        self._wish = _Wish(_first_scenario(options.first), options.first.speed, self._shelf)
+        self._wish = wish
         self._present: Scenario | None = None
         """What was built last."""
         self._trouble = ""
@@ -146,7 +150,7 @@ class _Host:
             threads=threads,
             recordings=first.recordings,
             on_load=self._wish.ask,
-            shelf=self._shelf,
+            shelf=self._wish.shelf,
         ) as simulation:
             self._present, self._wish.quit = scenario, simulation.quit
             self._interrupts.be_gentle()
@@ -160,7 +164,7 @@ class _Host:
         """Open a log and stay with it."""
         from volery.runtime.player import Player
 
-        with Player(log, on_load=self._wish.ask, shelf=self._shelf) as player:
+        with Player(log, on_load=self._wish.ask, shelf=self._wish.shelf) as player:
             if player.scenario is not None:
                 self._page.building(player.scenario, self._trouble)
             _ = player.geometry  # made here: the server only reads it
@@ -199,7 +203,7 @@ class _Host:
         """Keep the doors open with no world behind them."""
         from volery.runtime.lobby import Lobby
 
-        lobby = Lobby(self._wish.ask, self._shelf)
+        lobby = Lobby(self._wish.ask, self._wish.shelf)
         with open_doors(lobby, self._options.first), self._page.showing(lobby, self._trouble):
             typer.echo("no world is loaded", err=True)
             self._trouble = ""

@@ -18,18 +18,32 @@ class Shelf:
     """The library and, where there is one, a folder with more: `FOLDER/NAME/scenario.toml`.
 
     Names of the library come first. A shipped scenario cannot be hidden by one of the folder.
-    `logs` is the folder of recorded logs that may be played; None: none.
+    `logs` is the folder of recorded logs that may be played; None: none. `given` is a scenario that
+    lies elsewhere, such as that of the command line; neither can it hide another one.
     """
 
     FILE = "scenario.toml"
 
-    def __init__(self, folder: Path | None = None, logs: Path | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path | None = None,
+        logs: Path | None = None,
+        given: Scenario | None = None,
+    ) -> None:
         self.folder = folder
         self._logs = logs
+        self._given = given
 
     def names(self) -> tuple[str, ...]:
         """All names that can be loaded."""
-        return (*library.names(), *self.added())
+        return (*library.names(), *self.added(), *(each.name for each in self.given()))
+
+    def given(self) -> tuple[Scenario, ...]:
+        """The scenario that lies elsewhere, if there is one of that name nowhere else."""
+        given = self._given
+        if given is None or given.name in (*library.names(), *self.added()):
+            return ()
+        return (given,)
 
     def added(self) -> tuple[str, ...]:
         """Names of the folder's scenarios, sorted."""
@@ -43,6 +57,9 @@ class Shelf:
         """A scenario by its name. `ScenarioError` where there is none, or it is broken."""
         if name in library.names():
             return load_scenario(name)
+        for given in self.given():
+            if given.name == name:
+                return given
         if self.folder is None or name not in self.added():
             raise ScenarioError(f"no scenario '{name}'; known: {', '.join(self.names())}")
         return load_scenario(self.folder / name / self.FILE)

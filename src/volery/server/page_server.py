@@ -34,11 +34,14 @@ _LONGEST_CALL_S = 30.0
 
 
 class PageServer:
-    """Serves the page. Use it as a context manager, or call `start` and `stop`."""
+    """Serves the page. Use it as a context manager, or call `start` and `stop`.
 
-    def __init__(self, settings: PageSettings) -> None:
+    shelf: the scenarios of the cards; those that ship and the uploads unless it is given.
+    """
+
+    def __init__(self, settings: PageSettings, shelf: Shelf | None = None) -> None:
         self._settings = settings
-        self._site = Site(settings.recordings, Shelf(settings.uploads))
+        self._site = Site(settings.recordings, shelf or Shelf(settings.uploads))
         self._thread = LoopThread("volery-page")
         self._server: uvicorn.Server | None = None
         self._socket: socket.socket | None = None

@@ -42,6 +42,7 @@ async def picture(request: Request) -> Response:
 def cards_of(shelf: Shelf) -> list[Card]:
     """Cards of all scenarios; one that cannot be read any more has none."""
     cards = [_shipped(name) for name in library.names()]
+    cards += [_card(given, uploaded=False) for given in shelf.given()]
     for name in shelf.added():
         try:
             cards.append(_card(shelf.load(name), uploaded=True))

@@ -115,9 +115,16 @@ def test_a_token_opens_and_a_cookie_keeps_open(locked, token, role):
 
 
 def test_wrong_tokens_are_refused(locked):
-    assert ask(locked, "/?token=wrong").status == 401
+    assert ask(locked, "/api/status?token=wrong").status == 401
+    assert ask(locked, "/rosbridge?token=wrong").status == 401
     assert ask(locked, "/api/status", Authorization="Bearer wrong").status == 401
     assert ask(locked, "/api/world.glb", Cookie=f"volery_{locked.port}=pilot-00").status == 401
+
+
+def test_the_page_itself_opens_with_a_wrong_token_and_gives_no_right(locked):
+    answer = ask(locked, "/?token=wrong")
+    assert answer.status != 401  # people get the page, which asks for another one
+    assert "Set-Cookie" not in answer.headers
 
 
 def test_a_viewer_brings_no_files(locked):

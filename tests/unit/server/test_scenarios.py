@@ -7,6 +7,7 @@ from page_bench import ask, serving
 from PIL import Image
 
 from volery.scenario import library
+from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.shelf import Shelf
 from volery.server.cards import CARDS
 from volery.server.draw_cards import HEIGHT, VIEWS, WIDTH
@@ -63,3 +64,15 @@ def test_uploaded_scenarios_stand_behind_and_broken_ones_not_at_all(tmp_path):
     last = cards_of(shelf)[-1]
     assert (last["name"], last["uploaded"], last["picture"]) == ("mine", True, None)
     assert shelf.load("hover").uav_count == 1
+
+
+def test_a_scenario_of_the_command_line_can_be_chosen_again(tmp_path, flat_data):
+    mine = parse_scenario({**flat_data, "name": "mine"})
+    shelf = Shelf(tmp_path, given=mine)
+    assert shelf.load("mine") is mine
+    assert "mine" in shelf.names()
+    assert [card["name"] for card in cards_of(shelf)] == [*library.names(), "mine"]
+    # It hides none of the others.
+    hidden = Shelf(tmp_path, given=parse_scenario({**flat_data, "name": "hover"}))
+    assert hidden.load("hover") == load_scenario("hover")
+    assert len(cards_of(hidden)) == len(library.names())

@@ -73,6 +73,7 @@ function Lobby() {
 
 function TokenNeeded() {
   const reason = useConnection((connection) => connection.reason);
+  const given = new URLSearchParams(location.search).has("token");
   return (
     <Paper className="situation" shadow="lg" withBorder p="lg">
       <form
@@ -91,7 +92,13 @@ function TokenNeeded() {
               {reason}
             </Text>
           )}
-          <PasswordInput label="Token" name="token" required autoComplete="current-password" />
+          <PasswordInput
+            label="Token"
+            name="token"
+            required
+            autoComplete="current-password"
+            error={given && "The token in the address is not one of this server's"}
+          />
           <Button type="submit">Enter</Button>
         </Stack>
       </form>

@@ -1,11 +1,15 @@
 import { ActionIcon, Group, Paper, Text } from "@mantine/core";
 import { Minus, Plus, X } from "lucide-react";
 import { useRef, type KeyboardEvent, type PointerEvent, type ReactNode } from "react";
+import { create } from "zustand";
 import { placeTile, useLayout, type Tile } from "../state/layout.ts";
 
 const LEAST_PX = 140;
 const STEP = 0.05;
 const STEP_PX = 40;
+
+/** The tile that was touched last lies over the others. */
+const useFront = create(() => ({ name: "" }));
 
 interface FloatingTileProps {
   /** Under which its place is kept. */
@@ -25,6 +29,8 @@ export function FloatingTile(props: FloatingTileProps) {
   const tile = useLayout((layout) => layout.tiles[name]) ?? usual;
   const box = useRef<HTMLDivElement>(null);
   const grip = useRef<{ x: number; y: number; tile: Tile } | null>(null);
+  const inFront = useFront((front) => front.name === name);
+  const raise = () => useFront.setState({ name });
   const place = (next: Tile) => placeTile(name, clamped(next));
   const begin = (event: PointerEvent) => {
     if ((event.target as HTMLElement).closest("button") !== null) return;
@@ -69,6 +75,9 @@ export function FloatingTile(props: FloatingTileProps) {
       role="group"
       aria-label={title}
       style={{ ...styleOf(tile), width: tile.width }}
+      data-front={inFront || undefined}
+      onPointerDownCapture={raise}
+      onFocusCapture={raise}
     >
       <Group
         className="tile-title"

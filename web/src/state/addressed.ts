@@ -1,8 +1,14 @@
-// The page's address keeps view, camera and selection, so that a link shows what its sender sees.
+// The page's address keeps scenario, view, camera and selection, so that a link shows what its sender
+// sees. Another scenario than flies here is offered, not started: others may be looking on.
 
 import { cameraOf, cameraText } from "./cameraText.ts";
+import { useSimulation } from "./simulation.ts";
 import { useVehicles } from "./vehicles.ts";
 import { putCamera, QUALITIES, useView, VIEWS } from "./view.ts";
+import { offerScenario } from "./windows.ts";
+
+/** Scenario of the link that was followed; empty: none, or it was offered already. */
+let linked = "";
 
 export function followAddress(): void {
   read();
@@ -14,6 +20,18 @@ export function followAddress(): void {
   useVehicles.subscribe((now, before) => {
     if (now.selected !== before.selected) write();
   });
+  useSimulation.subscribe(({ server }, before) => {
+    if (server?.scenario === before.server?.scenario) return;
+    offerLinked();
+    write();
+  });
+}
+
+function offerLinked(): void {
+  const scenario = useSimulation.getState().server?.scenario ?? "";
+  if (scenario === "") return; // not told yet
+  if (linked !== "" && linked !== scenario) offerScenario(linked);
+  linked = "";
 }
 
 function read(): void {
@@ -24,6 +42,8 @@ function read(): void {
   if (quality !== undefined) useView.setState({ quality });
   const camera = cameraOf(kept.get("camera"));
   if (camera !== null) putCamera(camera);
+  linked = kept.get("scenario") ?? "";
+  offerLinked();
   const uav = kept.get("uav");
   if (uav !== null) useVehicles.setState({ selected: uav });
 }
@@ -32,6 +52,7 @@ function write(): void {
   const kept = new URLSearchParams(location.hash.slice(1));
   const { name, camera, quality } = useView.getState();
   kept.set("view", name);
+  keep(kept, "scenario", useSimulation.getState().server?.scenario || linked);
   keep(kept, "camera", camera === null ? "" : cameraText(camera));
   keep(kept, "quality", quality === "auto" ? "" : quality);
   keep(kept, "uav", useVehicles.getState().selected);

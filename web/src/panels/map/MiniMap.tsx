@@ -4,10 +4,11 @@ import { AutoFit, pixelOf, type MapView, type Point, type Size } from "../../lib
 import { link } from "../../link/link.ts";
 import { useGoals } from "../../state/orders.ts";
 import { baseFrame, useVehicles } from "../../state/vehicles.ts";
-import { useWorldPlan } from "../../state/worldPlan.ts";
+import { useWorldPlan, type WorldPlan } from "../../state/worldPlan.ts";
 import { FloatingTile } from "../FloatingTile.tsx";
-import { drawPlan, type PlanColours, type PlanPicture } from "./drawPlan.ts";
+import { drawPlan, type PlanColours } from "./drawPlan.ts";
 import { Pen } from "./drawTraffic.ts";
+import { extentOf } from "./extent.ts";
 import { MapButtons } from "./MapButtons.tsx";
 import { MapCanvas } from "./MapCanvas.tsx";
 import { useTrails } from "./trails.ts";
@@ -38,7 +39,9 @@ export default function MiniMap() {
   const canvas = useRef<HTMLCanvasElement>(null);
   const shown = useRef<MapView | null>(null);
   const auto = useRef(new AutoFit());
-  useDrawing(canvas, view, auto.current, follows, shown);
+  const plan = useWorldPlan((world) => world.plan);
+  useEffect(() => setView(null), [plan]); // another world: another place
+  useDrawing(canvas, plan, view, auto.current, follows, shown);
   const fit = () => {
     auto.current.clear();
     setFollows(false);
@@ -77,13 +80,13 @@ export default function MiniMap() {
 /** view: as hands left it; null: nobody has moved it. Draws a dozen times a second, whatever React does. */
 function useDrawing(
   canvas: RefObject<HTMLCanvasElement | null>,
+  plan: WorldPlan | null,
   view: MapView | null,
   auto: AutoFit,
   follows: boolean,
   shownNow: RefObject<MapView | null>,
 ): void {
   const dark = useComputedColorScheme("light") === "dark";
-  const plan = useWorldPlan((world) => world.plan);
   const picture = useMemo(() => plan && drawPlan(plan, dark ? DARK : LIGHT), [plan, dark]);
   const trails = useTrails();
   const selected = useVehicles((vehicles) => vehicles.selected);
@@ -93,8 +96,8 @@ function useDrawing(
       const element = canvas.current;
       if (element === null || document.hidden || element.clientWidth === 0) return;
       const size = { width: element.clientWidth, height: element.clientHeight };
-      const uavs = useVehicles.getState().list.length;
-      let shown = view ?? auto.of([picture, uavs], () => extent(picture), size);
+      const uavs = places();
+      let shown = view ?? auto.of([plan, uavs.length], () => extentOf(plan, uavs), size);
       const pose = link.frames.pose(baseFrame(selected));
       if (follows && pose !== null) shown = { ...shown, x: pose[0], y: pose[1] };
       shownNow.current = shown;
@@ -117,7 +120,7 @@ function useDrawing(
     draw();
     const timer = setInterval(draw, FRAME_MS);
     return () => clearInterval(timer);
-  }, [canvas, view, auto, follows, shownNow, picture, selected, trails, path, dark]);
+  }, [canvas, view, auto, follows, shownNow, plan, picture, selected, trails, path, dark]);
 }
 
 function prepared(element: HTMLCanvasElement, { width, height }: Size): CanvasRenderingContext2D {
@@ -133,9 +136,6 @@ function prepared(element: HTMLCanvasElement, { width, height }: Size): CanvasRe
   return context;
 }
 
-/** What the map shows at first: all UAVs, and the world where it is not vast. */
-function extent(picture: PlanPicture | null): Point[] {
-  const uavs = useVehicles.getState().list.map(({ position: p }): Point => [p.x, p.y]);
-  if (picture === null || picture.right - picture.left > 2000) return uavs;
-  return [...uavs, [picture.left, picture.bottom], [picture.right, picture.top]];
+function places(): Point[] {
+  return useVehicles.getState().list.map(({ position: p }): Point => [p.x, p.y]);
 }

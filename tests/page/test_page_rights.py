@@ -1,0 +1,153 @@
+"""Who may do what on the page: tokens and roles, and two pilots who share the UAVs."""
+
+import json
+import urllib.error
+import urllib.request
+
+import numpy as np
+import pytest
+import roslibpy
+from asking import place, until, vehicle
+from page_browsing import keep_picture
+from page_serving import Served
+from scene_reading import on_screen, wait_for_picture, wait_until
+from working import WIDE, inspect, open_panel
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+
+PILOTS, VIEWERS = "pilots-secret-token", "viewers-secret-token"
+WHY_NOT = "You are looking on: the pilots' token is needed to steer"
+LOOK = "#view=fly&camera=-9_0_6_0_-0.3_0&quality=minimal&uav=uav1"
+ASK = """
+(order) => new Promise((resolve, reject) => {
+  const socket = new WebSocket(new URL("./rosbridge", location.href));
+  socket.onerror = () => reject(new Error("no socket"));
+  socket.onopen = () => socket.send(JSON.stringify(order));
+  socket.onmessage = ({ data }) => resolve(JSON.parse(data));
+})
+"""
+"""Sends one order past the page's own controls, with the browser's cookie."""
+
+
+@pytest.fixture(scope="module")
+def served(chromium):
+    with Served("hover", "--uavs", "2", "--viewer-token", VIEWERS, token=PILOTS) as server:
+        for uav in ("uav1", "uav2"):
+            vehicle(server, uav, lambda told: told["mode"] == "HOLD")
+        yield server
+
+
+def enter(browsing, served, token):
+    page = browsing.open(f"{served.url}?token={token}{LOOK}", viewport=WIDE)
+    page.get_by_role("option", name="uav1").wait_for()
+    return page
+
+
+def test_without_a_token_the_page_asks_for_one(browsing, served):
+    browsing.expected += ["401", "403", "WebSocket connection"]
+    page = browsing.open(served.url, viewport=WIDE)
+    page.get_by_text("This server asks for a token").wait_for()
+    assert page.get_by_role("option", name="uav1").count() == 0
+    keep_picture(page, "token")
+    page.get_by_label("Token").fill("wrong")
+    page.get_by_role("button", name="Enter").click()
+    page.wait_for_url("**token=wrong**")
+    page.get_by_text("This server asks for a token").wait_for()
+    page.get_by_label("Token").fill(PILOTS)
+    page.get_by_role("button", name="Enter").click()
+    page.get_by_role("option", name="uav1").wait_for()
+    with pytest.raises(urllib.error.HTTPError, match=r"HTTP Error 40[13]"):
+        served.ask("world.glb", query="")
+
+
+def test_a_viewer_sees_all_and_every_control_is_off(browsing, served):
+    page = enter(browsing, served, VIEWERS)
+    wait_for_picture(page)
+    assert json.loads(served.ask("status", f"?token={VIEWERS}"))["role"] == "viewer"
+    panel = inspect(page, "uav1")
+    orders = panel.get_by_role("group", name="Orders")
+    for name in ("Take off", "Land", "Hold", "Return", "Arm", "Kill"):
+        assert orders.get_by_role("button", name=name, exact=True).is_disabled()
+    for name in ("Go", "Go to a place that is clicked", "Take control", "Remove uav1"):
+        assert panel.get_by_role("button", name=name, exact=True).is_disabled()
+    for name in ("Pause", "Reset", "Fly by hand"):
+        assert page.get_by_role("button", name=name, exact=True).is_disabled()
+    open_panel(page, "Environment").get_by_text(WHY_NOT).wait_for()
+    assert page.get_by_role("button", name="Blow a gust").is_disabled()
+    assert page.get_by_role("slider").count() == 0  # none has a thumb
+    assert open_panel(page, "Faults").get_by_role("button", name="Inject").is_disabled()
+    assert page.get_by_role("button", name="A click sends the selected UAV there").is_disabled()
+    keep_picture(page, "viewer")
+    # What moves, moves for him too.
+    z = on_screen(page, "uav1")["position"][2]
+    request = {"position": {"x": 0.0, "y": 0.0, "z": z + 2.0}, "keep_heading": True}
+    served.call("/uav1/go_to", "volery_interfaces/srv/GoTo", request)
+    wait_until(page, lambda page: on_screen(page, "uav1")["position"][2] > z + 1.0)
+
+
+def test_a_viewers_keys_command_nothing(browsing, served):
+    page = enter(browsing, served, VIEWERS)
+    page.keyboard.press("l")
+    page.get_by_role("alert").filter(has_text=WHY_NOT).first.wait_for()
+    page.keyboard.press("c")
+    assert page.get_by_role("group", name="Flight by hand").count() == 0
+    assert vehicle(served, "uav1")["mode"] != "LAND"
+
+
+def test_the_server_refuses_a_viewer_whatever_his_page_does(browsing, served):
+    page = enter(browsing, served, VIEWERS)
+    order = {"op": "call_service", "service": "/uav2/land", "type": "std_srvs/srv/Trigger"}
+    answer = page.evaluate(ASK, order)
+    assert answer.get("result") is False or answer["op"] == "status"
+    assert "viewer" in json.dumps(answer)
+    twist = {"linear": {"x": 3.0, "y": 0.0, "z": 0.0}}
+    publish = {"op": "publish", "topic": "/uav2/cmd_vel", "msg": twist}
+    answer = page.evaluate(ASK, publish | {"type": "geometry_msgs/msg/Twist"})
+    assert "viewer" in json.dumps(answer)
+    told = vehicle(served, "uav2")
+    assert told["mode"] == "HOLD"
+    assert told["command_age"] < 0
+    upload = "api/uploads?kind=grid_map&name=a.csv"
+    status = "(url) => fetch('./' + url, {method: 'POST', body: '0,1'}).then((r) => r.status)"
+    browsing.expected += ["403"]
+    assert page.evaluate(status, upload) == 403
+
+
+def test_two_pilots_and_a_hand_over(browsing, served):
+    anna, ben = enter(browsing, served, PILOTS), enter(browsing, served, PILOTS)
+    annas, bens = inspect(anna, "uav1"), inspect(ben, "uav1")
+    annas.get_by_label("Your name").fill("Anna")
+    annas.get_by_role("button", name="Take control").click()
+    vehicle(served, "uav1", lambda uav: uav["holder"] == "Anna")
+    bens.get_by_text("Anna has it: your commands are refused.").wait_for()
+    # Ben takes the other one, by which Anna's page knows him.
+    inspect(ben, "uav2").get_by_label("Your name").fill("Ben")
+    bens.get_by_role("button", name="Take control").click()
+    vehicle(served, "uav2", lambda uav: uav["holder"] == "Ben")
+    inspect(ben, "uav1").get_by_role("button", name="Land", exact=True).click()
+    ben.get_by_role("alert").filter(has_text="held by Anna").first.wait_for()
+    assert vehicle(served, "uav1")["mode"] != "LAND"
+    ben.keyboard.press("c")
+    ben.get_by_role("group", name="Flight by hand").get_by_text("Anna has the control").wait_for()
+    ben.keyboard.down("KeyW")
+    ben.wait_for_timeout(1000)
+    ben.keyboard.up("KeyW")
+    assert vehicle(served, "uav1")["mode"] != "VELOCITY"
+    ben.keyboard.press("Escape")
+    keep_picture(ben, "held_by_another")
+    annas.get_by_label("Pilot to hand it to").fill("Ben")
+    anna.keyboard.press("Escape")  # the list of names
+    annas.get_by_role("button", name="Hand over").click()
+    vehicle(served, "uav1", lambda uav: uav["holder"] == "Ben")
+    annas.get_by_text("Ben has it: your commands are refused.").wait_for()
+    bens.get_by_text("You have it, as Ben.").wait_for()
+    x = place(served, "uav1")[0]
+    ben.keyboard.press("c")
+    ben.keyboard.down("KeyW")
+    vehicle(served, "uav1", lambda uav: uav["mode"] == "VELOCITY" and uav["position"]["x"] > x + 1)
+    ben.keyboard.up("KeyW")
+    with pytest.raises(roslibpy.core.ServiceException, match="held by Ben"):
+        served.call("/uav1/hold", "std_srvs/srv/Trigger")
+    ben.context.close()  # who leaves lets go
+    vehicle(served, "uav1", lambda uav: uav["holder"] == "")
+    until(lambda: np.isclose(vehicle(served, "uav1")["velocity"]["x"], 0.0, atol=0.2))

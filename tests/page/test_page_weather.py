@@ -1,0 +1,86 @@
+"""Sliders of the weather are worked, and looked up in the simulation and in the picture."""
+
+import numpy as np
+import pytest
+from asking import place, vehicle, weather
+from page_browsing import keep_picture
+from scene_reading import pixels, wait_for_frames, wait_for_picture, wait_until
+from working import SMALL, open_panel, set_slider
+
+pytestmark = pytest.mark.slow
+
+LOOK = "#view=fly&camera=-30_0_2.5_0_-0.12_0&quality=low"
+
+
+@pytest.fixture
+def page(browsing, served):
+    page = browsing.open(served.url + LOOK, viewport=SMALL)
+    wait_for_picture(page)
+    page.keyboard.press("m")
+    open_panel(page, "Environment").get_by_role("button", name="Calm and clear").click()
+    weather(served, lambda told: told["rain"] == told["snow"] == told["fog_visibility"] == 0.0)
+    set_slider(page, "Hour of day", "Home")
+    set_slider(page, "Hour of day", "ArrowRight", 47)  # noon
+    weather(served, lambda told: told["hour_of_day"] == pytest.approx(12.0))
+    wait_for_frames(page, 8)
+    return page
+
+
+def between(page):
+    """(height, width, 3) of the scene between the panels, without the menu of views."""
+    picture = pixels(page)
+    height, width, _ = picture.shape
+    return picture[int(0.2 * height) :, int(0.05 * width) : int(0.95 * width)]
+
+
+def restless(page):
+    """How much the picture changes from one frame to one soon after."""
+    first = between(page)
+    wait_for_frames(page, 1)
+    return float(np.abs(between(page) - first).mean())
+
+
+def contrast(page):
+    """Between the ground at one's feet and the horizon."""
+    picture = between(page)
+    rows = picture.mean(axis=(1, 2))
+    return float(np.ptp(rows))
+
+
+def test_the_fog_slider_hides_what_is_far(page, served):
+    clear = between(page)
+    set_slider(page, "Fog", "End")
+    weather(served, lambda told: told["fog_visibility"] == pytest.approx(10.0))
+    wait_until(page, lambda page: contrast(page) < 0.5 * np.ptp(clear.mean(axis=(1, 2))))
+    keep_picture(page, "fog_slider")
+
+
+def test_the_hour_slider_brings_the_night(page, served):
+    noon = between(page).mean()
+    set_slider(page, "Hour of day", "End")
+    weather(served, lambda told: told["hour_of_day"] == pytest.approx(24.0))
+    wait_until(page, lambda page: between(page).mean() < 0.6 * noon)
+
+
+@pytest.mark.parametrize("kind", ["Rain", "Snow"])
+def test_what_falls_is_seen_to_fall(page, served, kind):
+    still = restless(page)
+    set_slider(page, kind, "End")
+    weather(served, lambda told: told[kind.lower()] > 15.0)
+    wait_until(page, lambda page: restless(page) > 3.0 * still + 0.002)
+    keep_picture(page, f"{kind.lower()}_slider")
+
+
+def test_wind_and_gusts_move_a_uav(page, served):
+    vehicle(served, "uav1", lambda uav: uav["mode"] == "HOLD" and uav["airborne"])
+    before = place(served, "uav1")
+    set_slider(page, "Wind comes from", "Home")
+    set_slider(page, "Wind comes from", "ArrowRight", 18)  # 90 degrees: from the east
+    set_slider(page, "Wind", "ArrowRight", 12)
+    weather(served, lambda told: told["wind"]["x"] == pytest.approx(-6.0))
+    vehicle(served, "uav1", lambda uav: uav["position"]["x"] < before[0] - 0.05)
+    page.get_by_role("button", name="Calm and clear").click()
+    weather(served, lambda told: told["wind"]["x"] == 0.0)
+    vehicle(served, "uav1", lambda uav: abs(uav["velocity"]["x"]) < 0.05)
+    page.get_by_role("button", name="Blow a gust").click()
+    vehicle(served, "uav1", lambda uav: abs(uav["velocity"]["x"]) > 0.1)
