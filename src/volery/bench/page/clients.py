@@ -1,6 +1,7 @@
 """Other clients beside the page, over plain WebSockets: many that read, one that stops.
 
-python -m volery.bench.page.clients URL CLIENTS SECONDS TOPIC...   prints what each lost, as JSON
+python -m volery.bench.page.clients URL CLIENTS SECONDS TOPIC...   prints a line when all are
+connected, and at the end what they lost, as JSON
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ def main() -> None:
 
 
 async def _read(url: str, clients: int, seconds: float, topics: list[str]) -> dict[str, int]:
-    found = await asyncio.gather(*(_stamps(url, seconds, topics) for _ in range(clients)))
+    there = asyncio.Barrier(clients)
+    found = await asyncio.gather(*(_stamps(url, seconds, topics, there) for _ in range(clients)))
     series = [stamps for client in found for stamps in client.values()]
     return {
         "messages": sum(map(len, series)),
@@ -34,12 +36,16 @@ async def _read(url: str, clients: int, seconds: float, topics: list[str]) -> di
     }
 
 
-async def _stamps(url: str, seconds: float, topics: list[str]) -> dict[str, list[int]]:
-    """Stamps of what comes, ns, by topic."""
+async def _stamps(
+    url: str, seconds: float, topics: list[str], there: asyncio.Barrier
+) -> dict[str, list[int]]:
+    """Stamps of what comes from when all are there, ns, by topic."""
     stamps: dict[str, list[int]] = defaultdict(list)
     async with connect(url, max_size=None) as socket:
         for topic in topics:
             await socket.send(subscription(topic))
+        if await there.wait() == 0:
+            print("all are there", flush=True)  # noqa: T201
         loop = asyncio.get_running_loop()
         begins = loop.time() + _SETTLING_S
         while (left := begins + seconds - loop.time()) > 0:

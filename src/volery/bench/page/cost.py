@@ -40,6 +40,8 @@ def clients_figures(server: PageProcess, topics: list[str]) -> dict[str, float]:
     words = [server.rosbridge, str(_CLIENTS), str(_CLIENTS_S), *topics]
     command = [sys.executable, "-m", module, *words]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as clients:
+        assert clients.stdout is not None
+        clients.stdout.readline()  # all are there
         factor, _ = pace(server, _CLIENTS_S)
         out, _ = clients.communicate(timeout=10 * _CLIENTS_S)
     told = json.loads(out)
