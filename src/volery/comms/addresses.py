@@ -7,6 +7,7 @@ An address is a u16:
 | 0 .. 0x7EFF | the station with this linear id, planes_per_batch x batch + plane |
 | 0x7F00 .. 0x7FFF | ground stations, which belong to no batch |
 | 0x8000 + b | all stations of batch b, b up to 0x3FFF |
+| 0xC000 | all ground stations |
 | 0xFFFE | the server itself |
 | 0xFFFF | all stations |
 """
@@ -22,6 +23,7 @@ PLANES_PER_BATCH = 4
 FIRST_GROUND = 0x7F00
 FIRST_BATCH = 0x8000
 LAST_BATCH = 0xBFFF
+ALL_GROUND = 0xC000
 SERVER = 0xFFFE
 ALL = 0xFFFF
 GROUND_BATCH = 0xFFFF
@@ -81,4 +83,6 @@ def is_meant(station: int, address: int, planes_per_batch: int = PLANES_PER_BATC
     """Whether what is sent to `address` is meant for a station."""
     if FIRST_BATCH <= address <= LAST_BATCH:
         return station < FIRST_GROUND and station // planes_per_batch == address - FIRST_BATCH
+    if address == ALL_GROUND:
+        return FIRST_GROUND <= station < FIRST_BATCH
     return address in (station, ALL)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 
-from volery.comms.addresses import is_meant
+from volery.comms.addresses import is_meant, is_station
 from volery.comms.bodies import Reason
 from volery.comms.known import Known
 from volery.comms.mailbox import Mailbox
@@ -67,7 +67,7 @@ class Directory:
     def sweep(self, now_ns: int) -> Iterator[tuple[Frame, Reason | None]]:
         """What has become too old, with the reason for which it does not come.
 
-        None: kept for nobody any more; who was here has it.
+        None: a message to many that is kept for nobody any more; who was here has it.
         """
         if now_ns < self._next_sweep_ns:
             return
@@ -78,8 +78,10 @@ class Directory:
         for station in self.stations():
             if self._is_forgotten(station, now_ns):
                 del self._stations[station.address]
-                reason = Reason.EXPIRED if station.appeared else Reason.UNKNOWN
-                yield from ((frame, reason) for frame in station.mailbox.clear())
+                for frame in station.mailbox.clear():
+                    to_it = is_station(frame.destination)
+                    never = Reason.UNKNOWN if to_it else None  # it does not count among the many
+                    yield frame, Reason.EXPIRED if station.appeared else never
             else:
                 before_ns = now_ns - round(self._settings.keep_s * NS_PER_S)
                 yield from ((f, Reason.EXPIRED) for f in station.mailbox.expire(before_ns))
