@@ -230,7 +230,7 @@ BENCHES: dict[str, Bench] = {
             "Radio network: 64 stations in one process, the communication server in another one, "
             "5,000 messages/s of 256 bytes to changing stations over loopback; latency from send "
             "to handler, before the server is killed; lost and reordered also while that happens "
-            "and another one starts; `rejoin_s` from its listening again to the last station's welcome",
+            "and another one starts; `rejoin_s` from its listening again to the last welcome",
             {
                 "messages_per_s": Bound(4950.0),
                 "p99_ms": Bound(15.0, at_most=True),
