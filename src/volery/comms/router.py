@@ -39,7 +39,8 @@ from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
 
 _SETTLED_AT_ONCE = 64
-"""Sequences that a station is told of without waiting for the next tick."""
+"""Sequences that a station is told of at once; fewer wait for a while."""
+_SETTLED_NS = NS_PER_S // 5
 
 
 class Router:
@@ -69,6 +70,7 @@ class Router:
         self._tally = Tally()
         self._directory = Directory(settings, now_ns)
         self._woken: set[int] = set()
+        self._next_settled_ns = now_ns
         self._due: list[tuple[int, int]] = []
         """When a delayed message may go, and to whom."""
 
@@ -102,8 +104,7 @@ class Router:
         if ended is None:
             return
         ended.parser.finish()
-        self._tally.corrupt.update(ended.parser.flaws)
-        self._tally.counts["noise_bytes"] += ended.parser.noise_bytes
+        self._tally.add(ended.parser)
         station = ended.station
         if station is not None and station.connection == connection:
             station.connection = None
@@ -121,9 +122,11 @@ class Router:
                 self._dispose(frame, reason)
             else:
                 self._settle(frame)  # a message to many that is kept for nobody any more
-        for station in self._directory.stations():
-            if station.settled:
-                self._wake(station)
+        if now_ns >= self._next_settled_ns:
+            self._next_settled_ns = now_ns + _SETTLED_NS
+            for station in self._directory.stations():
+                if station.settled:
+                    self._wake(station)
 
     @property
     def next_due_ns(self) -> int | None:
@@ -169,9 +172,8 @@ class Router:
         stations = self._directory.stations()
         present = sum(station.connection is not None for station in stations)
         waiting = sum(len(station.mailbox) for station in stations)
-        return self._tally.statistics(
-            len(self._connections), present, len(stations) - present, waiting
-        )
+        parsers = [connection.parser for connection in self._connections.values()]
+        return self._tally.statistics(parsers, present, len(stations) - present, waiting)
 
     def stations(self) -> dict[int, str]:
         """Addresses and names of the stations that are here."""

@@ -59,6 +59,7 @@ class CommsServer:
         self._server: asyncio.Server | None = None
         self._ticks: asyncio.TimerHandle | None = None
         self._links: dict[int, _StationLink] = {}
+        self._sends = False
 
     @property
     def name(self) -> str:
@@ -123,13 +124,16 @@ class CommsServer:
 
     def _came(self, link: _StationLink, data: bytes) -> None:
         self.router.receive(link.number, data, time.monotonic_ns())
-        self._send_woken()
+        if not self._sends:  # once for all that has come in this turn of the loop
+            self._sends = True
+            self._loop.call_soon(self._send_woken)
 
     def _closed(self, link: _StationLink) -> None:
         self._links.pop(link.number, None)
         self.router.disconnect(link.number, time.monotonic_ns())
 
     def _send_woken(self) -> None:
+        self._sends = False
         for number in self.router.take_woken():
             link = self._links.get(number)
             if link is not None:

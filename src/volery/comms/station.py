@@ -26,7 +26,7 @@ from volery.core.listening import tend
 _AGAIN_S = 0.2
 _CONNECT_S = 1.0
 _TICK_S = 0.5
-_ACKNOWLEDGE_S = 0.02
+_ACKNOWLEDGE_S = 0.05
 
 
 def _ignore(_what: object) -> None:
@@ -75,6 +75,7 @@ class Station:
         self._task: asyncio.Task[None] | None = None
         self._acknowledges: asyncio.TimerHandle | None = None
         self._changed = asyncio.Event()
+        self._sends = False
 
     @property
     def joined(self) -> bool:
@@ -121,7 +122,9 @@ class Station:
     def send(self, kind: Kind, destination: int, payload: bytes) -> int:
         """Send a message, now or when there is a server; `CommsError` as of `StationCore.send`."""
         sequence = self.core.send(kind, destination, payload, time.monotonic_ns(), time.time_ns())
-        self._flush()
+        if not self._sends:  # once for all that is sent in this turn of the loop
+            self._sends = True
+            self._loop.call_soon(self._flush)
         return sequence
 
     async def until_joined(self) -> None:
@@ -195,6 +198,7 @@ class Station:
             self._changed.set()
 
     def _flush(self) -> None:
+        self._sends = False
         pipe = self._pipe
         if pipe is not None and not pipe.paused and (data := self.core.take()):
             pipe.transport.write(data)

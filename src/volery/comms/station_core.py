@@ -164,7 +164,7 @@ class StationCore:
         return messages
 
     def acknowledge(self, now_ns: int) -> None:
-        """Tell the server what has come; call it some 20 ms after `feed` at the latest."""
+        """Tell the server what has come; call it some 50 ms after `feed` at the latest."""
         if self.joined and len(self._inbox):
             self._say(Kind.RECEIVED, encode_received(self._inbox.take()), now_ns)
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from volery.comms.bodies import Reason
+from volery.comms.protocol import FrameParser
 from volery.core.framing import Flaw
 
 
@@ -60,9 +61,18 @@ class Tally:
         self.refused: Counter[Reason] = Counter()
         self.corrupt: Counter[Flaw] = Counter()
 
-    def statistics(self, connections: int, present: int, away: int, waiting: int) -> Statistics:
-        """The counts and how things stand."""
+    def add(self, parser: FrameParser) -> None:
+        """Keep the counts of a connection that has ended."""
+        self.corrupt.update(parser.flaws)
+        self.counts["noise_bytes"] += parser.noise_bytes
+
+    def statistics(
+        self, parsers: Sequence[FrameParser], present: int, away: int, waiting: int
+    ) -> Statistics:
+        """The counts and how things stand. parsers: of the open connections."""
         count = self.counts
+        corrupt = sum((parser.flaws for parser in parsers), self.corrupt)
+        noise_bytes = sum(parser.noise_bytes for parser in parsers)
         return Statistics(
             accepted=count["accepted"],
             delivered=count["delivered"],
@@ -73,12 +83,12 @@ class Tally:
             expired=count["expired"],
             lost_on_link=count["lost_on_link"],
             refused=dict(self.refused),
-            corrupt=dict(self.corrupt),
-            noise_bytes=count["noise_bytes"],
+            corrupt=dict(corrupt),
+            noise_bytes=count["noise_bytes"] + noise_bytes,
             unexpected=count["unexpected"],
             silent=count["silent"],
             replaced=count["replaced"],
-            connections=connections,
+            connections=len(parsers),
             present=present,
             away=away,
             waiting=waiting,

@@ -149,6 +149,10 @@ class FrameScanner(ABC, Generic[T]):
     def _next_sync(self, position: int) -> int:
         """Where the next sync word begins, or what may become one at the end."""
         data, sync = self._data, self._sync
+        if data.startswith(sync, position):
+            return position
+        if position == len(data):
+            return position
         found = data.find(sync, position)
         if found >= 0:
             return found
