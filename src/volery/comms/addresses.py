@@ -62,8 +62,11 @@ class Identity:
                 f"plane {self.plane}: a batch has the planes 0 to {planes_per_batch - 1}"
             )
         linear = planes_per_batch * self.batch + self.plane
-        if not 0 <= linear < FIRST_GROUND:
-            raise CommsError(f"batch {self.batch} is beyond the last address {FIRST_GROUND - 1}")
+        if not (0 <= linear < FIRST_GROUND and self.batch <= LAST_BATCH - FIRST_BATCH):
+            raise CommsError(
+                f"there is no batch {self.batch}: batches go to {LAST_BATCH - FIRST_BATCH}, "
+                f"linear ids to {FIRST_GROUND - 1}"
+            )
         return linear
 
 

@@ -34,6 +34,8 @@ VERSION = 1
 HEAD_BYTES = 30
 PAYLOAD_LIMIT_BYTES = 16 << 10
 """Modelling choice: a packet radio's message, not a map; larger things go in pieces."""
+LONGEST_BYTES = HEAD_BYTES + PAYLOAD_LIMIT_BYTES + CRC_BYTES
+"""Of a whole frame."""
 
 _HEAD = struct.Struct("<BBHHHIIq")
 

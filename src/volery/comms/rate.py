@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from volery.comms.protocol import LONGEST_BYTES
 from volery.core.clock import NS_PER_S
 
 
 class RateLimit:
     """Allows a steady rate and a burst above it.
 
-    messages_s, bytes_s: steady rates. burst: messages that may come at once; of bytes one second's.
+    messages_s, bytes_s: steady rates. burst: messages that may come at once, of any size.
     """
 
     def __init__(self, messages_s: float, bytes_s: float, burst: int, now_ns: int) -> None:
         self._rates = (messages_s, bytes_s)
-        self._most = (float(burst), bytes_s)
+        self._most = (float(burst), max(bytes_s, float(burst * LONGEST_BYTES)))
         self._left = self._most
         self._at_ns = now_ns
 

@@ -41,6 +41,8 @@ _PING_NS = NS_PER_S
 _SILENCE_NS = 3 * NS_PER_S
 _ACKNOWLEDGE_AT_ONCE = 64
 _REFUSALS_KEPT = 256
+_MOST_RECEIVED = 1000
+"""Entries of one RECEIVED, so that it stays below the limit of payloads."""
 
 
 class StationCore:
@@ -165,8 +167,12 @@ class StationCore:
 
     def acknowledge(self, now_ns: int) -> None:
         """Tell the server what has come; call it some 50 ms after `feed` at the latest."""
-        if self.joined and len(self._inbox):
-            self._say(Kind.RECEIVED, encode_received(self._inbox.take()), now_ns)
+        if not self.joined:
+            return
+        told = self._inbox.take()
+        for start in range(0, len(told), _MOST_RECEIVED):
+            part = told[start : start + _MOST_RECEIVED]
+            self._say(Kind.RECEIVED, encode_received(part), now_ns)
 
     @property
     def has_to_acknowledge(self) -> bool:

@@ -2,17 +2,18 @@
 
     doors.open(UavStations("127.0.0.1", 10200))
 
-The UAV that stands n-th in the fleet, from 0, has linear id n: batch n // planes_per_batch, plane
-n % planes_per_batch.
+uavN is the station with linear id N - 1; UAVs of other names take the lowest id that is free.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import re
 from functools import partial
 from typing import Any
 
-from volery.comms.addresses import ALL_GROUND, PLANES_PER_BATCH, Identity
+from volery.comms.addresses import ALL_GROUND, FIRST_GROUND, PLANES_PER_BATCH, Identity
 from volery.comms.payloads import (
     COMMANDS,
     REPLY,
@@ -85,19 +86,18 @@ class UavStations:
         while True:
             published = self._vehicles.take()
             if published:
-                for index, state in enumerate(published[-1].message.vehicles):
-                    station = self._stations.get(state.name)
-                    if station is None:
-                        station = await self._join(session, state.name, index)
+                states = {state.name: state for state in published[-1].message.vehicles}
+                for gone in self._stations.keys() - states.keys():
+                    await self._stations.pop(gone).stop()
+                for name, state in states.items():
+                    station = self._stations.get(name) or await self._join(session, name)
                     if station.joined:
-                        station.send(
-                            Kind.SENSING, ALL_GROUND, encode_named(STATE, STATE_TYPE, state)
-                        )
+                        _send(station, ALL_GROUND, encode_named(STATE, STATE_TYPE, state))
             await asyncio.sleep(_PERIOD_S)
 
-    async def _join(self, session: Session, uav: str, index: int) -> Station:
+    async def _join(self, session: Session, uav: str) -> Station:
         station = Station(
-            Identity.of(index, self._planes),
+            Identity.of(self._free_address(uav), self._planes),
             lambda frame: self._take(session, uav, frame),
             host=self._host,
             port=self._port,
@@ -108,6 +108,13 @@ class UavStations:
         self._stations[uav] = station
         await station.start(timeout_s=None)
         return station
+
+    def _free_address(self, uav: str) -> int:
+        used = {station.core.address for station in self._stations.values()}
+        number = re.fullmatch(r"uav([1-9]\d{0,4})", uav)
+        if number and int(number[1]) - 1 not in used and int(number[1]) <= FIRST_GROUND:
+            return int(number[1]) - 1
+        return next(address for address in range(FIRST_GROUND) if address not in used)
 
     def _take(self, session: Session, uav: str, frame: Frame) -> None:
         if frame.kind != Kind.COMMAND:
@@ -141,4 +148,10 @@ class UavStations:
         station = self._stations.get(uav)
         if station is not None:
             message = message_type(REPLY_TYPE)(text)
-            station.send(Kind.SENSING, to, encode_named(REPLY, REPLY_TYPE, message))
+            _send(station, to, encode_named(REPLY, REPLY_TYPE, message))
+
+
+def _send(station: Station, to: int, payload: bytes) -> None:
+    """Send a measurement; where nothing can be held any more it is as good as lost by radio."""
+    with contextlib.suppress(CommsError):
+        station.send(Kind.SENSING, to, payload)
