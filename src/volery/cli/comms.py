@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import signal
 
 import typer
 
@@ -15,18 +16,24 @@ _TOLD_S = 10.0
 
 
 def serve_stations(host: str, port: int, settings: RouterSettings, *, anywhere: bool) -> None:
-    """Serve stations and say every ten seconds, if something changed, how it goes."""
-    with contextlib.suppress(KeyboardInterrupt):
-        asyncio.run(_serve(CommsServer(settings, host, port, anywhere=anywhere)))
+    """Serve stations and say every ten seconds, if something changed, how it goes.
+
+    SIGINT and SIGTERM end it, also where a shell that put it into the background ignores SIGINT.
+    """
+    asyncio.run(_serve(CommsServer(settings, host, port, anywhere=anywhere)))
 
 
 async def _serve(server: CommsServer) -> None:
+    ended = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, ended.set)
     await server.start()
     typer.echo(f"open    {server.name}")
     said = ""
     try:
-        while True:
-            await asyncio.sleep(_TOLD_S)
+        while not ended.is_set():
+            with contextlib.suppress(TimeoutError, asyncio.TimeoutError):
+                await asyncio.wait_for(ended.wait(), _TOLD_S)
             line = summary(server.statistics)
             if line != said:
                 typer.echo(line)

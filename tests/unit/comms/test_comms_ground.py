@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import signal
 import subprocess
 import sys
 import time
@@ -196,6 +197,13 @@ def test_uavs_of_a_graph_are_commanded_by_lines_of_another_process(graph) -> Non
         ["uav2", "0.1", "HOLD"],
     ]
     assert gcs.returncode == 0
+
+
+def test_the_server_ends_in_good_order() -> None:
+    with served() as (process, _):
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(20.0) == 0
+        assert "stations 0 here" in process.stdout.read()
 
 
 def test_gcs_without_a_server_says_what_to_do() -> None:
