@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from typing import NamedTuple
 
+from volery.comms.addresses import is_station
 from volery.comms.protocol import Kind
 from volery.core.errors import CommsError
 
@@ -52,6 +53,12 @@ class Held:
     def settle(self, sequences: Iterable[int]) -> None:
         """Forget these."""
         for sequence in sequences:
+            self._remove(sequence)
+
+    def refuse(self, sequence: int) -> None:
+        """Forget what is refused; what is for many waits for the others."""
+        message = self._messages.get(sequence)
+        if message is not None and is_station(message.destination):
             self._remove(sequence)
 
     def reconcile(self, last: int, unsettled: Collection[int]) -> None:

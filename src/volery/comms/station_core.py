@@ -216,7 +216,7 @@ class StationCore:
     def _take_refusal(self, refusal: Refusal) -> None:
         self.refusals.append(refusal)
         if refusal.sequence:
-            self._held.settle((refusal.sequence,))
+            self._held.refuse(refusal.sequence)
         elif refusal.reason in FATAL:
             self.fatal = refusal
 

@@ -141,6 +141,25 @@ def test_a_source_that_starts_anew_is_heard() -> None:
     assert bench.got[1] == [b"1", b"2", b"3"]
 
 
+def test_a_message_to_many_that_one_refuses_still_comes_to_the_others() -> None:
+    bench = Bench(RouterSettings(lane_depth=1))
+    for address in range(3):
+        bench.station(address)
+    bench.run(LATE)
+    bench.cut(1)
+    bench.send(0, 1, "first", Kind.COMMAND)
+    bench.run()
+    bench.send(0, ALL, "to all", Kind.COMMAND)
+    bench.run(acknowledge=False)
+    assert [r.reason for r in bench.cores[0].refusals] == [Reason.FULL]
+    bench.cut(2)
+    bench.cores[2] = bench.station(2, session=2)  # it starts anew and has forgotten all
+    bench.restart()
+    for address in (0, 2):
+        bench.connect(address)
+    assert bench.got[2][-1] == b"to all"
+
+
 def test_the_newest_of_two_with_one_identity_wins() -> None:
     bench = Bench()
     bench.station(1)
