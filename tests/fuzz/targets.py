@@ -5,6 +5,7 @@ were. What it must not let out: any exception but those that its parser document
 """
 
 import city_targets
+import comms_targets
 import grid_map_targets
 import log_targets
 import mesh_targets
@@ -25,6 +26,8 @@ TARGETS = {
     "sensor_link_wire": socket_targets.sensor_link_wire,
     "sensor_link_payloads": socket_targets.sensor_link_payloads,
     "sensor_link_commands": socket_targets.sensor_link_commands,
+    "comms_wire": comms_targets.wire,
+    "comms_router": comms_targets.router,
     "cdr": message_targets.cdr,
     "ros1": message_targets.ros1,
     "plain_values": message_targets.plain_values,

@@ -226,6 +226,20 @@ BENCHES: dict[str, Bench] = {
             },
         ),
         Bench(
+            "comms",
+            "Radio network: 64 stations in one process, the communication server in another one, "
+            "5,000 messages/s of 256 bytes to changing stations over loopback; latency from send "
+            "to handler, before the server is killed; lost and reordered also while that happens "
+            "and another one starts; `rejoin_s` from its listening again to the last welcome",
+            {
+                "messages_per_s": Bound(4950.0),
+                "p99_ms": Bound(15.0, at_most=True),
+                "lost": Bound(0.0, at_most=True),
+                "reordered": Bound(0.0, at_most=True),
+                "rejoin_s": Bound(2.0, at_most=True),
+            },
+        ),
+        Bench(
             "page",
             "Page: the page in headless Chromium that draws WebGL in software, server and "
             "browser on loopback of one machine; `hover` at 640x360 opened, 10 UAVs at 320x180, a "

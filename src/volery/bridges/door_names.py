@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Literal, NamedTuple
 
 from volery.bridges.doors import Door
@@ -26,20 +26,26 @@ class Terms(NamedTuple):
     """What clients must show, where the protocol can carry it."""
 
 
-class _Kind(NamedTuple):
+class DoorKind(NamedTuple):
+    """A door that can be asked for: the port where none is said, how it is made, what it is."""
+
     port: int
     make: Callable[[Address, Terms], Door]
     what: str
 
 
-def make_door(text: str, terms: Terms) -> Door:
-    """Door of `NAME` or `NAME=[HOST:]PORT`. `BridgeError` tells which there are."""
+def make_door(text: str, terms: Terms, more: Mapping[str, DoorKind] | None = None) -> Door:
+    """Door of `NAME` or `NAME=[HOST:]PORT`. `BridgeError` tells which there are.
+
+    more: doors of other rooms by name, beside those of this one.
+    """
     name, _, address = text.partition("=")
-    kind = _KINDS.get(name)
+    kinds = {**_KINDS, **(more or {})}
+    kind = kinds.get(name)
     if kind is None:
-        near = difflib.get_close_matches(name, _KINDS, n=1)
+        near = difflib.get_close_matches(name, kinds, n=1)
         hint = f" Did you mean '{near[0]}'?" if near else ""
-        raise BridgeError(f"no door '{name}'.{hint} Doors: {', '.join(_KINDS)}")
+        raise BridgeError(f"no door '{name}'.{hint} Doors: {', '.join(kinds)}")
     return kind.make(_parse(address, kind.port, text), terms)
 
 
@@ -102,10 +108,12 @@ def _sensor_link(address: Address, terms: Terms) -> Door:
 
 
 _KINDS = {
-    "rosbridge": _Kind(9090, _rosbridge, "rosbridge v2 server (WebSocket, JSON and CBOR)"),
-    "ros-tcp": _Kind(10000, _ros_tcp, "server for Unity's ROS-TCP-Connector, ROS 1 messages"),
-    "ros-tcp-2": _Kind(10000, _ros_tcp_2, "the same with ROS 2 messages"),
-    "ros-tcp-connector": _Kind(10000, _ros_tcp_connector, "connects to a ROS-TCP-Endpoint"),
-    "ros1": _Kind(0, _ros1, "joins the roscore of ROS_MASTER_URI"),
-    "sensor-link": _Kind(10100, _sensor_link, "binary frames with CRC-16; images on the next port"),
+    "rosbridge": DoorKind(9090, _rosbridge, "rosbridge v2 server (WebSocket, JSON and CBOR)"),
+    "ros-tcp": DoorKind(10000, _ros_tcp, "server for Unity's ROS-TCP-Connector, ROS 1 messages"),
+    "ros-tcp-2": DoorKind(10000, _ros_tcp_2, "the same with ROS 2 messages"),
+    "ros-tcp-connector": DoorKind(10000, _ros_tcp_connector, "connects to a ROS-TCP-Endpoint"),
+    "ros1": DoorKind(0, _ros1, "joins the roscore of ROS_MASTER_URI"),
+    "sensor-link": DoorKind(
+        10100, _sensor_link, "binary frames with CRC-16; images on the next port"
+    ),
 }

@@ -98,16 +98,3 @@ def wake_of(loop: asyncio.AbstractEventLoop, callback: Callable[[], object]) -> 
             return
 
     return wake
-
-
-def check_address(host: str, *, anywhere: bool, flag: str) -> None:
-    """`BridgeError` for an address beyond loopback without the explicit consent `anywhere`.
-
-    flag: how a user gives that consent.
-    """
-    if host in {"127.0.0.1", "::1", "localhost"} or anywhere:
-        return
-    raise BridgeError(
-        f"{host} can be reached from other machines, and whoever reaches it commands the UAVs; "
-        f"allow that with {flag}, or listen on 127.0.0.1"
-    )

@@ -10,7 +10,7 @@ import ipaddress
 from collections.abc import Sequence
 from urllib.parse import urlsplit
 
-LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
+from volery.core.listening import LOOPBACK
 
 
 class Origins:

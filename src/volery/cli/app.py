@@ -10,6 +10,7 @@ import typer
 from volery.cli.graph_commands import node, service_app, topic_app
 from volery.cli.guard import guarded
 from volery.cli.options import (
+    BatchSizeOption,
     DoorsOption,
     PageCommand,
     RemoteOption,
@@ -97,7 +98,7 @@ def run(
 ) -> None:
     """Fly a scenario.
 
-    Doors: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, sensor-link.
+    Doors: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, sensor-link, comms.
 
     At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
     + and - double and halve the speed, m frees it. Ctrl-C ends the flight and still writes log and
@@ -231,6 +232,42 @@ def play(
         token=token,
     )
     play_log(log, options, loop=loop, paused=paused)
+
+
+@app.command()
+@guarded
+def comms(
+    port: Annotated[int, typer.Option(min=0, max=65535, help="0: a free one.")] = 10200,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    batch_size: BatchSizeOption = 4,
+    allow_remote: Annotated[
+        bool, typer.Option("--allow-remote", help="Listen beyond this machine; needs a token.")
+    ] = False,
+    token: TokenOption = None,
+) -> None:
+    """Serve the radio network's stations until Ctrl-C: UAVs and ground stations."""
+    from volery.cli.comms import serve_stations
+    from volery.comms.settings import RouterSettings
+
+    settings = RouterSettings(planes_per_batch=batch_size, token=token)
+    serve_stations(host, port, settings, anywhere=allow_remote)
+
+
+@app.command()
+@guarded
+def gcs(
+    server: Annotated[
+        str, typer.Option(metavar="HOST:PORT", help="Of volery comms.")
+    ] = "127.0.0.1:10200",
+    number: Annotated[int, typer.Option(min=0, max=255, help="Of this ground station.")] = 0,
+    batch_size: BatchSizeOption = 4,
+    token: TokenOption = None,
+    log: Annotated[Path | None, typer.Option(help="Append what is said to this file.")] = None,
+) -> None:
+    """Watch and command UAVs over the radio network, line by line; help lists the commands."""
+    from volery.cli.gcs import command_station
+
+    command_station(server, number, token, batch_size, log)
 
 
 @app.command("list")

@@ -21,6 +21,10 @@ ThreadsOption = Annotated[
     int | None, typer.Option(min=1, max=256, help="Threads; results do not depend on it.")
 ]
 
+BatchSizeOption = Annotated[
+    int, typer.Option(min=1, max=0x7F00, help="Planes a batch; linear id = it x batch + plane.")
+]
+
 
 class PageCommand(TyperCommand):
     """A command that takes `--page` as well as `--page=HOST:PORT`; typer knows only the latter."""

@@ -71,3 +71,7 @@ class EstimatorError(VoleryError):
 
 class PlanError(VoleryError):
     """A plan is refused: a start that cannot be, a map that is too large or has nothing free."""
+
+
+class CommsError(VoleryError):
+    """A message cannot be sent over the radio network, or a station cannot join it."""

@@ -17,7 +17,8 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from volery.bridges.origins import LOOPBACK, Origins, name_of
+from volery.bridges.origins import Origins, name_of
+from volery.core.listening import LOOPBACK
 from volery.server.replies import RefusedError, refused
 from volery.server.rights import Role, Sessions, Tokens
 

@@ -17,9 +17,10 @@ from typing import Any
 import uvicorn
 
 from volery.bridges.loop_thread import LoopThread
-from volery.bridges.origins import LOOPBACK, Origins
+from volery.bridges.origins import Origins
 from volery.bridges.rosbridge.wire import MOST_MESSAGE_BYTES
 from volery.core.errors import BridgeError
+from volery.core.listening import LOOPBACK
 from volery.scenario.schema import Scenario
 from volery.scenario.shelf import Shelf
 from volery.server.app import make_app

@@ -8,10 +8,8 @@ import secrets
 from dataclasses import dataclass
 from enum import StrEnum
 
-from volery.bridges.doors import check_address
-from volery.bridges.origins import LOOPBACK
-from volery.bridges.rosbridge.protocol import shows_token
 from volery.core.errors import BridgeError
+from volery.core.listening import check_address, check_token, shows_token
 
 
 class Role(StrEnum):
@@ -51,8 +49,7 @@ def check_rights(host: str, tokens: Tokens, *, anywhere: bool) -> None:
     anywhere: consent to listening beyond loopback.
     """
     check_address(host, anywhere=anywhere, flag="--allow-remote and --token")
-    if host not in LOOPBACK and not tokens.needed:
-        raise BridgeError(f"{host} can be reached from other machines: set a --token")
+    check_token(host, tokens.pilot)
     if tokens.viewer is not None and (not tokens.needed or tokens.viewer == tokens.pilot):
         raise BridgeError("--viewer-token needs a --token for pilots, and another one")
 

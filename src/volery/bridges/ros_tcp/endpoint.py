@@ -15,13 +15,14 @@ import socket
 from collections.abc import Callable
 from functools import partial
 
-from volery.bridges.doors import check_address, wake_of
+from volery.bridges.doors import wake_of
 from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.session import EndpointSession
 from volery.bridges.ros_tcp.wire import MOST_PAYLOAD_BYTES, FrameParser, Generation
 from volery.core.errors import BridgeError
+from volery.core.listening import check_address
 from volery.graph.mailbox import Wake
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.session import Gateway

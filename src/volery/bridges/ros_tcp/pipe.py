@@ -13,8 +13,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 from volery.bridges.ros_tcp.wire import Bytes, Frame, FrameParser
-from volery.bridges.sockets import tend
 from volery.core.errors import BridgeError
+from volery.core.listening import tend
 
 _BATCHES_A_TURN = 16
 """After so many others have their turn."""

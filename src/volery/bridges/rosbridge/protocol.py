@@ -12,7 +12,6 @@ called by others too.
 
 from __future__ import annotations
 
-import hmac
 import itertools
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -38,6 +37,7 @@ from volery.bridges.rosbridge.wire import (
     encode_png,
 )
 from volery.core.errors import BridgeError, VoleryError
+from volery.core.listening import shows_token
 from volery.graph.session import Session
 
 LEVELS = ("error", "none", "warning", "info")
@@ -313,12 +313,3 @@ class RosbridgePeer:
             post(act)
 
         return guarded
-
-
-def shows_token(given: Any, token: str | None) -> bool:
-    """Whether what was given is the token, told in the same time for every wrong one."""
-    if token is None:
-        return True
-    return isinstance(given, str) and hmac.compare_digest(
-        given.encode(errors="replace"), token.encode(errors="replace")
-    )

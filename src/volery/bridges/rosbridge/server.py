@@ -14,16 +14,15 @@ from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from volery.bridges.doors import check_address
-from volery.bridges.origins import LOOPBACK, Origins
+from volery.bridges.origins import Origins
 from volery.bridges.rosbridge.conversation import Bell, converse, post_to
 from volery.bridges.rosbridge.forms import Forms, Generation
-from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared, shows_token
+from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
 from volery.bridges.rosbridge.rosapi import RosApi
 from volery.bridges.rosbridge.rosapi_parameters import Parameters
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES
-from volery.bridges.sockets import tend
 from volery.core.errors import BridgeError
+from volery.core.listening import check_address, check_token, shows_token, tend
 from volery.graph.session import Gateway
 
 _log = logging.getLogger(__name__)
@@ -121,8 +120,7 @@ class RosbridgeServer:
 
         """
         check_address(self.host, anywhere=self._anywhere, flag="--allow-remote and --token")
-        if self.host not in LOOPBACK and self._token is None:
-            raise BridgeError(f"{self.host} can be reached from other machines: set a --token")
+        check_token(self.host, self._token)
         graph = gateway.graph
         self._gateway = gateway
         self._shared = Shared(Forms(self._generation), graph.now_ns, self._token, self._most_bytes)

@@ -12,14 +12,13 @@ import asyncio
 import errno
 from dataclasses import dataclass
 
-from volery.bridges.doors import check_address
 from volery.bridges.sensor_link.commands import Commands
 from volery.bridges.sensor_link.outbox import Outbox
 from volery.bridges.sensor_link.payloads import encode_notice
 from volery.bridges.sensor_link.streams import IMAGES, SENSORS, Stream, Streams, period_from_hz
 from volery.bridges.sensor_link.wire import VERSION, Frame, FrameParser, Kind, encode_frame
-from volery.bridges.sockets import tend
 from volery.core.errors import BridgeError
+from volery.core.listening import check_address, tend
 from volery.graph.session import Gateway
 
 PORT = 10100

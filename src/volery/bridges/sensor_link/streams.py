@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import re
-from binascii import crc_hqx
 from collections import deque
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
@@ -16,10 +15,10 @@ from volery.bridges.sensor_link.wire import (
     crc_of_head,
     encode_frame,
     encode_head,
-    encode_tail,
 )
 from volery.core.clock import NS_PER_S
 from volery.core.errors import BridgeError, GraphError
+from volery.core.framing import crc16, crc_bytes
 from volery.graph.mailbox import Mailbox
 from volery.graph.messages import Published
 from volery.graph.session import Gateway, Session
@@ -177,7 +176,7 @@ class Streams:
             else:
                 head = encode_head(stream.kind, stream.uav, due.sequence, stamp_ns, len(payload))
                 check = await _crc_in_steps(payload, crc_of_head(head))
-                frame = b"".join((head, payload, encode_tail(check)))
+                frame = b"".join((head, payload, crc_bytes(check)))
         except BridgeError:  # a message without a form on this link: its number is missing
             return
         self._send(stream, frame)
@@ -186,7 +185,7 @@ class Streams:
 async def _crc_in_steps(data: bytes, check: int) -> int:
     view = memoryview(data)
     for start in range(0, len(view), _CRC_STEP_BYTES):
-        check = crc_hqx(view[start : start + _CRC_STEP_BYTES], check)
+        check = crc16(view[start : start + _CRC_STEP_BYTES], check)
         await asyncio.sleep(0)
     return check
 

@@ -1,0 +1,53 @@
+"""`volery comms`: the communication server, until Ctrl-C."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+
+import typer
+
+from volery.comms.server import CommsServer
+from volery.comms.settings import RouterSettings
+from volery.comms.statistics import Statistics
+
+_TOLD_S = 10.0
+
+
+def serve_stations(host: str, port: int, settings: RouterSettings, *, anywhere: bool) -> None:
+    """Serve stations and say every ten seconds, if something changed, how it goes.
+
+    SIGINT and SIGTERM end it, also where a shell that put it into the background ignores SIGINT.
+    """
+    asyncio.run(_serve(CommsServer(settings, host, port, anywhere=anywhere)))
+
+
+async def _serve(server: CommsServer) -> None:
+    ended = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+    await server.start()
+    typer.echo(f"open    {server.name}")
+    said = ""
+    try:
+        while not ended.is_set():
+            with contextlib.suppress(TimeoutError, asyncio.TimeoutError):
+                await asyncio.wait_for(ended.wait(), _TOLD_S)
+            line = summary(server.statistics)
+            if line != said:
+                typer.echo(line)
+            said = line
+    finally:
+        await server.stop()
+
+
+def summary(counted: Statistics) -> str:
+    """The counts that matter, in one line."""
+    refused = sum(counted.refused.values())
+    lost = counted.dropped_sensing + counted.flooded + counted.expired + counted.lost_on_link
+    return (
+        f"stations {counted.present} here, {counted.away} away · messages {counted.accepted} in, "
+        f"{counted.delivered} out, {counted.waiting} waiting, {lost} lost by rule · "
+        f"{refused} refused · {sum(counted.corrupt.values())} damaged frames"
+    )

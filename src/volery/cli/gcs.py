@@ -1,0 +1,125 @@
+"""`volery gcs`: a ground station at the terminal, or fed with lines by another program."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import TextIO
+
+import typer
+
+from volery.cli.tables import print_table
+from volery.comms.addresses import Identity
+from volery.comms.bodies import Refusal
+from volery.comms.ground import HEAD, HELP, Ground
+from volery.comms.protocol import Frame
+from volery.comms.server import PORT
+from volery.comms.station import Station
+from volery.core.errors import CommsError
+
+_LEAVE_S = 2.0
+"""For how long commands may still be on their way when the last line has been read."""
+
+
+def parse_server(text: str) -> tuple[str, int]:
+    """Host and port of HOST[:PORT]. `CommsError` for anything else."""
+    host, colon, port = text.rpartition(":")
+    if not colon or host.endswith(":"):
+        return text, PORT  # a name, or an IPv6 address
+    if not host or not port.isdigit() or not 0 < int(port) < 65536:
+        raise CommsError(f"'{text}' is no server: write HOST:PORT")
+    return host.strip("[]"), int(port)
+
+
+def command_station(
+    server: str, number: int, token: str | None, planes_per_batch: int, log: Path | None
+) -> None:
+    """Join a server, show what comes, and send what is asked for, line by line."""
+    host, port = parse_server(server)
+    with contextlib.ExitStack() as stack:
+        file = None if log is None else stack.enter_context(log.open("a", encoding="utf-8"))
+        desk = _Desk(file)
+        station = Station(
+            Identity.ground(number),
+            desk.on_message,
+            desk.on_refusal,
+            host=host,
+            port=port,
+            name="gcs",
+            token=token,
+            planes_per_batch=planes_per_batch,
+        )
+        desk.ground = Ground(station.send, planes_per_batch)
+        asyncio.run(desk.work(station))
+
+
+class _Desk:
+    """Where lines come from and go to. log: a file for them, with the time."""
+
+    ground: Ground
+
+    def __init__(self, log: TextIO | None) -> None:
+        self._log = log
+
+    async def work(self, station: Station) -> None:
+        """Until the last line, or `quit`."""
+        await station.start()
+        self._say(f"joined as ground station, address {station.core.address}; help shows commands")
+        lines = _lines(asyncio.get_running_loop())
+        try:
+            while (line := await lines.get()) is not None and line.strip() not in ("quit", "exit"):
+                self._do(line)
+            with contextlib.suppress(TimeoutError, asyncio.TimeoutError):
+                await asyncio.wait_for(station.until_settled(), _LEAVE_S)
+        finally:
+            await station.stop()
+
+    def _do(self, line: str) -> None:
+        word = line.strip()
+        if not word:
+            return
+        if word == "help":
+            typer.echo(HELP)
+        elif word == "list":
+            print_table(HEAD, self.ground.rows(time.monotonic_ns()), right=(4, 5, 6))
+            sys.stdout.flush()
+        else:
+            try:
+                self._say(self.ground.command(word))
+            except CommsError as error:
+                self._say(f"error: {error}")
+
+    def on_message(self, frame: Frame) -> None:
+        """What a station tells."""
+        if line := self.ground.take(frame, time.monotonic_ns()):
+            self._say(line)
+
+    def on_refusal(self, refusal: Refusal) -> None:
+        """What the server refuses."""
+        self._say(self.ground.refused(refusal))
+
+    def _say(self, line: str) -> None:
+        typer.echo(line)
+        sys.stdout.flush()
+        if self._log is not None:
+            stamp = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime())
+            self._log.write(f"{stamp}Z {line}\n")
+            self._log.flush()
+
+
+def _lines(loop: asyncio.AbstractEventLoop) -> asyncio.Queue[str | None]:
+    """Lines of standard input as they come, then None; read in a thread, which may block."""
+    queue: asyncio.Queue[str | None] = asyncio.Queue()
+
+    def read() -> None:
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            for line in sys.stdin:
+                loop.call_soon_threadsafe(queue.put_nowait, line)
+            loop.call_soon_threadsafe(queue.put_nowait, None)
+
+    threading.Thread(target=read, name="volery-lines", daemon=True).start()
+    return queue

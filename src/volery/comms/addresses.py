@@ -1,0 +1,91 @@
+"""Who is spoken to: stations by batch and plane, batches, everybody.
+
+An address is a u16:
+
+| address | meaning |
+|---|---|
+| 0 .. 0x7EFF | the station with this linear id, planes_per_batch x batch + plane |
+| 0x7F00 .. 0x7FFF | ground stations, which belong to no batch |
+| 0x8000 + b | all stations of batch b, b up to 0x3FFF |
+| 0xC000 | all ground stations |
+| 0xFFFE | the server itself |
+| 0xFFFF | all stations |
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from volery.core.errors import CommsError
+
+PLANES_PER_BATCH = 4
+"""As of the ROSUnitySim article: linear id = 4 x batch + plane."""
+FIRST_GROUND = 0x7F00
+FIRST_BATCH = 0x8000
+LAST_BATCH = 0xBFFF
+ALL_GROUND = 0xC000
+SERVER = 0xFFFE
+ALL = 0xFFFF
+GROUND_BATCH = 0xFFFF
+"""What ground stations tell as their batch."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """A station by its batch and the number within; ground stations have `GROUND_BATCH`."""
+
+    batch: int
+    plane: int
+
+    @classmethod
+    def ground(cls, number: int = 0) -> Identity:
+        """A ground station."""
+        return cls(GROUND_BATCH, number)
+
+    @classmethod
+    def of(cls, address: int, planes_per_batch: int = PLANES_PER_BATCH) -> Identity:
+        """Of a station's address. `CommsError` where it is none."""
+        if not is_station(address):
+            raise CommsError(f"{address} is no station: 0 to {FIRST_BATCH - 1} are")
+        if address >= FIRST_GROUND:
+            return cls.ground(address - FIRST_GROUND)
+        return cls(*divmod(address, planes_per_batch))
+
+    def address(self, planes_per_batch: int = PLANES_PER_BATCH) -> int:
+        """The linear id. `CommsError` where batch and plane do not fit."""
+        if self.batch == GROUND_BATCH:
+            if 0 <= self.plane < FIRST_BATCH - FIRST_GROUND:
+                return FIRST_GROUND + self.plane
+            raise CommsError(f"ground stations are numbered 0 to 255, not {self.plane}")
+        if not 0 <= self.plane < planes_per_batch:
+            raise CommsError(
+                f"plane {self.plane}: a batch has the planes 0 to {planes_per_batch - 1}"
+            )
+        linear = planes_per_batch * self.batch + self.plane
+        if not (0 <= linear < FIRST_GROUND and self.batch <= LAST_BATCH - FIRST_BATCH):
+            raise CommsError(
+                f"there is no batch {self.batch}: batches go to {LAST_BATCH - FIRST_BATCH}, "
+                f"linear ids to {FIRST_GROUND - 1}"
+            )
+        return linear
+
+
+def is_station(address: int) -> bool:
+    """Whether an address is that of one station."""
+    return 0 <= address < FIRST_BATCH
+
+
+def batch_address(batch: int) -> int:
+    """Address of all stations of a batch. `CommsError` where there is no such batch."""
+    if not 0 <= batch <= LAST_BATCH - FIRST_BATCH:
+        raise CommsError(f"batches are numbered 0 to {LAST_BATCH - FIRST_BATCH}, not {batch}")
+    return FIRST_BATCH + batch
+
+
+def is_meant(station: int, address: int, planes_per_batch: int = PLANES_PER_BATCH) -> bool:
+    """Whether what is sent to `address` is meant for a station."""
+    if FIRST_BATCH <= address <= LAST_BATCH:
+        return station < FIRST_GROUND and station // planes_per_batch == address - FIRST_BATCH
+    if address == ALL_GROUND:
+        return FIRST_GROUND <= station < FIRST_BATCH
+    return address in (station, ALL)

@@ -1,0 +1,27 @@
+"""Who may join: a HELLO against the server's rules."""
+
+from __future__ import annotations
+
+from volery.comms.addresses import Identity
+from volery.comms.bodies import Hello, Reason, Refusal
+from volery.comms.settings import RouterSettings
+from volery.core.errors import CommsError
+from volery.core.listening import shows_token
+
+
+def admit(hello: Hello, source: int, settings: RouterSettings) -> Refusal | None:
+    """None for a station that may join; else why it may not."""
+    if not shows_token(hello.token, settings.token):
+        return Refusal(Reason.TOKEN, 0, "the token is wrong, or there is none")
+    planes = settings.planes_per_batch
+    if hello.planes_per_batch != planes:
+        text = f"here a batch has {planes} planes, not {hello.planes_per_batch}"
+        return Refusal(Reason.BATCH_SIZE, 0, text)
+    try:
+        address = Identity(hello.batch, hello.plane).address(planes)
+    except CommsError as error:
+        return Refusal(Reason.IDENTITY, 0, str(error))
+    if address != source:
+        text = f"batch {hello.batch}, plane {hello.plane} is station {address}, not {source}"
+        return Refusal(Reason.IDENTITY, 0, text)
+    return None

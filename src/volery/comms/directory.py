@@ -1,0 +1,98 @@
+"""Which stations the server knows, and whom an address means.
+
+A server that has just started knows nobody. For a while (`grace_s`) it therefore takes every
+station for known but away, and keeps what is sent to many for those who come within that time.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+
+from volery.comms.addresses import is_meant, is_station
+from volery.comms.bodies import Reason
+from volery.comms.known import Known
+from volery.comms.mailbox import Mailbox
+from volery.comms.protocol import Frame
+from volery.comms.rate import RateLimit
+from volery.comms.settings import RouterSettings
+from volery.core.clock import NS_PER_S
+
+_SWEEP_NS = NS_PER_S // 4
+
+
+class Directory:
+    """Stations by address. now_ns: when the server starts."""
+
+    def __init__(self, settings: RouterSettings, now_ns: int) -> None:
+        self._settings = settings
+        self._stations: dict[int, Known] = {}
+        self._grace_ends_ns = now_ns + round(settings.grace_s * NS_PER_S)
+        self._to_many: deque[Frame] = deque()
+        self._next_sweep_ns = now_ns
+
+    def find(self, address: int) -> Known | None:
+        """A station that is known."""
+        return self._stations.get(address)
+
+    def stations(self) -> list[Known]:
+        """All that are known."""
+        return list(self._stations.values())
+
+    def add(self, address: int, now_ns: int) -> Known:
+        """A station that is not known yet."""
+        rules = self._settings
+        rate = RateLimit(rules.rate_messages_s, rules.rate_bytes_s, rules.burst_messages, now_ns)
+        station = self._stations[address] = Known(address, Mailbox(rules), rate, left_ns=now_ns)
+        return station
+
+    def expects(self, now_ns: int) -> bool:
+        """Whether stations that have not been here count as known."""
+        return now_ns < self._grace_ends_ns
+
+    def meant(self, frame: Frame) -> list[Known]:
+        """Stations that a message to many is meant for, its source left out."""
+        return [each for each in self.stations() if self._is_meant(each.address, frame)]
+
+    def keep(self, frame: Frame) -> list[Frame]:
+        """Keep a message to many for those who come; returns what is kept no longer for it."""
+        self._to_many.append(frame)
+        too_many = max(len(self._to_many) - self._settings.grace_messages, 0)
+        return [self._to_many.popleft() for _ in range(too_many)]
+
+    def kept_for(self, address: int) -> list[Frame]:
+        """What is kept for a station that comes now."""
+        return [frame for frame in self._to_many if self._is_meant(address, frame)]
+
+    def sweep(self, now_ns: int) -> Iterator[tuple[Frame, Reason | None]]:
+        """What has become too old, with the reason for which it does not come.
+
+        None: a message to many that is kept for nobody any more; who was here has it.
+        """
+        if now_ns < self._next_sweep_ns:
+            return
+        self._next_sweep_ns = now_ns + _SWEEP_NS
+        if not self.expects(now_ns):
+            while self._to_many:
+                yield self._to_many.popleft(), None
+        for station in self.stations():
+            if self._is_forgotten(station, now_ns):
+                del self._stations[station.address]
+                for frame in station.mailbox.clear():
+                    to_it = is_station(frame.destination)
+                    never = Reason.UNKNOWN if to_it else None  # it does not count among the many
+                    yield frame, Reason.EXPIRED if station.appeared else never
+            else:
+                before_ns = now_ns - round(self._settings.keep_s * NS_PER_S)
+                yield from ((f, Reason.EXPIRED) for f in station.mailbox.expire(before_ns))
+
+    def _is_forgotten(self, station: Known, now_ns: int) -> bool:
+        if station.connection is not None:
+            return False
+        if not station.appeared:
+            return not self.expects(now_ns)
+        return now_ns - station.left_ns > self._settings.forget_s * NS_PER_S
+
+    def _is_meant(self, address: int, frame: Frame) -> bool:
+        planes = self._settings.planes_per_batch
+        return address != frame.source and is_meant(address, frame.destination, planes)

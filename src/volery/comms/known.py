@@ -1,0 +1,46 @@
+"""What the server keeps of a station and of a connection."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from volery.comms.mailbox import Mailbox
+from volery.comms.protocol import FrameParser
+from volery.comms.rate import RateLimit
+
+
+@dataclass(slots=True)
+class Known:
+    """A station that has been here, or is expected."""
+
+    address: int
+    mailbox: Mailbox
+    rate: RateLimit
+    name: str = ""
+    connection: int | None = None
+    appeared: bool = False
+    left_ns: int = 0
+    """When its connection ended."""
+    session: int = 0
+    last: int = 0
+    """Highest sequence that came of this session."""
+    unsettled: dict[int, int] = field(default_factory=dict)
+    """Sequence of this session: how many stations have not told yet that it came."""
+    settled: list[int] = field(default_factory=list)
+    """Sequences that it has not been told of."""
+    control: deque[bytes] = field(default_factory=lambda: deque(maxlen=4096))
+    """Refusals for it; also while it is away."""
+
+
+@dataclass(slots=True)
+class Connection:
+    """A connection, identified or not."""
+
+    opened_ns: int
+    heard_ns: int
+    station: Known | None = None
+    parser: FrameParser = field(default_factory=FrameParser)
+    control: list[bytes] = field(default_factory=list)
+    closing: bool = False
+    """To be ended when what is said has been sent."""

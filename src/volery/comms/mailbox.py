@@ -1,0 +1,182 @@
+"""What waits for one station: a lane for each source, and what is on its way.
+
+Every station has a mailbox of its own, so that traffic to one never waits for another. Sources take
+turns; within a lane messages keep their order.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from volery.comms.bodies import Received
+from volery.comms.protocol import Frame, Kind
+from volery.comms.settings import RouterSettings
+
+
+class Waiting(NamedTuple):
+    """A message in a mailbox."""
+
+    frame: Frame
+    arrived_ns: int
+    due_ns: int
+    """Not to be handed over before."""
+    number: int
+    """Counts the messages of a lane."""
+
+
+class Posted(NamedTuple):
+    """What became of a new message."""
+
+    kept: bool
+    dropped: Frame | None = None
+    """A measurement that had to go for it."""
+
+
+class _Lane:
+    """Messages from one source, commands and sensing apart, so that either can be bounded."""
+
+    def __init__(self) -> None:
+        self.commands: deque[Waiting] = deque()
+        self.sensing: deque[Waiting] = deque()
+        self.sent: deque[Waiting] = deque()
+        """On their way: the station has not yet told that they came."""
+        self.last_due_ns = 0
+        self.count = 0
+
+    def __len__(self) -> int:
+        return len(self.commands) + len(self.sensing)
+
+    def of(self, kind: int) -> deque[Waiting]:
+        return self.commands if kind == Kind.COMMAND else self.sensing
+
+    def next(self) -> deque[Waiting]:
+        """The queue whose first message is the lane's first."""
+        if not self.commands or not self.sensing:
+            return self.commands or self.sensing
+        earlier = self.commands[0].number < self.sensing[0].number
+        return self.commands if earlier else self.sensing
+
+    def acknowledged(self, upto: Received) -> Iterator[Waiting]:
+        """Remove what came, up to a sequence of a session; what was sent before it came too."""
+        last = -1
+        for index, waiting in enumerate(self.sent):
+            frame = waiting.frame
+            if frame.session == upto.session and frame.sequence <= upto.sequence:
+                last = index
+            elif frame.session == upto.session:
+                break
+        for _ in range(last + 1):
+            yield self.sent.popleft()
+
+    def rewind(self) -> None:
+        """What was on its way is to go again, first."""
+        while self.sent:
+            waiting = self.sent.pop()
+            self.of(waiting.frame.kind).appendleft(waiting)
+
+
+class Mailbox:
+    """Bounded queues of messages for one station."""
+
+    def __init__(self, settings: RouterSettings) -> None:
+        self._settings = settings
+        self._lanes: dict[int, _Lane] = {}
+        self._turns: deque[int] = deque()
+        self._on_the_way = 0
+        self._bytes = 0
+
+    def __len__(self) -> int:
+        """Messages that wait or are on their way."""
+        return sum(len(lane) for lane in self._lanes.values()) + self._on_the_way
+
+    def put(self, frame: Frame, now_ns: int, delay_ns: int = 0) -> tuple[Posted, int]:
+        """Add a message; also when it may go. A full lane drops its oldest sensing, no command."""
+        lane = self._lanes.setdefault(frame.source, _Lane())
+        queue, dropped = lane.of(frame.kind), None
+        size = len(frame.data)
+        full = len(queue) >= self._settings.lane_depth
+        if full or self._bytes + size > self._settings.mailbox_bytes:
+            if frame.kind == Kind.COMMAND or not queue:
+                return Posted(False), 0
+            dropped = queue.popleft().frame
+            self._bytes -= len(dropped.data)
+        if frame.source not in self._turns:
+            self._turns.append(frame.source)
+        lane.last_due_ns = due_ns = max(lane.last_due_ns, now_ns + delay_ns)
+        lane.count += 1
+        queue.append(Waiting(frame, now_ns, due_ns, lane.count))
+        self._bytes += size
+        return Posted(True, dropped), due_ns
+
+    def take(self, now_ns: int) -> Frame | None:
+        """The next message, whose source then is the last to have its turn; None: nothing is due.
+
+        It counts as on its way until `received`; at most `window` do.
+        """
+        if self._on_the_way >= self._settings.window:
+            return None
+        for _ in range(len(self._turns)):
+            source = self._turns.popleft()
+            lane = self._lanes[source]
+            queue = lane.next()
+            if not queue:
+                continue
+            self._turns.append(source)
+            if queue[0].due_ns > now_ns:
+                continue
+            waiting = queue.popleft()
+            lane.sent.append(waiting)
+            self._on_the_way += 1
+            self._bytes -= len(waiting.frame.data)
+            if not lane:
+                self._turns.pop()
+            return waiting.frame
+        return None
+
+    def received(self, upto: Received) -> list[Frame]:
+        """Remove and return what the station has told to have come."""
+        lane = self._lanes.get(upto.source)
+        if lane is None:
+            return []
+        came = [waiting.frame for waiting in lane.acknowledged(upto)]
+        self._on_the_way -= len(came)
+        self._forget_empty(upto.source, lane)
+        return came
+
+    def rewind(self) -> None:
+        """The connection has ended: what was on its way is to go again."""
+        for source, lane in self._lanes.items():
+            self._bytes += sum(len(waiting.frame.data) for waiting in lane.sent)
+            lane.rewind()
+            if lane and source not in self._turns:
+                self._turns.append(source)
+        self._on_the_way = 0
+
+    def expire(self, before_ns: int) -> list[Frame]:
+        """Remove and return what has waited since before an instant."""
+        old: list[Frame] = []
+        for source, lane in list(self._lanes.items()):
+            for queue in (lane.commands, lane.sensing):
+                while queue and queue[0].arrived_ns < before_ns:
+                    frame = queue.popleft().frame
+                    self._bytes -= len(frame.data)
+                    old.append(frame)
+            self._forget_empty(source, lane)
+        return old
+
+    def clear(self) -> list[Frame]:
+        """Remove and return everything."""
+        self.rewind()
+        lanes = self._lanes.values()
+        everything = [w.frame for lane in lanes for q in (lane.commands, lane.sensing) for w in q]
+        self._lanes.clear()
+        self._turns.clear()
+        self._bytes = 0
+        return everything
+
+    def _forget_empty(self, source: int, lane: _Lane) -> None:
+        """Lanes of sources that are gone for good cost nothing."""
+        if not lane and not lane.sent and source not in self._turns:
+            del self._lanes[source]

@@ -1,0 +1,75 @@
+"""What stands in messages between stations: a named message of the graph.
+
+Payload of COMMAND and SENSING: text name · text type · CDR with its four bytes of header; `text` is
+a u8 length and so many bytes of UTF-8. The name is what would follow the UAV's in the graph:
+
+| kind | name | type | meaning |
+|---|---|---|---|
+| SENSING | `state` | `volery_interfaces/msg/VehicleState` | how a UAV fares |
+| SENSING | `reply` | `std_msgs/msg/String` | what became of a command, for people |
+| COMMAND | one of `COMMANDS` | the service's request | call that service of the UAV |
+
+Programs may send any other message of the graph under a name of their own.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from volery.core.errors import CommsError, GraphError
+from volery.graph.cdr import decode_cdr, encode_cdr
+
+STATE, STATE_TYPE = "state", "volery_interfaces/msg/VehicleState"
+REPLY, REPLY_TYPE = "reply", "std_msgs/msg/String"
+_TRIGGER = "std_srvs/srv/Trigger"
+COMMANDS = {
+    "take_off": _TRIGGER,
+    "take_off_to": "volery_interfaces/srv/TakeOffTo",
+    "land": _TRIGGER,
+    "hold": _TRIGGER,
+    "return_home": _TRIGGER,
+    "go_to": "volery_interfaces/srv/GoTo",
+}
+"""Services of a UAV that stations may call, and their types."""
+
+_LONGEST_TEXT_BYTES = 255
+
+
+class Named(NamedTuple):
+    """A message of the graph with its name."""
+
+    name: str
+    msgtype: str
+    message: Any
+
+
+def encode_named(name: str, msgtype: str, message: Any) -> bytes:
+    """Payload of a message.
+
+    Raises
+    ------
+    CommsError
+        A name is too long, or the message does not fit its type.
+
+    """
+    texts = [text.encode() for text in (name, msgtype)]
+    if max(map(len, texts)) > _LONGEST_TEXT_BYTES:
+        raise CommsError(f"'{name[:40]}': names have {_LONGEST_TEXT_BYTES} bytes at most")
+    try:
+        cdr = encode_cdr(message, msgtype)
+    except GraphError as error:
+        raise CommsError(str(error)) from None
+    return b"".join(bytes((len(text),)) + text for text in texts) + cdr
+
+
+def decode_named(payload: bytes) -> Named:
+    """Message of a payload. `CommsError` where it is none."""
+    try:
+        texts, rest = [], payload
+        for _ in range(2):
+            end = 1 + rest[0]
+            texts.append(rest[1:end].decode())
+            rest = rest[end:]
+        return Named(texts[0], texts[1], decode_cdr(rest, texts[1]))
+    except (IndexError, UnicodeDecodeError, GraphError) as error:
+        raise CommsError(f"not a message of the graph: {error}") from None

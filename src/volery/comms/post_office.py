@@ -1,0 +1,182 @@
+"""The post office of the communication server: what becomes of each message.
+
+Accepted once, put into the mailboxes of those it is meant for, settled when all of them have it or
+a rule has disposed of it.
+"""
+
+from __future__ import annotations
+
+import heapq
+
+from volery.comms.addresses import SERVER, is_station
+from volery.comms.bodies import Reason, Refusal, decode_received, encode_refusal
+from volery.comms.directory import Directory
+from volery.comms.known import Known
+from volery.comms.link import Link
+from volery.comms.protocol import Frame, Kind, encode_frame
+from volery.comms.settings import RouterSettings
+from volery.comms.statistics import Tally
+from volery.core.clock import NS_PER_S
+from volery.core.errors import CommsError
+
+_SETTLED_AT_ONCE = 64
+"""Sequences that a station is told of at once; fewer wait for a while."""
+_SETTLED_NS = NS_PER_S // 5
+
+
+class PostOffice:
+    """Knows the stations and carries their messages. now_ns: the clock at the start."""
+
+    def __init__(self, settings: RouterSettings, now_ns: int, link: Link) -> None:
+        self.directory = Directory(settings, now_ns)
+        self.tally = Tally()
+        self.woken: set[int] = set()
+        """Connections for which there is something to send."""
+        self._link = link
+        self._next_settled_ns = now_ns
+        self._due: list[tuple[int, int]] = []
+        """When a delayed message may go, and to whom."""
+
+    @property
+    def next_due_ns(self) -> int | None:
+        """When the next delayed message may go."""
+        return self._due[0][0] if self._due else None
+
+    def tick(self, now_ns: int) -> None:
+        """Delayed messages, those that are too old, and what senders have not been told."""
+        while self._due and self._due[0][0] <= now_ns:
+            self.wake(self.directory.find(heapq.heappop(self._due)[1]))
+        for frame, reason in self.directory.sweep(now_ns):
+            if reason is not None:
+                self._dispose(frame, reason)
+            else:
+                self._settle(frame)  # a message to many that is kept for nobody any more
+        if now_ns >= self._next_settled_ns:
+            self._next_settled_ns = now_ns + _SETTLED_NS
+            for station in self.directory.stations():
+                if station.settled:
+                    self.wake(station)
+
+    def accept(self, source: Known, frame: Frame, now_ns: int) -> None:
+        """A message from a station, which may have sent it before."""
+        if frame.sequence <= source.last:
+            self.tally.counts["duplicates"] += 1
+            return
+        source.last = frame.sequence
+        self.tally.counts["accepted"] += 1
+        source.unsettled[frame.sequence] = 1
+        if not source.rate.allows(len(frame.data), now_ns):
+            self._dispose(frame, Reason.RATE)
+            return
+        stations = self._receivers(frame, now_ns)
+        if stations is None:
+            self._dispose(frame, Reason.UNKNOWN)
+            return
+        source.unsettled[frame.sequence] += len(stations)
+        for each in stations:
+            self._post(each, frame, now_ns)
+        if is_station(frame.destination) or not self.directory.expects(now_ns):
+            self._settle(frame)
+        else:  # it stays unsettled as long as it is kept for those who come
+            for no_longer in self.directory.keep(frame):
+                self._settle(no_longer)
+
+    def take_received(self, station: Known, frame: Frame) -> None:
+        """A station tells what has come."""
+        try:
+            for entry in decode_received(frame.payload):
+                for came in station.mailbox.received(entry):
+                    self.tally.counts["delivered"] += 1
+                    self._settle(came)
+        except CommsError:
+            self.tally.counts["unexpected"] += 1
+            return
+        self.wake(station)  # there is room on its way again
+
+    def _receivers(self, frame: Frame, now_ns: int) -> list[Known] | None:
+        """Stations that a message is meant for; None where it is for one that is not known."""
+        if not is_station(frame.destination):
+            return self.directory.meant(frame)
+        station = self.directory.find(frame.destination)
+        if station is None and self.directory.expects(now_ns):
+            station = self.expect(frame.destination, now_ns)
+        return None if station is None else [station]
+
+    def expect(self, address: int, now_ns: int) -> Known:
+        """A station not known before, with what was sent to many and is kept for it."""
+        station = self.directory.add(address, now_ns)
+        for frame in self.directory.kept_for(address):
+            source = self.directory.find(frame.source)
+            same = source is not None and source.session == frame.session
+            if source is not None and same and frame.sequence in source.unsettled:
+                source.unsettled[frame.sequence] += 1
+            self._post(station, frame, now_ns)
+        return station
+
+    def _post(self, station: Known, frame: Frame, now_ns: int) -> None:
+        """Put one message into one mailbox."""
+        delivery = self._link(now_ns, frame.source, station.address, frame)
+        if delivery.lost:
+            self.tally.counts["lost_on_link"] += 1
+            self._settle(frame)
+            return
+        posted, due_ns = station.mailbox.put(frame, now_ns, delivery.delay_ns)
+        if not posted.kept:
+            self._dispose(frame, Reason.FULL, station.address)
+            return
+        if posted.dropped is not None:
+            self._dispose(posted.dropped, Reason.FULL, station.address)
+        if station.connection is None:
+            self.tally.counts["stored"] += 1
+        elif due_ns <= now_ns:
+            self.wake(station)
+        if due_ns > now_ns:
+            heapq.heappush(self._due, (due_ns, station.address))
+
+    def _dispose(self, frame: Frame, reason: Reason, at: int | None = None) -> None:
+        """Done with a message that does not come: told for commands, counted for sensing."""
+        if frame.kind == Kind.COMMAND or reason is Reason.UNKNOWN:
+            self.tally.refused[reason] += 1
+            self._tell_refused(frame, reason, frame.destination if at is None else at)
+        elif reason is Reason.FULL:
+            self.tally.counts["dropped_sensing"] += 1
+        elif reason is Reason.RATE:
+            self.tally.counts["flooded"] += 1
+        if reason is Reason.EXPIRED:
+            self.tally.counts["expired"] += 1
+        self._settle(frame)
+
+    def _tell_refused(self, frame: Frame, reason: Reason, at: int) -> None:
+        source = self.directory.find(frame.source)
+        if source is None or source.session != frame.session:
+            return
+        text = _REFUSED[reason].format(at)
+        refusal = encode_refusal(Refusal(reason, frame.sequence, text))
+        source.control.append(encode_frame(Kind.REFUSAL, SERVER, frame.source, payload=refusal))
+        self.wake(source)
+
+    def _settle(self, frame: Frame) -> None:
+        """One station less that has not got this message."""
+        source = self.directory.find(frame.source)
+        if source is None or source.session != frame.session:
+            return
+        left = source.unsettled.get(frame.sequence, 0) - 1
+        if left > 0:
+            source.unsettled[frame.sequence] = left
+        elif source.unsettled.pop(frame.sequence, None) is not None:
+            source.settled.append(frame.sequence)
+            if len(source.settled) >= _SETTLED_AT_ONCE:
+                self.wake(source)
+
+    def wake(self, station: Known | None) -> None:
+        """There is something to send to a station."""
+        if station is not None and station.connection is not None:
+            self.woken.add(station.connection)
+
+
+_REFUSED = {
+    Reason.UNKNOWN: "no station {} has ever been here",
+    Reason.FULL: "too many commands wait for station {}",
+    Reason.RATE: "too many messages a second (to {})",
+    Reason.EXPIRED: "station {} did not come back in time",
+}

@@ -1,0 +1,118 @@
+"""The frames of the radio network: bytes to frames and back, without any socket.
+
+All numbers are little-endian and packed without padding:
+
+| offset | bytes | type | field |
+|---|---|---|---|
+| 0 | 4 | | sync word `AA 56 43 4D` |
+| 4 | 1 | u8 | version of the protocol, 1 |
+| 5 | 1 | u8 | kind, see `Kind` |
+| 6 | 2 | u16 | source, an address |
+| 8 | 2 | u16 | destination, an address |
+| 10 | 2 | u16 | n, bytes of payload, at most 16,384 |
+| 12 | 4 | u32 | session: drawn by the source when it starts |
+| 16 | 4 | u32 | sequence: 1, 2, ... over all messages of the source in this session; else 0 |
+| 20 | 8 | i64 | time at the source when it sent this, ns |
+| 28 | 2 | u16 | CRC of bytes 4 to 27 |
+| 30 | n | | payload, see `bodies` |
+| 30 + n | 2 | u16 | CRC of all bytes from 4 to 29 + n |
+
+CRC and search for frames are those of `core.framing`; addresses stand in `addresses`.
+"""
+
+from __future__ import annotations
+
+import struct
+from enum import IntEnum
+from typing import NamedTuple
+
+from volery.core.errors import CommsError
+from volery.core.framing import CRC_BYTES, Flaw, FrameScanner, crc16, crc_bytes
+
+SYNC = b"\xaaVCM"
+VERSION = 1
+HEAD_BYTES = 30
+PAYLOAD_LIMIT_BYTES = 16 << 10
+"""Modelling choice: a packet radio's message, not a map; larger things go in pieces."""
+LONGEST_BYTES = HEAD_BYTES + PAYLOAD_LIMIT_BYTES + CRC_BYTES
+"""Of a whole frame."""
+
+_HEAD = struct.Struct("<BBHHHIIq")
+
+
+class Kind(IntEnum):
+    """Kinds of frames; from 16 on messages between stations."""
+
+    HELLO = 1
+    WELCOME = 2
+    REFUSAL = 3
+    RECEIVED = 4
+    SETTLED = 5
+    PING = 6
+    PONG = 7
+    COMMAND = 16
+    SENSING = 17
+
+
+MESSAGES = frozenset({Kind.COMMAND, Kind.SENSING})
+
+
+class Frame(NamedTuple):
+    """One frame, its checks passed; `kind` may be one that is not known here."""
+
+    kind: int
+    source: int
+    destination: int
+    session: int
+    sequence: int
+    time_ns: int
+    payload: bytes
+    data: bytes = b""
+    """All of its bytes, to be passed on."""
+
+
+def encode_frame(
+    kind: int,
+    source: int,
+    destination: int,
+    session: int = 0,
+    sequence: int = 0,
+    time_ns: int = 0,
+    payload: bytes = b"",
+) -> bytes:
+    """A whole frame. `CommsError` where the payload is too long or a number does not fit."""
+    if len(payload) > PAYLOAD_LIMIT_BYTES:
+        raise CommsError(
+            f"a payload of {len(payload)} bytes is too long: {PAYLOAD_LIMIT_BYTES} is the limit"
+        )
+    try:
+        head = _HEAD.pack(
+            VERSION, kind, source, destination, len(payload), session, sequence, time_ns
+        )
+    except struct.error as error:
+        raise CommsError(f"{source} to {destination}, sequence {sequence}: {error}") from None
+    guarded = head + crc_bytes(crc16(head)) + payload
+    return SYNC + guarded + crc_bytes(crc16(guarded))
+
+
+class FrameParser(FrameScanner[Frame]):
+    """Finds the radio network's frames in a stream of bytes."""
+
+    def __init__(self) -> None:
+        super().__init__(SYNC, HEAD_BYTES)
+
+    def payload_bytes(self, head: bytes | bytearray) -> int | Flaw:
+        """Length that a head tells, within the limit."""
+        version, _, _, _, length, _, _, _ = _HEAD.unpack(head)
+        if version != VERSION:
+            return Flaw.VERSION
+        return Flaw.LENGTH if length > PAYLOAD_LIMIT_BYTES else int(length)
+
+    def frame_of(self, view: memoryview) -> Frame:
+        """The frame of whole bytes."""
+        data = bytes(view)
+        _, kind, source, destination, _, session, sequence, time_ns = _HEAD.unpack_from(
+            data, len(SYNC)
+        )
+        payload = data[HEAD_BYTES:-CRC_BYTES]
+        return Frame(kind, source, destination, session, sequence, time_ns, payload, data)

@@ -1,0 +1,241 @@
+"""The communication server without sockets and without a clock.
+
+A shell hands it connections, bytes and the time, and asks it what to send:
+
+    router = Router(RouterSettings(), now_ns=0, boot=1)
+    connection = router.connect(now_ns)
+    router.receive(connection, data, now_ns)
+    for each in router.take_woken():
+        send(each, router.take(each, now_ns))
+
+`server` is the shell around it for TCP, `exchange` the one inside a run. The same calls with the
+same times give the same bytes. Rules and promises: docs/comms.md.
+"""
+
+from __future__ import annotations
+
+from volery.comms.addresses import SERVER
+from volery.comms.admission import admit
+from volery.comms.bodies import (
+    MOST_SEQUENCES,
+    Reason,
+    Refusal,
+    Welcome,
+    decode_hello,
+    encode_refusal,
+    encode_settled,
+    encode_welcome,
+)
+from volery.comms.known import Connection, Known
+from volery.comms.link import Link, ideal_link
+from volery.comms.post_office import PostOffice
+from volery.comms.protocol import MESSAGES, Frame, Kind, encode_frame
+from volery.comms.settings import RouterSettings
+from volery.comms.statistics import Statistics
+from volery.core.clock import NS_PER_S
+from volery.core.errors import CommsError
+
+
+class Router:
+    """Takes messages from stations and hands them to those they are meant for.
+
+    Parameters
+    ----------
+    settings
+        The rules as numbers.
+    now_ns
+        The clock at the start; any clock that never goes back.
+    boot
+        u32 that tells this start of the server from others.
+    link
+        Decides what is lost or late between two stations.
+
+    """
+
+    def __init__(
+        self, settings: RouterSettings, now_ns: int, boot: int, link: Link = ideal_link
+    ) -> None:
+        self._settings = settings
+        self._boot = boot
+        self._connections: dict[int, Connection] = {}
+        self._opened = 0
+        self._office = PostOffice(settings, now_ns, link)
+        self._tally = self._office.tally
+        self._directory = self._office.directory
+        self._woken = self._office.woken
+
+    # ----------------------------------------------------------------------------------- the shell
+
+    def connect(self, now_ns: int) -> int | None:
+        """Number of a new connection; None: there are too many."""
+        if len(self._connections) >= self._settings.most_connections:
+            self._tally.refused[Reason.FULL] += 1
+            return None
+        self._opened += 1
+        self._connections[self._opened] = Connection(now_ns, now_ns)
+        return self._opened
+
+    def receive(self, connection: int, data: bytes | memoryview, now_ns: int) -> None:
+        """Take bytes that came, in pieces of any size."""
+        known = self._connections.get(connection)
+        if known is None or known.closing:
+            return
+        for frame in known.parser.feed(data):
+            self._take_frame(connection, known, frame, now_ns)
+            if self.closing(connection):
+                return
+        if known.parser.corrupt > self._settings.most_corrupt:
+            self._refuse_connection(connection, Reason.PROTOCOL, "too many damaged frames")
+
+    def disconnect(self, connection: int, now_ns: int) -> None:
+        """A connection has ended."""
+        ended = self._connections.pop(connection, None)
+        self._woken.discard(connection)
+        if ended is None:
+            return
+        ended.parser.finish()
+        self._tally.add(ended.parser)
+        station = ended.station
+        if station is not None and station.connection == connection:
+            station.connection = None
+            station.left_ns = now_ns
+            station.mailbox.rewind()
+
+    def tick(self, now_ns: int) -> None:
+        """What time brings: silence, age, delayed messages. Call it every 50 ms or so."""
+        for number, connection in list(self._connections.items()):
+            self._end_silent(number, connection, now_ns)
+        self._office.tick(now_ns)
+
+    @property
+    def next_due_ns(self) -> int | None:
+        """When the next delayed message may go."""
+        return self._office.next_due_ns
+
+    def take_woken(self) -> list[int]:
+        """Connections for which there is something to send, since the last call."""
+        woken = sorted(self._woken)
+        self._woken.clear()
+        return woken
+
+    def take(self, connection: int, now_ns: int, most_bytes: int = 64 << 10) -> bytes:
+        """What to send now, some frames; nothing: wait until it is woken."""
+        known = self._connections.get(connection)
+        if known is None:
+            return b""
+        frames, known.control = known.control, []
+        station = known.station
+        if station is None or known.closing:
+            return b"".join(frames)
+        while station.control:
+            frames.append(station.control.popleft())
+        if station.settled:
+            frames.append(self._settled_frame(station))
+        size = 0
+        while size < most_bytes:
+            frame = station.mailbox.take(now_ns)
+            if frame is None:
+                break
+            frames.append(frame.data)
+            size += len(frame.data)
+        return b"".join(frames)
+
+    def closing(self, connection: int) -> bool:
+        """Whether a connection is to be ended when what `take` gave has been sent."""
+        known = self._connections.get(connection)
+        return known is None or known.closing
+
+    @property
+    def statistics(self) -> Statistics:
+        """What has been counted so far."""
+        stations = self._directory.stations()
+        present = sum(station.connection is not None for station in stations)
+        waiting = sum(len(station.mailbox) for station in stations)
+        parsers = [connection.parser for connection in self._connections.values()]
+        return self._tally.statistics(parsers, present, len(stations) - present, waiting)
+
+    def stations(self) -> dict[int, str]:
+        """Addresses and names of the stations that are here."""
+        return {s.address: s.name for s in self._directory.stations() if s.connection is not None}
+
+    # ------------------------------------------------------------------------------------ frames
+
+    def _take_frame(self, number: int, connection: Connection, frame: Frame, now_ns: int) -> None:
+        station = connection.station
+        if station is None:
+            self._greet(number, connection, frame, now_ns)
+            return
+        connection.heard_ns = now_ns
+        if frame.source != station.address or frame.session != station.session:
+            self._refuse_connection(number, Reason.PROTOCOL, "a frame in another's name")
+        elif frame.kind in MESSAGES:
+            self._office.accept(station, frame, now_ns)
+        elif frame.kind == Kind.RECEIVED:
+            self._office.take_received(station, frame)
+        elif frame.kind == Kind.PING:
+            station.control.append(encode_frame(Kind.PONG, SERVER, station.address))
+            self._office.wake(station)
+        else:
+            self._tally.counts["unexpected"] += 1
+
+    def _greet(self, number: int, connection: Connection, frame: Frame, now_ns: int) -> None:
+        try:
+            if frame.kind != Kind.HELLO:
+                raise CommsError("the first frame must be HELLO")
+            refused = admit(decode_hello(frame.payload), frame.source, self._settings)
+        except CommsError as error:
+            refused = Refusal(Reason.PROTOCOL, 0, str(error))
+        if refused is not None:
+            self._refuse_connection(number, refused.reason, refused.text)
+            return
+        station = self._directory.find(frame.source) or self._office.expect(frame.source, now_ns)
+        station.appeared = True
+        if station.connection is not None:
+            self._replace(station)
+        station.name = decode_hello(frame.payload).name
+        station.connection, connection.station = number, station
+        connection.heard_ns = now_ns
+        if station.session != frame.session:
+            station.session, station.last = frame.session, 0
+            station.unsettled.clear()
+            station.control.clear()
+        station.settled.clear()  # WELCOME tells it by what it leaves away
+        welcome = Welcome(self._boot, station.last, tuple(station.unsettled)[:MOST_SEQUENCES])
+        connection.control.append(
+            encode_frame(Kind.WELCOME, SERVER, station.address, payload=encode_welcome(welcome))
+        )
+        self._woken.add(number)
+
+    def _replace(self, station: Known) -> None:
+        """The same station anew: the newest wins, since the old connection is most often dead."""
+        old = station.connection
+        if old is not None:
+            self._tally.counts["replaced"] += 1
+            self._refuse_connection(old, Reason.REPLACED, "this station has connected anew")
+            self._connections[old].station = None
+        station.mailbox.rewind()
+
+    # ------------------------------------------------------------------------------------ small
+
+    def _settled_frame(self, station: Known) -> bytes:
+        told = station.settled[:MOST_SEQUENCES]
+        del station.settled[:MOST_SEQUENCES]
+        return encode_frame(Kind.SETTLED, SERVER, station.address, payload=encode_settled(told))
+
+    def _end_silent(self, number: int, connection: Connection, now_ns: int) -> None:
+        greeted = connection.station is not None
+        since = connection.heard_ns if greeted else connection.opened_ns
+        allowed_s = self._settings.silence_s if greeted else self._settings.hello_s
+        if now_ns - since > allowed_s * NS_PER_S and not connection.closing:
+            self._tally.counts["silent"] += 1
+            connection.closing = True
+            self._woken.add(number)
+
+    def _refuse_connection(self, number: int, reason: Reason, text: str) -> None:
+        connection = self._connections[number]
+        self._tally.refused[reason] += 1
+        payload = encode_refusal(Refusal(reason, 0, text))
+        to = 0 if connection.station is None else connection.station.address
+        connection.control.append(encode_frame(Kind.REFUSAL, SERVER, to, payload=payload))
+        connection.closing = True
+        self._woken.add(number)

@@ -1,0 +1,185 @@
+"""The communication server on TCP: sockets and the wall clock around `Router`.
+
+    server = CommsServer(port=10200)
+    await server.start()
+    ...
+    await server.stop()
+
+Everything happens in the callbacks of one asyncio loop. A station that does not read fills its own
+mailbox, and nobody waits for it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import secrets
+import time
+
+from volery.comms.router import Router
+from volery.comms.settings import RouterSettings
+from volery.comms.statistics import Statistics
+from volery.core.errors import CommsError
+from volery.core.listening import check_address, check_token, tend
+
+PORT = 10200
+_TICK_S = 0.05
+_UNSENT_BYTES = 128 << 10
+"""In the operating system's hands and ours before a station's mailbox has to wait."""
+_FAREWELL_S = 1.0
+"""For how long a connection that is being ended may take to read why."""
+
+
+class CommsServer:
+    """Listens for stations.
+
+    Parameters
+    ----------
+    settings
+        The rules; its token is what stations must show.
+    host, port
+        Address to listen on; port 0 takes a free one, and the attribute tells which.
+    anywhere
+        Consent to a `host` beyond loopback, which also needs a token.
+
+    """
+
+    def __init__(
+        self,
+        settings: RouterSettings | None = None,
+        host: str = "127.0.0.1",
+        port: int = PORT,
+        *,
+        anywhere: bool = False,
+    ) -> None:
+        self.host = host
+        self.port = port
+        self._settings = settings or RouterSettings()
+        self._anywhere = anywhere
+        self._server: asyncio.Server | None = None
+        self._ticks: asyncio.TimerHandle | None = None
+        self._links: dict[int, _StationLink] = {}
+        self._sends = False
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        return f"communication server {self.host}:{self.port}"
+
+    @property
+    def statistics(self) -> Statistics:
+        """What has been counted since the start."""
+        return self.router.statistics
+
+    async def start(self) -> None:
+        """Begin to listen.
+
+        Raises
+        ------
+        BridgeError
+            The address is beyond loopback without consent and token.
+        CommsError
+            The address is taken or not this machine's.
+
+        """
+        check_address(self.host, anywhere=self._anywhere, flag="--allow-remote and --token")
+        check_token(self.host, self._settings.token)
+        self.router = Router(self._settings, time.monotonic_ns(), secrets.randbits(32))
+        self._loop = asyncio.get_running_loop()
+        try:
+            self._server = await self._loop.create_server(
+                lambda: _StationLink(self), self.host, self.port, reuse_address=True
+            )
+        except (OSError, OverflowError) as error:
+            taken = isinstance(error, OSError) and error.errno == errno.EADDRINUSE
+            why = "the port is taken" if taken else str(error)
+            raise CommsError(f"cannot listen on {self.host}:{self.port}: {why}") from None
+        self.port = self._server.sockets[0].getsockname()[1]
+        self._tick()
+
+    async def stop(self) -> None:
+        """Let everybody go."""
+        if self._ticks is not None:
+            self._ticks.cancel()
+        if self._server is not None:
+            self._server.close()
+        for link in list(self._links.values()):
+            link.transport.abort()
+        await asyncio.sleep(0)  # their callbacks
+
+    def _tick(self) -> None:
+        self.router.tick(time.monotonic_ns())
+        self._send_woken()
+        self._ticks = self._loop.call_later(_TICK_S, self._tick)
+
+    # ------------------------------------------------------------------------- of the connections
+
+    def _opened(self, link: _StationLink) -> None:
+        number = self.router.connect(time.monotonic_ns())
+        if number is None:
+            link.transport.abort()
+            return
+        link.number = number
+        self._links[number] = link
+
+    def _came(self, link: _StationLink, data: bytes) -> None:
+        self.router.receive(link.number, data, time.monotonic_ns())
+        if not self._sends:  # once for all that has come in this turn of the loop
+            self._sends = True
+            self._loop.call_soon(self._send_woken)
+
+    def _closed(self, link: _StationLink) -> None:
+        self._links.pop(link.number, None)
+        self.router.disconnect(link.number, time.monotonic_ns())
+
+    def _send_woken(self) -> None:
+        self._sends = False
+        for number in self.router.take_woken():
+            link = self._links.get(number)
+            if link is not None:
+                self._send(link)
+
+    def _send(self, link: _StationLink) -> None:
+        now_ns = time.monotonic_ns()
+        while not link.paused and (data := self.router.take(link.number, now_ns)):
+            link.transport.write(data)
+        if self.router.closing(link.number):
+            self._closed(link)
+            link.transport.close()
+            self._loop.call_later(_FAREWELL_S, link.transport.abort)
+
+
+class _StationLink(asyncio.Protocol):
+    """One connection."""
+
+    transport: asyncio.Transport
+
+    def __init__(self, server: CommsServer) -> None:
+        self._server = server
+        self.number = 0
+        self.paused = False
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """As of asyncio."""
+        assert isinstance(transport, asyncio.Transport)
+        self.transport = transport
+        transport.set_write_buffer_limits(_UNSENT_BYTES)
+        tend(transport.get_extra_info("socket"))
+        self._server._opened(self)
+
+    def data_received(self, data: bytes) -> None:
+        """As of asyncio."""
+        self._server._came(self, data)
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
+        """As of asyncio."""
+        self._server._closed(self)
+
+    def pause_writing(self) -> None:
+        """As of asyncio."""
+        self.paused = True
+
+    def resume_writing(self) -> None:
+        """As of asyncio."""
+        self.paused = False
+        self._server._send(self)

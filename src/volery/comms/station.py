@@ -1,0 +1,238 @@
+"""A station on TCP: sockets and the wall clock around `StationCore`.
+
+    station = Station(Identity(0, 1), on_message=take)
+    await station.start()
+    station.send(Kind.COMMAND, 3, b"...")
+
+It comes again by itself where the connection breaks, every 0.2 s, and nothing that it has sent gets
+lost thereby: what is promised stands in docs/comms.md.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import time
+from collections.abc import Callable
+
+from volery.comms.addresses import PLANES_PER_BATCH, Identity
+from volery.comms.bodies import Refusal
+from volery.comms.protocol import Frame, Kind
+from volery.comms.server import PORT
+from volery.comms.station_core import StationCore
+from volery.core.errors import CommsError
+from volery.core.listening import tend
+
+_AGAIN_S = 0.2
+_CONNECT_S = 1.0
+_TICK_S = 0.5
+_ACKNOWLEDGE_S = 0.05
+
+
+def _ignore(_what: object) -> None:
+    return
+
+
+class Station:
+    """One station, in one asyncio loop.
+
+    Parameters
+    ----------
+    identity
+        Batch and plane, or `Identity.ground()`.
+    on_message, on_refusal
+        Called in the loop with what comes, each message once, in order.
+    host, port
+        Of the communication server.
+    name, token, planes_per_batch
+        What the station tells the server.
+
+    """
+
+    def __init__(
+        self,
+        identity: Identity,
+        on_message: Callable[[Frame], None] = _ignore,
+        on_refusal: Callable[[Refusal], None] = _ignore,
+        *,
+        host: str = "127.0.0.1",
+        port: int = PORT,
+        name: str = "",
+        token: str | None = None,
+        planes_per_batch: int = PLANES_PER_BATCH,
+    ) -> None:
+        self.core = StationCore(
+            identity,
+            secrets.randbits(32),
+            name=name,
+            token=token,
+            planes_per_batch=planes_per_batch,
+        )
+        self._on_message = on_message
+        self._on_refusal = on_refusal
+        self._address = (host, port)
+        self._pipe: _Pipe | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._acknowledges: asyncio.TimerHandle | None = None
+        self._changed = asyncio.Event()
+        self._sends = False
+
+    @property
+    def joined(self) -> bool:
+        """Whether a server has welcomed it and the connection stands."""
+        return self.core.joined
+
+    async def start(self, timeout_s: float | None = 5.0) -> None:
+        """Join, and from now on come again whenever the connection breaks.
+
+        timeout_s: None does not wait for the first time.
+
+        Raises
+        ------
+        CommsError
+            Nobody listens there, or the server does not let this station in.
+
+        """
+        self._loop = asyncio.get_running_loop()
+        self._task = asyncio.create_task(self._keep_joined())
+        if timeout_s is None:
+            return
+        try:
+            await asyncio.wait_for(self.until_joined(), timeout_s)
+        except TimeoutError:
+            await self.stop()
+            host, port = self._address
+            raise CommsError(
+                f"no communication server at {host}:{port}; start one with volery comms"
+            ) from None
+        except CommsError:
+            await self.stop()
+            raise
+
+    async def stop(self) -> None:
+        """Leave. What is not settled is forgotten; see `until_settled`."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+            self._task = None
+        if self._pipe is not None:
+            self._pipe.transport.abort()
+            self._lost(self._pipe)
+
+    def send(self, kind: Kind, destination: int, payload: bytes) -> int:
+        """Send a message, now or when there is a server; `CommsError` as of `StationCore.send`."""
+        sequence = self.core.send(kind, destination, payload, time.monotonic_ns(), time.time_ns())
+        if not self._sends:  # once for all that is sent in this turn of the loop
+            self._sends = True
+            self._loop.call_soon(self._flush)
+        return sequence
+
+    async def until_joined(self) -> None:
+        """Wait for the server's welcome. `CommsError` where it will never come."""
+        while not self.joined:
+            if self.core.fatal is not None:
+                raise CommsError(f"the server refuses this station: {self.core.fatal.text}")
+            await self._next_change()
+
+    async def until_settled(self) -> None:
+        """Wait until the server is done with all that was sent."""
+        while self.core.unsettled:
+            await self._next_change()
+
+    async def _next_change(self) -> None:
+        self._changed.clear()
+        await self._changed.wait()
+
+    # ---------------------------------------------------------------------------- of the connection
+
+    async def _keep_joined(self) -> None:
+        while self.core.fatal is None:
+            if self._pipe is None:
+                await self._connect()
+                await asyncio.sleep(0 if self._pipe is not None else _AGAIN_S)
+                continue
+            await asyncio.sleep(_TICK_S if self.joined else _AGAIN_S)
+            self._tick()
+
+    async def _connect(self) -> None:
+        try:
+            connecting = self._loop.create_connection(lambda: _Pipe(self), *self._address)
+            await asyncio.wait_for(connecting, _CONNECT_S)
+        except (TimeoutError, OSError, OverflowError):
+            return
+
+    def _tick(self) -> None:
+        pipe, now_ns = self._pipe, time.monotonic_ns()
+        if pipe is None:
+            return
+        if self.core.is_deaf(now_ns):
+            pipe.transport.abort()
+            return
+        self.core.tick(now_ns)
+        self._flush()
+
+    def _opened(self, pipe: _Pipe) -> None:
+        self._pipe = pipe
+        self.core.connected(time.monotonic_ns())
+        self._flush()
+
+    def _came(self, data: bytes) -> None:
+        for frame in self.core.feed(data, time.monotonic_ns()):
+            self._on_message(frame)
+        while self.core.refusals:
+            self._on_refusal(self.core.refusals.popleft())
+        if self.core.has_to_acknowledge and self._acknowledges is None:
+            self._acknowledges = self._loop.call_later(_ACKNOWLEDGE_S, self._acknowledge)
+        self._flush()
+        self._changed.set()
+
+    def _acknowledge(self) -> None:
+        self._acknowledges = None
+        self.core.acknowledge(time.monotonic_ns())
+        self._flush()
+
+    def _lost(self, pipe: _Pipe) -> None:
+        if self._pipe is pipe:
+            self._pipe = None
+            self.core.disconnected()
+            self._changed.set()
+
+    def _flush(self) -> None:
+        self._sends = False
+        pipe = self._pipe
+        if pipe is not None and not pipe.paused and (data := self.core.take()):
+            pipe.transport.write(data)
+
+
+class _Pipe(asyncio.Protocol):
+    """One connection of a station."""
+
+    transport: asyncio.Transport
+
+    def __init__(self, station: Station) -> None:
+        self._station = station
+        self.paused = False
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """As of asyncio."""
+        assert isinstance(transport, asyncio.Transport)
+        self.transport = transport
+        tend(transport.get_extra_info("socket"))
+        self._station._opened(self)
+
+    def data_received(self, data: bytes) -> None:
+        """As of asyncio."""
+        self._station._came(data)
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
+        """As of asyncio."""
+        self._station._lost(self)
+
+    def pause_writing(self) -> None:
+        """As of asyncio."""
+        self.paused = True
+
+    def resume_writing(self) -> None:
+        """As of asyncio."""
+        self.paused = False
+        self._station._flush()

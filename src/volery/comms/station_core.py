@@ -1,0 +1,227 @@
+"""A station without sockets and without a clock: what it sends, resends and passes on.
+
+A shell hands it bytes and the time, and asks what to send:
+
+    core = StationCore(Identity(0, 1), session=7)
+    core.connected(now_ns)
+    messages = core.feed(data, now_ns)
+    core.send(Kind.COMMAND, 3, b"...", now_ns)
+    write(core.take())
+
+It holds every message until the server says that it is settled, and sends again after each new
+connection what a server has not got. To its user it passes each message on once, those of a source
+in the order in which they were sent.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from volery.comms.addresses import PLANES_PER_BATCH, SERVER, Identity
+from volery.comms.bodies import (
+    Hello,
+    Reason,
+    Refusal,
+    decode_refusal,
+    decode_settled,
+    decode_welcome,
+    encode_hello,
+    encode_received,
+)
+from volery.comms.held import Held
+from volery.comms.inbox import Inbox
+from volery.comms.protocol import MESSAGES, Frame, FrameParser, Kind, encode_frame
+from volery.core.clock import NS_PER_S
+from volery.core.errors import CommsError
+
+FATAL = frozenset({Reason.IDENTITY, Reason.BATCH_SIZE, Reason.TOKEN, Reason.REPLACED})
+"""Refusals after which coming again would not help."""
+
+_PING_NS = NS_PER_S
+_SILENCE_NS = 3 * NS_PER_S
+_ACKNOWLEDGE_AT_ONCE = 64
+_REFUSALS_KEPT = 256
+_MOST_RECEIVED = 1000
+"""Entries of one RECEIVED, so that it stays below the limit of payloads."""
+
+
+class StationCore:
+    """One station's side of the protocol.
+
+    session: u32, another one each time that the station starts. name, token: what it tells the
+    server.
+    """
+
+    def __init__(
+        self,
+        identity: Identity,
+        session: int,
+        *,
+        name: str = "",
+        token: str | None = None,
+        planes_per_batch: int = PLANES_PER_BATCH,
+    ) -> None:
+        self.address = identity.address(planes_per_batch)
+        self._session = session
+        hello = Hello(identity.batch, identity.plane, planes_per_batch, name, token or "")
+        self._hello = encode_hello(hello)
+        self._parser = FrameParser()
+        self._held = Held()
+        self._inbox = Inbox()
+        self._out: list[bytes] = []
+        self._sequence = 0
+        self._spoke_ns = 0
+        self._heard_ns = 0
+        self.joined = False
+        """Whether the server has welcomed this connection."""
+        self.fatal: Refusal | None = None
+        """Why it is of no use to come again."""
+        self.boot = 0
+        """Number of the server's start."""
+        self.refusals: deque[Refusal] = deque(maxlen=_REFUSALS_KEPT)
+        """What the server refused, newest last; take them off as they are read."""
+        self.corrupt = 0
+        """Damaged frames on connections that have ended."""
+
+    @property
+    def unsettled(self) -> int:
+        """Messages that may have to be sent again."""
+        return len(self._held)
+
+    @property
+    def dropped(self) -> int:
+        """Measurements that this station itself dropped, since too many were held."""
+        return self._held.dropped
+
+    @property
+    def duplicates(self) -> int:
+        """Messages that came again and were not passed on."""
+        return self._inbox.duplicates
+
+    def connected(self, now_ns: int) -> None:
+        """A new connection: introduce ourselves."""
+        self._parser = FrameParser()
+        self._heard_ns = now_ns
+        self.joined = False
+        self._out = []
+        self._say(Kind.HELLO, self._hello, now_ns)
+
+    def disconnected(self) -> None:
+        """The connection has ended."""
+        self.corrupt += self._parser.corrupt
+        self._parser = FrameParser()
+        self.joined = False
+        self._out = []
+
+    def send(
+        self,
+        kind: Kind,
+        destination: int,
+        payload: bytes,
+        now_ns: int,
+        stamp_ns: int | None = None,
+    ) -> int:
+        """Send a message as soon as there is a server; returns its sequence.
+
+        stamp_ns: the frame's time; `now_ns` unless given.
+
+        Raises
+        ------
+        CommsError
+            The payload is too long, the kind is no message, or a command finds too many messages
+            held for that destination already. Measurements then take the place of the oldest.
+
+        """
+        if kind not in MESSAGES:
+            raise CommsError(f"{kind.name} is no message: COMMAND and SENSING are")
+        sequence = self._sequence + 1
+        data = encode_frame(
+            kind,
+            self.address,
+            destination,
+            self._session,
+            sequence,
+            now_ns if stamp_ns is None else stamp_ns,
+            payload,
+        )
+        self._held.put(sequence, kind, destination, data)
+        self._sequence = sequence
+        if self.joined:
+            self._out.append(data)
+            self._spoke_ns = now_ns
+        return sequence
+
+    def feed(self, data: bytes | memoryview, now_ns: int) -> list[Frame]:
+        """New messages in these bytes."""
+        messages = []
+        for frame in self._parser.feed(data):
+            self._heard_ns = now_ns
+            if frame.kind in MESSAGES:
+                if self._inbox.is_new(frame):
+                    messages.append(frame)
+            else:
+                self._take_control(frame)
+        if len(self._inbox) >= _ACKNOWLEDGE_AT_ONCE:
+            self.acknowledge(now_ns)
+        return messages
+
+    def acknowledge(self, now_ns: int) -> None:
+        """Tell the server what has come; call it some 50 ms after `feed` at the latest."""
+        if not self.joined:
+            return
+        told = self._inbox.take()
+        for start in range(0, len(told), _MOST_RECEIVED):
+            part = told[start : start + _MOST_RECEIVED]
+            self._say(Kind.RECEIVED, encode_received(part), now_ns)
+
+    @property
+    def has_to_acknowledge(self) -> bool:
+        """Whether `acknowledge` has something to tell."""
+        return len(self._inbox) > 0
+
+    def tick(self, now_ns: int) -> None:
+        """Acknowledge, and keep the connection alive; call it every second or more often."""
+        self.acknowledge(now_ns)
+        if self.joined and now_ns - self._spoke_ns >= _PING_NS * 9 // 10:
+            self._say(Kind.PING, b"", now_ns)
+
+    def is_deaf(self, now_ns: int) -> bool:
+        """Whether nothing has come for so long that the server must be taken for dead."""
+        return now_ns - self._heard_ns > _SILENCE_NS
+
+    def take(self) -> bytes:
+        """What to send now."""
+        data = b"".join(self._out)
+        self._out = []
+        return data
+
+    def _take_control(self, frame: Frame) -> None:
+        try:
+            if frame.kind == Kind.SETTLED:
+                self._held.settle(decode_settled(frame.payload))
+            elif frame.kind == Kind.WELCOME:
+                self._take_welcome(frame.payload)
+            elif frame.kind == Kind.REFUSAL:
+                self._take_refusal(decode_refusal(frame.payload))
+        except CommsError:
+            self.corrupt += 1
+
+    def _take_welcome(self, payload: bytes) -> None:
+        welcome = decode_welcome(payload)
+        self.boot = welcome.boot
+        self._held.reconcile(welcome.last, welcome.unsettled)
+        self._out += self._held.after(welcome.last)
+        self.joined = True
+
+    def _take_refusal(self, refusal: Refusal) -> None:
+        self.refusals.append(refusal)
+        if refusal.sequence:
+            self._held.refuse(refusal.sequence)
+        elif refusal.reason in FATAL:
+            self.fatal = refusal
+
+    def _say(self, kind: Kind, payload: bytes, now_ns: int) -> None:
+        self._out.append(
+            encode_frame(kind, self.address, SERVER, self._session, 0, now_ns, payload)
+        )
+        self._spoke_ns = now_ns

@@ -1,0 +1,31 @@
+"""Addresses as people write them: `3`, `0.3`, `uav4`, `batch1`, `all`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from volery.comms.addresses import ALL, Identity, batch_address
+from volery.core.errors import CommsError
+
+FORMS = "a linear id such as 3, batch.plane such as 0.3, a name such as uav4, batch1, or all"
+
+
+def address_of(text: str, planes_per_batch: int, names: Mapping[str, int]) -> int:
+    """Address meant by a word; names: addresses of those who have told their name.
+
+    `uavN` of nobody who has been heard is the station with linear id N - 1. `CommsError` where
+    nothing of the kind is meant.
+    """
+    if text == "all":
+        return ALL
+    if text in names:
+        return names[text]
+    if found := re.fullmatch(r"batch(\d{1,5})", text):
+        return batch_address(int(found[1]))
+    if found := re.fullmatch(r"(\d{1,5})\.(\d{1,5})", text):
+        return Identity(int(found[1]), int(found[2])).address(planes_per_batch)
+    if found := re.fullmatch(r"(uav)?(\d{1,5})", text):
+        linear = int(found[2]) - bool(found[1])
+        return Identity.of(linear, planes_per_batch).address(planes_per_batch)
+    raise CommsError(f"'{text}' is nobody: write {FORMS}")

@@ -1,0 +1,157 @@
+"""A door that makes every UAV of a graph a station: it tells its state and takes commands.
+
+    doors.open(UavStations("127.0.0.1", 10200))
+
+uavN is the station with linear id N - 1; UAVs of other names take the lowest id that is free.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import re
+from functools import partial
+from typing import Any
+
+from volery.comms.addresses import ALL_GROUND, FIRST_GROUND, PLANES_PER_BATCH, Identity
+from volery.comms.payloads import (
+    COMMANDS,
+    REPLY,
+    REPLY_TYPE,
+    STATE,
+    STATE_TYPE,
+    decode_named,
+    encode_named,
+)
+from volery.comms.protocol import Frame, Kind
+from volery.comms.server import PORT
+from volery.comms.station import Station
+from volery.core.errors import CommsError, GraphError
+from volery.graph.messages import message_type
+from volery.graph.reply import Reply
+from volery.graph.session import Gateway, Session
+
+_VEHICLES = "/volery/vehicles"
+_VEHICLES_TYPE = "volery_interfaces/msg/VehicleStates"
+_PERIOD_S = 0.2
+"""As often as the simulation tells of its vehicles."""
+
+
+class UavStations:
+    """One station for each UAV.
+
+    host, port, token, planes_per_batch: of the communication server, as of `Station`.
+    """
+
+    def __init__(
+        self,
+        host: str = "127.0.0.1",
+        port: int = PORT,
+        *,
+        token: str | None = None,
+        planes_per_batch: int = PLANES_PER_BATCH,
+    ) -> None:
+        self._host = host
+        self._port = port
+        self._token = token
+        self._planes = planes_per_batch
+        self._stations: dict[str, Station] = {}
+        self._task: asyncio.Task[None] | None = None
+        self._session: Session | None = None
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        return f"stations at {self._host}:{self._port}"
+
+    async def start(self, gateway: Gateway) -> None:
+        """Begin to watch the fleet. A server that is not there yet is waited for."""
+        self._loop = asyncio.get_running_loop()
+        self._session = gateway.open(self.name)
+        self._vehicles = self._session.subscribe(_VEHICLES, _VEHICLES_TYPE, wake=lambda: None)
+        self._task = asyncio.create_task(self._watch(self._session))
+
+    async def stop(self) -> None:
+        """Take all stations from the network."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+        for station in self._stations.values():
+            await station.stop()
+        self._stations.clear()
+        if self._session is not None:
+            self._session.close()
+
+    async def _watch(self, session: Session) -> None:
+        while True:
+            published = self._vehicles.take()
+            if published:
+                states = {state.name: state for state in published[-1].message.vehicles}
+                for gone in self._stations.keys() - states.keys():
+                    await self._stations.pop(gone).stop()
+                for name, state in states.items():
+                    station = self._stations.get(name) or await self._join(session, name)
+                    if station.joined:
+                        _send(station, ALL_GROUND, encode_named(STATE, STATE_TYPE, state))
+            await asyncio.sleep(_PERIOD_S)
+
+    async def _join(self, session: Session, uav: str) -> Station:
+        station = Station(
+            Identity.of(self._free_address(uav), self._planes),
+            lambda frame: self._take(session, uav, frame),
+            host=self._host,
+            port=self._port,
+            name=uav,
+            token=self._token,
+            planes_per_batch=self._planes,
+        )
+        self._stations[uav] = station
+        await station.start(timeout_s=None)
+        return station
+
+    def _free_address(self, uav: str) -> int:
+        used = {station.core.address for station in self._stations.values()}
+        number = re.fullmatch(r"uav([1-9]\d{0,4})", uav)
+        if number and int(number[1]) - 1 not in used and int(number[1]) <= FIRST_GROUND:
+            return int(number[1]) - 1
+        return next(address for address in range(FIRST_GROUND) if address not in used)
+
+    def _take(self, session: Session, uav: str, frame: Frame) -> None:
+        if frame.kind != Kind.COMMAND:
+            return
+        tell = partial(self._tell, uav, frame.source)
+        try:
+            command = decode_named(frame.payload)
+        except CommsError as error:
+            tell(str(error))
+            return
+        srvtype = COMMANDS.get(command.name)
+        if srvtype is None or command.msgtype != f"{srvtype}_Request":
+            tell(f"no command {command.name} ({command.msgtype}); there are {', '.join(COMMANDS)}")
+            return
+
+        def answered(response: Any) -> None:
+            said = response.message or ("done" if response.success else "refused")
+            self._tell_soon(tell, f"{command.name}: {said}")
+
+        def failed(error: GraphError) -> None:
+            self._tell_soon(tell, f"{command.name}: {error}")
+
+        session.call(f"/{uav}/{command.name}", command.message, Reply(answered, failed))
+
+    def _tell_soon(self, tell: Any, text: str) -> None:
+        """From whatever thread answers, into the loop; nobody is told once that has ended."""
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(tell, text)
+
+    def _tell(self, uav: str, to: int, text: str) -> None:
+        station = self._stations.get(uav)
+        if station is not None:
+            message = message_type(REPLY_TYPE)(text)
+            _send(station, to, encode_named(REPLY, REPLY_TYPE, message))
+
+
+def _send(station: Station, to: int, payload: bytes) -> None:
+    """Send a measurement; where nothing can be held any more it is as good as lost by radio."""
+    with contextlib.suppress(CommsError):
+        station.send(Kind.SENSING, to, payload)

@@ -1,0 +1,220 @@
+"""The ground station, the UAVs' side of it, and `volery gcs` as a user has it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from live_graph import LiveGraph
+
+from volery.bench.comms import served
+from volery.bridges.doors import Doors
+from volery.cli.gcs import parse_server
+from volery.comms.addresses import ALL, ALL_GROUND, FIRST_GROUND, batch_address, is_meant
+from volery.comms.bodies import Reason, Refusal
+from volery.comms.ground import Ground
+from volery.comms.payloads import (
+    REPLY,
+    REPLY_TYPE,
+    STATE,
+    STATE_TYPE,
+    decode_named,
+    encode_named,
+)
+from volery.comms.protocol import Frame, Kind
+from volery.comms.server import CommsServer
+from volery.comms.targets import address_of
+from volery.comms.uav_stations import UavStations
+from volery.core.errors import CommsError
+from volery.graph.messages import Header, Point, Time, Vector3, message_type
+
+State = message_type(STATE_TYPE)
+States = message_type("volery_interfaces/msg/VehicleStates")
+Response = message_type("std_srvs/srv/Trigger_Response")
+
+
+def state(name="uav1", mode="HOLD", battery=0.5):
+    place, velocity = Point(1.0, -2.0, 3.0), Vector3(3.0, 4.0, 0.0)
+    return State(
+        name, "f450", "f450", mode, True, False, battery, 12.0, place, velocity, 0.5, -1.0, ""
+    )
+
+
+def frame(name, msgtype, message, source=0):
+    return Frame(Kind.SENSING, source, FIRST_GROUND, 1, 1, 0, encode_named(name, msgtype, message))
+
+
+class Desk:
+    def __init__(self):
+        self.sent = []
+        self.ground = Ground(self.send)
+
+    def send(self, kind, address, payload):
+        assert kind is Kind.COMMAND
+        self.sent.append((address, decode_named(payload)))
+        return len(self.sent)
+
+
+def test_addresses_as_people_write_them() -> None:
+    names = {"scout": 7}
+    for text, address in (
+        ("3", 3),
+        ("1.2", 6),
+        ("uav4", 3),
+        ("scout", 7),
+        ("batch2", batch_address(2)),
+        ("all", ALL),
+    ):
+        assert address_of(text, 4, names) == address
+    for wrong in ("uav0", "1.4", "batch", "batch99999", "x", "-1", "40000", "0.0.0"):
+        with pytest.raises(CommsError):
+            address_of(wrong, 4, names)
+    assert is_meant(FIRST_GROUND + 3, ALL_GROUND)
+    assert not is_meant(3, ALL_GROUND)
+
+
+def test_lines_become_commands() -> None:
+    desk = Desk()
+    for line in (
+        "take_off uav1",
+        "take_off 1.0 2.5",
+        "return all",
+        "go_to 2 1 -2 3",
+        "hold batch0",
+    ):
+        assert desk.ground.command(line).startswith("sent: ")
+    assert desk.ground.command("go_to 2 1 -2 3 90") == "sent: go_to to 2"
+    assert [(address, named.name) for address, named in desk.sent] == [
+        (0, "take_off"),
+        (4, "take_off_to"),
+        (ALL, "return_home"),
+        (2, "go_to"),
+        (batch_address(0), "hold"),
+        (2, "go_to"),
+    ]
+    assert desk.sent[1][1].message.altitude == 2.5
+    place = desk.sent[3][1].message
+    assert (place.position.x, place.position.y, place.position.z) == (1.0, -2.0, 3.0)
+    assert place.keep_heading
+    turned = desk.sent[5][1].message
+    assert not turned.keep_heading
+    assert turned.yaw == pytest.approx(math.pi / 2)
+
+
+@pytest.mark.parametrize(
+    "line", ["fly 1", "land", "go_to 1 2", "take_off 1 nan", "land 1 2", "hold ?"]
+)
+def test_lines_that_are_no_commands(line: str) -> None:
+    desk = Desk()
+    with pytest.raises(CommsError):
+        desk.ground.command(line)
+    assert desk.sent == []
+
+
+def test_states_replies_and_refusals_are_shown() -> None:
+    desk = Desk()
+    assert desk.ground.take(frame(STATE, STATE_TYPE, state()), 0) == "uav1: HOLD"
+    assert desk.ground.take(frame(STATE, STATE_TYPE, state()), 10**9) is None
+    assert desk.ground.take(frame(STATE, STATE_TYPE, state(mode="LAND")), 10**9) == "uav1: LAND"
+    other = frame(STATE, STATE_TYPE, state("uav6", battery=math.nan), source=5)
+    desk.ground.take(other, 10**9)
+    first, second = desk.ground.rows(3 * 10**9)
+    assert first == ("uav1", "0.0", "LAND", "1.0 -2.0 3.0", "5.0", "50 %", "2.0")
+    assert (second.name, second.address, second.battery) == ("uav6", "1.1", "-")
+    said = message_type(REPLY_TYPE)("land: done")
+    assert desk.ground.take(frame(REPLY, REPLY_TYPE, said), 0) == "uav1: land: done"
+    desk.ground.command("hold 9")
+    refused = desk.ground.refused(Refusal(Reason.UNKNOWN, 1, "no station 9"))
+    assert refused == "refused: hold to 9: no station 9"
+    broken = Frame(Kind.SENSING, 5, 0, 1, 1, 0, b"\x05stat")
+    assert "not a message" in desk.ground.take(broken, 0)
+
+
+def test_servers_as_people_write_them() -> None:
+    assert parse_server("10.0.0.2:99") == ("10.0.0.2", 99)
+    assert parse_server("[::1]:99") == ("::1", 99)
+    assert parse_server("base") == ("base", 10200)
+    for wrong in ("base:x", ":1", "base:70000"):
+        with pytest.raises(CommsError, match="HOST:PORT"):
+            parse_server(wrong)
+
+
+@pytest.fixture
+def graph():
+    live = LiveGraph()
+    yield live
+    live.close()
+
+
+def test_uavs_of_a_graph_are_commanded_by_lines_of_another_process(graph) -> None:
+    """Everything there is: a graph's UAVs, a server of its own, `volery gcs` fed through a pipe."""
+    asked = []
+    vehicles = graph.do(lambda: graph.graph.advertise("/volery/vehicles", States))
+
+    def hold(request):
+        asked.append("hold")
+        return Response(True, "holds")
+
+    graph.do(lambda: graph.graph.offer("/uav2/hold", "std_srvs/srv/Trigger", hold))
+
+    def tell():
+        message = States(Header(Time(0, 0), "map"), [state("uav1"), state("uav2")])
+        graph.do(lambda: vehicles.publish(message))
+
+    with served() as (_, port), Doors(graph.gateway) as doors:
+        doors.open(UavStations(port=port))
+        command = [sys.executable, "-m", "volery.cli.app", "gcs", "--server", f"127.0.0.1:{port}"]
+        gcs = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
+        )
+        try:
+            said = [gcs.stdout.readline()]
+            assert "joined as ground station" in said[0]
+            for _ in range(4):
+                tell()
+                time.sleep(0.25)
+            while sum(": HOLD" in line for line in said) < 2:
+                said.append(gcs.stdout.readline())
+            gcs.stdin.write("hold uav2\nland uav1\nnonsense\n")
+            while not any("nonsense" in line for line in said):
+                said.append(gcs.stdout.readline())
+            while sum("uav" in line and ("holds" in line or "land:" in line) for line in said) < 2:
+                said.append(gcs.stdout.readline())
+            rest, _ = gcs.communicate("list\nquit\n", timeout=20.0)
+        finally:
+            gcs.kill()
+            gcs.wait()
+    assert asked == ["hold"]
+    assert "uav2: hold: holds\n" in said
+    assert any(line.startswith("uav1: land: ") for line in said)  # no such service in this graph
+    assert [line.split()[:3] for line in rest.splitlines() if line.startswith("uav")] == [
+        ["uav1", "0.0", "HOLD"],
+        ["uav2", "0.1", "HOLD"],
+    ]
+    assert gcs.returncode == 0
+
+
+def test_the_server_ends_in_good_order() -> None:
+    with served() as (process, _):
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(20.0) == 0
+        assert "stations 0 here" in process.stdout.read()
+
+
+def test_gcs_without_a_server_says_what_to_do() -> None:
+    async def free_port() -> int:
+        server = CommsServer(port=0)
+        await server.start()
+        await server.stop()
+        return server.port
+
+    port = asyncio.run(free_port())
+    command = [sys.executable, "-m", "volery.cli.app", "gcs", "--server", f"127.0.0.1:{port}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, input="")
+    assert done.returncode == 2
+    assert "start one with volery comms" in done.stderr
