@@ -4,8 +4,8 @@ import json
 import re
 
 import pytest
-from asking import until
 from page_browsing import keep_picture
+from truth import until
 from working import WIDE, open_panel
 
 pytestmark = pytest.mark.slow

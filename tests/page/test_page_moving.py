@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from asking import place, put, until, vehicle
 from map_reading import map_canvas, red_circle
 from page_browsing import keep_picture
 from scene_reading import on_screen, project, wait_for_frames, wait_for_picture, wait_until
+from truth import place, put, until, vehicle
 from working import SMALL, inspect, pull
 
 pytestmark = pytest.mark.slow

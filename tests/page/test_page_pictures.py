@@ -5,11 +5,11 @@ import io
 
 import numpy as np
 import pytest
-from asking import until
 from page_browsing import keep_picture
 from page_serving import Served
 from PIL import Image
 from scene_reading import wait_for_picture, wait_until
+from truth import until
 from working import WIDE, pull
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]

@@ -4,9 +4,9 @@ import subprocess
 import sys
 
 import pytest
-from asking import vehicle, weather
 from page_serving import Served
 from scene_reading import on_screen, wait_for_picture, wait_until
+from truth import vehicle, weather
 from working import WIDE, choose, inspect, open_panel, set_slider
 
 from volery.bridges.logs.flights import read_flight

@@ -7,10 +7,10 @@ import urllib.request
 import numpy as np
 import pytest
 import roslibpy
-from asking import place, until, vehicle
 from page_browsing import keep_picture
 from page_serving import Served
 from scene_reading import on_screen, wait_for_picture, wait_until
+from truth import place, until, vehicle
 from working import WIDE, inspect, open_panel
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]

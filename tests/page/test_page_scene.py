@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from asking import put
 from page_browsing import keep_picture
 from scene_reading import eye, on_screen, pixels, wait_for_frames, wait_for_picture, wait_until
+from truth import put
 
 pytestmark = pytest.mark.slow
 

@@ -4,8 +4,8 @@ import re
 
 import pytest
 import roslibpy
-from asking import VEHICLES, stamp_ns, status, vehicle, weather
 from page_browsing import keep_picture
+from truth import VEHICLES, stamp_ns, status, vehicle, weather
 from working import WIDE, inspect, open_panel, set_slider
 
 pytestmark = pytest.mark.slow

@@ -7,11 +7,11 @@ import re
 import numpy as np
 import pytest
 import trimesh
-from asking import put, status, until, vehicle
 from page_browsing import keep_picture
 from page_serving import Served
 from PIL import Image
 from scene_reading import pixels, wait_for_frames, wait_for_picture, wait_until
+from truth import put, status, until, vehicle
 from working import SMALL
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]

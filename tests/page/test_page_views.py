@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from asking import place, put, vehicle
 from page_browsing import keep_picture
 from page_serving import Served
 from scene_reading import eye, pixels, wait_for_frames, wait_for_picture, wait_until
+from truth import place, put, vehicle
 from working import SMALL, press_canvas, pull
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]

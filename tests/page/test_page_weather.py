@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from asking import place, vehicle, weather
 from page_browsing import keep_picture
 from scene_reading import pixels, wait_for_frames, wait_for_picture, wait_until
+from truth import place, vehicle, weather
 from working import SMALL, open_panel, set_slider
 
 pytestmark = pytest.mark.slow

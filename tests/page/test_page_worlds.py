@@ -4,10 +4,10 @@ import json
 import re
 
 import pytest
-from asking import until, vehicle
 from page_browsing import keep_picture
 from page_serving import Served
 from scene_reading import pixels, wait_for_frames, wait_for_picture, wait_until
+from truth import until, vehicle
 from working import SMALL, choose, open_panel, set_slider
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
