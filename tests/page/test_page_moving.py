@@ -6,7 +6,7 @@ from map_reading import map_canvas, red_circle
 from page_browsing import keep_picture
 from scene_reading import on_screen, project, wait_for_frames, wait_for_picture, wait_until
 from truth import place, put, until, vehicle
-from working import SMALL, inspect, pull
+from working import WIDE, inspect, pull
 
 pytestmark = pytest.mark.slow
 
@@ -35,7 +35,7 @@ def page(browsing, served):
     for uav, home in HOMES.items():
         put(served, uav, *home)
         served.call(f"/{uav}/hold", "std_srvs/srv/Trigger")
-    opened = browsing.open(served.url + LOOK, viewport=SMALL)
+    opened = browsing.open(served.url + LOOK, viewport=WIDE)
     wait_for_picture(opened)
     opened.get_by_role("option", name="uav1").wait_for()
     return opened
@@ -174,7 +174,7 @@ def test_new_uavs_stand_where_one_clicks(page, served):
 
 def test_flight_by_gamepad(browsing, served):
     put(served, "uav1", *HOMES["uav1"])
-    page = browsing.open(served.url + LOOK, viewport=SMALL, init_script=PAD)
+    page = browsing.open(served.url + LOOK, viewport=WIDE, init_script=PAD)
     wait_for_picture(page)
     page.get_by_role("option", name="uav1").click()
     page.keyboard.press("c")

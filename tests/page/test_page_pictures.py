@@ -124,7 +124,8 @@ def test_depth_is_near_red_and_far_blue(page, served):
     assert np.ptp(seen[~known], axis=0).max() < 8.0  # what is not known has one colour
     legend = page.locator(".picture-legend").get_attribute("aria-label")
     told = [float(part.split()[0]) for part in legend.split(" to ")]
-    assert told == pytest.approx([least, most], abs=0.3)
+    assert told[0] == pytest.approx(least, abs=0.3)
+    assert told[1] == pytest.approx(most, rel=0.1)  # of another picture, and noise grows with range
 
 
 def test_a_tile_tells_the_rate_at_which_pictures_come(page):
