@@ -1,4 +1,4 @@
-import { Checkbox, Menu, Paper, ActionIcon, ScrollArea, Text, Tooltip } from "@mantine/core";
+import { Menu, Paper, ActionIcon, ScrollArea, Text, Tooltip } from "@mantine/core";
 import { Images } from "lucide-react";
 import { useEffect } from "react";
 import { showPicture, useLayout, type Tile } from "../../state/layout.ts";
@@ -59,23 +59,14 @@ function Chooser({ cameras, chosen }: { cameras: CameraTopic[]; chosen: string[]
         ) : (
           <ScrollArea.Autosize mah={320}>
             {cameras.map(({ name, title }) => (
-              <Menu.Item
+              <Menu.CheckboxItem
                 key={name}
-                onClick={() => showPicture(name, !chosen.includes(name))}
-                leftSection={
-                  <Checkbox
-                    size="xs"
-                    readOnly
-                    tabIndex={-1}
-                    checked={chosen.includes(name)}
-                    aria-hidden
-                  />
-                }
-                aria-checked={chosen.includes(name)}
-                role="menuitemcheckbox"
+                checked={chosen.includes(name)}
+                onChange={(checked) => showPicture(name, checked)}
+                closeMenuOnClick={false}
               >
                 {title}
-              </Menu.Item>
+              </Menu.CheckboxItem>
             ))}
           </ScrollArea.Autosize>
         )}
