@@ -49,6 +49,23 @@ def browsing(chromium):
     assert pages.unexpected() == []
 
 
+@pytest.fixture(scope="module")
+def module_browsing(chromium):
+    """Pages that stay open for all tests of a module; tests take them by `shared`."""
+    pages = Browsing(chromium)
+    yield pages
+    pages.close()
+
+
+@pytest.fixture
+def shared(module_browsing):
+    """A module's own pages: opening one costs seconds, and these tests do not need a fresh one."""
+    yield module_browsing
+    complaints = module_browsing.unexpected()
+    module_browsing.tidy()
+    assert complaints == []
+
+
 @pytest.fixture
 def page(browsing, served):
     """The page of `served`, in a small window."""

@@ -16,7 +16,7 @@ HARMLESS = (
 
 
 class Browsing:
-    """Pages of one test, each in a context of its own, and what they complained of."""
+    """Pages, each in a context of its own, and what they complained of."""
 
     def __init__(self, chromium):
         self._chromium = chromium
@@ -26,7 +26,10 @@ class Browsing:
         """Patterns of complaints that belong to the test."""
 
     def open(self, url, *, viewport=None, init_script=None, **context):
-        """Open a page and wait until it stands; `init_script` runs in it before its own scripts."""
+        """Open a page and wait until it stands; `init_script` runs in it before its own scripts.
+
+        Whoever names no quality looks at no picture: it is drawn as cheaply as can be.
+        """
         opened = self._chromium.new_context(viewport=viewport or SMALL, **context)
         opened.set_default_timeout(60_000)
         self._contexts.append(opened)
@@ -35,7 +38,7 @@ class Browsing:
         page = opened.new_page()
         page.on("console", self._hear)
         page.on("pageerror", lambda error: self.complaints.append(f"uncaught: {error}"))
-        page.goto(url)
+        page.goto(url if "quality=" in url else with_fragment(url, "quality=minimal"))
         page.locator(".page").wait_for()
         return page
 
@@ -47,9 +50,23 @@ class Browsing:
         allowed = re.compile("|".join([*HARMLESS, *self.expected]))
         return [complaint for complaint in self.complaints if not allowed.search(complaint)]
 
+    def tidy(self):
+        """Close what floats over the pages, so that the next test finds them as this one did."""
+        for context in self._contexts:
+            for page in context.pages:
+                page.keyboard.press("Escape")
+                page.keyboard.press("Escape")
+        self.complaints.clear()
+        self.expected.clear()
+
     def close(self):
         for context in self._contexts:
             context.close()
+
+
+def with_fragment(url, parameter):
+    """The address with one more parameter behind its #."""
+    return f"{url}{'&' if '#' in url else '#'}{parameter}"
 
 
 def keep_picture(page, name):

@@ -26,9 +26,14 @@ def served(recordings, chromium):
         yield server
 
 
+@pytest.fixture(scope="module")
+def opened(module_browsing, served):
+    return module_browsing.open(served.url, viewport=WIDE)
+
+
 @pytest.fixture
-def page(browsing, served):
-    return browsing.open(served.url, viewport=WIDE)
+def page(opened, shared):
+    return opened
 
 
 def number(text):
@@ -133,19 +138,26 @@ def test_a_wrong_fault_tells_why(page):
     page.get_by_text("The fault was refused").wait_for()
 
 
-def test_a_flight_is_recorded_listed_and_fetched(page, recordings):
+@pytest.mark.parametrize("name", ["from_the_page.mcap", "from_the_page.bag"])
+def test_a_flight_is_recorded_listed_fetched_and_brought_again(page, recordings, name):
     panel = open_panel(page, "Recordings")
-    panel.get_by_label("Name of the recording").fill("from_the_page")
+    panel.get_by_label("Name of the recording").fill(name)
     panel.get_by_role("button", name="Record", exact=True).click()
     panel.get_by_role("button", name="Stop").wait_for()
     page.wait_for_timeout(1000)
     panel.get_by_role("button", name="Stop").click()
-    row = panel.get_by_role("row", name=re.compile("from_the_page.mcap"))
+    row = panel.get_by_role("row", name=re.compile(f"^{name}"))
     row.wait_for()
     with page.expect_download() as kept:
-        row.get_by_role("link", name="Download from_the_page.mcap").click()
-    assert kept.value.path().read_bytes() == (recordings / "from_the_page.mcap").read_bytes()
+        row.get_by_role("link", name=f"Download {name}").click()
+    content = kept.value.path().read_bytes()
+    assert content == (recordings / name).read_bytes()
     keep_picture(page, "recordings")
+    with page.expect_file_chooser() as chosen:
+        panel.get_by_role("button", name="Bring a log").click()
+    chosen.value.set_files({"name": f"brought_{name}", "mimeType": "", "buffer": content})
+    panel.get_by_role("button", name=f"Play brought_{name}").wait_for()
+    assert (recordings / f"brought_{name}").read_bytes() == content
 
 
 def test_the_meter_tells_age_load_and_memory(page):
@@ -165,8 +177,8 @@ def test_the_layout_is_kept_for_the_next_visit(page):
     assert json.loads(page.evaluate("localStorage.getItem('volery.layout')"))["bottom"] == "log"
 
 
-def test_a_recording_is_played_with_a_slider_and_left_again(page, served, browsing):
-    browsing.expected += ["WebSocket connection", "Failed to load"]  # while the worlds change
+def test_a_recording_is_played_with_a_slider_and_left_again(page, served, shared):
+    shared.expected += ["WebSocket connection", "Failed to load"]  # while the worlds change
     panel = open_panel(page, "Recordings")
     panel.get_by_label("Name of the recording").fill("to_be_played")
     panel.get_by_role("button", name="Record", exact=True).click()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from page_browsing import keep_picture
-from scene_reading import eye, wait_for_frames, wait_for_picture
+from scene_reading import eye, wait_for_frames, wait_for_picture, wait_until
 
 from volery.runtime.worlds import build_city, build_forest, build_terrain
 from volery.scenario.load import load_scenario
@@ -13,6 +13,10 @@ pytestmark = pytest.mark.slow
 SCENARIO = "forest_procedural"
 MOST_DRAW_CALLS = 250
 SMALL = {"width": 480, "height": 270}
+CAMERAS = {
+    "minimal": ("250_250_2_0.5_0_0", "250_250_30_2_-0.4_0", "-60_250_80_0_-0.3_0"),
+    "medium": ("250_250_2_0.5_0_0",),  # shadows cost software half a minute a view
+}
 
 
 @pytest.fixture(scope="module")
@@ -22,19 +26,24 @@ def forest():
     return build_forest(scenario, terrain, build_city(scenario, terrain))
 
 
-@pytest.mark.parametrize(
-    "camera", ["250_250_2_0.5_0_0", "250_250_30_2_-0.4_0", "-60_250_80_0_-0.3_0"]
-)
-@pytest.mark.parametrize("quality", ["minimal", "medium"])
-def test_draw_calls_of_five_thousand_trees(browsing, served, forest, camera, quality):
+@pytest.mark.parametrize("quality", CAMERAS)
+def test_draw_calls_of_five_thousand_trees(browsing, served, forest, quality):
     assert len(forest.position_map) >= 5000
-    page = browsing.open(f"{served.url}#view=fly&quality={quality}&camera={camera}", viewport=SMALL)
-    wait_for_picture(page)
-    wait_for_frames(page, 3)
-    told = page.evaluate("window.volery")
-    keep_picture(page, f"forest_{quality}_{camera.split('_')[2]}")
-    assert 0 < told["drawCalls"] <= MOST_DRAW_CALLS
-    assert told["triangles"] > 5000  # trees are in it
+    page = None
+    for camera in CAMERAS[quality]:
+        url = f"{served.url}#view=fly&quality={quality}&camera={camera}"
+        if page is None:
+            page = browsing.open(url, viewport=SMALL)
+            wait_for_picture(page)
+        else:
+            page.goto(url)
+        place = [float(number) for number in camera.split("_")[:3]]
+        wait_until(page, lambda page, place=place: np.allclose(eye(page), place, atol=0.1))
+        wait_for_frames(page, 3)
+        told = page.evaluate("window.volery")
+        keep_picture(page, f"forest_{quality}_{camera.split('_')[2]}")
+        assert 0 < told["drawCalls"] <= MOST_DRAW_CALLS
+        assert told["triangles"] > 5000  # trees are in it
 
 
 def test_a_walker_is_stopped_by_a_trunk(browsing, served, forest):

@@ -11,6 +11,7 @@ import pytest
 from page_browsing import keep_picture
 from page_serving import Served
 from reverse_proxy import ReverseProxy
+from truth import until
 
 pytestmark = pytest.mark.slow
 
@@ -160,3 +161,8 @@ def test_256_uavs(browsing, tmp_path):
         row.locator("[data-path='pose.pose.position.z']").wait_for()
         keep_picture(page, "256_uavs")
         assert page.evaluate("window.volery.uavs().length") == 256
+        page.get_by_label("Search UAVs").fill("uav25")
+        rows = page.get_by_role("option")
+        until(lambda: rows.count() == 8)  # 25 and 250 to 256
+        rows.last.click()
+        page.get_by_role("option", name="uav256", selected=True).wait_for()

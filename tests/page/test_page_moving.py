@@ -1,5 +1,7 @@
 """Hands move UAVs: handles in the scene, clicks on map and ground, a gamepad."""
 
+import re
+
 import numpy as np
 import pytest
 from map_reading import map_canvas, red_circle
@@ -30,15 +32,90 @@ def served(chromium):
         yield server
 
 
+@pytest.fixture(scope="module")
+def opened(module_browsing, served):
+    page = module_browsing.open(served.url + LOOK, viewport=WIDE)
+    wait_for_picture(page)
+    return page
+
+
 @pytest.fixture
-def page(browsing, served):
+def homes(served):
+    """All UAVs at their places."""
     for uav, home in HOMES.items():
         put(served, uav, *home)
         served.call(f"/{uav}/hold", "std_srvs/srv/Trigger")
-    opened = browsing.open(served.url + LOOK, viewport=WIDE)
-    wait_for_picture(opened)
-    opened.get_by_role("option", name="uav1").wait_for()
+
+
+@pytest.fixture
+def page(opened, shared, served, homes):
+    opened.goto(served.url + LOOK)  # only its part behind the # may be another one
+    opened.get_by_role("option", name="uav1").click()
     return opened
+
+
+# -------------------------------------------------------------------------------- gamepad
+
+
+def test_flight_by_gamepad(browsing, served, homes):
+    page = browsing.open(served.url + LOOK, viewport=WIDE, init_script=PAD)
+    wait_for_picture(page)
+    page.get_by_role("option", name="uav1").click()
+    page.keyboard.press("c")
+    hands = page.get_by_role("group", name="Flight by hand")
+    hands.get_by_text("gamepad").wait_for()
+    page.evaluate("window.pad.axes = [0, 0, 0, -1]")  # the right stick ahead
+    ahead = vehicle(served, "uav1", lambda uav: uav["velocity"]["x"] > 1.5)
+    assert ahead["mode"] == "VELOCITY"
+    page.evaluate("window.pad.axes = [0, -1, 0, 0]")  # the left stick up
+    vehicle(served, "uav1", lambda uav: uav["velocity"]["z"] > 0.7)
+    x, _, z = place(served, "uav1")
+    wait_until(page, lambda page: on_screen(page, "uav1")["position"][2] > z)
+    assert x > HOMES["uav1"][0] + 0.5
+    page.evaluate("window.pad.axes = [-1, 0, 0, 0]")  # the left stick to the left
+    turning = vehicle(served, "uav1", lambda uav: abs(uav["velocity"]["z"]) < 0.2)
+    assert turning["mode"] == "VELOCITY"
+    until(lambda: heading(served, "uav1") > 0.5, what="it did not turn left")
+    page.evaluate("window.pad.axes = [0.05, -0.05, 0.05, 0.05]")  # within the dead zone
+    vehicle(served, "uav1", lambda uav: np.hypot(*list(uav["velocity"].values())[:2]) < 0.2)
+    keep_picture(page, "gamepad")
+
+
+def heading(served, uav):
+    """rad, counter-clockwise from east."""
+    request = {"entity": uav}
+    told = served.call("/get_entity_state", "simulation_interfaces/srv/GetEntityState", request)
+    turned = told["state"]["pose"]["orientation"]
+    return 2.0 * np.arctan2(turned["z"], turned["w"])
+
+
+def circle_of(page, uav):
+    """Where the red circle is once this UAV is selected."""
+    page.get_by_role("option", name=uav).click()
+    page.get_by_role("option", name=uav, selected=True).wait_for()
+    page.wait_for_timeout(300)  # the map draws fifteen times a second
+    return wait_until(page, lambda page: red_circle(page) is not None) and red_circle(page)
+
+
+def test_the_map_zooms_follows_and_shows_all(browsing, served, homes):
+    page = browsing.open(served.url + LOOK, viewport=WIDE)
+    page.get_by_role("option", name="uav1").wait_for()
+    before = {uav: circle_of(page, uav) for uav in ("uav1", "uav3")}
+    apart = np.linalg.norm(before["uav3"] - before["uav1"])
+    map_canvas(page).focus()
+    page.keyboard.press("+")
+    wait_until(page, lambda page: np.linalg.norm(red_circle(page) - before["uav3"]) > 3.0)
+    closer = np.linalg.norm(circle_of(page, "uav1") - circle_of(page, "uav3"))
+    assert closer == pytest.approx(1.4 * apart, rel=0.1)
+    box = map_canvas(page).bounding_box()
+    middle = [box["width"] / 2, box["height"] / 2]
+    page.get_by_role("button", name="Follow the selected UAV").click()
+    wait_until(page, lambda page: np.linalg.norm(red_circle(page) - middle) < 3.0)
+    page.get_by_role("button", name="Show all").click()
+    wait_until(page, lambda page: np.linalg.norm(red_circle(page) - before["uav3"]) < 3.0)
+
+
+# ---------------------------------------------------------------------------------- places
 
 
 def near(seen, wanted, metres):
@@ -99,14 +176,6 @@ def test_without_the_handles_a_drag_only_turns_the_view(page, served):
 # ------------------------------------------------------------------------------------ map
 
 
-def circle_of(page, uav):
-    """Where the red circle is once this UAV is selected."""
-    page.get_by_role("option", name=uav).click()
-    page.get_by_role("option", name=uav, selected=True).wait_for()
-    page.wait_for_timeout(300)  # the map draws fifteen times a second
-    return wait_until(page, lambda page: red_circle(page) is not None) and red_circle(page)
-
-
 def test_the_map_circles_the_selected_uav_and_a_click_sends_it(page, served):
     circles = {uav: circle_of(page, uav) for uav in ("uav2", "uav3", "uav1")}
     way = np.subtract(HOMES["uav3"], HOMES["uav1"])[:2]
@@ -127,22 +196,6 @@ def test_the_map_circles_the_selected_uav_and_a_click_sends_it(page, served):
     x, y = circles["uav2"]
     map_canvas(page).click(position={"x": float(x), "y": float(y)})
     page.get_by_role("option", name="uav2", selected=True).wait_for()
-
-
-def test_the_map_zooms_follows_and_shows_all(page):
-    before = {uav: circle_of(page, uav) for uav in ("uav1", "uav3")}
-    apart = np.linalg.norm(before["uav3"] - before["uav1"])
-    map_canvas(page).focus()
-    page.keyboard.press("+")
-    wait_until(page, lambda page: np.linalg.norm(red_circle(page) - before["uav3"]) > 3.0)
-    closer = np.linalg.norm(circle_of(page, "uav1") - circle_of(page, "uav3"))
-    assert closer == pytest.approx(1.4 * apart, rel=0.1)
-    box = map_canvas(page).bounding_box()
-    middle = [box["width"] / 2, box["height"] / 2]
-    page.get_by_role("button", name="Follow the selected UAV").click()
-    wait_until(page, lambda page: np.linalg.norm(red_circle(page) - middle) < 3.0)
-    page.get_by_role("button", name="Show all").click()
-    wait_until(page, lambda page: np.linalg.norm(red_circle(page) - before["uav3"]) < 3.0)
 
 
 def test_a_click_on_the_ground_sends_the_selected_uav(page, served):
@@ -169,40 +222,22 @@ def test_new_uavs_stand_where_one_clicks(page, served):
     page.get_by_role("option", name="uav4").wait_for(state="detached")
 
 
-# -------------------------------------------------------------------------------- gamepad
+# --------------------------------------------------------------------------------- crashes
 
 
-def test_flight_by_gamepad(browsing, served):
-    put(served, "uav1", *HOMES["uav1"])
-    page = browsing.open(served.url + LOOK, viewport=WIDE, init_script=PAD)
-    wait_for_picture(page)
-    page.get_by_role("option", name="uav1").click()
-    page.keyboard.press("c")
-    hands = page.get_by_role("group", name="Flight by hand")
-    hands.get_by_text("gamepad").wait_for()
-    page.evaluate("window.pad.axes = [0, 0, 0, -1]")  # the right stick ahead
-    ahead = vehicle(served, "uav1", lambda uav: uav["velocity"]["x"] > 1.5)
-    assert ahead["mode"] == "VELOCITY"
-    page.evaluate("window.pad.axes = [0, -1, 0, 0]")  # the left stick up
-    vehicle(served, "uav1", lambda uav: uav["velocity"]["z"] > 0.7)
-    x, _, z = place(served, "uav1")
-    wait_until(page, lambda page: on_screen(page, "uav1")["position"][2] > z)
-    assert x > HOMES["uav1"][0] + 0.5
-    page.evaluate("window.pad.axes = [-1, 0, 0, 0]")  # the left stick to the left
-    turning = vehicle(served, "uav1", lambda uav: abs(uav["velocity"]["z"]) < 0.2)
-    assert turning["mode"] == "VELOCITY"
-    until(lambda: heading(served, "uav1") > 0.5, what="it did not turn left")
-    page.evaluate("window.pad.axes = [0.05, -0.05, 0.05, 0.05]")  # within the dead zone
-    vehicle(served, "uav1", lambda uav: np.hypot(*list(uav["velocity"].values())[:2]) < 0.2)
-    keep_picture(page, "gamepad")
-
-
-def heading(served, uav):
-    """rad, counter-clockwise from east."""
-    request = {"entity": uav}
-    told = served.call("/get_entity_state", "simulation_interfaces/srv/GetEntityState", request)
-    turned = told["state"]["pose"]["orientation"]
-    return 2.0 * np.arctan2(turned["z"], turned["w"])
+def test_smoke_rises_from_a_crash(page, served):
+    page.get_by_role("option", name="uav2").click()
+    put(served, "uav3", 3.0, 2.0, 3.0)  # in the free part of the picture
+    at = place(served, "uav3")
+    served.call("/uav3/stop", "std_srvs/srv/Trigger")
+    vehicle(served, "uav3", lambda uav: uav["crashed"])
+    page.get_by_role("option", name=re.compile("uav3.*crashed", re.DOTALL)).wait_for()
+    wait_until(page, lambda page: on_screen(page, "uav3")["position"][2] < at[2] - 1.0)
+    x, y = (int(value) for value in project(page, np.add(place(served, "uav3"), [0, 0, 1.5])))
+    box = {"x": x - 20, "y": y - 20, "width": 40, "height": 40}
+    first = page.screenshot(clip=box)
+    wait_until(page, lambda page: page.screenshot(clip=box) != first)
+    keep_picture(page, "crash")
 
 
 # --------------------------------------------------------------------------------- orders

@@ -59,13 +59,18 @@ def served(chromium, tmp_path_factory):
         yield server
 
 
+@pytest.fixture(scope="module")
+def opened(module_browsing, served):
+    page = module_browsing.open(served.url, viewport=WIDE)
+    page.get_by_role("option", name="uav1").wait_for()
+    wait_for_picture(page)
+    page.keyboard.press("p")
+    page.keyboard.press("m")
+    return page
+
+
 @pytest.fixture
-def page(browsing, served):
-    opened = browsing.open(served.url + "#quality=minimal", viewport=WIDE)
-    opened.get_by_role("option", name="uav1").wait_for()
-    wait_for_picture(opened)
-    opened.keyboard.press("p")
-    opened.keyboard.press("m")
+def page(opened, shared):
     return opened
 
 

@@ -2,6 +2,7 @@
 
 import pytest
 from page_browsing import keep_picture
+from working import tab_to
 
 pytestmark = pytest.mark.slow
 
@@ -57,12 +58,7 @@ def test_panels_work_by_keyboard_alone(browsing, served):
     page.keyboard.press("Enter")
     filter_ = page.get_by_label("Filter topics")
     filter_.wait_for()
-    for _ in range(60):
-        if filter_.evaluate("element => element === document.activeElement"):
-            break
-        page.keyboard.press("Tab")
-    else:
-        raise AssertionError("the filter cannot be reached by Tab")
+    tab_to(page, filter_)
     page.keyboard.type("uav1/odom")
     row = page.get_by_role("listitem", name="/uav1/odom", exact=True)
     row.wait_for()

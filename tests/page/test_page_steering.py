@@ -5,10 +5,12 @@ import re
 import pytest
 import roslibpy
 from page_browsing import keep_picture
-from truth import VEHICLES, stamp_ns, status, vehicle, weather
-from working import WIDE, inspect, open_panel, set_slider
+from truth import VEHICLES, place, put, stamp_ns, status, vehicle, weather
+from working import WIDE, inspect, open_panel, set_slider, tab_to
 
 pytestmark = pytest.mark.slow
+
+PHONE = {"width": 390, "height": 844}
 
 
 @pytest.fixture(scope="module")
@@ -20,11 +22,34 @@ def served(tmp_path_factory, chromium):
         yield server
 
 
+@pytest.fixture(scope="module")
+def opened(module_browsing, served):
+    page = module_browsing.open(served.url, viewport=WIDE)
+    page.get_by_role("option", name="uav1").wait_for()
+    return page
+
+
 @pytest.fixture
-def page(browsing, served):
-    opened = browsing.open(served.url, viewport=WIDE)
-    opened.get_by_role("option", name="uav1").wait_for()
+def page(opened, shared):
     return opened
+
+
+def test_thumbs_fly_on_a_screen_that_is_touched(browsing, served):
+    vehicle(served, "uav2", lambda uav: uav["airborne"])
+    page = browsing.open(served.url + "#uav=uav2", viewport=PHONE, has_touch=True)
+    page.get_by_role("button", name="Fly by hand").click()
+    hands = page.get_by_role("group", name="Flight by hand")
+    stick = hands.get_by_role("application", name=re.compile("^Ahead"))
+    box = stick.bounding_box()
+    middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    before = place(served, "uav2")[0]
+    page.mouse.move(*middle)
+    page.mouse.down()
+    page.mouse.move(middle[0], box["y"])
+    vehicle(served, "uav2", lambda uav: uav["position"]["x"] > before + 1.0)
+    keep_picture(page, "sticks")
+    page.mouse.up()
+    vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["x"]) < 0.2)
 
 
 # ------------------------------------------------------------------------------------------- time
@@ -95,6 +120,16 @@ def test_orders_and_a_place_to_go_to(page, served):
     keep_picture(page, "inspector")
 
 
+def test_return_brings_a_uav_home(page, served):
+    vehicle(served, "uav2", lambda uav: uav["mode"] == "HOLD")
+    home = place(served, "uav2")
+    put(served, "uav2", home[0] + 4.0, home[1], home[2])
+    inspect(page, "uav2").get_by_role("button", name="Return", exact=True).click()
+    vehicle(served, "uav2", lambda uav: uav["mode"] == "RETURN")
+    vehicle(served, "uav2", lambda uav: abs(uav["position"]["x"] - home[0]) < 0.5)
+    served.call("/uav2/hold", "std_srvs/srv/Trigger")
+
+
 def test_a_kill_is_asked_twice(page, served):
     panel = inspect(page, "uav3")
     vehicle(served, "uav3", lambda uav: uav["airborne"])
@@ -118,6 +153,23 @@ def test_flight_by_keyboard(page, served):
     page.keyboard.press("Escape")
     page.get_by_role("group", name="Flight by hand").wait_for(state="hidden")
     assert ahead["position"]["x"] > flying["position"]["x"]
+
+
+def test_a_uav_is_chosen_and_flown_without_a_mouse(page, served):
+    vehicle(served, "uav2", lambda uav: uav["mode"] in ("HOLD", "VELOCITY"))
+    before = place(served, "uav2")
+    page.get_by_role("option", name="uav1").click()
+    tab_to(page, page.get_by_role("listbox", name="UAVs"))
+    page.keyboard.press("ArrowDown")
+    page.get_by_role("option", name="uav2", selected=True).wait_for()
+    page.keyboard.press("c")
+    page.get_by_role("group", name="Flight by hand").wait_for()
+    page.keyboard.down("KeyR")
+    vehicle(served, "uav2", lambda uav: uav["position"]["z"] > before[2] + 1.0)
+    page.keyboard.up("KeyR")
+    vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["z"]) < 0.2)
+    page.keyboard.press("Escape")
+    page.get_by_role("group", name="Flight by hand").wait_for(state="hidden")
 
 
 def test_uavs_come_and_go(page, served):
@@ -160,6 +212,12 @@ def test_weather_follows_its_sliders(page, served):
     set_slider(page, "Fog", "End", 1)
     weather(served, lambda told: told["fog_visibility"] == pytest.approx(10.0))
     page.get_by_label("Fog now").get_by_text("10 m").wait_for()
+    set_slider(page, "Snow", "ArrowRight", 2)
+    set_slider(page, "Dust", "End", 1)
+    set_slider(page, "Turbulence", "ArrowRight", 6)
+    told = weather(served, lambda told: told["w20"] == pytest.approx(3.0))
+    assert told["snow"] > 0.0
+    assert 0.0 < told["dust_visibility"] < 1000.0
     set_slider(page, "Wind", "ArrowRight", 6)
     told = weather(served, lambda told: told["wind"]["y"] == pytest.approx(-3.0))  # from the north
     assert told["rain"] == pytest.approx(8.0)
@@ -167,8 +225,8 @@ def test_weather_follows_its_sliders(page, served):
     weather(served, lambda told: told["rain"] == told["fog_visibility"] == 0.0)
 
 
-def test_a_wrong_upload_is_answered_with_the_reason(page, browsing):
-    browsing.expected += ["422"]
+def test_a_wrong_upload_is_answered_with_the_reason(page, shared):
+    shared.expected += ["422"]
     page.get_by_role("button", name=re.compile("choose another one")).click()
     page.locator("input[type=file]").set_input_files(
         {"name": "field.csv", "mimeType": "text/csv", "buffer": b"0,1\n1,x\n"}
@@ -180,8 +238,8 @@ def test_a_wrong_upload_is_answered_with_the_reason(page, browsing):
     assert "field.csv" in refused.inner_text()
 
 
-def test_a_map_is_uploaded_and_flown_without_a_new_page(page, browsing, served):
-    browsing.expected += ["WebSocket connection", "Failed to load"]  # while the worlds change
+def test_a_map_is_uploaded_and_flown_without_a_new_page(page, shared, served):
+    shared.expected += ["WebSocket connection", "Failed to load"]  # while the worlds change
     page.evaluate("window.samePage = true")
     page.get_by_role("button", name=re.compile("choose another one")).click()
     rows = "\n".join(

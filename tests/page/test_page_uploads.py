@@ -94,13 +94,19 @@ def served(chromium, tmp_path_factory):
         yield server
 
 
-@pytest.fixture
-def page(browsing, served):
-    browsing.expected += ["WebSocket connection", "Failed to load", "422", "415", "503"]
-    page = browsing.open(served.url + LOOK, viewport=SMALL)
+@pytest.fixture(scope="module")
+def opened(module_browsing, served):
+    page = module_browsing.open(served.url + LOOK, viewport=SMALL)
     wait_for_picture(page)
     page.keyboard.press("m")  # the map lies over the sky
     return page
+
+
+@pytest.fixture
+def page(opened, shared, served):
+    shared.expected += ["WebSocket connection", "Failed to load", "422", "415", "503"]
+    opened.goto(served.url + LOOK)  # its part behind the #: where one looks from
+    return opened
 
 
 def bring(page, name, kind, content):

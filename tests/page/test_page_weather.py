@@ -12,11 +12,17 @@ pytestmark = pytest.mark.slow
 LOOK = "#view=fly&camera=-30_0_2.5_0_-0.12_0&quality=low"
 
 
-@pytest.fixture
-def page(browsing, served):
-    page = browsing.open(served.url + LOOK, viewport=SMALL)
+@pytest.fixture(scope="module")
+def opened(module_browsing, served):
+    page = module_browsing.open(served.url + LOOK, viewport=SMALL)
     wait_for_picture(page)
     page.keyboard.press("m")
+    return page
+
+
+@pytest.fixture
+def page(opened, shared, served):
+    page = opened
     open_panel(page, "Environment").get_by_role("button", name="Calm and clear").click()
     weather(served, lambda told: told["rain"] == told["snow"] == told["fog_visibility"] == 0.0)
     set_slider(page, "Hour of day", "Home")

@@ -56,13 +56,19 @@ def served(chromium, tmp_path_factory):
         yield server
 
 
-@pytest.fixture
-def page(browsing, served):
-    browsing.expected += ["WebSocket connection", "Failed to load", "503"]  # while worlds change
-    page = browsing.open(served.url + LOOK, viewport=SMALL)
+@pytest.fixture(scope="module")
+def opened(module_browsing, served):
+    page = module_browsing.open(served.url + LOOK, viewport=SMALL)
     wait_for_picture(page)
     page.keyboard.press("m")
     return page
+
+
+@pytest.fixture
+def page(opened, shared, served):
+    shared.expected += ["WebSocket connection", "Failed to load", "503"]  # while worlds change
+    opened.goto(served.url + LOOK)
+    return opened
 
 
 def start(page, served, name, work=lambda dialog: None):

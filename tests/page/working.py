@@ -43,6 +43,15 @@ def pull(page, start, end, steps=8):
     page.mouse.up()
 
 
+def tab_to(page, element, most=60):
+    """Give the keyboard to an element as a hand without a mouse does."""
+    for _ in range(most):
+        if element.evaluate("element => element === document.activeElement"):
+            return
+        page.keyboard.press("Tab")
+    raise AssertionError(f"{element} cannot be reached by Tab")
+
+
 def press_canvas(page):
     """Give the keyboard to the scene, so that views hear the keys."""
     page.get_by_label("Scene", exact=True).locator("canvas").focus()

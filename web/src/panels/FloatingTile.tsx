@@ -16,6 +16,8 @@ interface FloatingTileProps {
   name: string;
   title: string;
   usual: Tile;
+  /** Of the scene's width, until somebody has placed the tile. */
+  mostShare?: number;
   /** Width over height of what is in it. */
   aspect: number;
   actions?: ReactNode;
@@ -25,17 +27,20 @@ interface FloatingTileProps {
 
 /** A small window over the scene: drag its title, pull its corner, or use the keys on the title. */
 export function FloatingTile(props: FloatingTileProps) {
-  const { name, title, usual, aspect, actions, onClose, children } = props;
-  const tile = useLayout((layout) => layout.tiles[name]) ?? usual;
+  const { name, title, usual, mostShare = 1, aspect, actions, onClose, children } = props;
+  const placed = useLayout((layout) => layout.tiles[name]);
+  const tile = placed ?? usual;
   const box = useRef<HTMLDivElement>(null);
   const grip = useRef<{ x: number; y: number; tile: Tile } | null>(null);
   const inFront = useFront((front) => front.name === name);
+  /** As it is on the screen: narrow scenes make unplaced tiles smaller. */
+  const present = () => ({ ...tile, width: box.current?.offsetWidth ?? tile.width });
   const raise = () => useFront.setState({ name });
   const place = (next: Tile) => placeTile(name, clamped(next));
   const begin = (event: PointerEvent) => {
     if ((event.target as HTMLElement).closest("button") !== null) return;
     event.currentTarget.setPointerCapture(event.pointerId);
-    grip.current = { x: event.clientX, y: event.clientY, tile };
+    grip.current = { x: event.clientX, y: event.clientY, tile: present() };
   };
   const end = () => (grip.current = null);
   const drag = (event: PointerEvent) => {
@@ -64,7 +69,7 @@ export function FloatingTile(props: FloatingTileProps) {
     if (step === undefined || event.target !== event.currentTarget) return;
     event.preventDefault();
     event.stopPropagation();
-    place({ ...tile, ...step });
+    place({ ...present(), ...step });
   };
   return (
     <Paper
@@ -74,7 +79,7 @@ export function FloatingTile(props: FloatingTileProps) {
       withBorder
       role="group"
       aria-label={title}
-      style={{ ...styleOf(tile), width: tile.width }}
+      style={{ ...styleOf(tile), width: placed?.width ?? narrowed(usual.width, mostShare) }}
       data-front={inFront || undefined}
       onPointerDownCapture={raise}
       onFocusCapture={raise}
@@ -100,12 +105,12 @@ export function FloatingTile(props: FloatingTileProps) {
           <TileButton
             label={`${title}: smaller`}
             icon={<Minus size={14} />}
-            press={() => place({ ...tile, width: tile.width - STEP_PX })}
+            press={() => place({ ...tile, width: present().width - STEP_PX })}
           />
           <TileButton
             label={`${title}: larger`}
             icon={<Plus size={14} />}
-            press={() => place({ ...tile, width: tile.width + STEP_PX })}
+            press={() => place({ ...tile, width: present().width + STEP_PX })}
           />
           {onClose !== undefined && (
             <TileButton label={`Close ${title}`} icon={<X size={14} />} press={onClose} />
@@ -150,6 +155,11 @@ function styleOf({ x, y }: Tile): React.CSSProperties {
     top: `${100 * y}%`,
     transform: `translate(${-100 * x}%, ${-100 * y}%)`,
   };
+}
+
+/** CSS width of so many pixels, or less where the scene is narrow. */
+function narrowed(width: number, mostShare: number): string {
+  return `max(${LEAST_PX}px, min(${width}px, ${100 * mostShare}%))`;
 }
 
 function clamped({ x, y, width }: Tile): Tile {

@@ -45,11 +45,21 @@ export async function choices(): Promise<Choices> {
   return await order<Choices>("/volery/get_choices", "volery_interfaces/srv/GetChoices", {});
 }
 
+/** What this page has last had flown, and with what. */
+let last: { scenario: string; changes: ScenarioChanges } | null = null;
+
 /** Build a world and fly it in place of the present one; the link is made anew meanwhile. */
 export async function loadScenario(scenario: string, changes: ScenarioChanges): Promise<void> {
   const request = { scenario, changes: JSON.stringify(changes) };
   const type = "volery_interfaces/srv/LoadScenario";
   await order("/volery/load_scenario", type, request, LOAD_TIMEOUT_S);
+  last = { scenario, changes };
+}
+
+/** The same world with more changes; those with which this page has started it stay. */
+export async function rebuildScenario(scenario: string, more: ScenarioChanges): Promise<void> {
+  const kept = last?.scenario === scenario ? last.changes : {};
+  await loadScenario(scenario, { ...kept, ...more });
 }
 
 export const UPLOAD_KINDS = ["grid_map", "city", "mesh", "forest"] as const;

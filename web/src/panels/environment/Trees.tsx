@@ -1,6 +1,6 @@
 import { Button, Group, NumberInput, Text } from "@mantine/core";
 import { useState } from "react";
-import { loadScenario } from "../../link/commands.ts";
+import { rebuildScenario } from "../../link/commands.ts";
 import { succeeds } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { useSimulation } from "../../state/simulation.ts";
@@ -18,7 +18,7 @@ export function Trees() {
   const build = async () => {
     setBusy(true);
     const changes = { tree_density_per_ha: Number(density) };
-    await succeeds("Trees", loadScenario(scenario, changes));
+    await succeeds("Trees", rebuildScenario(scenario, changes));
     setBusy(false);
   };
   return (

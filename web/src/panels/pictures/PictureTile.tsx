@@ -8,6 +8,8 @@ import type { CameraTopic } from "./cameraTopics.ts";
 import { usePicture } from "./usePicture.ts";
 
 const LARGE_PX = 360;
+/** Tiles side by side leave one another room in narrow scenes. */
+const MOST_SHARE = 0.25;
 
 /** What one camera sees, how old it is and how often it comes. */
 export function PictureTile({ camera, usual }: { camera: CameraTopic; usual: Tile }) {
@@ -19,6 +21,7 @@ export function PictureTile({ camera, usual }: { camera: CameraTopic; usual: Til
       name={camera.name}
       title={camera.title}
       usual={usual}
+      mostShare={MOST_SHARE}
       aspect={aspect}
       onClose={() => showPicture(camera.name, false)}
     >
