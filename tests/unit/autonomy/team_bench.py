@@ -31,7 +31,7 @@ from volery.graph.zero import zero_message
 S = 1_000_000_000
 AREA = [0.0, 0.0, 80.0, 60.0]
 _NOTHING = np.zeros(36)
-_SPEED_M_S, _LANE_M = 5.0, 8.0
+_SPEED_M_S, _LANE_M, _MOVE_S = 5.0, 8.0, 0.2
 
 
 class Clockwork:
@@ -94,7 +94,7 @@ class FakeUav:
         graph.offer(f"/{name}/hold", "std_srvs/srv/Trigger", lambda _r: trigger(True, ""))
         graph.subscribe(f"/{name}/search_area", self._sweep, "geometry_msgs/msg/PolygonStamped")
         graph.subscribe(f"/{name}/mission/goal_pose", self._go, "geometry_msgs/msg/PoseStamped")
-        bench.clock.every(0.1, self._move)
+        bench.clock.every(_MOVE_S, self._move)
 
     def _sweep(self, published: Published) -> None:
         corners = published.message.polygon.points
@@ -110,7 +110,7 @@ class FakeUav:
         self.way = [np.array([p.x, p.y])]
 
     def _move(self) -> None:
-        step = 0.1 * _SPEED_M_S
+        step = _MOVE_S * _SPEED_M_S
         if self.flies and self.way and not self.stuck:
             to = self.way[0] - self.place[:2]
             away = float(np.linalg.norm(to))
