@@ -314,11 +314,14 @@ def bench(
     markdown: Annotated[
         Path | None, typer.Option(help="Write a page with figures and bounds.")
     ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Shorter, where the bench can: forest_search, load.")
+    ] = False,
 ) -> None:
     """Measure how fast Volery is on this machine."""
     from volery.cli.benching import measure_and_show
 
-    measure_and_show(name, as_json=json, out=out, markdown=markdown)
+    measure_and_show(name, as_json=json, out=out, markdown=markdown, quick=quick)
 
 
 @app.command()
