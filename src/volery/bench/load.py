@@ -1,9 +1,8 @@
 """The bench `load`: what the parts of a search take of a core, by the number of UAVs.
 
-The scenario `forest_search` is flown as fast as possible; figures are percent of one core at real
-time. Nodes are counted by the CPU time of their callbacks, wherever they run; the engine's stages
-by their wall time, on one thread, so that both are the same on a machine that does nothing else.
-The graph's share is that of the stage that hands messages out, less the nodes called in it.
+The scenario `forest_search` is flown as fast as possible on one thread; figures are CPU time in
+percent of one core at real time. Nodes are counted by their callbacks, wherever they run. The
+graph's share is that of the stage that hands messages out, less the nodes that are called in it.
 """
 
 from __future__ import annotations
@@ -36,11 +35,11 @@ def shares(uavs: int, seconds: float) -> dict[str, float]:
     scenario = search_scenario(uavs, 1, _CLIMB_S + seconds + 1.0)
     with Simulation(scenario, threads=1) as simulation:
         simulation.run(_CLIMB_S)
-        nodes, stages = _busy(simulation), simulation.stage_seconds
+        nodes, stages = _busy(simulation), simulation.stage_cpu_s
         began = time.process_time()
         simulation.run(seconds)
         process_s = time.process_time() - began
-        took = {k: v - stages[k] for k, v in simulation.stage_seconds.items()}
+        took = {k: v - stages[k] for k, v in simulation.stage_cpu_s.items()}
         thought = {name: busy - nodes[name] for name, busy in _busy(simulation).items()}
         inline_s = sum(
             busy for name, busy in thought.items() if name not in _with_latency(simulation)

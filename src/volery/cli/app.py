@@ -326,6 +326,29 @@ def bench(
 
 @app.command()
 @guarded
+def report(
+    log: Annotated[Path, typer.Argument(help="A .mcap or .bag log of a simulated flight.")],
+    out: Annotated[Path, typer.Option(help="The folder to write index.html into.")] = Path(
+        "report"
+    ),
+    compare: Annotated[
+        Path | None, typer.Option(help="Log of a real flight, laid over the simulated one.")
+    ] = None,
+    compare_topic: Annotated[
+        str | None,
+        typer.Option(help="Its poses, Odometry or PoseStamped, where there are several."),
+    ] = None,
+    uav: Annotated[str | None, typer.Option(help="UAV to compare with; the first.")] = None,
+) -> None:
+    """Draw the ways of a log, simulated against estimated, with a map of trunks."""
+    from volery.report.way_page import write_log_report
+
+    path = write_log_report(log, out, compare=compare, compare_topic=compare_topic, uav=uav)
+    typer.echo(f"report  {path}")
+
+
+@app.command()
+@guarded
 def identify(
     airframe: Annotated[str, typer.Argument(help="A shipped airframe, or a TOML file.")],
     out: Annotated[Path, typer.Option(help="The data file to write.")],

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_RATE_HZ = 10.0
+_RATE_HZ, _SMOOTHED = 10.0, 5
+_LEAST_COMMON = 0.3
 _LEAST_SPREAD = 1e-12
 
 
@@ -67,16 +68,16 @@ def common_times(one_s: Array, other_s: Array) -> NDArray[np.bool_]:
 def time_shift_s(one_s: Array, one: Array, other_s: Array, other: Array) -> float:
     """What to add to the times of the other way so that both are flown at the same time.
 
-    The shift at which their speeds, ten a second, are most alike (normalised cross-correlation);
-    frames need not agree.
+    The shift at which their speeds, over a second, are most alike (by their correlation, where at
+    least three tenths of the shorter way are in common); frames need not agree.
     """
     mine, theirs = _speeds(one_s, one), _speeds(other_s, other)
+    least = max(round(_LEAST_COMMON * min(len(mine), len(theirs))), 3)
     best, best_lag = -np.inf, 0
-    for lag in range(1 - len(theirs), len(mine)):
+    for lag in range(least - len(theirs), len(mine) - least + 1):
         a = mine[max(lag, 0) : lag + len(theirs)]
         b = theirs[max(-lag, 0) : max(-lag, 0) + len(a)]
-        if len(a) < max(0.3 * min(len(mine), len(theirs)), 2):
-            continue
+        a, b = a - a.mean(), b - b.mean()
         spread = float(np.sqrt((a @ a) * (b @ b)))
         alike = float(a @ b) / spread if spread > _LEAST_SPREAD else -1.0
         if alike > best:
@@ -85,7 +86,11 @@ def time_shift_s(one_s: Array, one: Array, other_s: Array, other: Array) -> floa
 
 
 def _speeds(time_s: Array, places: Array) -> Array:
+    """Ten a second, each over the second that follows, of a way smoothed over half a second."""
     times = np.arange(time_s[0], time_s[-1], 1.0 / _RATE_HZ)
-    steps = np.diff(at_times(time_s, places, times), axis=0)
-    speeds: Array = np.linalg.norm(steps, axis=1) * _RATE_HZ
+    rough = at_times(time_s, places, times)
+    window = np.full(_SMOOTHED, 1.0 / _SMOOTHED)
+    smooth = np.stack([np.convolve(column, window, "valid") for column in rough.T], axis=1)
+    over = round(_RATE_HZ)
+    speeds: Array = np.linalg.norm(smooth[over:] - smooth[:-over], axis=1)
     return speeds

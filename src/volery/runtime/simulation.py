@@ -578,6 +578,11 @@ class Simulation:
         """Wall seconds spent in each stage of the step so far."""
         return dict(self._engine.stage_seconds)
 
+    @property
+    def stage_cpu_s(self) -> dict[str, float]:
+        """CPU seconds of this thread in each stage so far."""
+        return dict(self._engine.stage_cpu_s)
+
     def enable_digest(self) -> None:
         """Fingerprint all states and messages from now on; call before the first step."""
         self.outlet.enable_digest()
