@@ -48,7 +48,7 @@ def figures_of(team: Sequence[Search], alone: Sequence[Search]) -> Measured:
         "distance_m_median": statistics.median(distances),
         "searched_m2": statistics.median(search.searched_m2() for search in team),
         "searched_three_to_one": _three_to_one(team, alone),
-        "targets_found": statistics.mean(len(s.target_errors_m()) for s in team),
+        "targets_found": statistics.fmean(len(s.target_errors_m()) for s in team),
     }
     failures = {}
     if errors:
