@@ -47,7 +47,7 @@ class LaneFlight(GapFlight):
     def __init__(self, **options: Any) -> None:
         super().__init__("lane_flight", **options)
         self._lane_m = float(self.declare_parameter("lane_m", 10.0).value)
-        goal_topic = str(self.declare_parameter("goal_topic", "mission/goal_pose").value)
+        goal_topic = str(self.declare_parameter("goal_topic", "planning/goal").value)
         self._has_begun = False
         self._way: list[Array] = []
         """Waypoints (2,) that are left."""

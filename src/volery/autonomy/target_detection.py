@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from volery.autonomy.scan_points import Pose
 from volery.autonomy.search.colour_blob import ColourRange, colour_mask, largest_blob, pixels_of
 from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
+from volery.autonomy.team.map_poses import MapPoses
 from volery.autonomy.team.sightings import Doubt, Tracks, sighting_of
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
@@ -20,6 +21,7 @@ from volery.graph.messages import (
     Image,
     Odometry,
     Range,
+    TFMessage,
     header,
     message_type,
     stamp_of,
@@ -44,7 +46,7 @@ class TargetDetection(Node):
     ----------
     camera: name of the camera.
     mount_m, mount_rpy_deg: of the camera in the body, as in a scenario.
-    odometry: topic of the pose in the map.
+    odometry: topic of the pose; corrected: whether `/tf` tells where its frame lies in the map.
     hue_deg: [first, last]; saturation, value: least ones; see `search.colour_blob`.
     share: least share of the picture.
     object_m: height of the targets' middle above the ground.
@@ -53,7 +55,7 @@ class TargetDetection(Node):
 
     """
 
-    STATE = ("_pose", "_range", "_intrinsics", "_tracks")
+    STATE = ("_poses", "_pose", "_range", "_intrinsics", "_tracks")
     """Everything that changes."""
 
     def __init__(self, **options: Any) -> None:
@@ -63,6 +65,8 @@ class TargetDetection(Node):
         self._mount = np.array(declare("mount_m", [0.0, 0.0, 0.0]).value, dtype=np.float64)
         self._turn = [float(a) for a in declare("mount_rpy_deg", [0.0, 0.0, 0.0]).value]
         odometry = str(declare("odometry", "odom").value)
+        if declare("corrected", False).value:
+            self.create_subscription(TFMessage, "/tf", self._on_tf, 50)
         first, last = (float(hue) for hue in declare("hue_deg", list(ColourRange()[:2])).value)
         self._colours = ColourRange(
             first, last, float(declare("saturation", 0.5).value), float(declare("value", 0.2).value)
@@ -74,6 +78,7 @@ class TargetDetection(Node):
             int(declare("sightings", 4).value), spread_m=float(declare("spread_m", 2.0).value)
         )
         self._doubt = Doubt()
+        self._poses = MapPoses()
         self._pose: Pose | None = None
         self._range: tuple[int, float] | None = None
         self._intrinsics: Intrinsics | None = None
@@ -93,8 +98,11 @@ class TargetDetection(Node):
         """Go back to a kept state."""
         put_back(self, state)
 
+    def _on_tf(self, message: TFMessage) -> None:
+        self._poses.on_tf(message)
+
     def _on_odometry(self, message: Odometry) -> None:
-        self._pose = Pose.from_odometry(message)
+        self._pose = self._poses.of(message)
 
     def _on_range(self, message: Range) -> None:
         if math.isfinite(message.range):

@@ -9,47 +9,26 @@ do not hear each other go on, each by itself, until they do again.
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.scan_points import Pose
-from volery.autonomy.team.assignment import Claim, Worker, assign, must_yield
+from volery.autonomy.team.assignment import Claim, assign, must_yield
+from volery.autonomy.team.member import POSE_S, TeamMember
 from volery.autonomy.team.mission_messages import goal_at, polygon_of
-from volery.autonomy.team.reports import ALOFT, Phase, Team
-from volery.autonomy.team.reports import TYPE as REPORT_TYPE
-from volery.autonomy.team.sectors import Coverage, from_bits, to_bits
-from volery.autonomy.team.settings import Settings
-from volery.autonomy.team.target_list import Find, TargetList
+from volery.autonomy.team.reports import ALOFT, Phase
+from volery.autonomy.team.sectors import Coverage
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
-from volery.core.kept import keep, put_back
 from volery.graph.client import Client
-from volery.graph.messages import (
-    BatteryState,
-    Odometry,
-    Point,
-    PolygonStamped,
-    PoseStamped,
-    Vector3,
-    header,
-    message_type,
-    single,
-    time_from_ns,
-)
-from volery.graph.node import Node
+from volery.graph.messages import PolygonStamped, PoseStamped, String, message_type
 
-Array = NDArray[np.float64]
-
-_TARGETS_TYPE = "volery_interfaces/msg/Targets"
-_STATUS_TYPE = "volery_interfaces/msg/MissionStatus"
 _PERIOD_S = 0.2
 _REPEAT_S = 2.0
 """A take-off or landing that has not begun is asked for again."""
-_POSE_S = 1.0
-"""Without odometry for so long it does not know where it is."""
 _RISE_S = 30.0
 """A take-off that takes longer has failed."""
 _RETURN_STUCK_S = 60.0
@@ -59,12 +38,14 @@ _FALLEN_M, _LANDED_M, _STILL_M_S = 0.5, 0.3, 0.2
 """All modelling choices."""
 
 
-class TaskManager(Node):
+class TaskManager(TeamMember):
     """Takes off, has its sectors explored, shares what is found, comes home and lands.
 
     Says `search_area` (where to explore; no corners: nowhere), the goal to fly to on `goal_topic`,
     `mission`, `targets` and, for the radio, `team`. Hears odometry, `battery`,
     `target_detection/targets` and, from the radio, `radio/team`. `~/return_home` ends its search.
+    An explorer may tell on `exploration/status` (JSON with a `state`: searching, then done or
+    blocked) that it is through with an area; else what has been in sight decides.
 
     Parameters
     ----------
@@ -79,119 +60,51 @@ class TaskManager(Node):
     search_s: how long it searches at most; 0: without an end.
     alone_s: after so long without hearing anybody, once it has, it goes home; 0: it goes on.
     gate_m: finds nearer to each other than this are of one thing.
-    odometry: topic of its pose in the map.
+    odometry: topic of its pose; corrected: whether `/tf` tells where its frame lies in the map.
     goal_topic: where goals are published. Not `goal_pose`, to which flight modes fly straight on.
 
     """
 
     STATE = (
-        "phase",
-        "sector",
-        "searched",
-        "targets",
-        "team",
-        "trouble",
-        "_pose",
-        "_pose_ns",
         "_home",
         "_began_ns",
         "_phase_ns",
-        "_since_ns",
-        "_given_up",
-        "_coverage",
-        "_news_ns",
-        "_battery",
         "_asked_ns",
-        "_heard_ns",
         "_nearest_m",
         "_ordered_home",
+        "_explores",
+        *TeamMember.STATE,
     )
-    """Everything that changes."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("task_manager", **options)
-        self.settings = settings = Settings.declare(self)
-        count = len(settings.sectors)
-        self.phase = Phase.WAIT
-        self.sector = -1
-        self.searched = np.zeros(count, np.bool_)
-        self.targets = TargetList(settings.gate_m)
-        self.team = Team(count)
-        self.trouble = ""
-        self._pose: Pose | None = None
-        self._pose_ns = 0
         self._home = np.zeros(3)
         self._began_ns: int | None = None
         self._phase_ns = 0
-        self._since_ns = 0
-        self._given_up = np.zeros(count, np.bool_)
-        self._coverage: Coverage | None = None
-        self._news_ns = 0
-        """When something new was last seen, or home came nearer."""
-        self._battery = math.nan
         self._asked_ns = -1 << 62
-        self._heard_ns = 0
         self._nearest_m = math.inf
+        """To home, so far."""
         self._ordered_home = False
-
-        self._report_type = message_type(REPORT_TYPE)
-        self._targets_type = message_type(_TARGETS_TYPE)
-        self._status_type = message_type(_STATUS_TYPE)
-        self._report = self.create_publisher(self._report_type, "team", 1)
+        self._explores = False
+        """Whether the explorer has taken up the present sector."""
         self._area = self.create_publisher(PolygonStamped, "search_area", 1, latched=True)
-        self._goal = self.create_publisher(PoseStamped, settings.goal_topic, 1, latched=True)
-        self._found = self.create_publisher(self._targets_type, "targets", 1, latched=True)
-        self._status = self.create_publisher(self._status_type, "mission", 1)
+        self._goal = self.create_publisher(PoseStamped, self.settings.goal_topic, 1, latched=True)
         self._take_off = self.create_client("volery_interfaces/srv/TakeOffTo", "take_off_to")
         self._land = self.create_client("std_srvs/srv/Trigger", "land")
         self._hold = self.create_client("std_srvs/srv/Trigger", "hold")
         self.create_service("std_srvs/srv/Trigger", "~/return_home", self._on_return_home)
-        self.create_subscription(Odometry, settings.odometry, self._on_odometry, 5)
-        self.create_subscription(BatteryState, "battery", self._on_battery, 1)
-        self.create_subscription(self._report_type, "radio/team", self._on_report, 20)
-        self.create_subscription(self._targets_type, "target_detection/targets", self._on_finds, 5)
+        self.create_subscription(String, "exploration/status", self._on_explorer, 5)
         self.create_timer(_PERIOD_S, self._on_timer)
 
-    def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
-        return keep(self, self.STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
-        put_back(self, state)
-
-    # ------------------------------------------------------------------------------ what it hears
-
-    @property
-    def _now_ns_here(self) -> int:
-        return self.get_clock().now_ns()
-
-    def _on_odometry(self, message: Odometry) -> None:
-        pose = Pose.from_odometry(message)
-        if not np.isfinite(pose.position).all():
-            return
-        self._pose, self._pose_ns = pose, self._now_ns_here
-        coverage = self._coverage
-        if coverage is not None and coverage.look(pose.position[:2], self.settings.sight_m):
-            self._news_ns = self._pose_ns
-
-    def _on_battery(self, message: BatteryState) -> None:
-        self._battery = float(message.percentage)
-
-    def _on_report(self, report: Any) -> None:
-        now = self._now_ns_here
-        if report.name == self.settings.name or not self.team.hear(report, now):
-            return
-        self._heard_ns = now
-        self.searched |= from_bits(report.searched, len(self.searched))
-        if self.targets.take(map(Find.from_message, report.targets)):
-            self._tell_targets()
-
-    def _on_finds(self, message: Any) -> None:
-        finds = [Find.from_message(each) for each in message.targets]
-        if self.targets.take(f._replace(finder=self.settings.name) for f in finds):
-            self._tell_targets()
-            self._tell_team()  # at once: the others shall know within a second
+    def _on_explorer(self, message: String) -> None:
+        """An explorer that says when it is done with an area, or cannot get on in it."""
+        now, state = self.now_ns, _state_in(message.data)
+        if state == "searching":
+            self._explores = True
+        elif self._explores and self.phase is Phase.SEARCH and state in ("done", "blocked"):
+            self.searched[self.sector] = state == "done"
+            self._given_up[self.sector] |= state == "blocked"
+            self._drop(now)
 
     def _on_return_home(self, _request: Any, response: Any) -> Any:
         self._ordered_home = True
@@ -201,20 +114,20 @@ class TaskManager(Node):
     # ------------------------------------------------------------------------------- what it does
 
     def _on_timer(self) -> None:
-        now, pose = self._now_ns_here, self._pose
+        now, pose = self.now_ns, self._pose
         if pose is None:
             return
         if self._began_ns is None:
             self._began_ns = self._heard_ns = now
             self._home = pose.position.copy()
             self._enter(Phase.WAIT)
-        self.trouble = self._what_is_wrong(now)
-        if now - self._pose_ns > _POSE_S * NS_PER_S and self.phase in ALOFT:
+        self.trouble = self.what_is_wrong(now)
+        if now - self._pose_ns > POSE_S * NS_PER_S and self.phase in ALOFT:
             self._ask_now_and_then(self._hold)
         else:
             self._act(pose, now)
-        self._tell_team()
-        self._tell_status()
+        self.tell_team()
+        self.tell_status()
 
     def _act(self, pose: Pose, now: int) -> None:
         if self.phase in (Phase.SEARCH, Phase.IDLE) and self._must_go_home(now):
@@ -246,7 +159,7 @@ class TaskManager(Node):
     def _choose(self, now: int) -> None:
         """Take the sector that falls to this UAV; go home where none ever will."""
         workers = self.team.workers(now, self.settings.patience_s)
-        workers[self.settings.name] = self._as_worker()
+        workers[self.settings.name] = self.as_worker()
         chosen = assign(workers, self.searched, self.settings.sectors.centres())
         sector = chosen.get(self.settings.name, -1)
         if sector >= 0:
@@ -256,6 +169,7 @@ class TaskManager(Node):
 
     def _begin(self, sector: int, now: int) -> None:
         self.sector, self._since_ns, self._news_ns = sector, now, now
+        self._explores = False
         area = self.settings.sectors.of(sector)
         self._coverage = Coverage(area, self.settings.cell_m)
         self._enter(Phase.SEARCH)
@@ -313,82 +227,17 @@ class TaskManager(Node):
 
     def _sink(self, pose: Pose) -> None:
         still = float(np.linalg.norm(pose.velocity)) < _STILL_M_S
-        if still and self._now_ns_here - self._phase_ns > _REPEAT_S * NS_PER_S:
+        if still and self.now_ns - self._phase_ns > _REPEAT_S * NS_PER_S:
             self._enter(Phase.DONE)
         else:
             self._ask_now_and_then(self._land)
 
-    # -------------------------------------------------------------------------------- what it says
-
-    def _what_is_wrong(self, now: int) -> str:
-        wrong = []
-        if now - self._pose_ns > _POSE_S * NS_PER_S:
-            wrong.append("no odometry")
-        silent = sorted(
-            name
-            for name, mate in self.team.mates.items()
-            if now - mate.heard_ns > self.settings.patience_s * NS_PER_S
-            and mate.phase not in (Phase.DONE, Phase.DOWN)
-        )
-        if silent:
-            wrong.append(f"silent: {', '.join(silent)}")
-        if self._battery < self.settings.low_battery:
-            wrong.append("low battery")
-        if self.team.strangers:
-            wrong.append(f"another search: {', '.join(sorted(self.team.strangers))}")
-        return "; ".join(wrong)
-
-    def _as_worker(self) -> Worker:
-        assert self._pose is not None
-        return Worker(self._pose.position[:2], self.sector, self._since_ns, self._given_up)
-
-    def _tell_team(self) -> None:
-        pose, now = self._pose, self._now_ns_here
-        if pose is None:
-            return
-        self._report.publish(
-            self._report_type(
-                header(now, "map"),
-                self.settings.name,
-                str(self.phase),
-                Point(*pose.position.tolist()),
-                Vector3(*pose.velocity.tolist()),
-                single(self._battery),
-                len(self.searched),
-                self.sector,
-                time_from_ns(self._since_ns),
-                to_bits(self.searched),
-                to_bits(self._given_up),
-                self.targets.messages(),
-            )
-        )
-
-    def _tell_status(self) -> None:
-        now = self._now_ns_here
-        heard = [name for name, _ in self.team.heard(now, self.settings.patience_s)]
-        self._status.publish(
-            self._status_type(
-                header(now, "map"),
-                str(self.phase),
-                self.sector,
-                int(self.searched.sum()),
-                len(self.searched),
-                heard,
-                len(self.targets.targets()),
-                self.trouble,
-            )
-        )
-
-    def _tell_targets(self) -> None:
-        found = [find.message() for find in self.targets.targets()]
-        self._found.publish(self._targets_type(header(self._now_ns_here, "map"), found))
-
     def _enter(self, phase: Phase) -> None:
-        self.phase, self._phase_ns = phase, self._now_ns_here
+        self.phase, self._phase_ns = phase, self.now_ns
 
     def _ask_now_and_then(self, client: Client, request: Any | None = None) -> None:
         """Call a service unless it was called lately."""
-        now = self._now_ns_here
+        now = self.now_ns
         if now - self._asked_ns < _REPEAT_S * NS_PER_S:
             return
         self._asked_ns = now
@@ -396,3 +245,12 @@ class TaskManager(Node):
             client.call_async(request)
         except GraphError:
             return  # nobody offers it at the moment
+
+
+def _state_in(text: str) -> str:
+    """The `state` of a JSON text; empty where there is none."""
+    try:
+        told = json.loads(text)
+    except json.JSONDecodeError:
+        return ""
+    return str(told.get("state", "")) if isinstance(told, dict) else ""

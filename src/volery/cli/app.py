@@ -326,6 +326,24 @@ def bench(
 
 @app.command()
 @guarded
+def launch(
+    profile: Annotated[Path, typer.Argument(help="A .toml profile with [[launch]] in it.")],
+    via: Annotated[
+        str | None, typer.Option(help="Way into the graph, as of `volery node`.")
+    ] = None,
+    namespace: Annotated[str | None, typer.Option(help="Of the nodes, such as /uav1.")] = None,
+    lock_step: Annotated[
+        float | None, typer.Option(help="The simulation waits for them each so many seconds.")
+    ] = None,
+) -> None:
+    """Run the nodes of a launch profile in a process of their own."""
+    from volery.cli.launching import launch_profile
+
+    launch_profile(profile, via=via, namespace=namespace, lock_step_s=lock_step)
+
+
+@app.command()
+@guarded
 def report(
     log: Annotated[Path, typer.Argument(help="A .mcap or .bag log of a simulated flight.")],
     out: Annotated[Path, typer.Option(help="The folder to write index.html into.")] = Path(

@@ -74,6 +74,8 @@ class FakeUav:
         self.stuck = False
         self.silent = False
         self.charge = 1.0
+        self.frame = "map"
+        """Of its odometry."""
         self.way: list[np.ndarray] = []
         graph = bench.graph
         self.odometry = graph.advertise(f"/{name}/odom", Odometry)
@@ -93,7 +95,7 @@ class FakeUav:
         graph.offer(f"/{name}/land", "std_srvs/srv/Trigger", land)
         graph.offer(f"/{name}/hold", "std_srvs/srv/Trigger", lambda _r: trigger(True, ""))
         graph.subscribe(f"/{name}/search_area", self._sweep, "geometry_msgs/msg/PolygonStamped")
-        graph.subscribe(f"/{name}/mission/goal_pose", self._go, "geometry_msgs/msg/PoseStamped")
+        graph.subscribe(f"/{name}/planning/goal", self._go, "geometry_msgs/msg/PoseStamped")
         bench.clock.every(_MOVE_S, self._move)
 
     def _sweep(self, published: Published) -> None:
@@ -122,7 +124,9 @@ class FakeUav:
         now = self._bench.clock.now_ns
         pose = Pose(Point(*self.place.tolist()), Quaternion(0.0, 0.0, 0.0, 1.0))
         still = TwistWithCovariance(Twist(Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)), _NOTHING)
-        message = Odometry(header(now, "map"), "base", PoseWithCovariance(pose, _NOTHING), still)
+        message = Odometry(
+            header(now, self.frame), "base", PoseWithCovariance(pose, _NOTHING), still
+        )
         self.odometry.publish(message)
         battery = zero_message("sensor_msgs/msg/BatteryState")
         battery.percentage = self.charge

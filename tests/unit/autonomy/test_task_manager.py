@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from volery.autonomy.team.assignment import Claim, Worker, assign, must_yield
 from volery.autonomy.team.sectors import Coverage, Sectors, from_bits, to_bits
 from volery.autonomy.team.target_list import Find, TargetList
 from volery.core.errors import GraphError
-from volery.graph.messages import header, message_type
+from volery.graph.messages import String, TFMessage, header, message_type
+from volery.graph.zero import zero_message
 
 HOMES = {"uav1": (0.0, 0.0), "uav2": (0.0, 25.0), "uav3": (0.0, 50.0)}
 NONE = np.zeros(12, np.bool_)
@@ -238,6 +240,39 @@ def test_a_kept_state_is_all_that_a_manager_knows() -> None:
     for name, manager in bench.managers.items():
         assert manager.sector == other.managers[name].sector
         assert manager.searched.tolist() == other.managers[name].searched.tolist()
+
+
+def test_an_explorer_says_when_it_is_through() -> None:
+    bench = TeamBench({"uav1": (0.0, 0.0)})
+    bench.run(6.0)
+    manager, sectors = bench.managers["uav1"], []
+    says = bench.graph.advertise("/uav1/exploration/status", String)
+    for state in ("done", "searching", "done", "blocked", "searching", "blocked", "{"):
+        text = state if state == "{" else json.dumps({"state": state})
+        says.publish(String(text))
+        bench.run(0.3)
+        sectors.append(manager.sector)
+    first, second, third = sectors[0], sectors[2], sectors[5]
+    assert sectors == [first, first, second, second, second, third, third]
+    assert len({first, second, third}) == 3
+    assert manager.searched.nonzero()[0].tolist() == [first]
+
+
+def test_a_corrected_pose_is_one_in_the_map() -> None:
+    bench = TeamBench({})
+    bench.add("uav1", (10.0, 0.0), corrected=True)
+    tf = zero_message("geometry_msgs/msg/TransformStamped")
+    tf.header.frame_id, tf.child_frame_id = "map", "map/odom"
+    tf.transform.translation.x = 5.0
+    tf.transform.rotation.z = tf.transform.rotation.w = 0.5**0.5  # a quarter turn to the left
+    bench.graph.advertise("/tf", TFMessage).publish(TFMessage([tf]))
+    bench.uavs["uav1"].frame = "map/odom"
+    bench.run(1.0)
+    reports = []
+    bench.graph.subscribe("/uav1/team", reports.append)
+    bench.run(0.5)
+    place = reports[-1].message.position
+    assert (place.x, place.y) == pytest.approx((5.0, 10.0))
 
 
 def test_another_area_is_no_part_of_this_search() -> None:

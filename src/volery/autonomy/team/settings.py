@@ -29,6 +29,7 @@ class Settings:
     search_s: float
     alone_s: float
     gate_m: float
+    corrected: bool
     odometry: str
     goal_topic: str
 
@@ -66,6 +67,7 @@ class Settings:
             search_s=number("search_s", 0.0, 0.0),
             alone_s=number("alone_s", 0.0, 0.0),
             gate_m=number("gate_m", 4.0, 0.0),
+            corrected=bool(node.declare_parameter("corrected", False).value),
             odometry=str(node.declare_parameter("odometry", "odom").value),
-            goal_topic=str(node.declare_parameter("goal_topic", "mission/goal_pose").value),
+            goal_topic=str(node.declare_parameter("goal_topic", "planning/goal").value),
         )

@@ -67,13 +67,13 @@ class TargetList:
     finds: dict[tuple[str, int], Find] = field(default_factory=dict)
 
     def take(self, finds: Iterable[Find]) -> bool:
-        """Take finds in; whether one of them was not known at all."""
-        known = len(self.finds)
+        """Take finds in; whether one of them told something new."""
+        changed = False
         for find in finds:
             key = find.finder, find.number
             if key not in self.finds or self.finds[key].stamp_ns < find.stamp_ns:
-                self.finds[key] = find
-        return len(self.finds) > known
+                self.finds[key], changed = find, True
+        return changed
 
     def messages(self) -> list[Any]:
         """All finds, by finder and number."""
