@@ -2,10 +2,10 @@
 
 Each UAV has one, and none leads. The area is a grid of sectors; a UAV that is free takes the one
 that falls to it by what it has heard (`team.assignment`), has it explored, and tells the others
-several times a second what it does, what has been searched and what has been found. So a report that
-is lost, repeated or late does no harm, a UAV may come late or fall silent, and parts of a team that
-do not hear each other go on, each by itself, until they do again.
-"""  # noqa: E501
+several times a second what it does, what has been searched and what has been found. So a report
+that is lost, repeated or late does no harm, a UAV may come late or fall silent, and parts of a team
+that do not hear each other go on, each by itself, until they do again.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _RISE_S = 30.0
 _RETURN_STUCK_S = 60.0
 """Without coming nearer to home for so long it lands where it is."""
 _HOME_M, _NEARER_M = 1.5, 1.0
-_FALLEN_M, _LANDED_M, _STILL_M_S = 0.5, 0.3, 0.2
+_LANDED_M, _SUNK_M, _STILL_M_S = 0.3, 0.25, 0.2
 """All modelling choices."""
 
 
@@ -71,6 +71,7 @@ class TaskManager(TeamMember):
         "_phase_ns",
         "_asked_ns",
         "_nearest_m",
+        "_highest_m",
         "_ordered_home",
         "_explores",
         *TeamMember.STATE,
@@ -84,6 +85,8 @@ class TaskManager(TeamMember):
         self._asked_ns = -1 << 62
         self._nearest_m = math.inf
         """To home, so far."""
+        self._highest_m = -math.inf
+        """Since the landing began."""
         self._ordered_home = False
         self._explores = False
         """Whether the explorer has taken up the present sector."""
@@ -151,7 +154,7 @@ class TaskManager(TeamMember):
         if climbed > 0.8 * self.settings.altitude_m and abs(pose.velocity[2]) < _STILL_M_S:
             self._enter(Phase.IDLE)
         elif now - self._phase_ns > _RISE_S * NS_PER_S:
-            self._enter(Phase.DOWN if climbed < _FALLEN_M else Phase.LAND)
+            self._enter(Phase.DOWN if climbed < _LANDED_M else Phase.LAND)
         elif climbed < _LANDED_M:
             request = message_type("volery_interfaces/srv/TakeOffTo_Request")
             self._ask_now_and_then(self._take_off, request(self.settings.altitude_m))
@@ -202,6 +205,8 @@ class TaskManager(TeamMember):
         self.sector, self._coverage = -1, None
         self._enter(Phase.IDLE)
         self._choose(now)
+        if self.phase is Phase.IDLE:
+            self._area.publish(polygon_of(None, float(self._home[2]), now))
 
     def _must_go_home(self, now: int) -> bool:
         assert self._began_ns is not None
@@ -226,13 +231,15 @@ class TaskManager(TeamMember):
             self._enter(Phase.LAND)
 
     def _sink(self, pose: Pose) -> None:
+        self._highest_m = max(self._highest_m, float(pose.position[2]))
         still = float(np.linalg.norm(pose.velocity)) < _STILL_M_S
-        if still and self.now_ns - self._phase_ns > _REPEAT_S * NS_PER_S:
+        if still and pose.position[2] < self._highest_m - _SUNK_M:
             self._enter(Phase.DONE)
         else:
             self._ask_now_and_then(self._land)
 
     def _enter(self, phase: Phase) -> None:
+        self._highest_m = -math.inf
         self.phase, self._phase_ns = phase, self.now_ns
 
     def _ask_now_and_then(self, client: Client, request: Any | None = None) -> None:

@@ -242,6 +242,23 @@ def test_a_kept_state_is_all_that_a_manager_knows() -> None:
         assert manager.searched.tolist() == other.managers[name].searched.tolist()
 
 
+def test_who_has_nothing_to_search_waits_and_takes_over() -> None:
+    """One sector for two: the other one hovers, until the first one fails."""
+    bench = TeamBench({})
+    for name, home in (("uav1", (30.0, 30.0)), ("uav2", (0.0, 0.0))):
+        bench.add(name, home, sector_m=100.0)
+    bench.run(10.0)
+    assert bench.phases() == {"uav1": "search", "uav2": "idle"}
+    bench.uavs["uav1"].charge = 0.1
+    bench.run(2.0)
+    assert bench.phases() == {"uav1": "return", "uav2": "search"}
+    assert bench.uavs["uav2"].way
+    bench.managers["uav2"].searched[0] = True  # as if it had heard so
+    bench.run(0.5)
+    assert bench.phases()["uav2"] == "return"
+    assert len(bench.uavs["uav2"].way) == 1
+
+
 def test_an_explorer_says_when_it_is_through() -> None:
     bench = TeamBench({"uav1": (0.0, 0.0)})
     bench.run(6.0)
