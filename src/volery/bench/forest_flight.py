@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from volery.engine.events import EventKind
 from volery.graph.messages import Published, stamp_of
 from volery.report.alignment import at_times, ate_rmse_m, common_times
+from volery.report.logged_flights import ESTIMATES, SCAN, TRUTH
 from volery.report.trunks import in_map, trunks_of_scan
+from volery.report.ways import Way
 from volery.runtime import Simulation
 from volery.scenario import overrides
 from volery.scenario.load import load_scenario
@@ -24,8 +26,6 @@ Array = NDArray[np.float64]
 
 SIGHT_M = 6.0
 """As far as the task manager takes a place for seen."""
-ESTIMATES = ("slam/odom", "odom")
-"""Where a UAV's own idea of its pose is looked for, the first that there is."""
 _CELL_M = 2.0
 _SCAN_NS, _POSE_NS = 500_000_000, 100_000_000
 _SEEN_OFTEN = 3
@@ -44,6 +44,16 @@ class Flown:
     """Time, and trunks (K, 2) in the scanner's frame."""
     targets: list[tuple[float, Array]] = field(default_factory=list)
     """Time, and the places (T, 2) on its list, whenever it is published."""
+
+    @property
+    def way(self) -> Way:
+        """Where it truly was."""
+        return Way.of_rows(self.truth)
+
+    @property
+    def own_way(self) -> Way:
+        """Where it thought it was."""
+        return Way.of_rows(self.estimate)
 
 
 @dataclass(frozen=True)
@@ -65,20 +75,17 @@ class Search:
 
     def distances_m(self) -> dict[str, float]:
         """How far each has flown over ground."""
-        return {
-            name: float(np.hypot(*np.diff(_xyz(uav.truth)[:, :2], axis=0).T).sum())
-            for name, uav in self.uavs.items()
-        }
+        return {name: uav.way.length_m for name, uav in self.uavs.items()}
 
     def ate_rmse_m(self) -> dict[str, float]:
         """Error of each UAV's own idea of its way, after alignment."""
         found = {}
         for name, uav in self.uavs.items():
-            times, own = _times(uav.estimate), _xyz(uav.estimate)
-            known = common_times(times, _times(uav.truth))
+            own, way = uav.own_way, uav.way
+            known = common_times(own.time_s, way.time_s)
             if known.sum() > 3:
-                true = at_times(_times(uav.truth), _xyz(uav.truth), times[known])
-                found[name] = ate_rmse_m(own[known], true)
+                true = at_times(way.time_s, way.position, own.time_s[known])
+                found[name] = ate_rmse_m(own.position[known], true)
         return found
 
     def searched_m2(self, until_s: float = np.inf) -> float:
@@ -87,8 +94,8 @@ class Search:
         x, y = (np.arange(a + _CELL_M / 2.0, b, _CELL_M) for a, b in ((x0, x1), (y0, y1)))
         seen = np.zeros((len(y), len(x)), np.bool_)
         for uav in self.uavs.values():
-            way = _xyz(uav.truth)[_times(uav.truth) <= until_s]
-            for place in _thinned(way[:, :2]):
+            way = uav.way
+            for place in _thinned(way.position[way.time_s <= until_s, :2]):
                 seen |= np.hypot(x[None, :] - place[0], y[:, None] - place[1]) <= SIGHT_M
         return float(seen.sum()) * _CELL_M**2
 
@@ -100,8 +107,9 @@ class Search:
         """
         sums, counts = np.zeros_like(self.trees), np.zeros(len(self.trees), np.int64)
         for uav in self.uavs.values():
+            way, own_way = uav.way, uav.own_way
             for seconds, trunks in uav.scans:
-                true, own = (_pose_at(rows, seconds) for rows in (uav.truth, uav.estimate))
+                true, own = way.pose_at(seconds), own_way.pose_at(seconds)
                 if true is None or own is None or not len(trunks):
                     continue
                 there = in_map(trunks, *true)
@@ -181,11 +189,11 @@ def fly(scenario: Scenario, *, threads: int = 2) -> Search:
 def _listen(simulation: Simulation, name: str, flown: Flown) -> None:
     graph = simulation.graph
     estimate = next(t for t in ESTIMATES if graph.publishers(f"/{name}/{t}"))
-    for topic, rows in (("ground_truth/odom", flown.truth), (estimate, flown.estimate)):
+    for topic, rows in ((TRUTH, flown.truth), (estimate, flown.estimate)):
         take = _thinning(_POSE_NS, partial(_take_pose, rows))
-        graph.subscribe(f"/{name}/{topic}", take, "nav_msgs/msg/Odometry")
+        graph.subscribe(f"/{name}/{topic}", take)
     scan = _thinning(_SCAN_NS, partial(_take_scan, flown.scans))
-    graph.subscribe(f"/{name}/laser/horizontal/scan", scan, "sensor_msgs/msg/LaserScan")
+    graph.subscribe(f"/{name}/{SCAN}", scan, "sensor_msgs/msg/LaserScan")
     targets = partial(_take_targets, flown.targets)
     graph.subscribe(f"/{name}/targets", targets, "volery_interfaces/msg/Targets")
 
@@ -224,28 +232,6 @@ def _first_heard(uav: Flown, place: Array) -> float:
         if len(places) and np.hypot(*(places - place).T).min() <= _TARGET_GATE_M:
             return seconds
     return np.inf
-
-
-def _times(rows: list[tuple[float, ...]]) -> Array:
-    return np.array([row[0] for row in rows])
-
-
-def _xyz(rows: list[tuple[float, ...]]) -> Array:
-    return np.array([row[1:4] for row in rows]).reshape(-1, 3)
-
-
-def _pose_at(rows: list[tuple[float, ...]], seconds: float) -> tuple[Array, Array] | None:
-    """Position and attitude at a time, between the two rows around it; None outside of them."""
-    times = _times(rows)
-    k = int(np.searchsorted(times, seconds))
-    if not 0 < k < len(times):
-        return None
-    share = (seconds - times[k - 1]) / (times[k] - times[k - 1])
-    one, other = np.array(rows[k - 1][1:]), np.array(rows[k][1:])
-    if one[3:] @ other[3:] < 0.0:
-        other[3:] *= -1.0
-    between = one + share * (other - one)
-    return between[:3], between[3:] / np.linalg.norm(between[3:])
 
 
 def _thinned(way: Array, step_m: float = 0.5) -> Array:

@@ -354,7 +354,7 @@ def report(
     ] = None,
     compare_topic: Annotated[
         str | None,
-        typer.Option(help="Its poses, Odometry or PoseStamped, where there are several."),
+        typer.Option(help="Its topic of poses, where there are several."),
     ] = None,
     uav: Annotated[str | None, typer.Option(help="UAV to compare with; the first.")] = None,
 ) -> None:

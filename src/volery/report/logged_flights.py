@@ -15,35 +15,21 @@ from volery.bridges.logs.records import LogWalk
 from volery.core.errors import GraphError, VoleryError
 from volery.graph.messages import stamp_of
 from volery.report.trunks import TrunkMap, in_map, trunks_of_scan
+from volery.report.ways import Way
 
 Array = NDArray[np.float64]
 
 TRUTH = "ground_truth/odom"
-ESTIMATES = ("slam/odom", "odom")
+ESTIMATES = ("slam/pose", "slam/odom", "odom")
 """Where a UAV's own idea of its pose is looked for, the first that there is."""
 SCAN = "laser/horizontal/scan"
-_POSE_TYPES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped")
+_POSE_TYPES = (
+    "nav_msgs/msg/Odometry",
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+)
 _SCAN_NS, _POSE_NS = 500_000_000, 50_000_000
 _SEEN_OFTEN = 3
-
-
-@dataclass(frozen=True)
-class Way:
-    """Poses of one UAV, by time."""
-
-    time_s: Array
-    """(N,)"""
-    position: Array
-    """(N, 3) m"""
-    attitude: Array
-    """(N, 4) x y z w"""
-
-    def pose_at(self, time_s: float) -> tuple[Array, Array] | None:
-        """The last pose before a time; None where there is none within half a second."""
-        k = int(np.searchsorted(self.time_s, time_s, side="right")) - 1
-        if k < 0 or time_s - self.time_s[k] > 0.5:
-            return None
-        return self.position[k], self.attitude[k]
 
 
 @dataclass(frozen=True)
@@ -72,8 +58,8 @@ class _Rows:
         self.poses.append((time_ns * 1e-9, p.x, p.y, p.z, q.x, q.y, q.z, q.w))
 
     def way(self) -> Way:
-        rows = np.array(self.poses).reshape(-1, 8)
-        return Way(rows[:, 0], rows[:, 1:4], rows[:, 4:])
+        """All of them."""
+        return Way.of_rows(self.poses)
 
 
 def read_uavs(path: Path) -> list[LoggedUav]:
@@ -94,7 +80,7 @@ def read_uavs(path: Path) -> list[LoggedUav]:
         trunks = np.zeros((0, 2)) if estimate is None else _map_of(estimate, seen)
         found.append(LoggedUav(name, None if truth is None else truth.way(), estimate, trunks))
     if not found:
-        raise VoleryError(f"{path}: no UAV tells its pose in it (/NAME/{ESTIMATES[1]})")
+        raise VoleryError(f"{path}: no UAV tells its pose in it (/NAME/{ESTIMATES[-1]})")
     return found
 
 

@@ -17,9 +17,10 @@ from volery.report.alignment import (
     time_shift_s,
     umeyama,
 )
-from volery.report.logged_flights import LoggedUav, Way, read_uavs, read_way
+from volery.report.logged_flights import LoggedUav, read_uavs, read_way
 from volery.report.page import STYLE, ReportError
 from volery.report.way_charts import Line, over_time, ways_from_above
+from volery.report.ways import Way
 
 Array = NDArray[np.float64]
 
@@ -96,7 +97,7 @@ def _error_text(estimate: Way, truth: Way) -> str:
 def _comparison_section(uav: LoggedUav, real: Way, log: Path) -> list[str]:
     """A real flight over the simulated one."""
     simulated = uav.truth or uav.estimate
-    if simulated is None or min(_lasts_s(real), _lasts_s(simulated)) < _LEAST_S:
+    if simulated is None or min(real.lasts_s, simulated.lasts_s) < _LEAST_S:
         raise VoleryError(f"{log}: too few poses to lay it over {uav.name}")
     shift = time_shift_s(simulated.time_s, simulated.position, real.time_s, real.position)
     times = real.time_s + shift
@@ -116,10 +117,6 @@ def _comparison_section(uav: LoggedUav, real: Way, log: Path) -> list[str]:
         f"square distance {left:.2f} m over {float(known.sum()) / len(known):.0%} of it."
     )
     return ["<h2>Real against simulated</h2>", *_figures(lines, uav.trunks, told)]
-
-
-def _lasts_s(way: Way) -> float:
-    return float(way.time_s[-1] - way.time_s[0]) if len(way.time_s) else 0.0
 
 
 def _figures(lines: Sequence[Line], trunks: Array, told: str) -> list[str]:
