@@ -139,3 +139,15 @@ def test_foliage_shortens_the_reach() -> None:
     assert clear.snr_db(0, 0, 1) - wood.snr_db(0, 0, 1) == pytest.approx(loss)
     assert loss > 10.0
     assert clear.snr_db(0, 0, 7) == -math.inf
+
+
+def test_a_kept_state_is_not_touched_by_what_follows() -> None:
+    places = {0: (0.0, 0.0, 5.0), 1: (40.0, 0.0, 5.0)}
+    link = link_of(Radio(bit_rate_mbit_s=0.1), places)
+    link(0, 0, 1, frame_of(1, size=1000))
+    kept = link.get_state()
+    after = [link(0, 0, 1, frame_of(k, size=1000)) for k in (2, 3, 4)]
+    link.set_state(kept)
+    assert [link(0, 0, 1, frame_of(k, size=1000)) for k in (2, 3, 4)] == after
+    link.set_state(kept)
+    assert link.counts == {"sent": 1, "received": 1}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections import Counter
 from collections.abc import Callable, Mapping
 from itertools import combinations
@@ -31,7 +32,7 @@ _MOST_TRIES = 8
 
 
 class _Sent(NamedTuple):
-    """When the frame that a station sent last has left the air, and after how many tries."""
+    """When the frame that a station sent last has left the air."""
 
     session: int
     sequence: int
@@ -101,11 +102,11 @@ class RadioLink:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, self.STATE)
+        return copy.deepcopy(keep(self, self.STATE))
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        put_back(self, copy.deepcopy(state))
 
     def _try(self, source: int, destination: int, frame: Frame, snr: float) -> tuple[int, bool]:
         """How often the frame is sent, and whether it is received at last."""
