@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.world.forest import Forest
+from volery.world.trees.model import TreeModel
 
 Array = NDArray[np.float64]
 
 _WITHIN = 0.9
 """Share of a crown's leaves that its ellipsoid reaches to. Modelling choice."""
+_THINNEST_M = 0.05
 
 
 class Crowns:
@@ -45,16 +47,15 @@ class Crowns:
         return float(np.linalg.norm(end - start)) * _length_of_union(enter, leave)
 
 
-def _shape(model: object) -> tuple[float, float, float]:
+def _shape(model: TreeModel) -> tuple[float, float, float]:
     """Radius, height of the middle, half the height of a model's crown; zeros without leaves."""
-    levels = model.levels  # type: ignore[attr-defined]
-    level = min(levels.values(), key=lambda tree: len(tree.leaves.vertices))
+    level = min(model.levels.values(), key=lambda tree: len(tree.leaves.vertices))
     leaves = np.asarray(level.leaves.vertices, np.float64)
     if not len(leaves):
         return 0.0, 0.0, 0.0
     low, high = np.quantile(leaves[:, 2], [0.5 - 0.5 * _WITHIN, 0.5 + 0.5 * _WITHIN])
     radius = np.quantile(np.hypot(leaves[:, 0], leaves[:, 1]), _WITHIN)
-    return float(radius), float(0.5 * (low + high)), float(0.5 * (high - low))
+    return float(radius), float(0.5 * (low + high)), max(float(0.5 * (high - low)), _THINNEST_M)
 
 
 def _length_of_union(enter: Array, leave: Array) -> float:
