@@ -314,11 +314,55 @@ def bench(
     markdown: Annotated[
         Path | None, typer.Option(help="Write a page with figures and bounds.")
     ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Shorter, where the bench can: forest_search, load.")
+    ] = False,
 ) -> None:
     """Measure how fast Volery is on this machine."""
     from volery.cli.benching import measure_and_show
 
-    measure_and_show(name, as_json=json, out=out, markdown=markdown)
+    measure_and_show(name, as_json=json, out=out, markdown=markdown, quick=quick)
+
+
+@app.command()
+@guarded
+def launch(
+    profile: Annotated[Path, typer.Argument(help="A .toml profile with [[launch]] in it.")],
+    via: Annotated[
+        str | None, typer.Option(help="Way into the graph, as of `volery node`.")
+    ] = None,
+    namespace: Annotated[str | None, typer.Option(help="Of the nodes, such as /uav1.")] = None,
+    lock_step: Annotated[
+        float | None, typer.Option(help="The simulation waits for them each so many seconds.")
+    ] = None,
+) -> None:
+    """Run the nodes of a launch profile in a process of their own."""
+    from volery.cli.launching import launch_profile
+
+    launch_profile(profile, via=via, namespace=namespace, lock_step_s=lock_step)
+
+
+@app.command()
+@guarded
+def report(
+    log: Annotated[Path, typer.Argument(help="A .mcap or .bag log of a simulated flight.")],
+    out: Annotated[Path, typer.Option(help="The folder to write index.html into.")] = Path(
+        "report"
+    ),
+    compare: Annotated[
+        Path | None, typer.Option(help="Log of a real flight, laid over the simulated one.")
+    ] = None,
+    compare_topic: Annotated[
+        str | None,
+        typer.Option(help="Its topic of poses, where there are several."),
+    ] = None,
+    uav: Annotated[str | None, typer.Option(help="UAV to compare with; the first.")] = None,
+) -> None:
+    """Draw the ways of a log, simulated against estimated, with a map of trunks."""
+    from volery.report.way_page import write_log_report
+
+    path = write_log_report(log, out, compare=compare, compare_topic=compare_topic, uav=uav)
+    typer.echo(f"report  {path}")
 
 
 @app.command()

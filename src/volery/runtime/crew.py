@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from volery.comms.radio.net import RadioNet
 from volery.core.errors import CommandError
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
@@ -55,6 +56,7 @@ class Crew:
     faults: FaultPlan
     starts: tuple[Start, ...]
     """In fleet order."""
+    radio: RadioNet | None = None
     fitted: list[Fitted] = field(default_factory=list)
     uavs: dict[str, Uav] = field(default_factory=dict)
     nodes: list[Node] = field(default_factory=list)
@@ -138,10 +140,12 @@ class Crew:
         flight = self.scenario.types[start.type_name].flight
         uav = Uav(self.engine.fleet, row, start.name, flight, start.type_name)
         self.uavs[start.name] = uav
-        self._closes[start.name] = [
+        closes = self._closes[start.name] = [
             *open_commands(self.graph, uav, self._now_ns),
             *offer_uav_services(self.graph, uav),
         ]
+        if self.radio is not None and self.scenario.types[start.type_name].radio:
+            closes.append(self.radio.join(start.name))
 
     def _dismiss(self, name: str) -> None:
         own = [node for node in self.nodes if node.get_namespace() == f"/{name}"]

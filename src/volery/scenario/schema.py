@@ -28,6 +28,7 @@ from volery.scenario.city import City
 from volery.scenario.faults import Fault
 from volery.scenario.grid_map import GridMapWorld
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
+from volery.scenario.radio import Radio
 from volery.scenario.things import Things, check_things
 from volery.scenario.user_mesh import UserMesh
 from volery.scenario.weather import Weather
@@ -216,6 +217,7 @@ _TAKEN_NAMES = (
     "joint_states",
     "land",
     "odom",
+    "radio",
     "return_home",
     "take_off",
     "trajectory",
@@ -281,6 +283,8 @@ class UavType(Data):
     flight: Flight = Flight()
     sensors: tuple[Sensor, ...] = ()
     nodes: tuple[NodeEntry, ...] = ()
+    radio: bool = True
+    """Whether it has one, where the scenario has `[radio]`."""
 
     @model_validator(mode="after")
     def _settings_are_of_the_plant(self) -> Self:
@@ -356,6 +360,7 @@ class Scenario(Data):
     ends_when: Literal["time_is_up", "all_landed"] = "time_is_up"
     physics: Physics = Physics()
     world: World = World()
+    radio: Radio | None = None
     types: Annotated[dict[Name, UavType], Field(min_length=1)]
     uavs: Annotated[tuple[UavGroup, ...], Field(min_length=1)]
     nodes: tuple[NodeEntry, ...] = ()

@@ -1666,6 +1666,17 @@ export interface volery_interfaces_Gust {
   front: geometry_msgs_Vector3;
 }
 
+export interface volery_interfaces_MissionStatus {
+  header: std_msgs_Header;
+  phase: string;
+  sector: number;
+  searched: number;
+  sectors: number;
+  team: string[];
+  targets: number;
+  trouble: string;
+}
+
 export interface volery_interfaces_PlayerState {
   position: number;
   start: number;
@@ -1696,6 +1707,35 @@ export interface volery_interfaces_SimulationStatus {
   clients: number;
   dropped: number | bigint;
   replaying: boolean;
+}
+
+export interface volery_interfaces_Target {
+  header: std_msgs_Header;
+  finder: string;
+  number: number;
+  position: geometry_msgs_Point;
+  covariance: Float64Array | number[];
+  sightings: number;
+}
+
+export interface volery_interfaces_Targets {
+  header: std_msgs_Header;
+  targets: volery_interfaces_Target[];
+}
+
+export interface volery_interfaces_TeamReport {
+  header: std_msgs_Header;
+  name: string;
+  phase: string;
+  position: geometry_msgs_Point;
+  velocity: geometry_msgs_Vector3;
+  battery: number;
+  sectors: number;
+  sector: number;
+  since: builtin_interfaces_Time;
+  searched: Uint8Array | string;
+  given_up: Uint8Array | string;
+  targets: volery_interfaces_Target[];
 }
 
 export interface volery_interfaces_VehicleState {
@@ -2147,9 +2187,13 @@ export interface Messages {
   "visualization_msgs/msg/UVCoordinate": visualization_msgs_UVCoordinate;
   "volery_interfaces/msg/CommandRecord": volery_interfaces_CommandRecord;
   "volery_interfaces/msg/Gust": volery_interfaces_Gust;
+  "volery_interfaces/msg/MissionStatus": volery_interfaces_MissionStatus;
   "volery_interfaces/msg/PlayerState": volery_interfaces_PlayerState;
   "volery_interfaces/msg/SearchState": volery_interfaces_SearchState;
   "volery_interfaces/msg/SimulationStatus": volery_interfaces_SimulationStatus;
+  "volery_interfaces/msg/Target": volery_interfaces_Target;
+  "volery_interfaces/msg/Targets": volery_interfaces_Targets;
+  "volery_interfaces/msg/TeamReport": volery_interfaces_TeamReport;
   "volery_interfaces/msg/VehicleState": volery_interfaces_VehicleState;
   "volery_interfaces/msg/VehicleStates": volery_interfaces_VehicleStates;
   "volery_interfaces/msg/Weather": volery_interfaces_Weather;
