@@ -92,6 +92,7 @@ class Node:
             if context.latency_ns
             else None
         )
+        context.graph.enter(self.full_name)
 
     # ------------------------------------------------------------------------------ the contract
 

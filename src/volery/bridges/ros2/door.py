@@ -12,9 +12,11 @@ named to the door from the graph. No ROS 2 needs to be installed.
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from volery.bridges.ros2.actions import ActionServers
 from volery.bridges.ros2.environment import Ros2Terms, join_ros2
@@ -26,12 +28,15 @@ from volery.bridges.ros2.topics import Topics
 from volery.bridges.ros2.worker import Worker
 from volery.bridges.sharing import COMMANDS, Sharing
 from volery.core.errors import BridgeError, GraphError
+from volery.graph.messages import message_type
+from volery.graph.reply import Reply
 from volery.graph.session import Gateway, Session
 
 _SURVEY_S = 0.25
 _BREATH_S = 0.02
 """Between two surveys, however many others come and go."""
 NODE = "/volery"
+_SET = "rosapi_msgs/srv/SetParam"
 
 _log = logging.getLogger(__name__)
 
@@ -115,15 +120,13 @@ class Ros2Door:
         """Share what appears, take back what goes, here and there."""
         shared, breath = self._shared, threading.Event()
         while shared is not None and not self._stopping:
-            self._news.wait(_SURVEY_S)
-            self._news.clear()
-            if self._stopping:
-                return
             try:
                 shared.survey()
             except Exception as error:  # a topic that breaks must not end the door
                 _log.warning("%s: %s: %s", self.name, type(error).__name__, error)
             breath.wait(_BREATH_S)
+            self._news.wait(_SURVEY_S)
+            self._news.clear()
 
 
 class _Shared:
@@ -139,7 +142,10 @@ class _Shared:
         self.topics = Topics(participant, session, sharing, node, self._worker)
         self.services = Services(participant, session, sharing, node, self._worker)
         self._actions = ActionServers(participant, session, node, self._worker)
-        self._parameters = ParameterServices(participant, session, node, self._worker)
+        graph = session.graph
+        self._parameters = ParameterServices(
+            participant, graph.parameters, self._set, node, self._worker, graph.now_ns
+        )
 
     def survey(self) -> None:
         """Bring everything up to date."""
@@ -148,6 +154,12 @@ class _Shared:
         self._actions.survey()
         self._parameters.survey()
         self._participant.announce()
+
+    def _set(self, node: str, name: str, value: Any, done: Callable[[str], None]) -> None:
+        """Set a parameter as clients of all doors do, so that recorded flights repeat it."""
+        request = message_type(f"{_SET}_Request")(f"{node}:{name}", json.dumps(value))
+        reply = Reply(lambda response: done(response.reason), lambda error: done(str(error)))
+        self._session.call("/rosapi/set_param", request, reply)
 
     def close(self) -> None:
         """Take everything back."""

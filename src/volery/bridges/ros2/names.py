@@ -1,7 +1,7 @@
 """Names of ROS 2 and what middlewares call the same things.
 
-Topics and services: https://design.ros2.org/articles/topic_and_service_names.html; what DDS calls
-them: `rmw_dds_common` and `rmw_cyclonedds_cpp` (prefixes `rt`, `rq`, `rr`, types `pkg::msg::dds_::`).
+https://design.ros2.org/articles/topic_and_service_names.html tells what is allowed, and what DDS
+calls topics and services; types are called `pkg::msg::dds_::Name_` by rosidl's type supports.
 """
 
 from __future__ import annotations

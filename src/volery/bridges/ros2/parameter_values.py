@@ -32,19 +32,17 @@ _DTYPES = {_BOOLS: np.bool_, _INTEGERS: np.int64, _DOUBLES: np.float64}
 
 def type_of(value: Any) -> int:
     """Number of a value's type; NOT_SET for what ROS 2 has no type for."""
-    if isinstance(value, bool | np.bool_):
-        return _BOOL
-    if isinstance(value, int | np.integer):
-        return _INTEGER if -_LONG <= value < _LONG else NOT_SET
-    if isinstance(value, float | np.floating):
-        return _DOUBLE
-    if isinstance(value, str):
-        return _STRING
-    if isinstance(value, bytes):
-        return _BYTES
     if isinstance(value, list | tuple | np.ndarray):
         return _type_of_array(list(value))
-    return NOT_SET
+    if isinstance(value, int | np.integer) and not isinstance(value, bool):
+        return _INTEGER if -_LONG <= value < _LONG else NOT_SET
+    kinds = {
+        bool | np.bool_: _BOOL,
+        float | np.floating: _DOUBLE,
+        str: _STRING,
+        bytes: _BYTES,
+    }
+    return next((number for kind, number in kinds.items() if isinstance(value, kind)), NOT_SET)
 
 
 def _type_of_array(values: list[Any]) -> int:

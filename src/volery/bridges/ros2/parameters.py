@@ -1,12 +1,10 @@
 """Parameters of nodes as ROS 2 asks for them: six services for each node, and their events.
 
-Values are set through rosapi's service, as clients of all doors set them, so that recorded flights
-hold that and repeat it.
+How a value is set is up to whoever owns the parameters: see `SetValue`.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -22,8 +20,8 @@ from volery.bridges.ros2.worker import Worker
 from volery.core.errors import GraphError
 from volery.graph.cdr import encode_cdr
 from volery.graph.messages import message_type, time_from_ns
+from volery.graph.parameters import Parameters
 from volery.graph.reply import Reply
-from volery.graph.session import Session
 from volery.graph.zero import zero_message
 
 _SIM_TIME = "use_sim_time"
@@ -40,20 +38,32 @@ _SERVICES = (
 )
 
 
+SetValue = Callable[[str, str, Any, Callable[[str], None]], None]
+"""(node, parameter, value, done): sets a value and says why not, or an empty text, some time."""
+
+
 class ParameterServices:
     """The parameters of all nodes of a graph; `survey` brings the nodes up to date.
 
-    owner: the node that stands for the whole simulation, and has no parameters of its own.
+    owner: the node that stands for the whole process, which need not have any of its own.
+    now_ns: what stamps the events.
     """
 
     def __init__(
-        self, participant: Participant, session: Session, owner: NodeName, worker: Worker
+        self,
+        participant: Participant,
+        parameters: Parameters,
+        set_value: SetValue,
+        owner: NodeName,
+        worker: Worker,
+        now_ns: Callable[[], int],
     ) -> None:
         self._participant = participant
-        self._session = session
+        self._declared = parameters
+        self._set_value = set_value
         self._owner = owner
         self._worker = worker
-        self._declared = session.graph.parameters
+        self._now_ns = now_ns
         self._nodes: dict[NodeName, list[Handle]] = {}
         self._complaints = Complaints()
         spec = TopicSpec(owner, _EVENTS, _EVENT_TYPE, profile_of(_EVENTS, "", latched=False))
@@ -61,7 +71,7 @@ class ParameterServices:
 
     def survey(self) -> None:
         """Have nodes appear that have parameters, and those disappear that have ended."""
-        names = {node for node, _ in self._declared.names()}
+        names = self._declared.nodes()
         wanted = {self._owner, *(NodeName.of(name) for name in names if self._is_possible(name))}
         for node in [node for node in self._nodes if node not in wanted]:
             self._leave(node)
@@ -178,7 +188,6 @@ class ParameterServices:
     ) -> None:
         """Set one after the other; `done` gets the results."""
         results: list[Any] = []
-        request_type = message_type("rosapi_msgs/srv/SetParam_Request")
 
         def go_on() -> None:
             if len(results) == len(wanted):
@@ -186,30 +195,21 @@ class ParameterServices:
                 return
             parameter = wanted[len(results)]
             if parameter.value.type == NOT_SET:
-                finish(_result(f"parameter '{parameter.name}' cannot be deleted"))
-                return
-            value = json.dumps(plain_of(parameter.value))
-            request = request_type(f"{node.full}:{parameter.name}", value)
-            reply = Reply(tell(parameter), lambda error: finish(_result(str(error))))
-            self._session.call("/rosapi/set_param", request, reply)
+                finish(f"parameter '{parameter.name}' cannot be deleted")
+            else:
+                self._set_value(node.full, parameter.name, plain_of(parameter.value), finish)
 
-        def tell(parameter: Any) -> Callable[[Any], None]:
-            def take(response: Any) -> None:
-                if response.successful:
-                    self._tell_event(node, parameter)
-                finish(_result("" if response.successful else response.reason))
-
-            return take
-
-        def finish(result: Any) -> None:
-            results.append(result)
+        def finish(reason: str) -> None:
+            if not reason:
+                self._tell_event(node, wanted[len(results)])
+            results.append(_result(reason))
             go_on()
 
         go_on()
 
     def _tell_event(self, node: NodeName, parameter: Any) -> None:
         event = zero_message(_EVENT_TYPE)
-        event.stamp = time_from_ns(self._session.graph.now_ns())
+        event.stamp = time_from_ns(self._now_ns())
         event.node, event.changed_parameters = node.full, [parameter]
         self._worker.post(lambda: self._events.write(encode_cdr(event, _EVENT_TYPE)))
 

@@ -10,7 +10,7 @@ import threading
 from functools import cache
 from typing import Any
 
-from cyclonedds.idl import IdlStruct, make_idl_struct, types
+from cyclonedds.idl import make_idl_struct, types
 from rosbags.interfaces import Nodetype
 
 from volery.bridges.ros2.names import dds_type
@@ -54,13 +54,13 @@ def _struct(msgtype: str, *, headed: bool) -> type[Any]:
     fields = dict(_REQUEST_HEADER) if headed else {}
     fields |= {name: _type_of(kind) for name, kind in typestore().fielddefs[msgtype][1]}
     name = dds_type(msgtype).replace("::", ".")
-    made = make_idl_struct(name.rpartition(".")[2], name, fields, dataclassify=False)
-    made.deserialize = classmethod(_keep)  # type: ignore[method-assign,assignment]
-    made.deserialize_key = classmethod(_keep)  # type: ignore[method-assign,assignment]
+    made: type[Any] = make_idl_struct(name.rpartition(".")[2], name, fields, dataclassify=False)
+    made.deserialize = classmethod(_keep)
+    made.deserialize_key = classmethod(_keep)
     return made
 
 
-def _keep(cls: type[IdlStruct], data: bytes, *_: Any, **__: Any) -> Any:
+def _keep(cls: Any, data: bytes, *_: Any, **__: Any) -> Any:
     """A sample that keeps the bytes it came in."""
     sample = cls.__new__(cls)
     sample.cdr = data

@@ -83,9 +83,9 @@ def wait(waitset: Any, timeout_ns: int) -> list[int] | None:
 
 def subscriptions(writer: Any) -> int:
     """How many readers a writer has."""
-    return max(_matched(writer._ref, None, 0), 0)
+    return max(int(_matched(writer._ref, None, 0)), 0)
 
 
 def publications(reader: Any) -> int:
     """How many writers a reader has."""
-    return max(_served(reader._ref, None, 0), 0)
+    return max(int(_served(reader._ref, None, 0)), 0)
