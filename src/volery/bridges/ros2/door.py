@@ -54,6 +54,8 @@ class Ros2Door:
         Patterns of the names of topics and services that are shared, as `fnmatch` has them.
     commands
         Patterns of topics that ROS 2 may publish beside publishers of the graph.
+    reliable
+        Patterns of topics that are published reliably though they carry what sensors stream.
     remote_services
         ROS 2 services that the graph can call, and their types (`std_srvs/srv/Trigger`).
 
@@ -66,12 +68,14 @@ class Ros2Door:
         *,
         topics: Sequence[str] = ("*",),
         commands: Sequence[str] = COMMANDS,
+        reliable: Sequence[str] = (),
         remote_services: Mapping[str, str] | None = None,
     ) -> None:
         self.name = f"ROS 2 node {node_name}"
         self._node_name = node_name
         self._terms = terms or Ros2Terms()
         self._sharing = Sharing(tuple(topics), tuple(commands))
+        self._reliable = tuple(reliable)
         self._remote = dict(remote_services or {})
         self._shared: _Shared | None = None
         self._steward: threading.Thread | None = None
@@ -99,7 +103,9 @@ class Ros2Door:
         participant = join_ros2(self._terms)
         self.name = f"ROS 2 node {self._node_name}, {participant.where}"
         node = NodeName.of(self._node_name)
-        self._shared = shared = _Shared(participant, gateway.open(self.name), self._sharing, node)
+        session = gateway.open(self.name)
+        shared = _Shared(participant, session, self._sharing, self._reliable, node)
+        self._shared = shared
         shared.services.take_remote(self._remote)
         participant.when_changed(self._news.set)
         shared.survey()
@@ -133,18 +139,24 @@ class _Shared:
     """All that the door shares."""
 
     def __init__(
-        self, participant: Participant, session: Session, sharing: Sharing, node: NodeName
+        self,
+        participant: Participant,
+        session: Session,
+        sharing: Sharing,
+        reliable: tuple[str, ...],
+        node: NodeName,
     ) -> None:
         self._participant = participant
         self._session = session
         self._worker = Worker()
+        self._clerk = Worker("volery-ros2-services")  # answers may wait for who asked to be found
         participant.add_node(node)
-        self.topics = Topics(participant, session, sharing, node, self._worker)
-        self.services = Services(participant, session, sharing, node, self._worker)
-        self._actions = ActionServers(participant, session, node, self._worker)
+        self.topics = Topics(participant, session, sharing, reliable, node, self._worker)
+        self.services = Services(participant, session, sharing, node, self._clerk)
+        self._actions = ActionServers(participant, session, node, self._clerk)
         graph = session.graph
         self._parameters = ParameterServices(
-            participant, graph.parameters, self._set, node, self._worker, graph.now_ns
+            participant, graph.parameters, self._set, node, self._clerk, graph.now_ns
         )
 
     def survey(self) -> None:
@@ -164,6 +176,7 @@ class _Shared:
     def close(self) -> None:
         """Take everything back."""
         self._worker.close()
+        self._clerk.close()
         self.topics.close()
         self.services.close()
         self._actions.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import logging
 from typing import Any
 
@@ -29,12 +30,14 @@ class Topics:
         participant: Participant,
         session: Session,
         sharing: Sharing,
+        reliable: tuple[str, ...],
         node: NodeName,
         worker: Worker,
     ) -> None:
         self._participant = participant
         self._session = session
         self._sharing = sharing
+        self._reliable = reliable
         self._node = node
         self._worker = worker
         self._outlets: dict[str, Outlet] = {}
@@ -85,6 +88,8 @@ class Topics:
                 self._worker.post(outlet.close)
             return
         profile = profile_of(topic.name, topic.msgtype, latched=topic.latched)
+        if any(fnmatch.fnmatch(topic.name, pattern) for pattern in self._reliable):
+            profile = profile._replace(reliable=True)
         spec = TopicSpec(self._node, topic.name, topic.msgtype, profile)
         if outlet is not None and outlet.spec != spec:
             self._worker.post(outlet.close)

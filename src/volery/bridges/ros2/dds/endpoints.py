@@ -8,6 +8,7 @@ import os
 import random
 import struct
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -34,6 +35,8 @@ from volery.bridges.ros2.type_hashes import message_hash
 _HEADER = struct.Struct("<Qq")
 """rmw_cyclonedds' cdds_request_header_t: whose question, and its number."""
 _CDR_HEADER = 4
+_LONGEST_WAIT_S = 0.1
+_PAUSE_S = 0.001
 _MOST_WAITING = 1000
 """Questions of one client that have no answer yet; the oldest is given up beyond."""
 
@@ -95,7 +98,8 @@ class DdsServer:
         qos = qos_of(SERVICES, _identity("serviceid"))
         self._writer = self._half.writer(replies, qos)
         self._take = take
-        self._half.reader(requests, qos, self._on_request)
+        self._missed = (0, 0)
+        self._reader = self._half.reader(requests, qos, self._on_request)
 
     def close(self) -> None:
         """Offer it no more."""
@@ -105,9 +109,26 @@ class DdsServer:
         header = data[_CDR_HEADER : _CDR_HEADER + _HEADER.size]
 
         def answer(cdr: bytes) -> None:
+            self._wait_for_listeners()
             library.write(self._writer, cdr[:_CDR_HEADER] + header + cdr[_CDR_HEADER:])
 
         self._take(_without_header(data), answer)
+
+
+    def _wait_for_listeners(self) -> None:
+        """Wait until whoever asked can hear: its two halves are not discovered at once.
+
+        rmw_cyclonedds does so too, and as long. What was waited for in vain is not waited for again.
+        """
+        end_s = time.monotonic() + _LONGEST_WAIT_S
+        while (halves := self._halves()) != self._missed and halves[0] < halves[1]:
+            if time.monotonic() > end_s:
+                self._missed = halves
+            time.sleep(_PAUSE_S)
+
+    def _halves(self) -> tuple[int, int]:
+        """How many can hear answers, and how many can ask."""
+        return library.subscriptions(self._writer), library.publications(self._reader)
 
 
 class DdsCaller:

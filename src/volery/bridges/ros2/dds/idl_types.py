@@ -31,7 +31,7 @@ _BASE: dict[str, Any] = {
         for bits in (8, 16, 32, 64)
     },
 }
-_REQUEST_HEADER = {"guid_": types.uint64, "seq_": types.int64}
+_REQUEST_HEADER = {"guid": types.uint64, "seq": types.int64}
 """What rmw_cyclonedds puts before requests and responses: who asked, and which question."""
 
 _lock = threading.RLock()
