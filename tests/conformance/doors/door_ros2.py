@@ -90,9 +90,7 @@ class PeerClient(Client):
     def subscribe(self, topic, msgtype=STRING):
         self._kinds[topic] = msgtype
         latched = topic in LATCHED
-        assert self._do(
-            "subscribe", topic=topic, type=msgtype, reliable=True, latched=latched
-        )
+        assert self._do("subscribe", topic=topic, type=msgtype, reliable=True, latched=latched)
         until(lambda: self._bench.is_heard(topic))
         if not self._reading:
             os.kill(self._process.pid, signal.SIGSTOP)

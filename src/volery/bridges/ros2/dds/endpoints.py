@@ -114,11 +114,10 @@ class DdsServer:
 
         self._take(_without_header(data), answer)
 
-
     def _wait_for_listeners(self) -> None:
         """Wait until whoever asked can hear: its two halves are not discovered at once.
 
-        rmw_cyclonedds does so too, and as long. What was waited for in vain is not waited for again.
+        rmw_cyclonedds does so too, and as long. Who is waited for in vain is so only once.
         """
         end_s = time.monotonic() + _LONGEST_WAIT_S
         while (halves := self._halves()) != self._missed and halves[0] < halves[1]:
