@@ -17,13 +17,12 @@ from types import MappingProxyType
 
 from door_bench import IMAGE, PATIENCE_S, STRING, TRIGGER, Bench, Client, Refused
 from door_ros_tcp import Form
+from ros2_bench import DOMAIN
 from ros_tcp_client import until
 
 from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
 
-DOMAIN = 20 + os.getpid() % 80
-"""Test runs beside each other have domains of their own."""
 LATCHED = ("/map", "/plan")
 _PEER = Path(__file__).with_name("plain_ros2.py")
 _BASE_PORT, _PORTS_A_DOMAIN, _UNICAST = 7400, 250, 10  # RTPS 2.5, 9.6.2.3

@@ -42,6 +42,8 @@ class Profile(BaseModel):
     remap: dict[Name, Name] = {}
     """The node's names, relative ones below its namespace, to those of the graph."""
     parameters: dict[str, Any] = {}
+    messages: tuple[str, ...] = ()
+    """Folders of ROS packages with message definitions, beside the profile."""
 
 
 def load_profile(path: Path) -> Profile:
