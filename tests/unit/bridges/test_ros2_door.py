@@ -34,6 +34,7 @@ from volery.graph.messages import (
     header,
     message_type,
     time_from_ns,
+    typestore,
 )
 from volery.graph.parameters import Parameter
 from volery.graph.zero import zero_message

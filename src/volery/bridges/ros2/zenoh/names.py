@@ -19,7 +19,7 @@ _SLASH = "%"
 _RELIABLE, _BEST_EFFORT = 1, 2  # rmw_qos_reliability_policy_e
 _TRANSIENT_LOCAL, _VOLATILE = 1, 2  # rmw_qos_durability_policy_e
 _KEEP_LAST = 1  # rmw_qos_history_policy_e
-_REST = ":,:,:,,"
+_REST = ",:,:,,"
 """Deadline, lifespan and liveliness: at their defaults."""
 _ENDPOINT_PARTS = 13
 _ATTACHMENT = struct.Struct("<qqB16s")
