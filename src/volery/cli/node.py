@@ -51,6 +51,10 @@ def run_node(options: NodeOptions) -> None:
         raise BridgeError(f"a node is named module:Class, not '{options.node}'") from None
     name = options.node.rpartition(":")[2]
     via = options.via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
+    if options.lock_step_s is not None and via.startswith("ros2"):
+        raise BridgeError(
+            "--lock-step: ROS 2 keeps no order between topics; use rosbridge or ros-tcp"
+        )
     with closing(open_link(via, name)) as link:
         host = NodeHost(link, clock=profile.clock)
         context = host.context(absolute_names(profile.remap, namespace))

@@ -17,6 +17,8 @@ _ENCLAVE = b"enclave=/;"
 """Security enclave of the participant, as rmw tells it."""
 _MOST_PARTICIPANTS = 32
 """On one machine without multicast: what rmw_cyclonedds probes for with LOCALHOST discovery."""
+_RECEIVE_BUFFER = "4 MiB"
+"""Where the system allows it: a picture of 1 MB in pieces overruns the usual 208 KiB."""
 
 _lock = threading.Lock()
 _domains: dict[int, tuple[Domain, str, int]] = {}
@@ -46,6 +48,7 @@ def configuration(interfaces: Sequence[str] = (), lease_s: float = 10.0) -> str:
         '<CycloneDDS><Domain id="any">'
         f"<General><Interfaces>{chosen}</Interfaces>{how}</General>"
         f"<Discovery>{lease}{peers}</Discovery>"
+        f'<Internal><SocketReceiveBufferSize max="{_RECEIVE_BUFFER}"/></Internal>'
         "</Domain></CycloneDDS>"
     )
 
