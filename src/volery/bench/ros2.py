@@ -112,7 +112,7 @@ def _streams() -> dict[str, float]:
         _wait_for_subscribers(simulation, topics, least=2)
         factor = _real_time_factor(simulation, _STREAM_S)
         got = [(topic, stamp, at) for topic, _, stamp, at in peer.finish()]
-        figures = {**stream_ages([got], published), "stream_real_time_factor": factor}
+        figures = {**stream_ages([got], dict(published)), "stream_real_time_factor": factor}
         stopped = _Peer("scan", topics)
         _wait_for_subscribers(simulation, topics, least=2)
         stopped.signal(signal.SIGSTOP)

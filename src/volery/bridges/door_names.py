@@ -62,7 +62,7 @@ def describe_doors() -> dict[str, str]:
 
 
 def _parse(address: str, port: int, text: str) -> Address:
-    host = "127.0.0.1"
+    host = _HERE
     if address:
         before, colon, after = address.rpartition(":")
         if colon:
@@ -110,6 +110,8 @@ def _ros1(address: Address, terms: Terms) -> Door:
 def _ros2(address: Address, terms: Terms) -> Door:
     from volery.bridges.ros2.environment import Ros2Terms
 
+    if address.host != _HERE:
+        raise BridgeError("ros2=N names a domain; interfaces are chosen with --ros2-interface")
     domain_id = terms.domain_id if address.port == _UNSAID else address.port
     return _ros2_door(Ros2Terms("dds", domain_id, terms.interfaces))
 
@@ -135,6 +137,7 @@ def _sensor_link(address: Address, terms: Terms) -> Door:
     return SensorLink(*address, image_port=image_port, anywhere=terms.anywhere)
 
 
+_HERE = "127.0.0.1"
 _UNSAID = -1
 _KINDS = {
     "rosbridge": DoorKind(9090, _rosbridge, "rosbridge v2 server (WebSocket, JSON and CBOR)"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import socket
 import struct
 import time
 
@@ -199,6 +201,22 @@ def test_other_domains_are_not_heard(world):
 def test_one_domain_has_one_configuration_in_a_process(world):
     with pytest.raises(BridgeError, match="other interfaces"):
         join_ros2(Ros2Terms(domain_id=DOMAIN, interfaces=("eth0",)))
+
+
+def test_sockets_hear_this_machine_alone(world):
+    found = 0
+    for name in os.listdir("/proc/self/fd"):
+        try:
+            sock = socket.socket(fileno=os.dup(int(name)))
+        except OSError:
+            continue  # no socket, or one that has closed
+        with sock:
+            port = sock.getsockname()[1] if sock.type == socket.SOCK_DGRAM else 0
+            if 0 <= port - 7400 - 250 * DOMAIN < 250:
+                device = sock.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16)
+                assert device.rstrip(b"\0") == b"lo"
+                found += 1
+    assert found >= 2
 
 
 def test_interfaces_that_there_are_not_are_told():

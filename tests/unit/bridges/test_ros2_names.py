@@ -176,5 +176,7 @@ def test_doors_by_name(monkeypatch):
     assert make_door("ros2=7", Terms()).door._terms.domain_id == 7
     named = make_door("ros2", Terms(domain_id=9, interfaces=("eth0",))).door._terms
     assert named == ("dds", 9, ("eth0",), "")
+    with pytest.raises(BridgeError, match="--ros2-interface"):
+        make_door("ros2=10.0.0.1:7", Terms())
     zenoh = make_door("ros2-zenoh=10.0.0.7:7447", Terms(domain_id=3)).door._terms
     assert zenoh == ("zenoh", 3, (), "10.0.0.7:7447")

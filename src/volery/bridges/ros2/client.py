@@ -97,6 +97,10 @@ class Ros2Client:
             self._named = True
         self._participant.add_node(node)
         self._node, self.name = node, f"ROS 2 node {name}"
+        with self._lock:  # what was subscribed before belongs to the node too
+            for inlet in self._mailboxes.values():
+                inlet.profile = None
+                self._open(inlet)
         if self._parameters is None:
             self._parameters = ParameterServices(
                 self._participant, parameters, set_value, node, self._worker, time.time_ns

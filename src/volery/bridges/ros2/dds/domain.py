@@ -11,6 +11,7 @@ from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.qos import Policy, Qos
 
 from volery.bridges.ros2.dds import library
+from volery.bridges.ros2.dds.confining import confine
 from volery.core.errors import BridgeError
 
 _ENCLAVE = b"enclave=/;"
@@ -58,22 +59,28 @@ def _called(interface: str) -> str:
     return f"{key}={quoteattr(interface)}"
 
 
-def join_domain(domain_id: int, config: str) -> DomainParticipant:
+def join_domain(domain_id: int, interfaces: Sequence[str]) -> DomainParticipant:
     """A new participant. `BridgeError` where the domain cannot be joined like this."""
+    config = configuration(interfaces)
     with _lock:
         known = _domains.get(domain_id)
         if known is not None and known[1] != config:
             raise BridgeError(
                 f"DDS domain {domain_id} is in use in this process with other interfaces"
             )
+        domain = None
         try:
             domain = known[0] if known else Domain(domain_id, config)
             participant = DomainParticipant(domain_id, qos=Qos(Policy.Userdata(data=_ENCLAVE)))
         except DDSException as error:
+            if domain is not None and known is None:
+                library.delete(domain)
             raise BridgeError(
                 f"cannot join DDS domain {domain_id}: {error}. Do the interfaces exist, and do "
                 f"fewer than {_MOST_PARTICIPANTS} other programs of this machine take part?"
             ) from None
+        if not interfaces:
+            confine(domain_id)
         _domains[domain_id] = (domain, config, 1 + (known[2] if known else 0))
         return participant
 

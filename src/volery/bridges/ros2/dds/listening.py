@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import logging
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -24,7 +25,7 @@ from volery.bridges.ros2.dds import library
 _ANY = ViewState.Any | InstanceState.Any | SampleState.NotRead
 _MOST_AT_ONCE = 100
 """Samples of one reader before others have their turn."""
-_LONGEST_WAIT_NS = 10**9
+_PERIOD_S = 0.2
 
 _log = logging.getLogger(__name__)
 
@@ -32,14 +33,15 @@ Take = Callable[[list[Any]], None]
 
 
 class Ear:
-    """Waits for data and hands it out."""
+    """Waits for data and hands it out; calls `now_and_then` some times a second."""
 
-    def __init__(self, participant: DomainParticipant) -> None:
+    def __init__(self, participant: DomainParticipant, now_and_then: Callable[[], None]) -> None:
         self._waitset = WaitSet(participant)
         self._bell = GuardCondition(participant)
         self._numbers = itertools.count(1)
         self._readers: dict[int, tuple[Any, Any, Take]] = {}
         self._closing = False
+        self._now_and_then = now_and_then
         library.attach(self._waitset, self._bell, 0)
         self._thread = threading.Thread(target=self._run, name="volery-ros2-dds", daemon=True)
         self._thread.start()
@@ -66,10 +68,14 @@ class Ear:
             self._thread.join()
 
     def _run(self) -> None:
+        due_s = 0.0
         while not self._closing:
-            ready = library.wait(self._waitset, _LONGEST_WAIT_NS)
+            ready = library.wait(self._waitset, int(_PERIOD_S * 1e9))
             if ready is None:
                 return
+            if time.monotonic() > due_s:
+                due_s = time.monotonic() + _PERIOD_S
+                self._now_and_then()
             for number in ready:
                 if number and not self._closing:
                     self._serve(number)

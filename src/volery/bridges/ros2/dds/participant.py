@@ -7,7 +7,7 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 
 from volery.bridges.ros2.dds.discovery import Discovery
-from volery.bridges.ros2.dds.domain import configuration, join_domain, leave_domain
+from volery.bridges.ros2.dds.domain import join_domain, leave_domain
 from volery.bridges.ros2.dds.endpoints import DdsCaller, DdsReader, DdsServer, DdsWriter, Place
 from volery.bridges.ros2.dds.listening import Ear
 from volery.bridges.ros2.dds.records import Record
@@ -35,16 +35,15 @@ class DdsParticipant:
 
     def __init__(self, domain_id: int, interfaces: Sequence[str] = ()) -> None:
         self._domain_id = domain_id
-        self._participant = join_domain(domain_id, configuration(interfaces))
+        self._participant = join_domain(domain_id, tuple(interfaces))
         reach = ", ".join(interfaces) or "this machine"
         self.where = f"DDS domain {domain_id} ({reach})"
-        self._ear = Ear(self._participant)
+        self._callers: weakref.WeakSet[DdsCaller] = weakref.WeakSet()
+        self._lock = threading.Lock()
+        self._ear = Ear(self._participant, self._check_callers)
         self._record = Record(self._participant)
         self._place = Place(self._participant, self._ear, self._record)
         self._discovery = Discovery(self._participant, self._ear)
-        self._discovery.when_changed(self._check_callers)
-        self._callers: weakref.WeakSet[DdsCaller] = weakref.WeakSet()
-        self._lock = threading.Lock()
         self._closed = False
 
     def add_node(self, node: NodeName) -> None:
