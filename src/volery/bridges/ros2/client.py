@@ -10,7 +10,6 @@ parameters.
 from __future__ import annotations
 
 import contextlib
-import logging
 import threading
 import time
 from collections.abc import Callable
@@ -28,12 +27,13 @@ from volery.bridges.ros2.middleware import (
 )
 from volery.bridges.ros2.names import NodeName, check_name
 from volery.bridges.ros2.parameters import ParameterServices
-from volery.bridges.ros2.services import answerer, forwarder, wait_for
+from volery.bridges.ros2.services import answerer, ask_server, wait_for
+from volery.bridges.ros2.subscriptions import Subscriptions
 from volery.bridges.ros2.worker import Worker
 from volery.core.errors import GraphError
-from volery.graph.cdr import decode_cdr, encode_cdr
+from volery.graph.cdr import encode_cdr
 from volery.graph.mailbox import Mailbox, Wake
-from volery.graph.messages import Published, message_type, type_name
+from volery.graph.messages import message_type, type_name
 from volery.graph.parameters import Parameters
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
 from volery.graph.reply import Reply
@@ -45,8 +45,6 @@ _FIRST_LOOK_S = 1.0
 _LONGEST_LOOK_S = 3.0
 _LATCHED_DEPTH = 1
 _PUBLISHED_DEPTH = 100
-
-_log = logging.getLogger(__name__)
 
 
 class Ros2Client:
@@ -69,9 +67,9 @@ class Ros2Client:
         self._complaints = Complaints()
         self._lock = threading.RLock()
         self._publishers: dict[str, _Publisher] = {}
-        self._mailboxes: dict[Mailbox, _Inlet] = {}
+        self._subscriptions = Subscriptions(self._participant, self._node)
         self._servers: dict[str, Handle] = {}
-        self._callers: dict[str, tuple[str, Caller]] = {}
+        self._callers: dict[str, tuple[ServiceSpec, Caller]] = {}
         self._parameters: ParameterServices | None = None
         self._closed = False
         self._participant.when_changed(lambda: self._worker.post(self._adapt))
@@ -97,10 +95,7 @@ class Ros2Client:
             self._named = True
         self._participant.add_node(node)
         self._node, self.name = node, f"ROS 2 node {name}"
-        with self._lock:  # what was subscribed before belongs to the node too
-            for inlet in self._mailboxes.values():
-                inlet.profile = None
-                self._open(inlet)
+        self._subscriptions.move(node)
         if self._parameters is None:
             self._parameters = ParameterServices(
                 self._participant, parameters, set_value, node, self._worker, time.time_ns
@@ -176,19 +171,14 @@ class Ros2Client:
         mailbox = Mailbox(topic, depth, wake, reliable=reliable)
         with self._lock:
             self._check_open()
-            inlet = _Inlet(topic, found, max(depth, DEFAULT_DEPTH), self._receiver(mailbox, found))
-            self._mailboxes[mailbox] = inlet
-            self._open(inlet)
+            self._subscriptions.open(mailbox, found, depth)
         self._participant.announce()
         return mailbox
 
     def unsubscribe(self, mailbox: Mailbox) -> None:
         """Receive no more; what waits can still be taken."""
-        with self._lock:
-            inlet = self._mailboxes.pop(mailbox, None)
-        if inlet is not None and inlet.handle is not None:
-            inlet.handle.close()
-            self._participant.announce()
+        self._subscriptions.close(mailbox)
+        self._participant.announce()
 
     def _type_of(self, topic: str) -> str:
         found = self.topic_types().get(topic)
@@ -196,43 +186,8 @@ class Ros2Client:
             raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
         return found
 
-    def _receiver(self, mailbox: Mailbox, msgtype: str) -> Callable[[bytes], None]:
-        def receive(data: bytes) -> None:
-            try:
-                message = decode_cdr(data, msgtype)
-            except GraphError as error:
-                self._complaints.tell(mailbox.topic, str(error))
-                return
-            mailbox.put(Published(mailbox.topic, msgtype, time.time_ns(), message))
-
-        return receive
-
-    def _open(self, inlet: _Inlet) -> None:
-        """Subscribe so that all present publishers of a topic are heard."""
-        offers = [
-            p.profile
-            for p in self._participant.publishers()
-            if (p.topic, p.msgtype) == (inlet.topic, inlet.msgtype)
-        ]
-        wanted = Profile(
-            reliable=all(offer.reliable for offer in offers),
-            latched=bool(offers) and all(offer.latched for offer in offers),
-            depth=inlet.depth,
-        )
-        if inlet.handle is not None:
-            if inlet.profile == wanted:
-                return
-            inlet.handle.close()
-        inlet.profile = wanted
-        spec = TopicSpec(self._node, inlet.topic, inlet.msgtype, wanted)
-        inlet.handle = self._participant.reader(spec, inlet.receive)
-
     def _adapt(self) -> None:
-        """Others came or went: subscriptions ask for what their publishers offer now."""
-        with self._lock:
-            if not self._closed:
-                for inlet in self._mailboxes.values():
-                    self._open(inlet)
+        self._subscriptions.adapt()
         self._participant.announce()
 
     # ---------------------------------------------------------------------------------- services
@@ -247,18 +202,18 @@ class Ros2Client:
 
         def ask() -> None:
             try:
-                srvtype, caller = self._caller(service)
-                wanted = f"{srvtype}_Request"
+                spec, caller = self._caller(service)
+                wanted = f"{spec.srvtype}_Request"
                 question = zero_message(wanted) if request is None else request
                 if type_name(type(question)) != wanted:
                     raise GraphError(f"service '{service}' takes {wanted}")
-                forwarder(caller, service, srvtype)(question, reply)
+                ask_server(caller, spec, question, reply)
             except GraphError as error:
                 reply.fail(error)
 
         threading.Thread(target=ask, name=f"volery-ros2 {service}", daemon=True).start()
 
-    def _caller(self, service: str) -> tuple[str, Caller]:
+    def _caller(self, service: str) -> tuple[ServiceSpec, Caller]:
         """A client of a service that is there. `GraphError` where nobody offers it in time."""
         with self._lock:
             known = self._callers.get(service)
@@ -274,7 +229,7 @@ class Ros2Client:
             self._check_open()
             spec = ServiceSpec(self._node, service, srvtype)
             if service not in self._callers:
-                self._callers[service] = srvtype, self._participant.caller(spec)
+                self._callers[service] = spec, self._participant.caller(spec)
             return self._callers[service]
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
@@ -310,10 +265,10 @@ class Ros2Client:
         with contextlib.suppress(RuntimeError):
             self._worker.close()
         handles: list[Handle] = [p.writer for p in self._publishers.values()]
-        handles += [i.handle for i in self._mailboxes.values() if i.handle is not None]
         handles += [*self._servers.values(), *(caller for _, caller in self._callers.values())]
         for handle in handles:
             handle.close()
+        self._subscriptions.close_all()
         if self._parameters is not None:
             self._parameters.close()
         self._participant.close()
@@ -325,7 +280,7 @@ class Ros2Client:
             return SessionInfo(
                 self.name,
                 tuple(self._publishers),
-                tuple(mailbox.info for mailbox in self._mailboxes),
+                self._subscriptions.infos,
                 tuple(self._servers),
             )
 
@@ -345,20 +300,6 @@ class _Publisher:
         self.writer = writer
         self.msgtype = msgtype
         self.latched = latched
-
-
-class _Inlet:
-    """A subscription, and what it asks for at present."""
-
-    def __init__(
-        self, topic: str, msgtype: str, depth: int, receive: Callable[[bytes], None]
-    ) -> None:
-        self.topic = topic
-        self.msgtype = msgtype
-        self.depth = depth
-        self.receive = receive
-        self.profile: Profile | None = None
-        self.handle: Handle | None = None
 
 
 def _known(msgtype: str) -> None:

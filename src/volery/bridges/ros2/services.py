@@ -20,6 +20,7 @@ from volery.graph.zero import zero_message
 
 _LONGEST_WAIT_S = 10.0
 """For a server to appear, which DDS may take seconds to find."""
+_PAUSE_S = 0.005
 
 
 class Services:
@@ -66,8 +67,9 @@ class Services:
         """Offer ROS 2 services in the graph. `GraphError` for a wrong type or a taken name."""
         for name, srvtype in services.items():
             check_name(name)
-            caller = self._participant.caller(ServiceSpec(self._node, name, srvtype))
-            self._session.offer(name, srvtype, forwarder(caller, name, srvtype))
+            spec = ServiceSpec(self._node, name, srvtype)
+            caller = self._participant.caller(spec)
+            self._session.offer(name, srvtype, _forwarder(caller, spec))
             self._callers[name] = caller
 
     def close(self) -> None:
@@ -133,30 +135,33 @@ def _refusal(response_type: str, reason: str) -> Any | None:
     return None
 
 
-def forwarder(caller: Caller, name: str, srvtype: str) -> Callable[[Any, Reply], None]:
-    """A handler of a service of the graph that passes requests on to a ROS 2 server."""
-    request_type, response_type = f"{srvtype}_Request", f"{srvtype}_Response"
+def ask_server(caller: Caller, spec: ServiceSpec, request: Any, reply: Reply) -> None:
+    """Ask a ROS 2 server, waiting for it to be found; `reply` gets its response or an error."""
 
-    def lose() -> GraphError:
-        return GraphError(f"service '{name}': its ROS 2 node has left")
+    def respond(data: bytes) -> None:
+        try:
+            reply.answer(decode_cdr(data, f"{spec.srvtype}_Response"))
+        except GraphError as error:
+            reply.fail(error)
+
+    def lose() -> None:
+        reply.fail(GraphError(f"service '{spec.service}': its ROS 2 node has left"))
+
+    try:
+        if not wait_for(lambda: caller.ready, _LONGEST_WAIT_S):
+            raise GraphError(f"nobody offers ROS 2 service '{spec.service}'")
+        caller.call(encode_cdr(request, f"{spec.srvtype}_Request"), respond, lose)
+    except GraphError as error:
+        reply.fail(error)
+
+
+def _forwarder(caller: Caller, spec: ServiceSpec) -> Callable[[Any, Reply], None]:
+    """A handler of a service of the graph that passes requests on to a ROS 2 server."""
 
     def handle(request: Any, reply: Reply) -> None:
-        def respond(data: bytes) -> None:
-            try:
-                reply.answer(decode_cdr(data, response_type))
-            except GraphError as error:
-                reply.fail(error)
-
-        def ask() -> None:
-            try:
-                if not wait_for(lambda: caller.ready, _LONGEST_WAIT_S):
-                    raise GraphError(f"nobody offers ROS 2 service '{name}'")
-                cdr = encode_cdr(request, request_type)
-                caller.call(cdr, respond, lambda: reply.fail(lose()))
-            except GraphError as error:
-                reply.fail(error)
-
-        threading.Thread(target=ask, name=f"volery-ros2 {name}", daemon=True).start()
+        name = f"volery-ros2 {spec.service}"
+        work = (caller, spec, request, reply)
+        threading.Thread(target=ask_server, args=work, name=name, daemon=True).start()
 
     return handle
 
@@ -169,6 +174,3 @@ def wait_for(what: Callable[[], bool], timeout_s: float) -> bool:
             return True
         pause.wait(_PAUSE_S)
     return what()
-
-
-_PAUSE_S = 0.005

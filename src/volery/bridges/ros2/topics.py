@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fnmatch
-import logging
 from typing import Any
 
 from volery.bridges.ros2.complaints import Complaints
@@ -18,8 +17,6 @@ from volery.core.errors import GraphError
 from volery.graph.cdr import decode_cdr
 from volery.graph.graph import TopicInfo
 from volery.graph.session import Session
-
-_log = logging.getLogger(__name__)
 
 
 class Topics:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import logging
 import os
 import random
 import struct
@@ -39,8 +38,6 @@ _LONGEST_WAIT_S = 0.1
 _PAUSE_S = 0.001
 _MOST_WAITING = 1000
 """Questions of one client that have no answer yet; the oldest is given up beyond."""
-
-_log = logging.getLogger(__name__)
 
 
 class Place:

@@ -10,6 +10,7 @@ import ctypes
 from typing import Any
 
 from cyclonedds.__library__ import library_path
+from cyclonedds.core import Entity
 from cyclonedds.topic import Sample
 
 _library = ctypes.CDLL(str(library_path))
@@ -61,6 +62,7 @@ def write(writer: Any, cdr: bytes) -> bool:
 
 def delete(entity: Any) -> None:
     """End an entity and those below it now, whoever still refers to them in Python."""
+    Entity._entities.pop(entity._ref, None)  # else it would be deleted again with the object
     _delete(entity._ref)
 
 

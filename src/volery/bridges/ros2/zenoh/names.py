@@ -22,6 +22,7 @@ _KEEP_LAST = 1  # rmw_qos_history_policy_e
 _REST = ",:,:,,"
 """Deadline, lifespan and liveliness: at their defaults."""
 _ENDPOINT_PARTS = 13
+_MOST_DIGITS = 10
 _ATTACHMENT = struct.Struct("<qqB16s")
 GID_BYTES = 16
 
@@ -132,7 +133,7 @@ def _read_qos(words: str) -> Profile:
     return Profile(
         reliable=reliability != str(_BEST_EFFORT),
         latched=durability == str(_TRANSIENT_LOCAL),
-        depth=int(depth) if depth.isdecimal() else Profile().depth,
+        depth=int(depth) if depth.isdecimal() and len(depth) < _MOST_DIGITS else Profile().depth,
     )
 
 
