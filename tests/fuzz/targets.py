@@ -10,6 +10,7 @@ import grid_map_targets
 import log_targets
 import mesh_targets
 import message_targets
+import ros2_targets
 import rosbridge_targets
 import socket_targets
 
@@ -34,6 +35,8 @@ TARGETS = {
     "definitions": message_targets.definitions,
     "topic_patterns": message_targets.patterns,
     "type_names": message_targets.type_names,
+    "ros2_tokens": ros2_targets.tokens,
+    "ros2_attachments": ros2_targets.attachments,
     "mcap": log_targets.mcap,
     "bag": log_targets.bag,
     "grid_map_matrix": grid_map_targets.matrix,

@@ -197,6 +197,20 @@ BENCHES: dict[str, Bench] = {
             apart="latency_",
         ),
         Bench(
+            "ros2",
+            "ROS 2 over DDS: one way from the simulation to a subscriber in another process, the "
+            "line L = alpha S + beta through images of 0 to 1 MB; scans of 10 UAVs with two LIDARs "
+            "at 40 Hz to one subscriber, and while a subscriber stands still",
+            {
+                "alpha_s_per_mb": Bound(0.003, at_most=True),
+                "beta_s": Bound(0.0007, at_most=True),
+                "stream_lost": Bound(0.0, at_most=True),
+                "stream_real_time_factor": Bound(0.99),
+                "stopped_real_time_factor": Bound(0.99),
+            },
+            in_all=False,  # it needs the extra "ros2"
+        ),
+        Bench(
             "coverage",
             "Coverage: areas and tours of the reference cases of DARP; beside an open "
             "implementation where there is one, see [coverage.md](coverage.md#figures)",

@@ -11,9 +11,13 @@ from volery.cli.graph_commands import node, service_app, topic_app
 from volery.cli.guard import guarded
 from volery.cli.options import (
     BatchSizeOption,
+    DomainOption,
     DoorsOption,
+    InterfaceOption,
+    MiddlewareOption,
     PageCommand,
     RemoteOption,
+    Ros2Option,
     ThreadsOption,
     TokenOption,
 )
@@ -74,6 +78,10 @@ def run(
     door: DoorsOption = None,
     allow_remote: RemoteOption = False,
     token: TokenOption = None,
+    ros2: Ros2Option = False,
+    domain_id: DomainOption = None,
+    middleware: MiddlewareOption = "dds",
+    ros2_interface: InterfaceOption = None,
     recordings: Annotated[
         Path | None,
         typer.Option(help="Folder in which clients may record: /volery/start_recording."),
@@ -98,7 +106,8 @@ def run(
 ) -> None:
     """Fly a scenario.
 
-    Doors: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, sensor-link, comms.
+    Doors: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, ros2, ros2-zenoh,
+    sensor-link, comms.
 
     At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
     + and - double and halve the speed, m frees it. Ctrl-C ends the flight and still writes log and
@@ -106,13 +115,16 @@ def run(
     """
     from volery.cli.run import RunOptions, fly, parse_speed
 
+    doors = (*(door or ()), *((("ros2" if middleware == "dds" else "ros2-zenoh"),) * ros2))
     options = RunOptions(
         scenario=scenario,
         uavs=uavs,
         seconds=seconds,
         seed=seed,
-        speed=parse_speed(speed or ("1" if door else "max")),
-        doors=tuple(door or ()),
+        speed=parse_speed(speed or ("1" if doors else "max")),
+        doors=doors,
+        domain_id=domain_id,
+        interfaces=tuple(ros2_interface or ()),
         recordings=recordings,
         allow_remote=allow_remote,
         token=token,

@@ -24,7 +24,7 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
     from volery.bridges.door_names import DoorKind, Terms, make_door
     from volery.bridges.doors import Doors
 
-    terms = Terms(options.allow_remote, options.token)
+    terms = Terms(options.allow_remote, options.token, options.domain_id, options.interfaces)
     comms = DoorKind(10200, _comms, "makes UAVs stations of a communication server")
     wanted = [make_door(text, terms, {"comms": comms}) for text in options.doors]
     with Doors(simulation.gateway) as doors:

@@ -217,6 +217,10 @@ class Graph:
             raise GraphError("this graph has no thread of its own to post to")
         self._post(action)
 
+    def enter(self, node: str) -> None:
+        """Note that a node of this full name stands on the graph."""
+        self.parameters.enter(node)
+
     # ---------------------------------------------------------------------------------- topics
 
     @property

@@ -95,6 +95,7 @@ class Node:
             if context.latency_ns
             else None
         )
+        context.graph.enter(self.full_name)
 
     # ------------------------------------------------------------------------------ the contract
 

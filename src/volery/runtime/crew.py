@@ -19,6 +19,7 @@ from volery.graph.publishing import GraphPublisher
 from volery.runtime.assembly import Assembly, assemble
 from volery.runtime.command_door import open_commands
 from volery.runtime.graph_building import announce_sensors, start_nodes, start_system_nodes
+from volery.runtime.message_loading import learn_messages
 from volery.runtime.outlet import Outlet
 from volery.runtime.placement import Start
 from volery.runtime.sensor_fitting import Fitted
@@ -67,6 +68,7 @@ class Crew:
     def open(self, parts: Assembly) -> None:
         """Let the UAVs that the engine was made with take part in the graph."""
         self._take_over(parts, self.starts)
+        learn_messages(self.scenario)
         self.start_nodes()
 
     def regroup(self, starts: Sequence[Start]) -> None:

@@ -366,6 +366,8 @@ class Scenario(Data):
     nodes: tuple[NodeEntry, ...] = ()
     """Nodes of the whole system, one of each; their relative names begin at the root."""
     faults: tuple[Fault, ...] = ()
+    messages: tuple[str, ...] = ()
+    """Folders of ROS packages whose `.msg`, `.srv` and `.action` files the nodes use."""
 
     _folder: Path | None = PrivateAttr(default=None)
 

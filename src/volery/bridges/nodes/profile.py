@@ -61,6 +61,8 @@ class Profile(BaseModel):
     """Of the node that `volery node` starts."""
     launch: tuple[Launched, ...] = ()
     """What `volery launch` starts."""
+    messages: tuple[str, ...] = ()
+    """Folders of ROS packages with message definitions, beside the profile."""
 
 
 def load_profile(path: Path) -> Profile:
