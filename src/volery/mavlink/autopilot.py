@@ -11,18 +11,19 @@ repeats. What changes is in `memory`.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from volery.core.errors import CommandError
-from volery.core.rotations import yaw_of
 from volery.mavlink import failsafes, flying, messages, streams, switching
 from volery.mavlink.codec import AUTOPILOT, Codec, Parser, dialect
+from volery.mavlink.framing import Framer
 from volery.mavlink.geography import Earth
 from volery.mavlink.memory import Link, Memory, Source
 from volery.mavlink.parameters import Value, refusal
 from volery.mavlink.telemetry import HEARTBEAT, status_texts
 from volery.mavlink.transfers import keep_transfers_going
-from volery.mavlink.vehicle import Build, FlightState, Vehicle
+from volery.mavlink.vehicle import Build, FlightState, Vector, Vehicle
 
 ALL_LINKS = 65535
 MOST_LINKS = 64
@@ -48,7 +49,9 @@ class Autopilot:
         self.memory = Memory()
         self._codec = Codec(system)
         self._parser = Parser()
+        self._framer = Framer()
         self._sent: list[tuple[int, bytes]] = []
+        self._place: tuple[int, Vector] = (-1, (0.0, 0.0, 0.0))
         self._set_up(parameters or {})
 
     # ------------------------------------------------------------------------------------- links
@@ -61,8 +64,10 @@ class Autopilot:
             if len(memory.links) >= MOST_LINKS:
                 return
             memory.links[link] = streams.begin(Link(link, profile), now_ns)
-        for message in self._parser.feed(data):
-            if message.get_srcSystem() != self.system or message.get_srcComponent() != AUTOPILOT:
+        for frame in self._framer.datagram(data):
+            own = (frame.system, frame.component) == (self.system, AUTOPILOT)
+            message = None if own else self._parser.decode(frame.data)
+            if message is not None:
                 self._take(link, message)
 
     def close_link(self, number: int) -> None:
@@ -123,7 +128,16 @@ class Autopilot:
     @property
     def yaw(self) -> float:
         """Rad in the map."""
-        return float(yaw_of(self.state.attitude))
+        x, y, z, w = self.state.attitude
+        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+    def geodetic(self) -> Vector:
+        """Latitude and longitude in degrees and altitude of the UAV, worked out once a state."""
+        time_ns, place = self._place
+        if time_ns != self.state.time_ns:
+            place = self.earth.geodetic(self.state.position)
+            self._place = self.state.time_ns, place
+        return place
 
     def parameter(self, name: str) -> Value:
         """Value of a parameter."""

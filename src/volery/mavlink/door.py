@@ -20,6 +20,7 @@ from volery.graph.session import Gateway
 from volery.mavlink import ports
 from volery.mavlink.codec import Parser, dialect
 from volery.mavlink.fleet import Fleet, Sink
+from volery.mavlink.framing import Framer
 from volery.mavlink.serial_line import SerialLine
 from volery.mavlink.streams import GROUND, ONBOARD
 
@@ -115,7 +116,7 @@ class _UdpLink:
         self.number = own
         self._fleet, self._system, self._profile = fleet, system, profile
         self._peers = [to]
-        self._parser = Parser()
+        self._framer = Framer()
         family = socket.AF_INET6 if ":" in to[0] else socket.AF_INET
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -151,7 +152,7 @@ class _UdpLink:
                 continue
             if peer not in self._peers:  # the place agreed upon, and who spoke last
                 self._peers = [self._peers[0], peer[:2]]
-            frames = b"".join(bytes(m.get_msgbuf()) for m in self._parser.feed(data))
+            frames = b"".join(frame.data for frame in self._framer.datagram(data))
             if frames:
                 self._fleet.send(self._system, self.number, self._profile, frames)
 
@@ -162,7 +163,7 @@ class _Party:
     def __init__(self, fleet: Fleet, number: int, profile: int) -> None:
         self.number = number
         self._fleet, self._profile = fleet, profile
-        self._parser = Parser()
+        self._framer, self._parser = Framer(), Parser()
         self._systems: set[int] = set()
 
     def greet(self, system: int) -> None:
@@ -172,12 +173,11 @@ class _Party:
 
     def take(self, data: bytes) -> None:
         """Bring what came to the vehicles that it is for."""
-        for message in self._parser.feed(data):
-            target = getattr(message, "target_system", 0)
+        for frame in self._framer.feed(data):
+            target = getattr(self._parser.decode(frame.data), "target_system", 0)
             chosen = self._systems if target == 0 else self._systems & {target}
             for system in sorted(chosen):
-                frame = bytes(message.get_msgbuf())
-                self._fleet.send(system, self.number, self._profile, frame)
+                self._fleet.send(system, self.number, self._profile, frame.data)
 
     def leave(self) -> None:
         """Tell the vehicles that it is there no more."""

@@ -1,4 +1,7 @@
-"""A UAV of the graph as the autopilot's vehicle: services for modes, topics for setpoints."""
+"""A UAV of the graph as the autopilot's vehicle.
+
+Services carry everything: what is asked first is done first, and what is refused is told.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import math
 from typing import Any
 
 from volery.core.errors import GraphError
-from volery.graph.messages import Point, Quaternion, Vector3, message_type
+from volery.graph.messages import Point, Quaternion, Vector3
 from volery.graph.node import Node
 from volery.graph.zero import zero_message
 from volery.mavlink.vehicle import Build, FlightState, Vector
@@ -16,6 +19,8 @@ _TRIGGER = "std_srvs/srv/Trigger"
 _TAKE_OFF_TO = "volery_interfaces/srv/TakeOffTo"
 _GET_BUILD = "volery_interfaces/srv/GetBuild"
 _GO_TO = "volery_interfaces/srv/GoTo"
+_SET_TARGET = "volery_interfaces/srv/SetPositionTarget"
+_SET_ATTITUDE = "volery_interfaces/srv/SetAttitudeTarget"
 _TARGET = "mavros_msgs/msg/PositionTarget"
 _ATTITUDE = "mavros_msgs/msg/AttitudeTarget"
 _NO_PLACE, _NO_VELOCITY, _NO_PUSH = 7, 7 << 3, 7 << 6
@@ -28,9 +33,8 @@ class GraphVehicle:
     """Commands the UAV in whose namespace `node` lives."""
 
     def __init__(self, node: Node) -> None:
-        self._node = node
-        self._target = node.create_publisher(message_type(_TARGET), "setpoint_raw/local")
-        self._attitude = node.create_publisher(message_type(_ATTITUDE), "setpoint_raw/attitude")
+        self._target = node.create_client(_SET_TARGET, "set_position_target")
+        self._attitude = node.create_client(_SET_ATTITUDE, "set_attitude_target")
         self._clients = {
             name: node.create_client(_TRIGGER, name) for name in ("hold", "land", "stop")
         }
@@ -64,7 +68,7 @@ class GraphVehicle:
 
     def steer(self, velocity: Vector, yaw: float | None, yaw_rate: float) -> None:
         """As `Vehicle`."""
-        self._publish(_NO_PLACE | _NO_PUSH, _NOTHING, velocity, _NOTHING, yaw, yaw_rate)
+        self._steer(_NO_PLACE | _NO_PUSH, _NOTHING, velocity, _NOTHING, yaw, yaw_rate)
 
     def follow(
         self,
@@ -75,27 +79,27 @@ class GraphVehicle:
         yaw_rate: float,
     ) -> None:
         """As `Vehicle`."""
-        self._publish(0, position, velocity, acceleration, yaw, yaw_rate)
+        self._steer(0, position, velocity, acceleration, yaw, yaw_rate)
 
     def push(self, acceleration: Vector, yaw: float | None, yaw_rate: float) -> None:
         """As `Vehicle`."""
-        self._publish(_NO_PLACE | _NO_VELOCITY, _NOTHING, _NOTHING, acceleration, yaw, yaw_rate)
+        self._steer(_NO_PLACE | _NO_VELOCITY, _NOTHING, _NOTHING, acceleration, yaw, yaw_rate)
 
     def tilt(self, attitude: Turn, thrust: float) -> None:
         """As `Vehicle`."""
         message = zero_message(_ATTITUDE)
         message.type_mask = _NO_RATES
         message.orientation, message.thrust = Quaternion(*attitude), thrust
-        self._attitude.publish(message)
+        self._turn(message)
 
     def spin(self, rates: Vector, thrust: float) -> None:
         """As `Vehicle`."""
         message = zero_message(_ATTITUDE)
         message.type_mask = _NO_ATTITUDE
         message.body_rate, message.thrust = Vector3(*rates), thrust
-        self._attitude.publish(message)
+        self._turn(message)
 
-    def _publish(
+    def _steer(
         self,
         mask: int,
         position: Vector,
@@ -110,7 +114,14 @@ class GraphVehicle:
         message.position, message.velocity = Point(*position), Vector3(*velocity)
         message.acceleration_or_force = Vector3(*acceleration)
         message.yaw, message.yaw_rate = yaw or 0.0, yaw_rate
-        self._target.publish(message)
+        request = zero_message(f"{_SET_TARGET}_Request")
+        request.target = message
+        _ask(self._target, request)
+
+    def _turn(self, message: Any) -> None:
+        request = zero_message(f"{_SET_ATTITUDE}_Request")
+        request.target = message
+        _ask(self._attitude, request)
 
 
 def _ask(client: Any, request: Any = None) -> str:

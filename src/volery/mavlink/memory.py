@@ -24,7 +24,8 @@ class Link:
     profile: int
     periods_ns: dict[int, int] = field(default_factory=dict)
     """Of its streams, by message id."""
-    due_ns: dict[int, int] = field(default_factory=dict)
+    due: list[tuple[int, int]] = field(default_factory=list)
+    """Instants (ns) and ids of what is to be sent, a heap."""
     sequence: int = 0
     parameters_to_send: list[int] = field(default_factory=list)
     """Indices, the next one last."""

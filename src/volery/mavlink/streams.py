@@ -6,7 +6,7 @@ Rates are those of PX4's links: `onboard` for a companion computer, `normal` for
 
 from __future__ import annotations
 
-import math
+import heapq
 from typing import TYPE_CHECKING, Any
 
 from volery.mavlink import telemetry
@@ -41,7 +41,7 @@ def begin(link: Link, now_ns: int) -> Link:
     """Give a link the streams of its profile."""
     rates = RATES_HZ.get(link.profile, _ALWAYS)
     link.periods_ns = {number: round(1e9 / rate) for number, rate in rates.items()}
-    link.due_ns = dict.fromkeys(link.periods_ns, now_ns)
+    link.due = [(now_ns, number) for number in sorted(link.periods_ns)]
     return link
 
 
@@ -54,14 +54,15 @@ def ask_for(pilot: Autopilot, link: Link, number: int, period_us: float) -> bool
         return False
     if period_us < 0.0:
         link.periods_ns.pop(number, None)
-        link.due_ns.pop(number, None)
         return True
     usual = RATES_HZ.get(link.profile, _ALWAYS).get(number)
     if period_us == 0.0 and usual is None:
         return ask_for(pilot, link, number, -1.0)
     wanted = 1e9 / usual if period_us == 0.0 and usual is not None else period_us * 1e3
     link.periods_ns[number] = max(FASTEST_NS, round(min(wanted, 1e15)))
-    link.due_ns[number] = pilot.memory.now_ns
+    link.due = [entry for entry in link.due if entry[1] != number]
+    heapq.heapify(link.due)
+    heapq.heappush(link.due, (pilot.memory.now_ns, number))
     return True
 
 
@@ -79,13 +80,14 @@ def send_due(pilot: Autopilot) -> None:
     now_ns = pilot.memory.now_ns
     built: dict[int, Any] = {}
     for link in tuple(pilot.memory.links.values()):
-        due = link.due_ns
-        for number, instant_ns in due.items():
-            if instant_ns > now_ns:
+        while link.due and link.due[0][0] <= now_ns:
+            instant_ns, number = link.due[0]
+            period_ns = link.periods_ns.get(number)
+            if period_ns is None:  # nobody wants it any more
+                heapq.heappop(link.due)
                 continue
-            period_ns = link.periods_ns[number]
-            late = math.floor((now_ns - instant_ns) / period_ns) + 1
-            due[number] = instant_ns + late * period_ns
+            late = (now_ns - instant_ns) // period_ns + 1
+            heapq.heapreplace(link.due, (instant_ns + late * period_ns, number))
             if number not in built:
                 built[number] = telemetry.BUILDERS[number](pilot)
             if built[number] is not None:

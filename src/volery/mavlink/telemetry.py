@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from volery.core.atmosphere import pressure
 from volery.core.frames import frd_of_flu, ned_of_enu, q_ned_frd_of_enu_flu
-from volery.core.rotations import conjugate, rotate
 from volery.mavlink import arming, plans
 from volery.mavlink.codec import dialect
 from volery.mavlink.modes import Mode
@@ -62,8 +61,8 @@ def _roll_pitch_yaw(q: Quaternion) -> Vector:
     return roll, pitch, yaw
 
 
-def _degrees_e7(pilot: Autopilot, place: Vector) -> tuple[int, int, int]:
-    latitude, longitude, altitude = pilot.earth.geodetic(place)
+def _degrees_e7(geodetic: Vector) -> tuple[int, int, int]:
+    latitude, longitude, altitude = geodetic
     return round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3)
 
 
@@ -120,7 +119,7 @@ def _system_time(pilot: Autopilot) -> Any:
 
 def _gps_raw_int(pilot: Autopilot) -> Any:
     """As the estimate has it; of a UAV that has lost its fix: none."""
-    place = _degrees_e7(pilot, pilot.state.position)
+    place = _degrees_e7(pilot.geodetic())
     north, east, _ = ned_of_enu(pilot.state.velocity)
     speed = math.hypot(north, east)
     course = round(math.degrees(math.atan2(east, north)) % 360.0 * 100.0) % 36000
@@ -163,7 +162,7 @@ def _global_position(pilot: Autopilot) -> Any:
     velocity = (_clipped(part * 100.0, 16) for part in ned_of_enu(state.velocity))
     return dialect().MAVLink_global_position_int_message(
         _ms(pilot),
-        *_degrees_e7(pilot, state.position),
+        *_degrees_e7(pilot.geodetic()),
         round((state.position[2] - home[2]) * 1e3),
         *velocity,
         _heading_cdeg(pilot),
@@ -190,9 +189,16 @@ def _highres_imu(pilot: Autopilot) -> Any:
 
 
 def _specific_force(state: FlightState) -> Vector:
+    """m/s^2, body: what an accelerometer without errors feels."""
+    x, y, z, w = state.attitude
     ax, ay, az = state.acceleration
-    x, y, z = rotate(conjugate(state.attitude), (ax, ay, az + _GRAVITY)).tolist()
-    return x, y, z
+    az += _GRAVITY
+    tx, ty, tz = 2.0 * (z * ay - y * az), 2.0 * (x * az - z * ax), 2.0 * (y * ax - x * ay)
+    return (
+        ax + w * tx + z * ty - y * tz,
+        ay + w * ty + x * tz - z * tx,
+        az + w * tz + y * tx - x * ty,
+    )
 
 
 def _vfr_hud(pilot: Autopilot) -> Any:
@@ -256,7 +262,7 @@ def _home_position(pilot: Autopilot) -> Any:
     origin = pilot.memory.origin
     place = (home[0] - origin[0], home[1] - origin[1], home[2] - origin[2])
     return dialect().MAVLink_home_position_message(
-        *_degrees_e7(pilot, home),
+        *_degrees_e7(pilot.earth.geodetic(home)),
         *ned_of_enu(place),
         (math.nan,) * 4,
         *(math.nan,) * 3,
@@ -265,7 +271,7 @@ def _home_position(pilot: Autopilot) -> Any:
 
 
 def _global_origin(pilot: Autopilot) -> Any:
-    place = _degrees_e7(pilot, pilot.memory.origin)
+    place = _degrees_e7(pilot.earth.geodetic(pilot.memory.origin))
     return dialect().MAVLink_gps_global_origin_message(*place, _us(pilot))
 
 
