@@ -116,7 +116,9 @@ def enter(pilot: Autopilot, mode: Mode) -> None:
             order(pilot, "land", pilot.vehicle.land())
         elif mode is Mode.TAKE_OFF:
             rise(pilot)
-        elif mode is not Mode.OFFBOARD:
+        elif mode is Mode.OFFBOARD:
+            order(pilot, "steer")  # it goes on as it flies until the next setpoint
+        else:
             order(pilot, "hold", pilot.vehicle.hold())
     if changed:
         pilot.announce()
