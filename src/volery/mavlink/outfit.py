@@ -26,3 +26,27 @@ def with_autopilots(scenario: Scenario) -> Scenario:
     changed = parse_scenario(data, where=scenario.name)
     changed._folder = scenario.folder
     return changed
+
+
+def with_px4(scenario: Scenario) -> Scenario:
+    """The scenario for real PX4s: every type has the sensors that they need, none starts by itself.
+
+    An IMU at 250 Hz, so that each step has a reading; magnetometer, barometer and GNSS where a type
+    has none.
+    """
+    dialect()
+    data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
+    for name, uav_type in scenario.types.items():
+        sensors = [sensor.model_dump(exclude_unset=True) for sensor in uav_type.sensors]
+        kinds = {sensor["kind"] for sensor in sensors}
+        sensors += [{"kind": kind} for kind in _NEEDED if kind not in kinds]
+        for sensor in sensors:
+            sensor.update({"rate_hz": 250.0} if sensor["kind"] == "imu" else {})
+        data["types"][name] = {**data["types"][name], "sensors": sensors}
+    data["uavs"] = [{**group, "on_start": "wait"} for group in data["uavs"]]
+    changed = parse_scenario(data, where=scenario.name)
+    changed._folder = scenario.folder
+    return changed
+
+
+_NEEDED = ("imu", "magnetometer", "barometer", "gnss")

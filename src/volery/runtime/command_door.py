@@ -19,12 +19,13 @@ from volery.graph.messages import (
     TwistStamped,
     header,
 )
-from volery.runtime.raw_setpoints import steer_to_message, turn_to_message
+from volery.runtime.raw_setpoints import steer_to_message, turn_rotors, turn_to_message
 from volery.runtime.services.offering import Close, offer_command
 from volery.runtime.trajectory_messages import follow_message
 from volery.runtime.uav import Uav
 
 _TRIGGER = "std_srvs/srv/Trigger"
+_SPEEDS = "std_msgs/msg/Float32MultiArray"
 _POSITION_TARGET = "mavros_msgs/msg/PositionTarget"
 _ATTITUDE_TARGET = "mavros_msgs/msg/AttitudeTarget"
 _BUSY = (FlightMode.TAKE_OFF, FlightMode.LAND, FlightMode.RETURN)
@@ -35,7 +36,7 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
     """Listen to the topics that command one UAV, offer its plain services.
 
     `cmd_vel`, `goal_pose`, `trajectory`, `setpoint_raw/local` and `setpoint_raw/attitude`
-    (`runtime.raw_setpoints`) and, for a kinematic UAV that something outside moves, `pose_command`:
+    (`runtime.raw_setpoints`), `rotor_speeds` (shares of full speed) and, for a kinematic UAV that something outside moves, `pose_command`:
     where it stands from the next step on.
 
     A Twist is taken in the level heading frame, a pose and a trajectory in the map. On the ground,
@@ -59,6 +60,7 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
         "goal_pose": (PoseStamped, lambda pose: go_to_message(uav, pose)),
         "trajectory": (MultiDOFJointTrajectory, lambda message: follow_message(uav, message)),
         "pose_command": (PoseStamped, lambda pose: stand_at_message(uav, pose)),
+        "rotor_speeds": (_SPEEDS, lambda speeds: turn_rotors(uav, speeds)),
         "setpoint_raw/local": (_POSITION_TARGET, lambda target: steer_to_message(uav, target)),
         "setpoint_raw/attitude": (_ATTITUDE_TARGET, lambda target: turn_to_message(uav, target)),
     }

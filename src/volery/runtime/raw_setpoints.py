@@ -85,6 +85,18 @@ def turn_to_message(uav: Uav, message: Any) -> None:
     uav.command_rates([rates.x, rates.y, rates.z], newtons)
 
 
+def turn_rotors(uav: Uav, message: Any) -> None:
+    """Turn the rotors of `uav` at the shares of full speed of a Float32MultiArray, one each.
+
+    Numbers beyond those of its rotors are passed over. Raises `CommandError`.
+    """
+    rotors = uav.airframe.rotors
+    shares = np.asarray(message.data, dtype=np.float64)
+    if shares.size < len(rotors.places):
+        raise CommandError(f"{uav.name} has {len(rotors.places)} rotors, not {shares.size}")
+    uav.command_rotor_speeds(shares[: len(rotors.places)] * rotors.max_speed_rad_s)
+
+
 def _vector(value: Any, mask: int, bits: int, what: str) -> Any:
     """The vector (3,), None where all of it is to be ignored."""
     ignored = mask & bits

@@ -220,6 +220,7 @@ _TAKEN_NAMES = (
     "mavros",
     "odom",
     "return_home",
+    "rotor_speeds",
     "setpoint_raw",
     "take_off",
     "trajectory",
