@@ -17,12 +17,17 @@ if TYPE_CHECKING:
 
 
 def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
-    """The scenario with what the doors of `options` need: autopilots for MAVLink."""
-    if not any(text.partition("=")[0].startswith("mavlink") for text in options.doors):
-        return scenario
-    from volery.mavlink.outfit import with_autopilots
+    """The scenario with what the doors of `options` need: autopilots, or sensors for real ones."""
+    names = {text.partition("=")[0] for text in options.doors}
+    if any(name.startswith("mavlink") for name in names):
+        from volery.mavlink.outfit import with_autopilots
 
-    return with_autopilots(scenario)
+        scenario = with_autopilots(scenario)
+    if "px4" in names:
+        from volery.mavlink.outfit import with_px4
+
+        scenario = with_px4(scenario)
+    return scenario
 
 
 @contextmanager
@@ -38,6 +43,7 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
     more = {
         "comms": DoorKind(10200, _comms, "makes UAVs stations of a communication server"),
         "mavlink": DoorKind(14540, _mavlink, "MAVLink over UDP, ports as PX4's simulations"),
+        "px4": DoorKind(4560, _px4, "real PX4s fly the UAVs, in lock step"),
         "mavlink-tcp": DoorKind(5760, _mavlink_tcp, "MAVLink over TCP, all UAVs on each link"),
         "mavlink-serial": DoorKind(
             57600, _mavlink_serial, "MAVLink on a serial line", on_line=True
@@ -74,3 +80,9 @@ def _mavlink_serial(address: Address, _terms: Terms) -> Door:
     from volery.mavlink.door import MavlinkSerial
 
     return MavlinkSerial(*address)
+
+
+def _px4(address: Address, terms: Terms) -> Door:
+    from volery.mavlink.px4_door import Px4Door
+
+    return Px4Door(*address, anywhere=terms.anywhere)

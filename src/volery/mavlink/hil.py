@@ -1,9 +1,9 @@
 """A simulated UAV for a real PX4: sensors out, rotors in, in lock step.
 
-The protocol is that of PX4's `simulator_mavlink`: HIL_SENSOR sets its clock, so that times must only
-grow; it answers each with HIL_ACTUATOR_CONTROLS once it has begun to fly the simulation. Until the
-first answer the simulation runs freely. A group of sensors (accelerometer, gyroscope, magnetometer,
-barometer) is told whole or not at all.
+The protocol is that of PX4's `simulator_mavlink`: HIL_SENSOR sets its clock, so that times must
+only grow; it answers each with HIL_ACTUATOR_CONTROLS once it has begun to fly the simulation. Until
+the first answer the simulation runs freely. A group of sensors (accelerometer, gyroscope,
+magnetometer, barometer) is told whole or not at all.
 """
 
 from __future__ import annotations

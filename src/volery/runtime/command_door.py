@@ -36,8 +36,8 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
     """Listen to the topics that command one UAV, offer its plain services.
 
     `cmd_vel`, `goal_pose`, `trajectory`, `setpoint_raw/local` and `setpoint_raw/attitude`
-    (`runtime.raw_setpoints`), `rotor_speeds` (shares of full speed) and, for a kinematic UAV that something outside moves, `pose_command`:
-    where it stands from the next step on.
+    (`runtime.raw_setpoints`), `rotor_speeds` (shares of full speed) and, for a kinematic UAV that
+    something outside moves, `pose_command`: where it stands from the next step on.
 
     A Twist is taken in the level heading frame, a pose and a trajectory in the map. On the ground,
     during take-off, landing and return they are ignored, and so are those that are none: a refused
