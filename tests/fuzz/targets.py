@@ -8,6 +8,7 @@ import city_targets
 import comms_targets
 import grid_map_targets
 import log_targets
+import mavlink_targets
 import mesh_targets
 import message_targets
 import ros2_targets
@@ -29,6 +30,8 @@ TARGETS = {
     "sensor_link_commands": socket_targets.sensor_link_commands,
     "comms_wire": comms_targets.wire,
     "comms_router": comms_targets.router,
+    "mavlink_wire": mavlink_targets.wire,
+    "mavlink_autopilot": mavlink_targets.autopilot,
     "cdr": message_targets.cdr,
     "ros1": message_targets.ros1,
     "plain_values": message_targets.plain_values,

@@ -244,6 +244,17 @@ BENCHES: dict[str, Bench] = {
             },
         ),
         Bench(
+            "mavlink",
+            "MAVLink: ten autopilots with the streams of an onboard computer and of a ground "
+            "station, beyond the same flight without them; commands from a process of its own; "
+            "velocity setpoints to rotors in simulated time, physics at 250 Hz",
+            {
+                "ten_vehicles_core_share": Bound(0.25, at_most=True),
+                "ack_p95_ms": Bound(20.0, at_most=True),
+                "setpoint_to_motor_ms": Bound(10.0, at_most=True),
+            },
+        ),
+        Bench(
             "comms",
             "Radio network: 64 stations in one process, the communication server in another one, "
             "5,000 messages/s of 256 bytes to changing stations over loopback; latency from send "

@@ -34,11 +34,15 @@ class Terms(NamedTuple):
 
 
 class DoorKind(NamedTuple):
-    """A door that can be asked for: the port where none is said, how it is made, what it is."""
+    """A door that can be asked for: the port where none is said, how it is made, what it is.
+
+    on_line: it is no port of a host but a serial line, PATH[:BAUD].
+    """
 
     port: int
     make: Callable[[Address, Terms], Door]
     what: str
+    on_line: bool = False
 
 
 def make_door(text: str, terms: Terms, more: Mapping[str, DoorKind] | None = None) -> Door:
@@ -53,7 +57,8 @@ def make_door(text: str, terms: Terms, more: Mapping[str, DoorKind] | None = Non
         near = difflib.get_close_matches(name, kinds, n=1)
         hint = f" Did you mean '{near[0]}'?" if near else ""
         raise BridgeError(f"no door '{name}'.{hint} Doors: {', '.join(kinds)}")
-    return kind.make(_parse(address, kind.port, text), terms)
+    parse = _parse_line if kind.on_line else _parse
+    return kind.make(parse(address, kind.port, text), terms)
 
 
 def describe_doors() -> dict[str, str]:
@@ -71,6 +76,17 @@ def _parse(address: str, port: int, text: str) -> Address:
             raise BridgeError(f"'{text}': an address is PORT or HOST:PORT, port 0 to 65535")
         port = int(after)
     return Address(host, port)
+
+
+def _parse_line(address: str, baud: int, text: str) -> Address:
+    path, colon, after = address.rpartition(":")
+    if not colon:
+        path = address
+    elif after.isdecimal():
+        baud = int(after)
+    if not path or (colon and not after.isdecimal()):
+        raise BridgeError(f"'{text}': a serial line is PATH or PATH:BAUD")
+    return Address(path, baud)
 
 
 def _rosbridge(address: Address, terms: Terms) -> Door:

@@ -113,6 +113,11 @@ class Publisher:
         self._graph.enqueue(self, self._topic, message)
 
     @property
+    def heard(self) -> bool:
+        """Whether a node inside subscribes to this very topic: who takes everything is none."""
+        return len(self._topic.callbacks) > len(self._topic.outside)
+
+    @property
     def watched(self) -> bool:
         """Whether a client outside receives the topic."""
         return bool(self._topic.outside)
