@@ -58,7 +58,7 @@ class MotionHistory:
         del self._times[:-_KEPT], self._poses[:-_KEPT]
         return True
 
-    def at(self, time_ns: int, ahead_s: float = 0.1, gap_s: float = 0.5) -> Placement | None:
+    def at(self, time_ns: int, ahead_s: float = 0.25, gap_s: float = 0.5) -> Placement | None:
         """Where it was at `time_ns`; None where nothing near is known.
 
         Between two poses at most `gap_s` apart it is interpolated, after the newest one carried on
@@ -114,7 +114,7 @@ class NodHistory:
         del self._times[:-_KEPT], self._angles[:-_KEPT]
         return True
 
-    def at(self, time_ns: int, ahead_s: float = 0.1) -> float | None:
+    def at(self, time_ns: int, ahead_s: float = 0.25) -> float | None:
         """Angle at `time_ns`: interpolated, or carried on by the rate for `ahead_s` at most."""
         row = bisect_right(self._times, time_ns) - 1
         if row < 0:
