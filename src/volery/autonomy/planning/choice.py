@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.planning.clearance import Clearance, Squares
+from volery.autonomy.planning.clearance import Clearance
 from volery.autonomy.planning.cost_to_go import CostToGo
+from volery.autonomy.planning.distances import Squares
 from volery.autonomy.planning.primitives import Candidates
 from volery.core.compiled import inner_kernel, kernel
 

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.autonomy.planning.distances import Squares, squared_distances
 from volery.autonomy.planning.local_grid import UNKNOWN, Scores
 from volery.core.compiled import kernel
 
 Array = NDArray[np.float64]
-Squares = NDArray[np.int16]
 
 FAR_CELLS = 7
 """Distances are measured so far."""
@@ -49,45 +49,26 @@ def clearance_of(
 
     The nodding scan leaves gaps between its lines; what stands in a forest is upright.
     """
-    occupied = scores > 0
-    seen = scores != UNKNOWN
-    known = seen.copy()
-    for step in range(1, upright_cells + 1):
-        known[:, :, step:] |= seen[:, :, :-step]
-        known[:, :, :-step] |= seen[:, :, step:]
-    square = np.empty(scores.shape, np.int16)
-    _measure(occupied, square, np.empty_like(square))
-    return Clearance(square, known, low, cell_m)
+    occupied, known = np.empty(scores.shape, np.bool_), np.empty(scores.shape, np.bool_)
+    _know(scores, upright_cells, occupied, known)
+    return Clearance(squared_distances(occupied, FAR_CELLS), known, low, cell_m)
 
 
 @kernel
-def _measure(occupied: NDArray[np.bool_], square: Squares, spare: Squares) -> None:
-    """Exact squared distances up to `FAR_CELLS`, one axis after the other."""
-    nx, ny, nz = occupied.shape
+def _know(
+    scores: Scores, upright: int, occupied: NDArray[np.bool_], known: NDArray[np.bool_]
+) -> None:
+    nx, ny, nz = scores.shape
     for i in range(nx):
         for j in range(ny):
-            since = FAR_CELLS
+            last = -upright - 1  # the last cell from below that was seen
             for k in range(nz):
-                since = 0 if occupied[i, j, k] else min(since + 1, FAR_CELLS)
-                square[i, j, k] = since * since
-            since = FAR_CELLS
+                if scores[i, j, k] != UNKNOWN:
+                    last = k
+                occupied[i, j, k] = scores[i, j, k] > 0
+                known[i, j, k] = k - last <= upright
+            last = nz + upright
             for k in range(nz - 1, -1, -1):
-                since = 0 if occupied[i, j, k] else min(since + 1, FAR_CELLS)
-                square[i, j, k] = min(square[i, j, k], since * since)
-    for i in range(nx):
-        for j in range(ny):
-            for k in range(nz):
-                spare[i, j, k] = square[i, j, k]
-            for other in range(max(j - FAR_CELLS, 0), min(j + FAR_CELLS + 1, ny)):
-                away = np.int16((other - j) * (other - j))
-                for k in range(nz):
-                    spare[i, j, k] = min(spare[i, j, k], np.int16(square[i, other, k] + away))
-    for i in range(nx):
-        for j in range(ny):
-            for k in range(nz):
-                square[i, j, k] = spare[i, j, k]
-        for other in range(max(i - FAR_CELLS, 0), min(i + FAR_CELLS + 1, nx)):
-            away = np.int16((other - i) * (other - i))
-            for j in range(ny):
-                for k in range(nz):
-                    square[i, j, k] = min(square[i, j, k], np.int16(spare[other, j, k] + away))
+                if scores[i, j, k] != UNKNOWN:
+                    last = k
+                known[i, j, k] |= last - k <= upright

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.planning.clearance import Clearance, Squares
+from volery.autonomy.planning.clearance import Clearance
+from volery.autonomy.planning.distances import Squares
 from volery.autonomy.planning.surface import Surface
 from volery.core.compiled import inner_kernel, kernel
 

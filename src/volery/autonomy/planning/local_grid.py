@@ -91,10 +91,24 @@ class LocalGrid:
         assert self._low is not None
         low = np.floor(place / self.cell_m).astype(np.int64) - np.array(shape) // 2
         low = np.clip(low, self._low, self._low + np.array(self._score.shape) - shape)
-        numbers = [
-            np.arange(low[a], low[a] + shape[a]) % self._score.shape[a] for a in range(3)
-        ]
-        return self._score[np.ix_(*numbers)], low
+        scores = np.empty(shape, np.int8)
+        _copy(self._score, low, scores)
+        return scores, low
+
+
+@kernel
+def _copy(score: Scores, low: Integers, out: Scores) -> None:
+    nx, ny, nz = score.shape
+    first = low[2] % nz
+    until = min(out.shape[2], nz - first)
+    for i in range(out.shape[0]):
+        a = (low[0] + i) % nx
+        for j in range(out.shape[1]):
+            b = (low[1] + j) % ny
+            for k in range(until):
+                out[i, j, k] = score[a, b, first + k]
+            for k in range(until, out.shape[2]):
+                out[i, j, k] = score[a, b, first + k - nz]
 
 
 @kernel

@@ -17,7 +17,7 @@ from volery.autonomy.planning.sight import Surroundings
 from volery.autonomy.planning.trajectory_form import trajectory_message
 from volery.autonomy.planning.way_ahead import WayAhead
 from volery.autonomy.scan_points import Pose
-from volery.core.clock import ns_from_s
+from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.kept import keep, put_back
 from volery.graph.messages import (
     JointState,
@@ -38,7 +38,9 @@ _CARROT_M = 9.0
 """How far ahead on its way the vehicle looks: the window of the plan reaches 12 m."""
 _LEAST_HEIGHT_M = 1.0
 """Lower than this nothing is planned: it takes off or lands."""
-_STATE = ("_way", "_way_map", "_neighbours", "_told", "_plans", "_frame_was")
+_TELL_S = 1.0
+"""The status is told at each change of state or problems, else so often."""
+_STATE = ("_way", "_way_map", "_neighbours", "_told", "_told_ns", "_plans", "_frame_was")
 
 
 class LocalPlanner(Node):
@@ -70,7 +72,7 @@ class LocalPlanner(Node):
             for name in ("level", "nodding")
         }
         cell = float(self.declare_parameter("cell_m", 0.25).value)
-        scan_rate = float(self.declare_parameter("scan_rate_hz", 20.0).value)
+        scan_rate = float(self.declare_parameter("scan_rate_hz", 10.0).value)
         self._sight = Surroundings(mounts, cell, scan_rate)
         self._height = self.declare_parameter("height_m", 3.0, read_only=False)
         self._speed = self.declare_parameter("speed_m_s", 3.0, read_only=False)
@@ -89,12 +91,13 @@ class LocalPlanner(Node):
         """The places of the way in the map, from which `_way` is made."""
         self._neighbours: dict[str, Neighbour] = {}
         self._told = ""
+        self._told_ns = 0
         self._plans = 0
         self._open()
 
     def _open(self) -> None:
         odometry = str(self.declare_parameter("odometry", "slam/odom").value)
-        period = float(self.declare_parameter("period_s", 0.15).value)
+        period = float(self.declare_parameter("period_s", 0.18).value)
         self._trajectory = self.create_publisher(MultiDOFJointTrajectory, "planning/trajectory", 1)
         self._status = self.create_publisher(String, "planning/status", 1, latched=True)
         self.create_subscription(Odometry, odometry, self._on_odometry, 5)
@@ -231,7 +234,8 @@ class LocalPlanner(Node):
         told = {"state": state, "problems": problems, "left_m": left, "plans": self._plans}
         if clearance is not None:
             told["clearance_m"] = round(clearance, 2)
-        text = json.dumps(told)
-        if text != self._told:
-            self._told = text
-            self._status.publish(String(text))
+        now = self.get_clock().now_ns()
+        news = f"{state} {problems}"
+        if news != self._told or not 0 <= now - self._told_ns < _TELL_S * NS_PER_S:
+            self._told, self._told_ns = news, now
+            self._status.publish(String(json.dumps(told)))

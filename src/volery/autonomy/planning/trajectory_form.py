@@ -24,7 +24,8 @@ from volery.graph.messages import (
 
 Array = NDArray[np.float64]
 
-_STEP_S = 0.1
+_STEP_S = 0.2
+"""Between samples the velocity is taken as linear."""
 _DURATION: type[Any] = message_type("builtin_interfaces/msg/Duration")
 _NO_TURN = Vector3(0.0, 0.0, 0.0)
 
