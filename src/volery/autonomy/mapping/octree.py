@@ -19,6 +19,7 @@ Bytes = NDArray[np.uint8]
 
 _KEPT_SHARE = 0.7
 """Of the cells that stay where the map has become too large (modelling choice)."""
+_FREE_ABOVE_M = 1.5
 _DATA = b"\ndata\n"
 
 
@@ -44,8 +45,8 @@ class Octree:
     def insert(self, rays: Rays, reach_m: float, above_m: float = 6.0) -> None:
         """Take in the rays of one scan, all as cast from the middle one's start.
 
-        Rays that end more than `above_m` over or below it are left out: they fill the map with
-        crowns that nobody flies in. The tree knows free space only on the way to a point. Rays that meet nothing therefore end
+        Rays that end more than `above_m` over or below it are left out, and of those that meet
+        nothing all but the level ones: they fill the map with space that nobody flies in. The tree knows free space only on the way to a point. Rays that meet nothing therefore end
         beyond the reach, where octomap cuts them off without a hit: shorter ones are left out.
         """
         if len(rays.hits) == 0:
@@ -54,7 +55,8 @@ class Octree:
         way = rays.ends - origin
         length = np.sqrt((way * way).sum(axis=1))
         level = np.abs(way[:, 2]) <= above_m
-        free = level & ~rays.hits & (length > reach_m - 0.5)
+        ahead = np.abs(way[:, 2]) <= _FREE_ABOVE_M
+        free = ahead & ~rays.hits & (length > reach_m - 0.5)
         taken = free | (level & rays.hits)
         ends, stretched = rays.ends[taken], free[taken]
         ends[stretched] = origin + (way[free] / length[free, None]) * (reach_m + 0.5)

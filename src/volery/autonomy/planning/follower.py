@@ -18,7 +18,7 @@ from volery.graph.node import Node
 
 Array = NDArray[np.float64]
 
-_PERIOD_S = 0.02
+_PERIOD_S = 0.04
 _STALE_S = 0.5
 """Without a pose for so long it stops."""
 _TURN_GAIN, _TURN_RAD_S = 1.8, 1.2

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from volery.autonomy.map_frame import MAP, MapFrame
 from volery.autonomy.mapping.reports import OCTOMAP, voxels_of
 from volery.autonomy.planning.global_path import Search, plan_way
-from volery.autonomy.planning.voxel_space import VoxelSpace
+from volery.autonomy.planning.voxel_space import Solid, VoxelSpace
 from volery.autonomy.scan_points import Pose as Motion
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, PlanError
@@ -37,6 +37,7 @@ _PERIOD_S = 1.0
 _STUCK_S = 6.0
 _STUCK_M = 1.0
 """Without coming so much nearer to the goal for so long, the way is planned anew ..."""
+_MARGIN_M = 25.0
 _TRIES = 3
 """... so often; then the goal is given up."""
 _STATE = ("_goal", "_way", "_place", "_since_ns", "_best_m", "_tries", "_plans", "_told", "_map")
@@ -69,8 +70,8 @@ class GlobalPlanner(Node):
         self._cell = float(self.declare_parameter("cell_m", 0.4).value)
         self._seed = int(self.declare_parameter("seed", 1).value)
         self._frame = MapFrame()
-        self._map: Any = None
-        """The newest octomap message."""
+        self._map: Solid | None = None
+        """What is occupied in the newest map."""
         self._goal: Array | None = None
         self._way: Array | None = None
         self._place: Array | None = None
@@ -125,13 +126,14 @@ class GlobalPlanner(Node):
 
     def _on_map(self, message: Any) -> None:
         """A new map: is the way still clear?"""
-        self._map = message
+        try:
+            self._map = Solid.of(voxels_of(message), float(message.resolution))
+        except DataFileError as error:
+            self._tell("waiting" if self._way is None else "planned", str(error), 0.0)
+            return
         if self._goal is None or self._way is None or self._place is None:
             return
-        try:
-            space = self._space(self._place)
-        except (PlanError, DataFileError):
-            return  # told of when the next way is planned
+        space = self._space(self._place)
         if space is not None and not self._is_clear(space, self._way, self._place):
             self._plan()
 
@@ -174,7 +176,7 @@ class GlobalPlanner(Node):
             else:
                 seed = self._seed * 1_000_003 + self._plans
                 way = plan_way(space, place, goal, self._height, self._search, seed)
-        except (PlanError, DataFileError) as error:
+        except PlanError as error:
             self._give_up("refused", str(error))
             return
         self._way = way
@@ -185,12 +187,18 @@ class GlobalPlanner(Node):
         self._tell("planned", "" if space is not None else "nothing is known: straight", length)
 
     def _space(self, place: Array) -> VoxelSpace | None:
-        """The known map as a space; None where nothing is known. Raises PlanError, DataFileError."""
+        """The known map as a space; None where nothing is known there.
+
+        After each attempt in vain it is wider. Raises PlanError where start and goal are too far
+        apart.
+        """
         assert self._goal is not None
-        if self._map is None or len(self._map.data) == 0:
+        if self._map is None:
             return None
-        around = np.stack([place, self._goal])
-        return VoxelSpace(voxels_of(self._map), self._map.resolution, self._cell, around)
+        around, margin = np.stack([place, self._goal]), _MARGIN_M * (1 + self._tries)
+        if not self._map.is_near(around, margin):
+            return None
+        return VoxelSpace(self._map, self._cell, around, margin)
 
     def _is_clear(self, space: VoxelSpace, way: Array, place: Array) -> bool:
         """Whether what is left of a way is free."""

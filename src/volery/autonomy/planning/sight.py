@@ -21,8 +21,8 @@ from volery.graph.messages import JointState, LaserScan, Range, stamp_of
 
 Array = NDArray[np.float64]
 
-_SHAPE = (128, 128, 40)
-_WINDOW = (96, 96, 32)
+_SHAPE = (128, 128, 32)
+_WINDOW = (96, 96, 24)
 """Cells that are remembered, and cells that are planned in: 32 m and 24 m wide at 0.25 m."""
 _BUBBLE_M = 0.9
 """What is not known so near to the vehicle is free: it is there itself."""

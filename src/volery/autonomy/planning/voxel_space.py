@@ -7,6 +7,7 @@ What is not known is free: whoever flies there looks first.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,38 +29,58 @@ _TRUNK_FOOT_M = 0.8
 """What is lower than this above the lowest point of its column is ground or growth."""
 _MOST_COLUMNS = 2_000_000
 _FAR_CELLS = 5
-_MARGIN_M = 3.0
-"""Around what is known."""
+
+
+class Solid(NamedTuple):
+    """What is occupied in a map, m."""
+
+    middle: Array
+    """(K, 3)."""
+    side: Array
+    """(K,)."""
+
+    @classmethod
+    def of(cls, voxels: Voxels, resolution_m: float) -> Solid:
+        """The occupied cubes of a map."""
+        side = voxels.side[voxels.occupied] * resolution_m
+        corner = voxels.corner[voxels.occupied] * resolution_m
+        return cls(corner + 0.5 * side[:, None], side)
+
+    def is_near(self, around: Array, margin_m: float) -> bool:
+        """Whether any of it lies within `margin_m` of the box of places (K, 2+)."""
+        low, high = around[:, :2].min(axis=0) - margin_m, around[:, :2].max(axis=0) + margin_m
+        return bool(((self.middle[:, :2] >= low) & (self.middle[:, :2] <= high)).all(axis=1).any())
 
 
 class VoxelSpace:
     """Distances to obstacles over the ground, up to five cells, on cells of `cell_m`."""
 
-    def __init__(self, voxels: Voxels, resolution_m: float, cell_m: float, around: Array) -> None:
-        """`around`: (K, 2+) m, places that the space must hold. Raises PlanError if too large."""
-        if voxels.size == 0:
-            raise PlanError("the map is empty")
+    def __init__(
+        self, solid: Solid, cell_m: float, around: Array, margin_m: float = 25.0
+    ) -> None:
+        """`around`: (K, 2+) m; the space holds these places and `margin_m` around them.
+
+        Raises PlanError where it would be too large, or nothing is known there.
+        """
         self.cell_m = cell_m
-        corner = voxels.corner * resolution_m
-        side = voxels.side * resolution_m
-        small = voxels.side <= 64  # larger cubes are free sky
-        low = np.minimum(corner[small, :2].min(axis=0), around[:, :2].min(axis=0)) - _MARGIN_M
-        high = (corner[small, :2] + side[small, None]).max(axis=0)
-        high = np.maximum(high, around[:, :2].max(axis=0)) + _MARGIN_M
+        low = around[:, :2].min(axis=0) - margin_m
+        high = around[:, :2].max(axis=0) + margin_m
         self._low = np.floor(low / _GROUND_M) * _GROUND_M
         shape = np.ceil((high - self._low) / _GROUND_M).astype(np.int64)
         if int(shape.prod()) * (_GROUND_M / cell_m) ** 2 > _MOST_COLUMNS:
             raise PlanError(
-                f"the map and the goal span {shape[0] * _GROUND_M:g} m x "
-                f"{shape[1] * _GROUND_M:g} m: too large to plan in"
+                f"start and goal span {shape[0] * _GROUND_M:g} m x {shape[1] * _GROUND_M:g} m: "
+                "too far apart to plan a way"
             )
-        taken = voxels.occupied
-        middle = corner[taken] + 0.5 * side[taken, None]
+        near = ((solid.middle[:, :2] >= self._low) & (solid.middle[:, :2] <= high)).all(axis=1)
+        if not near.any():
+            raise PlanError("nothing is known of the map between start and goal")
+        middle, side = solid.middle[near], solid.side[near]
         self.ground = _ground(middle, self._low, shape)
         cells = np.ceil(shape * _GROUND_M / cell_m).astype(np.int64)
         levels = math.ceil(_ABOVE_M / cell_m)
         standing = np.zeros((*cells, levels), np.bool_)
-        _mark(middle, side[taken], self.ground, self._low, cell_m, standing)
+        _mark(middle, side, self.ground, self._low, cell_m, standing)
         square = squared_distances(standing, _FAR_CELLS)
         self._distance: Floats = (np.sqrt(square) * cell_m).astype(np.float32)
 
