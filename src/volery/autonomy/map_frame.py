@@ -1,6 +1,7 @@
 """Where a UAV's odometry frame lies in the map, as `/tf` tells.
 
-`map -> uavN/odom` is identity until a SLAM, or whoever corrects the drift, says otherwise (REP-105).
+`map -> uavN/odom` is identity until a SLAM, or whoever corrects the drift, says otherwise
+(REP-105).
 """
 
 from __future__ import annotations

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -125,5 +124,3 @@ class NodHistory:
             between = (self._times[row + 1] - self._times[row]) / NS_PER_S
             return angle + since / between * (self._angles[row + 1][0] - angle)
         return angle + since * rate if since <= ahead_s else None
-
-

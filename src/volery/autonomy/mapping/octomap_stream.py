@@ -1,11 +1,11 @@
 """OctoMap's streams of bytes as arrays of cubes, and back.
 
-After `octomap::OcTree::writeBinaryData` and `OcTreeDataNode::writeData` (A. Hornung et al., "OctoMap:
-an efficient probabilistic 3D mapping framework based on octrees", Autonomous Robots 2013). The tree
-has 16 levels; a node's children stand in the order x + 2 y + 4 z of their halves. In a binary stream
-a node with children is 16 bits, two a child, the first child's lowest: 0 unknown, 1 free, 2 occupied,
-3 has children of its own, which follow depth first. In a full stream each node is a log-odds
-(float32) and a byte that tells which children follow, depth first too.
+After `octomap::OcTree::writeBinaryData` and `OcTreeDataNode::writeData` (A. Hornung et al.,
+"OctoMap: an efficient probabilistic 3D mapping framework based on octrees", Autonomous Robots
+2013). The tree has 16 levels; a node's children stand in the order x + 2 y + 4 z of their halves.
+In a binary stream a node with children is 16 bits, two a child, the first child's lowest: 0
+unknown, 1 free, 2 occupied, 3 has children of its own, which follow depth first. In a full stream
+each node is a log-odds (float32) and a byte that tells which children follow, depth first too.
 """
 
 from __future__ import annotations
@@ -75,10 +75,9 @@ def binary_from_full(data: Bytes) -> Bytes:
     nodes = len(data) // 5
     label, size = np.empty(nodes, np.uint8), np.empty(nodes, np.int32)
     out = np.empty(2 * nodes + 2, np.uint8)
-    length = _binary_from_full(data, label, size, out)
-    if length < 0 or 5 * nodes != len(data):
+    if 5 * nodes != len(data) or not _label(data, label, size):
         raise DataFileError(f"not a full OctoMap: the stream of {len(data)} bytes is broken")
-    return out[:length].copy()
+    return out[: _write_binary(data, label, size, out)].copy()
 
 
 @kernel
@@ -154,11 +153,9 @@ def _decode_full(
 
 
 @kernel
-def _binary_from_full(data: Bytes, label: Bytes, size: Integers, out: Bytes) -> int:
+def _label(data: Bytes, label: Bytes, size: Integers) -> bool:
+    """From the last node to the first: how many nodes hang on it, and whether they are alike."""
     nodes = len(label)
-    if nodes == 0:
-        return 0
-    # From the last node to the first: how many nodes hang on it, and whether they are all alike.
     for node in range(nodes - 1, -1, -1):
         at = 5 * node
         children = data[at + 4]
@@ -175,7 +172,7 @@ def _binary_from_full(data: Bytes, label: Bytes, size: Integers, out: Bytes) -> 
                 common = _INNER
                 continue
             if child >= nodes:
-                return -1
+                return False
             if common < 0:
                 common = int(label[child])
             elif common != label[child]:
@@ -183,9 +180,13 @@ def _binary_from_full(data: Bytes, label: Bytes, size: Integers, out: Bytes) -> 
             child += size[child]
         label[node] = common
         size[node] = child - node
-    if size[0] != nodes:
-        return -1
-    # From the first to the last, passing over what is alike; the root is always written.
+    return nodes == 0 or size[0] == nodes
+
+
+@kernel
+def _write_binary(data: Bytes, label: Bytes, size: Integers, out: Bytes) -> int:
+    """From the first node to the last, passing over what is alike; the root is always written."""
+    nodes = len(label)
     length, node = 0, 0
     while node < nodes:
         children = data[5 * node + 4]

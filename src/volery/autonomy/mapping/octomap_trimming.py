@@ -30,25 +30,18 @@ def trimmed(data: Bytes, middle_cells: Array, radius_cells: float) -> Bytes:
     nodes = len(data) // 5
     keep, size = np.zeros(nodes, np.bool_), np.empty(nodes, np.int32)
     out = np.empty(len(data), np.uint8)
-    length = _trim(data, middle_cells, radius_cells, keep, size, out)
-    if length < 0:
+    if not _choose(data, middle_cells, radius_cells, keep):
         raise DataFileError(f"not a full OctoMap: the stream of {len(data)} bytes is broken")
-    return out[:length].copy()
+    _spread_up(data, keep, size)
+    return out[: _cut(data, keep, size, out)].copy()
 
 
 @kernel
-def _trim(
-    data: Bytes,
-    middle: Array,
-    radius: float,
-    keep: NDArray[np.bool_],
-    size: Integers,
-    out: Bytes,
-) -> int:
+def _choose(data: Bytes, middle: Array, radius: float, keep: NDArray[np.bool_]) -> bool:
+    """Forwards: which blocks, and which leaves above their level, are near enough."""
     nodes = len(keep)
     if nodes == 0:
-        return 0
-    # Forwards: which blocks, and which leaves above their level, are near enough.
+        return True
     stack = np.empty((_STACK, 4), np.int64)
     stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = -_HALF, -_HALF, -_HALF, 2 * _HALF
     top, node = 1, 0
@@ -56,7 +49,7 @@ def _trim(
         top -= 1
         x, y, z, width = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
         if node >= nodes or width < 1:
-            return -1
+            return False
         children = data[5 * node + 4]
         if width <= BLOCK_CELLS or children == 0:
             block = width // 2 if width > BLOCK_CELLS else BLOCK_CELLS // 2
@@ -72,10 +65,13 @@ def _trim(
                 stack[top, 3] = half
                 top += 1
         node += 1
-    if node != nodes:
-        return -1
-    # Backwards: a branch stays where one of its children does.
-    for node in range(nodes - 1, -1, -1):
+    return node == nodes
+
+
+@kernel
+def _spread_up(data: Bytes, keep: NDArray[np.bool_], size: Integers) -> None:
+    """Backwards: a branch stays where one of its children does."""
+    for node in range(len(keep) - 1, -1, -1):
         children = data[5 * node + 4]
         child = node + 1
         for k in range(8):
@@ -83,10 +79,13 @@ def _trim(
                 keep[node] |= keep[child]
                 child += size[child]
         size[node] = child - node
-    if not keep[0]:
-        return 0
+
+
+@kernel
+def _cut(data: Bytes, keep: NDArray[np.bool_], size: Integers, out: Bytes) -> int:
+    """Write what stays; returns its length."""
     length, node = 0, 0
-    while node < nodes:
+    while node < len(keep):
         if not keep[node]:
             node += size[node]
             continue

@@ -46,8 +46,9 @@ class Octree:
         """Take in the rays of one scan, all as cast from the middle one's start.
 
         Rays that end more than `above_m` over or below it are left out, and of those that meet
-        nothing all but the level ones: they fill the map with space that nobody flies in. The tree knows free space only on the way to a point. Rays that meet nothing therefore end
-        beyond the reach, where octomap cuts them off without a hit: shorter ones are left out.
+        nothing all but the level ones: they fill the map with space that nobody flies in. The tree
+        knows free space only on the way to a point, so that rays that meet nothing end beyond the
+        reach, where octomap cuts them off without a hit; shorter ones are left out.
         """
         if len(rays.hits) == 0:
             return

@@ -50,7 +50,7 @@ def grid_message(grid: LevelGrid, height: float, frame_id: str, now_ns: int) -> 
         empty = np.full((1, 1), -1, np.int8)
         return grid_values_message(empty, grid.cell_m, (0.0, 0.0, height), frame_id, now_ns)
     rows, columns = box
-    corner = (grid.origin + [columns.start, rows.start]) * grid.cell_m
+    corner = (grid.origin + np.array([columns.start, rows.start])) * grid.cell_m
     place = (float(corner[0]), float(corner[1]), height)
     return grid_values_message(
         occupancy(grid.score[rows, columns]), grid.cell_m, place, frame_id, now_ns

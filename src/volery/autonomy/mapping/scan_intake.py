@@ -1,4 +1,4 @@
-"""Scans of one LIDAR on their way into a map: decimated, checked, kept until their motion is known."""
+"""Scans of one LIDAR on their way into a map: decimated, and kept until their motion is known."""
 
 from __future__ import annotations
 

@@ -55,7 +55,10 @@ def judge(
         costs.cost,
         soft_m,
         near,
-        *verdicts,
+        verdicts.nearest_m,
+        verdicts.unknown,
+        verdicts.most_m_s2,
+        verdicts.cost,
     )
     return verdicts
 
@@ -92,8 +95,17 @@ def _judge(
         go = math.inf
         for step in range(steps + 1):
             time = min(step * _STEP_S, total)
-            _change(position, velocity, acceleration, cruise_velocity[c], rise_s[c],
-                    min(time, rise_s[c]), p, v, a)
+            _change(
+                position,
+                velocity,
+                acceleration,
+                cruise_velocity[c],
+                rise_s[c],
+                min(time, rise_s[c]),
+                p,
+                v,
+                a,
+            )
             if time > rise_s[c]:
                 cruised = min(time - rise_s[c], cruise_s[c])
                 for axis in range(3):

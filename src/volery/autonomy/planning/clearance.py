@@ -45,7 +45,7 @@ class Clearance(NamedTuple):
 def clearance_of(
     scores: Scores, low: NDArray[np.int64], cell_m: float, upright_cells: int
 ) -> Clearance:
-    """Distances from scores; a cell counts as known if one within `upright_cells` over or under it is.
+    """Distances from scores. A cell is known if one within `upright_cells` over or under it is.
 
     The nodding scan leaves gaps between its lines; what stands in a forest is upright.
     """

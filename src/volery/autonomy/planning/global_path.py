@@ -5,9 +5,9 @@ J. Kuffner, S. LaValle, "RRT-connect: an efficient approach to single-query path
 2000; I. Sucan, M. Moll, L. Kavraki, "The Open Motion Planning Library", 2012.
 
 The search is bounded by iterations, never by wall time. OMPL hands each random generator of a
-planner a seed out of one sequence of the process: that sequence is started anew for each plan, under
-a lock that is held until the plan is made, so that a plan follows from its input and its seed alone,
-whatever else plans in other threads.
+planner a seed out of one sequence of the process: that sequence is started anew for each plan,
+under a lock that is held until the plan is made, so that a plan follows from its input and its seed
+alone, whatever else plans in other threads.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from volery.core.errors import NodeError, PlanError
 Array = NDArray[np.float64]
 
 _OMPL = threading.Lock()
+
 
 class Search(NamedTuple):
     """How a way is searched for."""
@@ -42,11 +43,11 @@ class Search(NamedTuple):
 def plan_way(
     space: VoxelSpace, start: Array, goal: Array, height_m: float, search: Search, seed: int
 ) -> Array:
-    """Places (K, 3) m from `start` to `goal` (3,), both moved aside where they are too near to
-    obstacles; `height_m`: above ground at the goal.
+    """Places (K, 3) m from `start` to `goal` (3,), `height_m` above ground at the goal.
 
-    Raises PlanError that says why there is none: start or goal far inside of obstacles or off the
-    map, or no way found within the iterations.
+    Both are moved aside, up to 3 m, where they are too near to obstacles. Raises PlanError that
+    says why there is none: start or goal deep inside of obstacles or off the map, or no way found
+    within the iterations.
     """
     low, high = search.heights_m
     here = float(start[2] - space.ground_at(start[:2]))
@@ -106,7 +107,10 @@ def _search(space: VoxelSpace, begin: Array, end: Array, search: Search, seed: i
         asked[0] += 1
         return asked[0] > search.iterations
 
-    if not setup.solve(base.PlannerTerminationCondition(spent)) or not setup.haveExactSolutionPath():
+    if (
+        not setup.solve(base.PlannerTerminationCondition(spent))
+        or not setup.haveExactSolutionPath()
+    ):
         raise PlanError(f"no way was found in {search.iterations} iterations")
     path = setup.getSolutionPath()
     simplifier = geometric.PathSimplifier(information)

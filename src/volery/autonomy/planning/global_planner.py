@@ -44,10 +44,11 @@ _STATE = ("_goal", "_way", "_place", "_since_ns", "_best_m", "_tries", "_plans",
 
 
 class GlobalPlanner(Node):
-    """`planning/goal` (PoseStamped in the map) becomes `planning/path`; tells `planning/goal_status`.
+    """`planning/goal` (PoseStamped, map) becomes `planning/path`; tells `planning/goal_status`.
 
-    The status is JSON: state (waiting, planned, refused, unreachable), reason, goal, length_m. Where
-    nothing is known of the map the way is straight. Service `~/stop`: forget the goal and stay.
+    The status is JSON: state (waiting, planned, refused, unreachable), reason, goal, length_m,
+    plans. Where nothing is known of the map the way is straight. Service `~/stop`: forget the goal
+    and stay.
 
     Parameters
     ----------
@@ -125,7 +126,7 @@ class GlobalPlanner(Node):
             self._plan()
 
     def _on_map(self, message: Any) -> None:
-        """A new map: is the way still clear?"""
+        """Plan anew where the new map shows that the way is not clear any more."""
         try:
             self._map = Solid.of(voxels_of(message), float(message.resolution))
         except DataFileError as error:

@@ -22,8 +22,8 @@ Scores = NDArray[np.int8]
 
 UNKNOWN = -128
 _HIT, _MISS, _LEAST, _MOST = 4, 1, -3, 12
-"""Score of a scan's hit and miss, and bounds (modelling choices): what moves away is forgotten after
-16 scans that look through it."""
+"""Score of a scan's hit and miss, and bounds (modelling choices): what moves away is forgotten
+after 12 scans that look through it."""
 
 
 class LocalGrid:
@@ -127,9 +127,7 @@ def _cast(
         if not hits[k]:
             continue
         a, b, c = math.floor(ends[k, 0]), math.floor(ends[k, 1]), math.floor(ends[k, 2])
-        inside = (
-            0 <= a - low[0] < nx and 0 <= b - low[1] < ny and 0 <= c - low[2] < nz
-        )
+        inside = 0 <= a - low[0] < nx and 0 <= b - low[1] < ny and 0 <= c - low[2] < nz
         i, j, m = a % nx, b % ny, c % nz
         if inside and scan[i, j, m] != number:
             scan[i, j, m] = number
@@ -174,9 +172,7 @@ def _clear(place: Array, radius: float, low: Integers, score: Scores) -> None:
         for b in range(math.floor(place[1]) - reach, math.floor(place[1]) + reach + 1):
             for c in range(math.floor(place[2]) - reach, math.floor(place[2]) + reach + 1):
                 dx, dy, dz = a + 0.5 - place[0], b + 0.5 - place[1], c + 0.5 - place[2]
-                inside = (
-                    0 <= a - low[0] < nx and 0 <= b - low[1] < ny and 0 <= c - low[2] < nz
-                )
+                inside = 0 <= a - low[0] < nx and 0 <= b - low[1] < ny and 0 <= c - low[2] < nz
                 i, j, m = a % nx, b % ny, c % nz
                 near = dx * dx + dy * dy + dz * dz <= radius * radius
                 if inside and near and score[i, j, m] == UNKNOWN:

@@ -116,7 +116,9 @@ class LocalPlanner(Node):
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        parts = {name: getattr(self, name).get_state() for name in ("_sight", "_planning", "_frame")}
+        parts = {
+            name: getattr(self, name).get_state() for name in ("_sight", "_planning", "_frame")
+        }
         return {"parts": parts, **keep(self, _STATE)}
 
     def set_state(self, state: dict[str, Any]) -> None:
@@ -141,7 +143,9 @@ class LocalPlanner(Node):
         places = [[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in message.poses]
         found = np.array(places, dtype=np.float64).reshape(-1, 3)
         if message.header.frame_id not in ("", MAP) or not np.isfinite(found).all():
-            self._tell("refused", ["a path that is not in 'map', or with places that are not finite"])
+            self._tell(
+                "refused", ["a path that is not in 'map', or with places that are not finite"]
+            )
             return
         self._way_map = found if len(found) else None
         self._way = None
@@ -165,9 +169,12 @@ class LocalPlanner(Node):
         present = State(pose.position, pose.velocity, np.zeros(3))
         self._planning.policy = self._policy()
         then = now + self._ahead_ns
-        if height < _LEAST_HEIGHT_M or self._way_map is None and not self._plans:
+        if height < _LEAST_HEIGHT_M:
             self._planning.forget()
             self._tell("waiting", ["too low above ground to plan", *problems])
+            return
+        if self._way_map is None and not self._plans:
+            self._tell("waiting", ["no path", *problems])
             return
         start = self._planning.start(present, pose.yaw, now, then)
         if problems or self._way_here() is None:
@@ -187,11 +194,9 @@ class LocalPlanner(Node):
         sight = Sight(
             self._sight.clearance(pose.position),
             self._sight.surface(float(self._height.value)),
-            half_planes(
-                start.position, start.velocity, self._near(), self._separation, now
-            ),
+            half_planes(start.position, start.velocity, self._near(), self._separation, now),
         )
-        path = self._planning.plan(start, carrot, pose.yaw, sight, then)
+        path = self._planning.plan(start, carrot, sight, then)
         self._plans += 1
         self._publish(path, self._planning.began_ns)
         self._tell(str(self._planning.doing), [])

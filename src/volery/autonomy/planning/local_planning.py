@@ -145,18 +145,18 @@ class LocalPlanning:
             braking(start, self.policy.limits) if moves else at_rest(start.position), then_ns
         )
 
-    def plan(self, start: State, goal: Array, yaw: float, sight: Sight, then_ns: int) -> Path:
-        """The plan from `start` at `then_ns` towards `goal` (2,) m, with the nose at `yaw`."""
+    def plan(self, start: State, goal: Array, sight: Sight, then_ns: int) -> Path:
+        """The plan from `start` at `then_ns` towards `goal` (2,) m."""
         policy, surface = self.policy, sight.surface
         prices = Prices(policy.radius_m, policy.soft_m, policy.near, unknown=policy.unknown_cost)
         costs = cost_to_go(sight.clearance, surface, _OFFSETS, goal, prices)
-        candidates = self._fan(start, yaw, surface)
+        candidates = self._fan(start, surface)
         verdicts = judge(candidates, sight.clearance, costs, policy.soft_m, policy.near)
         safe = self._safe(start, candidates, verdicts, sight.clearance)
         total = self._total(start, candidates, verdicts, sight.planes)
         self._turn_nose(start, goal, costs)
         if not safe.any():
-            return self._last_resort(start, verdicts, candidates, sight, then_ns)
+            return self._last_resort(verdicts, candidates, sight, then_ns)
         best = int(np.argmin(np.where(safe, total, np.inf)))
         if not np.isfinite(total[best]):
             best = int(np.flatnonzero(safe)[-1])  # to stay, where that is safe
@@ -174,7 +174,7 @@ class LocalPlanning:
         self._path, self._began_ns = path, then_ns
         return path
 
-    def _fan(self, start: State, yaw: float, surface: Surface) -> Candidates:
+    def _fan(self, start: State, surface: Surface) -> Candidates:
         limits = self.policy.limits
         d, s, o = np.meshgrid(_DIRECTIONS, limits.speed * _SPEEDS, _OFFSETS, indexing="ij")
         way = 0.5 * limits.horizon_s * (s[..., None] * np.stack([np.cos(d), np.sin(d)], axis=-1))
@@ -218,12 +218,7 @@ class LocalPlanning:
         return np.asarray(total)
 
     def _last_resort(
-        self,
-        start: State,
-        verdicts: Verdicts,
-        candidates: Candidates,
-        sight: Sight,
-        then_ns: int,
+        self, verdicts: Verdicts, candidates: Candidates, sight: Sight, then_ns: int
     ) -> Path:
         """Fly the old plan to its end if that is still clear, else stop by the best way."""
         assert self._path is not None

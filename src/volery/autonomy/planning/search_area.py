@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,7 +58,9 @@ class SearchArea:
         """Share that has been looked at."""
         return self.seen_m2 / self.size_m2
 
-    def look(self, place: Array, grid: Grid, grid_low: Array, grid_cell: float, view_m: float) -> None:
+    def look(
+        self, place: Array, grid: Grid, grid_low: Array, grid_cell: float, view_m: float
+    ) -> None:
         """Everything within `view_m` of `place` (2+,) m that nothing known hides has been seen.
 
         grid: (rows, columns) of an occupancy grid whose lower left corner is `grid_low`; only what
@@ -82,7 +85,10 @@ class SearchArea:
 
 
 def _inside(corners: Array, places: Array) -> Mask:
-    """Whether places (..., 2) lie in a polygon: by how often a ray to the east crosses its border."""
+    """Whether places (..., 2) lie in a polygon.
+
+    Then a ray to the east crosses its border an odd number of times.
+    """
     x, y = places[..., 0], places[..., 1]
     odd = np.zeros(x.shape, np.bool_)
     for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):

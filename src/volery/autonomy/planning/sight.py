@@ -127,4 +127,7 @@ class Surroundings:
 
     @staticmethod
     def _is_fresh(time_ns: int | None, now_ns: int) -> bool:
-        return time_ns is not None and -_SILENT_S * NS_PER_S <= now_ns - time_ns <= _SILENT_S * NS_PER_S
+        return (
+            time_ns is not None
+            and -_SILENT_S * NS_PER_S <= now_ns - time_ns <= _SILENT_S * NS_PER_S
+        )

@@ -18,5 +18,5 @@ class Surface(NamedTuple):
     """(2,)."""
 
     def height_at(self, xy: Array) -> Array:
-        """z over places (..., 2)."""
+        """Heights over places (..., 2)."""
         return np.asarray(self.level + xy @ self.slope)

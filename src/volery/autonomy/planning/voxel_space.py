@@ -42,7 +42,7 @@ class Solid(NamedTuple):
     @classmethod
     def of(cls, voxels: Voxels, resolution_m: float) -> Solid:
         """The occupied cubes of a map."""
-        side = voxels.side[voxels.occupied] * resolution_m
+        side = voxels.side[voxels.occupied].astype(np.float64) * resolution_m
         corner = voxels.corner[voxels.occupied] * resolution_m
         return cls(corner + 0.5 * side[:, None], side)
 
@@ -55,9 +55,7 @@ class Solid(NamedTuple):
 class VoxelSpace:
     """Distances to obstacles over the ground, up to five cells, on cells of `cell_m`."""
 
-    def __init__(
-        self, solid: Solid, cell_m: float, around: Array, margin_m: float = 25.0
-    ) -> None:
+    def __init__(self, solid: Solid, cell_m: float, around: Array, margin_m: float = 25.0) -> None:
         """`around`: (K, 2+) m; the space holds these places and `margin_m` around them.
 
         Raises PlanError where it would be too large, or nothing is known there.
@@ -120,7 +118,9 @@ class VoxelSpace:
 
     def is_free_between(self, a: Array, b: Array, radius_m: float) -> bool:
         """As `is_free_leg`, of places (3,)."""
-        return self.is_free_leg(*a.tolist(), *b.tolist(), radius_m)
+        ax, ay, ah = a.tolist()
+        bx, by, bh = b.tolist()
+        return self.is_free_leg(ax, ay, ah, bx, by, bh, radius_m)
 
     def free_near(self, place: Array, radius_m: float, search_m: float = 3.0) -> Array | None:
         """The nearest free place (3,) within `search_m`, at the same height; None if there is none.
@@ -137,7 +137,7 @@ class VoxelSpace:
 
 
 def _ground(middle: Array, low: Array, shape: NDArray[np.int64]) -> Array:
-    """Lowest occupied point of each column, smoothed; columns without one have their neighbours'."""
+    """Lowest occupied point of each column, smoothed; where there is none, its neighbours'."""
     ground = np.full(tuple(shape), np.inf)
     cells = np.floor((middle[:, :2] - low) / _GROUND_M).astype(np.int64)
     inside = ((cells >= 0) & (cells < shape)).all(axis=1)

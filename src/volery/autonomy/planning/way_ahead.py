@@ -25,7 +25,9 @@ class WayAhead:
 
     def left_m(self, place: Array) -> float:
         """How far it is to the end, in plan, from a place beside it."""
-        return float(self._along[-1] - self.passed_m + np.hypot(*(self._at(self.passed_m) - place[:2])))
+        return float(
+            self._along[-1] - self.passed_m + np.hypot(*(self._at(self.passed_m) - place[:2]))
+        )
 
     def carrot(self, place: Array, ahead_m: float, search_m: float = 15.0) -> Array:
         """The place (2,) `ahead_m` further along than where the vehicle has come to.
@@ -39,6 +41,4 @@ class WayAhead:
         return self._at(min(self.passed_m + ahead_m, self._along[-1]))
 
     def _at(self, along: float) -> Array:
-        return np.array(
-            [np.interp(along, self._along, self.places[:, axis]) for axis in range(2)]
-        )
+        return np.array([np.interp(along, self._along, self.places[:, axis]) for axis in range(2)])
