@@ -26,7 +26,7 @@ class MapFrame:
     def __init__(self) -> None:
         self.odom_frame = ""
         """Name of the odometry frame; empty before it is known."""
-        self._known: dict[str, tuple[Array, Array]] = {}
+        self._known: dict[str, Placement] = {}
 
     def on_tf(self, message: TFMessage) -> None:
         """Take in what `/tf` says; transforms that are not finite are left out."""
@@ -37,13 +37,12 @@ class MapFrame:
             position, attitude = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
             length = float(np.linalg.norm(attitude))
             if np.isfinite(position).all() and 0.9 < length < 1.1:
-                self._known[stamped.child_frame_id] = (position, attitude / length)
+                self._known[stamped.child_frame_id] = Placement(position, attitude / length)
 
     @property
     def map_from_odom(self) -> Placement | None:
         """`T_map_odom`; None where it is identity."""
-        known = self._known.get(self.odom_frame)
-        return None if known is None else Placement(*known)
+        return self._known.get(self.odom_frame)
 
     def to_map(self, points_odom: Array) -> Array:
         """Points (..., 3) of the odometry frame in the map."""
