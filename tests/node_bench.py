@@ -43,9 +43,7 @@ class NodeBench:
         raise NotImplementedError
 
     def start(self, node_class, **parameters):
-        return node_class(
-            context=self.context, namespace="/uav1", parameter_overrides=parameters
-        )
+        return node_class(context=self.context, namespace="/uav1", parameter_overrides=parameters)
 
     def listen(self, topic):
         self.heard[topic] = []

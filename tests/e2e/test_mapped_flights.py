@@ -101,7 +101,13 @@ def test_a_uav_explores_the_forest_and_its_map_is_that_of_the_trees(simulate):
     send_area(simulation)
     told = {
         name: listen(simulation, name)
-        for name in ("planning/status", "exploration/status", "octomap_binary", "projected_map", "odom")
+        for name in (
+            "planning/status",
+            "exploration/status",
+            "octomap_binary",
+            "projected_map",
+            "odom",
+        )
     }
     simulation.run(24.0)
     assert [e for e in simulation.events if e.kind is EventKind.IMPACT] == []
@@ -127,7 +133,7 @@ def check_map(octomap, grid, track):
     assert tall.sum() > 10
     cubes = decode_binary(np.asarray(octomap.data).view(np.uint8))
     middle = (cubes.corner + 0.5 * cubes.side[:, None])[cubes.occupied] * octomap.resolution
-    above = middle[:, 2] - terrain.height_at(middle[:, :2])
+    above = middle[:, 2] - terrain.height(middle[:, 0], middle[:, 1])
     assert above.min() > -0.5  # nothing under the ground
     trunk_high = middle[(above > 1.5) & (above < 4.0), :2]
     away = np.hypot(*(feet[tall][:, None] - trunk_high[None]).transpose(2, 0, 1)).min(axis=1)

@@ -69,8 +69,12 @@ def test_a_change_of_velocity_begins_and_ends_as_told(velocity, acceleration, wa
     h = 1e-4
     before, after = (changed(start, wanted, seconds, 0.5 * seconds + s * h) for s in (-1, 1))
     middle = changed(start, wanted, seconds, 0.5 * seconds)
-    np.testing.assert_allclose((after.position - before.position) / (2 * h), middle.velocity, atol=1e-6)
-    np.testing.assert_allclose((after.velocity - before.velocity) / (2 * h), middle.acceleration, atol=1e-5)
+    np.testing.assert_allclose(
+        (after.position - before.position) / (2 * h), middle.velocity, atol=1e-6
+    )
+    np.testing.assert_allclose(
+        (after.velocity - before.velocity) / (2 * h), middle.acceleration, atol=1e-5
+    )
 
 
 @given(vectors)
@@ -86,7 +90,13 @@ def test_braking_from_steady_flight_keeps_the_limits_and_ends_at_rest(velocity):
 
 
 def test_paths_are_smooth_where_their_parts_meet():
-    path = Path(State(np.zeros(3), np.array([1.0, 0, 0]), np.zeros(3)), np.array([2.0, 1, 0.5]), 0.8, 0.7, 1.5)
+    path = Path(
+        State(np.zeros(3), np.array([1.0, 0, 0]), np.zeros(3)),
+        np.array([2.0, 1, 0.5]),
+        0.8,
+        0.7,
+        1.5,
+    )
     for joint in (0.8, 1.5):
         before, after = path.at(joint - 1e-9), path.at(joint + 1e-9)
         for a, b in zip(before, after, strict=True):
@@ -106,7 +116,9 @@ def test_distances_are_those_of_brute_force():
 
 
 def rays(starts, ends, hits):
-    return Rays(np.atleast_2d(starts).astype(float), np.atleast_2d(ends).astype(float), np.array(hits))
+    return Rays(
+        np.atleast_2d(starts).astype(float), np.atleast_2d(ends).astype(float), np.array(hits)
+    )
 
 
 def test_the_grid_follows_the_vehicle_and_forgets_what_leaves_it():
@@ -158,7 +170,9 @@ def test_rays_visit_the_cells_of_fine_sampling(end, start, dx, dy):
 
 def test_the_guidance_goes_around_a_wall_and_knows_what_is_out_of_reach():
     wall = lambda x, y: (abs(x - 3.0) < 0.3) & (y > -5.0)  # noqa: E731
-    costs = cost_to_go(sight(wall).clearance, LEVEL, OFFSETS, np.array([7.0, 0.0]), Prices(0.6, 1.6))
+    costs = cost_to_go(
+        sight(wall).clearance, LEVEL, OFFSETS, np.array([7.0, 0.0]), Prices(0.6, 1.6)
+    )
     assert costs.at(np.zeros(2)) > math.hypot(3.0, 5.0) + math.hypot(4.0, 5.0)
     assert costs.at(np.array([6.0, 0.0])) < 4.0
     here = np.zeros(2)
@@ -170,7 +184,9 @@ def test_the_guidance_goes_around_a_wall_and_knows_what_is_out_of_reach():
         assert not wall(*here)
     assert np.hypot(*(here - [7.0, 0.0])) < 3.0
     closed = lambda x, y: abs(np.maximum(abs(x - 7.0), abs(y)) - 2.3) < 0.3  # noqa: E731
-    costs = cost_to_go(sight(closed).clearance, LEVEL, OFFSETS, np.array([7.0, 0.0]), Prices(0.6, 1.6))
+    costs = cost_to_go(
+        sight(closed).clearance, LEVEL, OFFSETS, np.array([7.0, 0.0]), Prices(0.6, 1.6)
+    )
     assert costs.at(np.array([6.5, 0.0])) < 2.0
 
 

@@ -73,7 +73,9 @@ def test_each_beam_is_cast_from_where_it_was():
         q = rotations.from_rpy(0.1, -0.2, turn * t)
         motion.add(Pose(round(t * S), np.array([speed * t, 0.0, 1.0]), q, np.zeros(3), np.zeros(3)))
     ranges = np.full(101, 5.0)
-    made = RayMaker([0.1, 0.0, -0.08], Beams()).rays(scan(11 * MS, ranges, -1.0, 1.0, 0.05), motion, None)
+    made = RayMaker([0.1, 0.0, -0.08], Beams()).rays(
+        scan(11 * MS, ranges, -1.0, 1.0, 0.05), motion, None
+    )
     for beam in (0, 37, 100):
         t = 0.011 + 0.05 * beam / 100
         q = rotations.from_rpy(0.1, -0.2, turn * t)
@@ -110,7 +112,9 @@ def test_ranges_that_are_none():
 
 def test_motion_that_cannot_be_used_is_left_out():
     motion = MotionHistory()
-    pose = lambda t, x: Pose(t, np.array([x, 0.0, 0.0]), rotations.IDENTITY, np.zeros(3), np.zeros(3))  # noqa: E731
+    pose = lambda t, x: Pose(
+        t, np.array([x, 0.0, 0.0]), rotations.IDENTITY, np.zeros(3), np.zeros(3)
+    )  # noqa: E731
     assert motion.at(0) is None
     assert motion.add(pose(S, 1.0))
     assert not motion.add(pose(S, 2.0))  # repeated
@@ -253,7 +257,10 @@ def test_maps_of_two_are_merged_where_tf_places_them():
     node = mapping(single)
     fly(single, 0.6)
     data = node._octree.binary()
-    merged, told = bench.listen("/uav1/map_merging/octomap_binary"), bench.listen("/uav1/map_merging/status")
+    merged, told = (
+        bench.listen("/uav1/map_merging/octomap_binary"),
+        bench.listen("/uav1/map_merging/status"),
+    )
     bench.send("/uav1/octomap_binary", octomap_message(data.copy(), 0.2, "map", 0))
     bench.send("/uav2/octomap_binary", octomap_message(data.copy(), 0.2, "uav2/odom", 0))
     merge = lambda: bench.graph.call("/uav1/map_merging/merge", TRIGGER())  # noqa: E731

@@ -29,7 +29,9 @@ def plain_decode(data):
 
     def node(x, y, z, width):
         bits, half = next(stream) | next(stream) << 8, width // 2
-        places = [(x + half * (c & 1), y + half * (c >> 1 & 1), z + half * (c >> 2)) for c in range(8)]
+        places = [
+            (x + half * (c & 1), y + half * (c >> 1 & 1), z + half * (c >> 2)) for c in range(8)
+        ]
         kinds = [bits >> 2 * c & 3 for c in range(8)]
         for place, kind in zip(places, kinds, strict=True):
             if kind in (1, 2):
@@ -203,9 +205,7 @@ def test_a_map_that_is_not_there(tmp_path):
 
 @settings(max_examples=40)
 @given(
-    st.dictionaries(
-        st.tuples(*[st.integers(-5, 4)] * 3), st.booleans(), min_size=1, max_size=300
-    )
+    st.dictionaries(st.tuples(*[st.integers(-5, 4)] * 3), st.booleans(), min_size=1, max_size=300)
 )
 def test_cells_become_the_stream_that_holds_them(cells):
     codes = morton_codes(np.array(list(cells), np.int64))

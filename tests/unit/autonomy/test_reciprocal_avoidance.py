@@ -16,6 +16,7 @@ from volery.autonomy.planning.reciprocal_avoidance import (
 )
 
 S = 1_000_000_000
+c, s = math.cos(0.35), math.sin(0.35)
 SEPARATION = Separation(radius_m=2.0, horizon_s=4.0)
 
 
@@ -27,13 +28,13 @@ def step(places, velocities, goals, seconds=0.2, speed=2.0):
     """All avoid each other at once."""
     chosen = []
     for k, (place, velocity) in enumerate(zip(places, velocities, strict=True)):
-        others = [
-            at(*places[j], *velocities[j]) for j in range(len(places)) if j != k
-        ]
+        others = [at(*places[j], *velocities[j]) for j in range(len(places)) if j != k]
         planes = half_planes(np.append(place, 0.0), np.append(velocity, 0.0), others, SEPARATION, 0)
         way = goals[k] - place
         length = np.hypot(*way)
         wanted = way / max(length, 1e-9) * min(speed, length / 0.5)
+        if violation(planes, wanted[None])[0] > 0.0:  # keep right, lest all come to a stand
+            wanted = np.array([[c, s], [-s, c]]) @ wanted
         chosen.append(avoiding_velocity(planes, wanted, speed))
     velocities = np.array(chosen)
     return places + seconds * velocities, velocities
@@ -57,14 +58,16 @@ def test_two_that_meet_pass_each_other():
 def test_six_on_a_circle_change_sides():
     angle = np.arange(6) * math.pi / 3 + np.array([0.01, -0.02, 0.03, 0.0, 0.02, -0.01])
     places = 10.0 * np.stack([np.cos(angle), np.sin(angle)], -1)
-    nearest, left = fly(places, -places, 300)
+    nearest, left = fly(places, -places, 90)
     assert nearest > 1.9
-    assert left < 1.5
+    assert left < 0.5
 
 
 def test_each_takes_half_of_the_trouble():
     (plane,) = half_planes(np.zeros(3), np.array([1.0, 0, 0]), [at(6.0, 0.5, -1.0)], SEPARATION, 0)
-    (other,) = half_planes(np.array([6.0, 0.5, 0]), np.array([-1.0, 0, 0]), [at(0, 0, 1.0)], SEPARATION, 0)
+    (other,) = half_planes(
+        np.array([6.0, 0.5, 0]), np.array([-1.0, 0, 0]), [at(0, 0, 1.0)], SEPARATION, 0
+    )
     np.testing.assert_allclose(plane.normal, -other.normal, atol=1e-12)
     np.testing.assert_allclose(
         plane.point - [1.0, 0.0], -(other.point - np.array([-1.0, 0.0])), atol=1e-12
@@ -109,11 +112,13 @@ def test_those_that_are_too_near_part():
 
 
 @settings(max_examples=60)
-@given(st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), max_size=4), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
+@given(
+    st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), max_size=4),
+    st.floats(-3.0, 3.0),
+    st.floats(-3.0, 3.0),
+)
 def test_the_velocity_is_the_best_of_a_fine_raster(planes, x, y):
-    made = [
-        HalfPlane(np.array([a, b]), np.array([math.cos(c), math.sin(c)])) for a, b, c in planes
-    ]
+    made = [HalfPlane(np.array([a, b]), np.array([math.cos(c), math.sin(c)])) for a, b, c in planes]
     found = avoiding_velocity(made, np.array([x, y]), 2.0)
     assert np.hypot(*found) <= 2.0 + 1e-6
     side = np.linspace(-2.0, 2.0, 81)

@@ -60,7 +60,9 @@ def test_a_way_leads_around_the_wall_over_the_sloping_ground(walled):
     share = np.linspace(0.0, 1.0, 50)[:, None]
     for a, b in zip(way[:-1], way[1:], strict=True):
         places = a + share * (b - a)
-        to_wall = np.hypot(np.maximum(np.abs(places[:, 0]) - 0.3, 0), np.maximum(places[:, 1] - 4.0, 0))
+        to_wall = np.hypot(
+            np.maximum(np.abs(places[:, 0]) - 0.3, 0), np.maximum(places[:, 1] - 4.0, 0)
+        )
         assert to_wall.min() > 0.4
         above = places[:, 2] - ground(places[:, 0], places[:, 1])
         assert 1.5 < above.min()

@@ -47,7 +47,9 @@ _ASIDE_M_S = 0.8
 _PEAK = 1.25
 """Acceleration may exceed the limit so much where the present one leaves no choice."""
 _KEEP_APART = 8.0
-"""Cost of each m/s outside of what keeps vehicles apart."""
+"""Cost of each m/s outside of what keeps vehicles apart ..."""
+_KEEP_RIGHT = 1.0
+"""... and of each m/s to the left, where the cheapest way comes too near."""
 _LEVEL_COST, _TURN_COST = 0.4, 0.25
 """Of each m over or under the wanted height; of each m/s that the velocity changes by."""
 _LOST_M = 1.0
@@ -214,7 +216,21 @@ class LocalPlanning:
         aside = np.abs((aside + math.pi) % (2.0 * math.pi) - math.pi)
         total[(aside > _AHEAD_RAD) & (speed > _ASIDE_M_S)] = np.inf
         if planes:
-            total = total + _KEEP_APART * violation(planes, velocity[:, :2])
+            total = self._apart(total, velocity[:, :2], planes)
+        return np.asarray(total)
+
+    @staticmethod
+    def _apart(total: Array, velocity: Array, planes: list[HalfPlane]) -> Array:
+        """Price what comes too near to others; where the cheapest does, ways to the right of it.
+
+        Without a side that all prefer, those who meet head-on could come to a stand together.
+        """
+        crowded = violation(planes, velocity)
+        cheapest = int(np.argmin(total))
+        total = total + _KEEP_APART * crowded
+        if crowded[cheapest] > 0.0:
+            x, y = velocity[cheapest] / max(float(np.hypot(*velocity[cheapest])), 0.1)
+            total = total + _KEEP_RIGHT * np.maximum(velocity @ np.array([-y, x]), 0.0)
         return np.asarray(total)
 
     def _last_resort(
