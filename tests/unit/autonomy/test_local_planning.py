@@ -153,7 +153,7 @@ def test_one_hit_of_a_scan_beats_its_misses():
 @settings(max_examples=30)
 @given(vectors, vectors, st.floats(-0.3, 0.3), st.floats(-0.2, 0.2))
 def test_rays_visit_the_cells_of_fine_sampling(end, start, dx, dy):
-    start, end = start + [dx, dy, 0.013], end + 0.017
+    start, end = start + np.array([dx, dy, 0.013]), end + 0.017
     grid = LocalGrid(CELL, (40, 40, 40))
     grid.move_to(np.zeros(3))
     grid.add(rays([start], [end], [False]))
@@ -230,7 +230,7 @@ def fly(world, goal, seconds, planning=None, start=(0.0, 0.0, 0.0)):
 def test_it_flies_between_trunks_at_speed():
     trunks = np.array([(3.0, 0.2), (4.5, -2.2), (6.0, 1.5), (3.5, 2.6)])
     world = (trunks_at(trunks, 0.2),)
-    planning, track = fly(world, (8.0, 0.0), 6.0)
+    _, track = fly(world, (8.0, 0.0), 6.0)
     places = np.array([s.position for s in track])
     nearest = min(np.hypot(*(places[:, :2] - t).T).min() for t in trunks)
     assert nearest > 0.2 + 0.5

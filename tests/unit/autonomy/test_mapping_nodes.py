@@ -112,9 +112,10 @@ def test_ranges_that_are_none():
 
 def test_motion_that_cannot_be_used_is_left_out():
     motion = MotionHistory()
-    pose = lambda t, x: Pose(
-        t, np.array([x, 0.0, 0.0]), rotations.IDENTITY, np.zeros(3), np.zeros(3)
-    )  # noqa: E731
+
+    def pose(t, x):
+        return Pose(t, np.array([x, 0.0, 0.0]), rotations.IDENTITY, np.zeros(3), np.zeros(3))
+
     assert motion.at(0) is None
     assert motion.add(pose(S, 1.0))
     assert not motion.add(pose(S, 2.0))  # repeated

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from node_bench import NodeBench, nod, odometry, scan
 
-from volery.autonomy.mapping.octomap_stream import Voxels
 from volery.autonomy.mapping.merging import PlacedMap, merged
+from volery.autonomy.mapping.octomap_stream import Voxels
 from volery.autonomy.mapping.reports import grid_values_message, octomap_message
 from volery.autonomy.planning.exploring_node import POLYGON, Exploring
 from volery.autonomy.planning.follower import TrajectoryFollower
@@ -351,7 +351,7 @@ def test_areas_that_are_none_are_refused():
 
 
 def test_a_uav_that_gets_nowhere_is_blocked_in_the_end():
-    bench, goals, status = exploring()
+    bench, _, status = exploring()
     bench.send("/uav1/search_area", polygon((0, 0), (14, 0), (14, 14), (0, 14)))
     for k in range(200):
         bench.run_to(k * S)
