@@ -272,7 +272,7 @@ def test_whenever_plans_cease_it_comes_to_rest_in_known_free_space(seed):
 def test_a_new_obstacle_on_the_plan_is_braked_for():
     planning, track = fly((nothing,), (9.0, 0.0), 1.6)
     state, now = track[-1], 1_600_000_000
-    x = state.position[0] + 3.3
+    x = state.position[0] + 3.6
     seen = sight(lambda a, b: abs(a - x) < 0.2)
     for _ in range(15):
         begin = planning.start(state, 0.0, now, now + 100_000_000)

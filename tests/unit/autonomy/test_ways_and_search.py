@@ -155,7 +155,7 @@ def test_what_lies_behind_a_wall_or_is_not_known_has_not_been_seen():
     assert not field.seen[27, 20]
     open_field = area()
     open_field.look(np.array([20.0, 20.0]), *grid_of(), 10.0)
-    assert open_field.seen_m2 == pytest.approx(np.pi * 100.0, rel=0.08)
+    assert open_field.seen_m2 == pytest.approx(np.pi * 100.0, rel=0.12)  # cells at the rim
 
 
 def test_a_search_covers_its_area_with_little_way_to_spare():

@@ -68,6 +68,7 @@ class MapMerging(Node):
                 self._reasons[topic] = (
                     f"cells of {message.resolution:g} m; {self._resolution:g} m are merged"
                 )
+                self._maps.pop(topic, None)
                 return
             self._maps[topic], self._changed = message, True
 

@@ -54,6 +54,8 @@ _LEVEL_COST, _TURN_COST = 0.4, 0.25
 """Of each m over or under the wanted height; of each m/s that the velocity changes by."""
 _LOST_M = 1.0
 """Farther away from its plan the vehicle begins anew from where it is."""
+_HARD = 1.7
+"""In need it brakes so much harder than the limit; the F450 can (modelling choice)."""
 _MATTER = 0.05
 """Improvement of the cost for which it is worth not to stay."""
 
@@ -158,7 +160,7 @@ class LocalPlanning:
         total = self._total(start, candidates, verdicts, sight.planes)
         self._turn_nose(start, goal, costs)
         if not safe.any():
-            return self._last_resort(verdicts, candidates, sight, then_ns)
+            return self._last_resort(start, sight, then_ns)
         best = int(np.argmin(np.where(safe, total, np.inf)))
         if not np.isfinite(total[best]):
             best = int(np.flatnonzero(safe)[-1])  # to stay, where that is safe
@@ -233,27 +235,25 @@ class LocalPlanning:
             total = total + _KEEP_RIGHT * np.maximum(velocity @ np.array([-y, x]), 0.0)
         return np.asarray(total)
 
-    def _last_resort(
-        self, verdicts: Verdicts, candidates: Candidates, sight: Sight, then_ns: int
-    ) -> Path:
-        """Fly the old plan to its end if that is still clear, else stop by the best way."""
+    def _last_resort(self, start: State, sight: Sight, then_ns: int) -> Path:
+        """Fly the plan in force to its end if that is still clear, else stop: hard, if need be."""
         assert self._path is not None
         self.doing = Doing.BLOCKED
-        left = (then_ns - self._began_ns) / NS_PER_S
-        times = np.arange(left, self._path.duration_s + 0.1, 0.1)
-        if len(times) == 0:
-            times = np.array([left])
-        places = np.array([self._path.at(t).position for t in times])
-        distances = sight.clearance.at(places)
-        least = float(distances.min())
-        if least >= min(self.policy.radius_m, float(distances[0])):
-            self.least_m = least
-            return self._path
-        best = int(np.argmax(verdicts.nearest_m - 1e-3 * verdicts.most_m_s2))
-        if verdicts.nearest_m[best] <= least:
-            return self._path
-        self.least_m = float(verdicts.nearest_m[best])
-        return self._commit(candidates.path(best), then_ns)
+        limits, radius = self.policy.limits, self.policy.radius_m
+        hard = limits._replace(acceleration=_HARD * limits.acceleration)
+        since = (then_ns - self._began_ns) / NS_PER_S
+        ways = [
+            (self._path, self._began_ns, since),
+            (braking(start, limits), then_ns, 0.0),
+            (braking(start, hard), then_ns, 0.0),
+        ]
+        least = [_least(path, begin_s, sight.clearance) for path, _, begin_s in ways]
+        enough = [distance >= radius for distance in least]
+        best = enough.index(True) if any(enough) else int(np.argmax(least))
+        self.least_m = least[best]
+        path, self._began_ns, _ = ways[best]
+        self._path = path
+        return path
 
     def _turn_nose(self, start: State, goal: Array, costs: CostToGo) -> None:
         """Towards where it flies, or shall fly."""
@@ -276,3 +276,9 @@ class LocalPlanning:
     def began_ns(self) -> int:
         """When the plan in force begins."""
         return self._began_ns
+
+
+def _least(path: Path, begin_s: float, clearance: Clearance) -> float:
+    """Least distance (m) to obstacles from `begin_s` to the end of a path."""
+    times = np.append(np.arange(begin_s, path.duration_s, 0.1), max(path.duration_s, begin_s))
+    return float(clearance.at(np.array([path.at(t).position for t in times])).min())

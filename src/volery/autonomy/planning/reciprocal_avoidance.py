@@ -126,12 +126,13 @@ def avoiding_velocity(planes: Sequence[HalfPlane], preferred: Array, top_speed: 
     """The allowed velocity (2,) nearest to the preferred one; where none is, the least bad.
 
     The optimum of few constraints lies at the preferred velocity, at its projection on one of the
-    lines or the circle of `top_speed`, or where two of them cross: all are tried.
+    lines or the circle of `top_speed`, or where two of them cross: all are tried. Where nothing is
+    allowed, the fastest way out of each half plane is tried besides.
     """
     tries = [preferred, np.zeros(2)]
     tries += [plane.point + _along(plane) * _foot(plane, preferred) for plane in planes]
     for k, plane in enumerate(planes):
-        tries += _on_circle(plane, top_speed)
+        tries += [top_speed * plane.normal, *_on_circle(plane, top_speed)]
         for other in planes[:k]:
             across = float(_along(plane) @ other.normal)
             if abs(across) > 1e-9:

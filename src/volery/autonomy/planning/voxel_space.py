@@ -74,7 +74,8 @@ class VoxelSpace:
         if not near.any():
             raise PlanError("nothing is known of the map between start and goal")
         middle, side = solid.middle[near], solid.side[near]
-        self.ground = _ground(middle, self._low, shape)
+        lowest = middle - np.stack([0.0 * side, 0.0 * side, 0.5 * (side - side.min())], -1)
+        self.ground = _ground(lowest, self._low, shape)
         cells = np.ceil(shape * _GROUND_M / cell_m).astype(np.int64)
         levels = math.ceil(_ABOVE_M / cell_m)
         standing = np.zeros((*cells, levels), np.bool_)
