@@ -31,6 +31,8 @@ from volery.graph.node import Node
 Array = NDArray[np.float64]
 
 _TYPE = "volery_interfaces/msg/Targets"
+_MATE_S, _MATE_M = 2.0, 1.0
+"""A teammate heard so lately is within a ball of this radius. Modelling choice."""
 _STALE_S = 0.5
 """Odometry and range older than this, at the time of a picture, place nothing."""
 
@@ -40,7 +42,8 @@ class TargetDetection(Node):
 
     Sees `CAMERA/image_raw`, its `camera_info`, odometry, and `range`, which tells how far below the
     ground is. A target is published when it has been seen several times and is placed well enough,
-    and again with each sighting that makes it better known.
+    and again with each sighting that makes it better known. Nothing counts where `radio/team` says
+    that a teammate is.
 
     Parameters
     ----------
@@ -55,7 +58,7 @@ class TargetDetection(Node):
 
     """
 
-    STATE = ("_poses", "_pose", "_range", "_intrinsics", "_tracks")
+    STATE = ("_mates", "_poses", "_pose", "_range", "_intrinsics", "_tracks")
     """Everything that changes."""
 
     def __init__(self, **options: Any) -> None:
@@ -79,6 +82,8 @@ class TargetDetection(Node):
         )
         self._doubt = Doubt()
         self._poses = MapPoses()
+        self._mates: dict[str, tuple[int, Array]] = {}
+        """When each was heard, ns, and where it was."""
         self._pose: Pose | None = None
         self._range: tuple[int, float] | None = None
         self._intrinsics: Intrinsics | None = None
@@ -89,6 +94,8 @@ class TargetDetection(Node):
         self.create_subscription(Range, "range", self._on_range, 5)
         self.create_subscription(CameraInfo, f"{camera}/camera_info", self._on_info, 1)
         self.create_subscription(Image, f"{camera}/image_raw", self._on_image, 1)
+        report = message_type("volery_interfaces/msg/TeamReport")
+        self.create_subscription(report, "radio/team", self._on_report, 20)
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
@@ -111,16 +118,23 @@ class TargetDetection(Node):
     def _on_info(self, info: CameraInfo) -> None:
         self._intrinsics = Intrinsics.from_message(info)
 
+    def _on_report(self, report: Any) -> None:
+        p = report.position
+        place = np.array([p.x, p.y, p.z])
+        if np.isfinite(place).all():
+            self._mates[report.name] = (self.get_clock().now_ns(), place)
+
     def _on_image(self, image: Image) -> None:
         taken = stamp_of(image)
         ground = self._ground_z(taken)
         if ground is None or self._pose is None or self._intrinsics is None:
             return
-        blob = largest_blob(colour_mask(pixels_of(image), self._colours))
-        if blob is None or blob.share < self._share:
-            return
         pose = pose_at(self._pose, taken)
         view = GroundView(self._intrinsics, self._mount.tolist(), self._turn)
+        hidden = self._teammates_in(view, pose)
+        blob = largest_blob(colour_mask(pixels_of(image), self._colours, hidden))
+        if blob is None or blob.share < self._share:
+            return
         place = view.place_of(blob.u, blob.v, pose, ground + self._object_m)
         if place is None or np.hypot(*(place - pose.position)[:2]) > self._reach_m:
             return
@@ -128,6 +142,13 @@ class TargetDetection(Node):
         track = self._tracks.add(sighting_of(taken, eye, place, self._doubt))
         if track.number:
             self._tell(taken)
+
+    def _teammates_in(self, view: GroundView, pose: Pose) -> Array:
+        """(K, 3) discs of the picture in which teammates are, who may be of the colour."""
+        since = pose.time_ns - round(_MATE_S * NS_PER_S)
+        near = [place for heard_ns, place in self._mates.values() if heard_ns >= since]
+        discs = [view.disc_of(place, _MATE_M, pose) for place in near]
+        return np.array([disc for disc in discs if disc is not None]).reshape(-1, 3)
 
     def _ground_z(self, time_ns: int) -> float | None:
         """Height in the map of the ground below; None where pose or range are not of about now."""

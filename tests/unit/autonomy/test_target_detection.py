@@ -169,6 +169,16 @@ def test_a_ball_is_placed_where_it_is(colour: Any, found: bool) -> None:
         assert (target.finder, target.number) == ("uav1", 1)
 
 
+def test_a_red_teammate_is_no_target() -> None:
+    looks, mate = Onlooker(), np.array([9.0, 4.5, 11.5])
+    report = zero_message("volery_interfaces/msg/TeamReport")
+    report.name, report.position = "uav2", Point(*mate.tolist())
+    for k in range(10):
+        looks.say("radio/team", report)
+        looks.look(np.array([4.0 + 0.2 * k, 4.0, 13.0]), 0.1, mate, (200, 20, 20))
+    assert looks.told == []
+
+
 def test_nothing_is_placed_without_knowing_the_ground() -> None:
     looks, ball = Onlooker(), np.array([12.0, 5.0, 10.5])
     for k in range(10):

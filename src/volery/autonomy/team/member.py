@@ -61,6 +61,7 @@ class TeamMember(Node):
         "_news_ns",
         "_battery",
         "_heard_ns",
+        "_reports",
     )
     """Everything that changes."""
 
@@ -89,6 +90,8 @@ class TeamMember(Node):
         self._battery = math.nan
         self._heard_ns = 0
         """When anybody was heard."""
+        self._reports = 0
+        """How many have been sent."""
 
         self._report_type = message_type(REPORT_TYPE)
         self._targets_type = message_type(_TARGETS_TYPE)
@@ -181,6 +184,7 @@ class TeamMember(Node):
         pose, now = self._pose, self.now_ns
         if pose is None:
             return
+        self._reports += 1
         self._report.publish(
             self._report_type(
                 header(now, "map"),
@@ -194,7 +198,7 @@ class TeamMember(Node):
                 time_from_ns(self._since_ns),
                 to_bits(self.searched),
                 to_bits(self._given_up),
-                self.targets.messages(),
+                self.targets.to_tell(self._reports),
             )
         )
 

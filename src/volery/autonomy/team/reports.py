@@ -75,6 +75,8 @@ class Team:
         if known is not None and sent_ns <= known.sent_ns and not restarted:
             return False
         p = report.position
+        if not np.isfinite([p.x, p.y, p.z]).all():
+            return False
         since_ns = report.since.sec * NS_PER_S + report.since.nanosec
         worker = Worker(
             np.array([p.x, p.y]),

@@ -14,6 +14,8 @@ from volery.graph.messages import Point, header, message_type, stamp_of
 Array = NDArray[np.float64]
 
 TYPE = "volery_interfaces/msg/Target"
+_TOLD = 2
+"""Of the newest finds, and of the others, so many stand in a report. Modelling choice."""
 _LEAST_M = 0.1
 """Standard deviation that no place is better than: maps of two UAVs differ. Modelling choice."""
 
@@ -44,6 +46,13 @@ class Find(NamedTuple):
             int(message.sightings),
         )
 
+    @property
+    def is_sound(self) -> bool:
+        """Whether its numbers can be those of a find."""
+        a, b, c, d = self.covariance
+        finite = bool(np.isfinite([*self.place, *self.covariance]).all())
+        return finite and a >= 0.0 and d >= 0.0 and a * d >= b * c
+
     def message(self) -> Any:
         """As a `Target`."""
         return message_type(TYPE)(
@@ -70,14 +79,23 @@ class TargetList:
         """Take finds in; whether one of them told something new."""
         changed = False
         for find in finds:
+            if not find.is_sound:
+                continue
             key = find.finder, find.number
             if key not in self.finds or self.finds[key].stamp_ns < find.stamp_ns:
                 self.finds[key], changed = find, True
         return changed
 
-    def messages(self) -> list[Any]:
-        """All finds, by finder and number."""
-        return [self.finds[key].message() for key in sorted(self.finds)]
+    def to_tell(self, turn: int) -> list[Any]:
+        """Some finds as messages: the newest ones, and as many of the others as have their turn.
+
+        A report that held all would fill the radio's channel; after some turns all have been told.
+        """
+        keys = sorted(self.finds, key=lambda key: (-self.finds[key].stamp_ns, key))
+        newest, others = keys[:_TOLD], sorted(keys[_TOLD:])
+        first = turn * _TOLD % max(len(others), 1)
+        in_turn = (others[first:] + others[:first])[:_TOLD]
+        return [self.finds[key].message() for key in (*newest, *in_turn)]
 
     def targets(self) -> list[Find]:
         """One for each thing: its finds joined, weighted by their covariances."""
