@@ -224,12 +224,11 @@ class ActionServers:
             self._servers.pop(name).close()
         for name, action_type in types.items():
             if name not in self._servers:
-                try:
-                    check_name(name)
-                except GraphError as error:
-                    self._complaints.tell(name, str(error))
-                    continue
-                self._servers[name] = ActionServer(*self._parts, (name, action_type))
+                self._complaints.tried(name, lambda n=name, t=action_type: self._offer(n, t))  # type: ignore[misc]
+
+    def _offer(self, name: str, action_type: str) -> None:
+        check_name(name)
+        self._servers[name] = ActionServer(*self._parts, (name, action_type))
 
     def close(self) -> None:
         """Take everything back."""

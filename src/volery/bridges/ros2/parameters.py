@@ -71,13 +71,16 @@ class ParameterServices:
 
     def survey(self) -> None:
         """Have nodes appear that have parameters, and those disappear that have ended."""
-        names = self._declared.nodes()
-        wanted = {self._owner, *(NodeName.of(name) for name in names if self._is_possible(name))}
+        wanted = {self._owner, *map(NodeName.of, self._declared.nodes())}
         for node in [node for node in self._nodes if node not in wanted]:
             self._leave(node)
         for node in wanted - self._nodes.keys():
-            self._participant.add_node(node)
-            self._nodes[node] = [self._serve(node, base) for base in _SERVICES]
+            self._complaints.tried(node.full, lambda n=node: self._enter(n))  # type: ignore[misc]
+
+    def _enter(self, node: NodeName) -> None:
+        check_name(node.full)
+        self._participant.add_node(node)
+        self._nodes[node] = [self._serve(node, base) for base in _SERVICES]
 
     def close(self) -> None:
         """Take everything back."""
@@ -89,14 +92,6 @@ class ParameterServices:
         for handle in self._nodes.pop(node):
             handle.close()
         self._participant.remove_node(node)
-
-    def _is_possible(self, name: str) -> bool:
-        try:
-            check_name(name)
-        except GraphError as error:
-            self._complaints.tell(name, str(error))
-            return False
-        return True
 
     def _serve(self, node: NodeName, base: str) -> Handle:
         srvtype = f"rcl_interfaces/srv/{base}"

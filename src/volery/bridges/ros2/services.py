@@ -54,14 +54,13 @@ class Services:
             self._servers.pop(name).close()
         for name, srvtype in offered.items():
             if name not in self._servers:
-                try:
-                    check_name(name)
-                except GraphError as error:
-                    self._complaints.tell(name, str(error))
-                    continue
-                spec = ServiceSpec(self._node, name, srvtype)
-                take = answerer(self._worker, srvtype, self._asker(name), self._complaints)
-                self._servers[name] = self._participant.server(spec, take)
+                self._complaints.tried(name, lambda n=name, t=srvtype: self._offer(n, t))  # type: ignore[misc]
+
+    def _offer(self, name: str, srvtype: str) -> None:
+        check_name(name)
+        take = answerer(self._worker, srvtype, self._asker(name), self._complaints)
+        spec = ServiceSpec(self._node, name, srvtype)
+        self._servers[name] = self._participant.server(spec, take)
 
     def take_remote(self, services: Mapping[str, str]) -> None:
         """Offer ROS 2 services in the graph. `GraphError` for a wrong type or a taken name."""

@@ -53,10 +53,15 @@ class Topics:
         for publisher in self._participant.publishers():
             remote.setdefault(publisher.topic, []).append(publisher)
         for topic in self._session.graph.topics():
-            if self._sharing.has(topic.name) and self._is_possible(topic):
-                others = self._publishers(topic)
-                self._update_outlet(topic, others)
-                self._update_inlet(topic, others, remote.get(topic.name, []))
+            if self._sharing.has(topic.name):
+                known = remote.get(topic.name, [])
+                self._complaints.tried(topic.name, lambda t=topic, k=known: self._update(t, k))  # type: ignore[misc]
+
+    def _update(self, topic: TopicInfo, remote: list[RemotePublisher]) -> None:
+        check_name(topic.name)
+        others = self._publishers(topic)
+        self._update_outlet(topic, others)
+        self._update_inlet(topic, others, remote)
 
     def close(self) -> None:
         """Take everything back; after the worker's end."""
@@ -64,14 +69,6 @@ class Topics:
             inlet.close()
         for outlet in self._outlets.values():
             outlet.close()
-
-    def _is_possible(self, topic: TopicInfo) -> bool:
-        try:
-            check_name(topic.name)
-        except GraphError as error:
-            self._complaints.tell(topic.name, str(error))
-            return False
-        return True
 
     def _publishers(self, topic: TopicInfo) -> int:
         """How many others publish a topic in the graph."""
