@@ -60,7 +60,7 @@ def _scenario(count: int, physics_hz: int = 1000) -> Any:
 def _fly_ten(*, streams: bool) -> tuple[float, list[float]]:
     """CPU seconds a second in real time, and milliseconds from commands to their answers."""
     from volery.bridges.doors import Doors
-    from volery.mavlink.door import MavlinkUdp
+    from volery.mavlink.udp_door import MavlinkUdp
     from volery.runtime import Simulation
 
     plain, outfitted = _scenario(_VEHICLES)

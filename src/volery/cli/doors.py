@@ -65,19 +65,19 @@ def _comms(address: Address, terms: Terms) -> Door:
 
 
 def _mavlink(address: Address, terms: Terms) -> Door:
-    from volery.mavlink.door import MavlinkUdp
+    from volery.mavlink.udp_door import MavlinkUdp
 
     return MavlinkUdp(*address, anywhere=terms.anywhere)
 
 
 def _mavlink_tcp(address: Address, terms: Terms) -> Door:
-    from volery.mavlink.door import MavlinkTcp
+    from volery.mavlink.tcp_door import MavlinkTcp
 
     return MavlinkTcp(*address, anywhere=terms.anywhere)
 
 
 def _mavlink_serial(address: Address, _terms: Terms) -> Door:
-    from volery.mavlink.door import MavlinkSerial
+    from volery.mavlink.serial_door import MavlinkSerial
 
     return MavlinkSerial(*address)
 

@@ -2,5 +2,6 @@
 
 The autopilot (`autopilot.Autopilot`) takes frames and flight states with their simulated time and
 gives frames and commands to its UAV: it knows neither sockets nor graphs. `node.Autopilot` runs it
-inside the simulation, `door.MavlinkDoor` carries its frames over UDP, TCP and serial lines.
+inside the simulation, `udp_door`, `tcp_door` and `serial_door` carry its
+frames.
 """

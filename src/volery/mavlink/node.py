@@ -4,8 +4,9 @@
     node = "volery.mavlink.node:Autopilot"
     parameters = { px4 = { MIS_TAKEOFF_ALT = 5.0 } }
 
-Frames come on `mavlink/in` and go out on `mavlink/out`; `door.MavlinkDoor` carries them. Beside
-them stand MAVROS's topics and services below `mavros/`, those of system 1 below `/mavros/` too.
+Frames come on `mavlink/in` and go out on `mavlink/out`; `udp_door`, `tcp_door` and `serial_door`
+carry them. Beside them stand MAVROS's topics and services below `mavros/`, those of system 1 below
+`/mavros/` too.
 """
 
 from __future__ import annotations
