@@ -180,6 +180,6 @@ def test_places_that_were_refused_are_not_tried_again():
     field, place = area(), np.array([5.0, 5.0])
     first = next_viewpoint(field, place, 0.0, 8.0)
     second = next_viewpoint(field, place, 0.0, 8.0, [first.place])
-    assert np.hypot(*(first.place - second.place)) > 4.0
-    everywhere = [np.array([x, y]) for x in range(0, 60, 4) for y in range(0, 40, 4)]
+    assert np.hypot(*(first.place - second.place)) > 2.0
+    everywhere = [np.array([x, y]) for x in range(0, 60, 2) for y in range(0, 40, 2)]
     assert next_viewpoint(field, place, 0.0, 8.0, everywhere) is None

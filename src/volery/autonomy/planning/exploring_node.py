@@ -54,6 +54,7 @@ _STATE = (
     "_since_ns",
     "_best_m",
     "_refused",
+    "_visited",
     "_state",
     "_reason",
     "_told",
@@ -100,6 +101,8 @@ class Exploring(Node):
         self._since_ns = 0
         self._best_m = math.inf
         self._refused: list[Array] = []
+        self._visited: list[Array] = []
+        """Places that could not be reached, and those that have been looked from."""
         self._state, self._reason = Searching.WAITING, "no area"
         self._told = ""
         self._sent = 0
@@ -141,7 +144,7 @@ class Exploring(Node):
 
     def _on_area(self, message: Any) -> None:
         corners = np.array([[p.x, p.y] for p in message.polygon.points], dtype=np.float64)
-        self._goal, self._refused = None, []
+        self._goal, self._refused, self._visited = None, [], []
         if message.header.frame_id not in ("", MAP):
             self._area = None
             self._become(Searching.WAITING, f"areas are in 'map', not '{message.header.frame_id}'")
@@ -195,7 +198,10 @@ class Exploring(Node):
         if self._goal is not None:
             away = float(np.hypot(*(self._goal.place - place[:2])))
             gain = float(area.gains(self._goal.place[None], self._view)[0][0])
-            if away < _NEAR * self._view or gain < _STALE * self._goal.gain_m2:
+            if away < _NEAR * self._view:
+                self._visited.append(self._goal.place)
+                self._goal = None
+            elif gain < _STALE * self._goal.gain_m2:
                 self._goal = None
             elif away < self._best_m - _NEARER_M:
                 self._best_m, self._since_ns = away, now
@@ -209,12 +215,13 @@ class Exploring(Node):
         moving = self._frame.to_map(self._motion.position + self._motion.velocity) - place
         speed = float(np.hypot(*moving[:2]))
         heading = math.atan2(moving[1], moving[0]) if speed > 0.5 else self._motion.yaw
-        self._goal = next_viewpoint(area, place[:2], heading, self._view, self._refused)
+        left_out = [*self._refused, *self._visited]
+        self._goal = next_viewpoint(area, place[:2], heading, self._view, left_out)
         if self._goal is not None:
             self._best_m, self._since_ns = math.inf, now
             self._send(np.array([*self._goal.place, place[2]]))
             return
-        if self._refused and next_viewpoint(area, place[:2], heading, self._view) is not None:
+        if next_viewpoint(area, place[:2], heading, self._view, self._visited) is not None:
             self._become(Searching.BLOCKED, f"{len(self._refused)} places cannot be reached")
         else:
             self._become(Searching.DONE, "")

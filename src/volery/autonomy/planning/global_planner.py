@@ -134,7 +134,11 @@ class GlobalPlanner(Node):
             return
         if self._goal is None or self._way is None or self._place is None:
             return
-        space = self._space(self._place)
+        try:
+            space = self._space(self._place)
+        except PlanError as error:
+            self._give_up("refused", str(error))
+            return
         if space is not None and not self._is_clear(space, self._way, self._place):
             self._plan()
 

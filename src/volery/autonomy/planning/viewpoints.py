@@ -23,8 +23,8 @@ _WAY_M = 80.0
 choices)."""
 _LEAST_SHARE = 0.06
 """Of the disc of sight must be new, else it is not worth the way."""
-_APART_M = 4.0
-"""So near to a goal that could not be reached none is tried."""
+_APART_M = 2.0
+"""So near to a place that is left out none is tried."""
 
 
 class Viewpoint(NamedTuple):
@@ -39,14 +39,15 @@ def next_viewpoint(
     place: Array,
     heading: float,
     view_m: float,
-    refused: Sequence[Array] = (),
+    left_out: Sequence[Array] = (),
 ) -> Viewpoint | None:
     """The best place to go to from `place` (2,) m; None where nothing is worth the way.
 
-    heading: of the flight, rad. refused: places (2,) that could not be reached.
+    heading: of the flight, rad. left_out: places (2,) that could not be reached, or have been
+    looked from.
     """
     spots = _lattice(area, 0.5 * view_m)
-    for bad in refused:
+    for bad in left_out:
         spots = spots[np.hypot(*(spots - bad).T) > _APART_M]
     if len(spots) == 0:
         return None
