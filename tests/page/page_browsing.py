@@ -8,6 +8,8 @@ from pathlib import Path
 PICTURES = Path(__file__).parents[2] / "runs" / "page"
 """Screenshots of the tests, to be looked at."""
 SMALL = {"width": 640, "height": 360}
+COARSE = "Object.defineProperty(window, 'devicePixelRatio', { get: () => 0.25 })"
+"""The scene gets one pixel for sixteen of the page: software draws slowly."""
 HARMLESS = (
     r"GPU stall due to ReadPixels",
     r"GroupMarkerNotSet",
@@ -33,12 +35,15 @@ class Browsing:
         opened = self._chromium.new_context(viewport=viewport or SMALL, **context)
         opened.set_default_timeout(60_000)
         self._contexts.append(opened)
+        if "quality=" not in url:
+            url = with_fragment(url, "quality=minimal")
+            opened.add_init_script(COARSE)
         if init_script is not None:
             opened.add_init_script(init_script)
         page = opened.new_page()
         page.on("console", self._hear)
         page.on("pageerror", lambda error: self.complaints.append(f"uncaught: {error}"))
-        page.goto(url if "quality=" in url else with_fragment(url, "quality=minimal"))
+        page.goto(url)
         page.locator(".page").wait_for()
         return page
 

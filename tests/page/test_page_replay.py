@@ -27,7 +27,7 @@ def served(chromium, tmp_path_factory):
 
 @pytest.fixture
 def page(browsing, served):
-    page = browsing.open(served.url + "#quality=minimal&uav=uav1", viewport=WIDE)
+    page = browsing.open(served.url + "#uav=uav1", viewport=WIDE)
     wait_for_picture(page)
     page.get_by_role("option", name="uav1").wait_for()
     return page

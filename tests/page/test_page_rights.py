@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 PILOTS, VIEWERS = "pilots-secret-token", "viewers-secret-token"
 WHY_NOT = "You are looking on: the pilots' token is needed to steer"
-LOOK = "#view=fly&camera=-9_0_6_0_-0.3_0&quality=minimal&uav=uav1"
+LOOK = "#view=fly&camera=-9_0_6_0_-0.3_0&uav=uav1"
 ASK = """
 (order) => new Promise((resolve, reject) => {
   const socket = new WebSocket(new URL("./rosbridge", location.href));

@@ -60,7 +60,7 @@ def test_night_is_dark(browsing, served):
 
 def test_a_moved_uav_moves_on_the_screen(browsing, served):
     page = browsing.open(
-        served.url + "#view=fly&camera=-12_0_4_0_-0.1_0&quality=minimal&uav=uav1",
+        served.url + "#view=fly&camera=-12_0_4_0_-0.1_0&uav=uav1",
         viewport={"width": 640, "height": 360},
     )
     wait_for_picture(page)
@@ -78,7 +78,7 @@ def placed(seen, y):
 
 
 def test_number_keys_and_the_menu_choose_views(browsing, served):
-    page = browsing.open(served.url + "#quality=minimal", viewport={"width": 640, "height": 360})
+    page = browsing.open(served.url, viewport={"width": 640, "height": 360})
     wait_for_picture(page)
     page.keyboard.press("4")
     page.get_by_role("button", name="Chase", pressed=True).wait_for()
@@ -91,7 +91,7 @@ def test_number_keys_and_the_menu_choose_views(browsing, served):
 
 
 def test_a_link_shows_the_same_picture(browsing, served):
-    first = browsing.open(served.url + "#quality=minimal&view=fly&camera=-9_4_6_-0.5_-0.3_0")
+    first = browsing.open(served.url + "#view=fly&camera=-9_4_6_-0.5_-0.3_0")
     wait_for_picture(first)
     wait_for_frames(first, 3)
     second = browsing.open(first.url)

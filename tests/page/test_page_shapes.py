@@ -22,7 +22,7 @@ def overflow(page):
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_fits_the_window(browsing, served, size, scheme):
-    page = browsing.open(served.url, viewport=SIZES[size], color_scheme=scheme)
+    page = browsing.open(f"{served.url}#quality=minimal", viewport=SIZES[size], color_scheme=scheme)
     page.get_by_label("Simulated time").wait_for()
     assert overflow(page) <= 0
     for name in PANELS if scheme == "light" else ("Topics",):

@@ -59,7 +59,7 @@ def served(chromium, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def opened(module_browsing, served):
-    page = module_browsing.open(served.url + "#uav=uav1", viewport=SMALL)
+    page = module_browsing.open(served.url + "#quality=minimal&uav=uav1", viewport=SMALL)
     wait_for_picture(page)
     page.keyboard.press("m")
     return page
@@ -77,7 +77,7 @@ def uav_distance(page, served):
 
 
 def test_a_walker_is_stopped_by_a_block(browsing, served):
-    look = "#view=walk&quality=minimal&camera=0_2_0_1.5708_0_0"
+    look = "#view=walk&camera=0_2_0_1.5708_0_0"
     page = browsing.open(served.url + look, viewport=SMALL)  # south of the block at x -1..1, y 5..7
     wait_for_picture(page)
     wait_until(page, lambda page: abs(eye(page)[1] - 2.0) < 0.1)
@@ -90,7 +90,7 @@ def test_a_walker_is_stopped_by_a_block(browsing, served):
 
 
 def test_a_link_keeps_scenario_view_camera_and_selection(browsing, served):
-    first = browsing.open(served.url + "#quality=minimal&view=fly&camera=-9_4_6_-0.5_-0.3_0")
+    first = browsing.open(served.url + "#view=fly&camera=-9_4_6_-0.5_-0.3_0")
     wait_for_picture(first)
     link, stood = first.url, eye(first)
     first.close()  # software draws one page at a time in good time
