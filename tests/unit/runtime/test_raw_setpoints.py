@@ -3,7 +3,6 @@
 import math
 
 import pytest
-from conftest import FLAT
 
 from volery.core.errors import CommandError
 from volery.graph.zero import zero_message
@@ -11,6 +10,11 @@ from volery.runtime import Simulation
 from volery.runtime.raw_setpoints import steer_to_message, turn_to_message
 from volery.scenario.load import parse_scenario
 
+FLAT = {
+    "name": "flat",
+    "types": {"f450": {"sensors": [{"kind": "odometry", "noise": False}]}},
+    "uavs": [{"type": "f450", "position_m": [0.0, 0.0]}],
+}
 TARGET, ATTITUDE = "mavros_msgs/msg/PositionTarget", "mavros_msgs/msg/AttitudeTarget"
 
 
