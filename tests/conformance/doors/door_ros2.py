@@ -27,6 +27,7 @@ LATCHED = ("/map", "/plan")
 _PEER = Path(__file__).with_name("plain_ros2.py")
 _BASE_PORT, _PORTS_A_DOMAIN, _UNICAST = 7400, 250, 10  # RTPS 2.5, 9.6.2.3
 _HALF = b"RTPS\2\5\1\x10" + bytes(12) + b"\x15\5\xff\xff\0\0"
+_SUCCESS_AT = 4  # of a Trigger's response, behind the four bytes that name the encoding
 
 
 class PeerClient(Client):
@@ -100,7 +101,10 @@ class PeerClient(Client):
             raise Refused("no answer")
         data = base64.b64decode(answer)
         (length,) = struct.unpack_from("<I", data, 8)
-        return data[12 : 12 + length - 1].decode()
+        text = data[12 : 12 + length - 1].decode()
+        if not data[_SUCCESS_AT]:  # ROS 2 has no word for a failure but the response's own
+            raise Refused(text)
+        return text
 
     def offer(self, service):
         answer = None if self.their_answer is None else self._form.triggered(self.their_answer)

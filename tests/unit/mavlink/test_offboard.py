@@ -84,23 +84,22 @@ def test_a_place_with_a_velocity_is_tracked(flight):
 def test_acceleration_attitude_and_rates(flight):
     _, station, uav = flight
     enter(station)
-    speeds = []
     for _ in range(20):
         fields = (0, 1, 1, 1, 3135, 0, 0, 0, 0, 0, 0, 1.0, 0.0, 0.0, 0.0, 0.0)
         station.send("set_position_target_local_ned", *fields)
         station.seconds(0.05)
-        speeds.append(uav.velocity_map[1])
-    gained = (speeds[-1] - speeds[9]) / 0.5  # once it leans
-    assert gained == pytest.approx(1.0, abs=0.15)
+    assert uav.velocity_map[1] > 0.5  # NED's north
+    up = np.array([0.0, 0.0, 1.0])
+    lean = math.degrees(math.atan(1.0 / 9.81))  # what gives 1 m/s^2 without drag, as PX4 has it
+    assert tilt_of(uav, up) == pytest.approx(lean, abs=0.6)
     hover = 0.536  # of the iris: its weight over all that its rotors give
     roll = math.radians(10.0)
     q = (math.cos(roll / 2), math.sin(roll / 2), 0.0, 0.0)
     for _ in range(12):
         station.send("set_attitude_target", 0, 1, 1, 7, q, 0.0, 0.0, 0.0, hover)
         station.seconds(0.05)
-    up = np.array([0.0, 0.0, 1.0])
     assert tilt_of(uav, up) == pytest.approx(10.0, abs=1.5)
-    for _ in range(10):
+    for _ in range(30):  # rotors turn a UAV about its own axis slowly
         station.send("set_attitude_target", 0, 1, 1, 128, (1, 0, 0, 0), 0.0, 0.0, 0.5, hover)
         station.seconds(0.02)
     assert uav.omega_body == pytest.approx([0.0, 0.0, -0.5], abs=0.1)  # FRD's z is down
