@@ -14,6 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from ros2_bench import DOMAIN
 from websockets.sync.client import connect
 
 from volery.bridges.rosbridge.client import RosbridgeClient
@@ -31,10 +32,10 @@ VOLERY = [sys.executable, "-m", "volery.cli"]
 class Run:
     """A simulation in a process of its own, its doors on free ports."""
 
-    def __init__(self, *doors, scenario="hover", seconds=1200, port=0):
+    def __init__(self, *doors, scenario="hover", seconds=1200, port=0, more=()):
         words = [word for door in doors for word in ("--door", f"{door}={port}")]
         self.process = subprocess.Popen(
-            [*VOLERY, "run", scenario, "--seconds", str(seconds), *words],
+            [*VOLERY, "run", scenario, "--seconds", str(seconds), *words, *more],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
@@ -59,7 +60,7 @@ class Run:
 
 @pytest.fixture(scope="module")
 def run():
-    run = Run("rosbridge", "ros-tcp")
+    run = Run("rosbridge", "ros-tcp", more=("--ros2", "--domain-id", str(DOMAIN)))
     yield run
     run.close()
 
@@ -70,6 +71,10 @@ def via_rosbridge(run):
 
 def via_ros_tcp(run):
     return f"ros-tcp://127.0.0.1:{run.ports[1]}"
+
+
+def via_ros2(_run):
+    return f"ros2://{DOMAIN}"
 
 
 def volery(run, *words, via=via_rosbridge, timeout_s=40.0, ok=True):
@@ -87,7 +92,7 @@ def volery(run, *words, via=via_rosbridge, timeout_s=40.0, ok=True):
     return done.stdout if ok else done.stderr
 
 
-@pytest.mark.parametrize("via", [via_rosbridge, via_ros_tcp])
+@pytest.mark.parametrize("via", [via_rosbridge, via_ros_tcp, via_ros2])
 def test_topics_are_listed_with_their_types(run, via):
     lines = volery(run, "topic", "list", "--types", via=via).splitlines()
     assert "/uav1/odom [nav_msgs/msg/Odometry]" in lines
@@ -119,7 +124,7 @@ def x_of_uav1(run):
     return float(re.search(r"position:\s+x: (\S+)", text)[1])
 
 
-@pytest.mark.parametrize("via", [via_rosbridge, via_ros_tcp])
+@pytest.mark.parametrize("via", [via_rosbridge, via_ros_tcp, via_ros2])
 def test_services_are_listed_and_called(run, via):
     assert "/uav1/take_off [std_srvs/srv/Trigger]" in volery(run, "service", "list", "-t", via=via)
     answer = volery(run, "service", "call", "/get_entities", via=via)

@@ -8,8 +8,10 @@ import city_targets
 import comms_targets
 import grid_map_targets
 import log_targets
+import mavlink_targets
 import mesh_targets
 import message_targets
+import ros2_targets
 import rosbridge_targets
 import socket_targets
 
@@ -28,12 +30,16 @@ TARGETS = {
     "sensor_link_commands": socket_targets.sensor_link_commands,
     "comms_wire": comms_targets.wire,
     "comms_router": comms_targets.router,
+    "mavlink_wire": mavlink_targets.wire,
+    "mavlink_autopilot": mavlink_targets.autopilot,
     "cdr": message_targets.cdr,
     "ros1": message_targets.ros1,
     "plain_values": message_targets.plain_values,
     "definitions": message_targets.definitions,
     "topic_patterns": message_targets.patterns,
     "type_names": message_targets.type_names,
+    "ros2_tokens": ros2_targets.tokens,
+    "ros2_attachments": ros2_targets.attachments,
     "mcap": log_targets.mcap,
     "bag": log_targets.bag,
     "grid_map_matrix": grid_map_targets.matrix,

@@ -94,7 +94,7 @@ class Bench:
     """A module to measure with and the bounds of its figures.
 
     in_all: whether `volery bench all` runs it. apart: prefix of figures that a page of their own
-    tells.
+    tells. has_quick: whether `measure` takes `quick`.
     """
 
     name: str
@@ -102,11 +102,15 @@ class Bench:
     bounds: Mapping[str, Bound] = field(default_factory=dict)
     in_all: bool = True
     apart: str = ""
+    has_quick: bool = False
 
-    def run(self) -> Result:
-        """Measure now."""
+    def run(self, *, quick: bool = False) -> Result:
+        """Measure now; `quick` less, where the bench can. `VoleryError` where it cannot."""
         module = importlib.import_module(f"volery.bench.{self.name}")
-        found: Measured | dict[str, float] = module.measure()
+        if quick and not self.has_quick:
+            raise VoleryError(f"bench {self.name} has no --quick")
+        options = {"quick": True} if quick else {}
+        found: Measured | dict[str, float] = module.measure(**options)
         measured = found if isinstance(found, Measured) else Measured(found)
         machine = {**describe_machine(), **describe_versions()}
         return Result(self.name, machine, measured.figures, measured.failures, measured.versions)
@@ -193,6 +197,20 @@ BENCHES: dict[str, Bench] = {
             apart="latency_",
         ),
         Bench(
+            "ros2",
+            "ROS 2 over DDS: one way from the simulation to a subscriber in another process, the "
+            "line L = alpha S + beta through images of 0 to 1 MB; scans of 10 UAVs with two LIDARs "
+            "at 40 Hz to one subscriber, and while a subscriber stands still",
+            {
+                "alpha_s_per_mb": Bound(0.003, at_most=True),
+                "beta_s": Bound(0.0007, at_most=True),
+                "stream_lost": Bound(0.0, at_most=True),
+                "stream_real_time_factor": Bound(0.99),
+                "stopped_real_time_factor": Bound(0.99),
+            },
+            in_all=False,  # it needs the extra "ros2"
+        ),
+        Bench(
             "coverage",
             "Coverage: areas and tours of the reference cases of DARP; beside an open "
             "implementation where there is one, see [coverage.md](coverage.md#figures)",
@@ -223,6 +241,17 @@ BENCHES: dict[str, Bench] = {
             {
                 f"{way}_one_way_ms": Bound(10.0, at_most=True)
                 for way in ("lock_step", "rosbridge", "ros_tcp", "ros1")
+            },
+        ),
+        Bench(
+            "mavlink",
+            "MAVLink: ten autopilots with the streams of an onboard computer and of a ground "
+            "station, beyond the same flight without them; commands from a process of its own; "
+            "velocity setpoints to rotors in simulated time, physics at 250 Hz",
+            {
+                "ten_vehicles_core_share": Bound(0.25, at_most=True),
+                "ack_p95_ms": Bound(20.0, at_most=True),
+                "setpoint_to_motor_ms": Bound(10.0, at_most=True),
             },
         ),
         Bench(
@@ -258,6 +287,30 @@ BENCHES: dict[str, Bench] = {
                 "heap_growth_15_min": Bound(0.15, at_most=True),
             },
             in_all=False,  # it takes twenty minutes and a browser
+        ),
+        Bench(
+            "forest_search",
+            "Forest search: three UAVs without satellite navigation share out the Barro Colorado "
+            "forest for five minutes, ten seeds; each with two LIDARs at 40 Hz, a camera at 5 Hz, "
+            "IMU, sonar, radio; `searched_three_to_one` beside one UAV in the same time",
+            {
+                "realtime_factor": Bound(1.0),
+                "ate_rmse_m_median": Bound(0.30, at_most=True),
+                "ate_rmse_m_worst": Bound(2.0, at_most=True),
+                "collisions": Bound(0.0, at_most=True),
+                "distance_m_least": Bound(500.0),
+                "searched_three_to_one": Bound(2.4),
+                "trunks_within_half_m": Bound(0.95),
+                "target_delay_s_worst": Bound(1.0, at_most=True),
+            },
+            in_all=False,  # it takes an hour
+            has_quick=True,
+        ),
+        Bench(
+            "load",
+            "Load: what one, two, three and six UAVs of the scenario `forest_search` take of one "
+            "core, in percent of real time; nodes by the CPU time of their callbacks",
+            has_quick=True,
         ),
         Bench(
             "peers",

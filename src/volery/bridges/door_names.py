@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Mapping
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from volery.bridges.doors import Door
 from volery.core.errors import BridgeError
+
+if TYPE_CHECKING:
+    from volery.bridges.ros2.environment import Ros2Terms
 
 
 class Address(NamedTuple):
@@ -24,14 +27,22 @@ class Terms(NamedTuple):
     """Whether doors may listen beyond loopback."""
     token: str | None = None
     """What clients must show, where the protocol can carry it."""
+    domain_id: int | None = None
+    """ROS 2 domain; None: that of ROS_DOMAIN_ID."""
+    interfaces: tuple[str, ...] = ()
+    """Of the network, for ROS 2 over DDS; none: this machine alone."""
 
 
 class DoorKind(NamedTuple):
-    """A door that can be asked for: the port where none is said, how it is made, what it is."""
+    """A door that can be asked for: the port where none is said, how it is made, what it is.
+
+    on_line: it is no port of a host but a serial line, PATH[:BAUD].
+    """
 
     port: int
     make: Callable[[Address, Terms], Door]
     what: str
+    on_line: bool = False
 
 
 def make_door(text: str, terms: Terms, more: Mapping[str, DoorKind] | None = None) -> Door:
@@ -46,7 +57,8 @@ def make_door(text: str, terms: Terms, more: Mapping[str, DoorKind] | None = Non
         near = difflib.get_close_matches(name, kinds, n=1)
         hint = f" Did you mean '{near[0]}'?" if near else ""
         raise BridgeError(f"no door '{name}'.{hint} Doors: {', '.join(kinds)}")
-    return kind.make(_parse(address, kind.port, text), terms)
+    parse = _parse_line if kind.on_line else _parse
+    return kind.make(parse(address, kind.port, text), terms)
 
 
 def describe_doors() -> dict[str, str]:
@@ -55,7 +67,7 @@ def describe_doors() -> dict[str, str]:
 
 
 def _parse(address: str, port: int, text: str) -> Address:
-    host = "127.0.0.1"
+    host = _HERE
     if address:
         before, colon, after = address.rpartition(":")
         if colon:
@@ -64,6 +76,17 @@ def _parse(address: str, port: int, text: str) -> Address:
             raise BridgeError(f"'{text}': an address is PORT or HOST:PORT, port 0 to 65535")
         port = int(after)
     return Address(host, port)
+
+
+def _parse_line(address: str, baud: int, text: str) -> Address:
+    path, colon, after = address.rpartition(":")
+    if not colon:
+        path = address
+    elif after.isdecimal():
+        baud = int(after)
+    if not path or (colon and not after.isdecimal()):
+        raise BridgeError(f"'{text}': a serial line is PATH or PATH:BAUD")
+    return Address(path, baud)
 
 
 def _rosbridge(address: Address, terms: Terms) -> Door:
@@ -100,6 +123,29 @@ def _ros1(address: Address, terms: Terms) -> Door:
     return Ros1Door(uri, anywhere=terms.anywhere)
 
 
+def _ros2(address: Address, terms: Terms) -> Door:
+    from volery.bridges.ros2.environment import Ros2Terms
+
+    if address.host != _HERE:
+        raise BridgeError("ros2=N names a domain; interfaces are chosen with --ros2-interface")
+    domain_id = terms.domain_id if address.port == _UNSAID else address.port
+    return _ros2_door(Ros2Terms("dds", domain_id, terms.interfaces))
+
+
+def _ros2_zenoh(address: Address, terms: Terms) -> Door:
+    from volery.bridges.ros2.environment import Ros2Terms
+
+    router = "" if address.port == _UNSAID else f"{address.host}:{address.port}"
+    return _ros2_door(Ros2Terms("zenoh", terms.domain_id, router=router))
+
+
+def _ros2_door(terms: Ros2Terms) -> Door:
+    from volery.bridges.ros2.door import Ros2Door
+    from volery.bridges.rosbridge.beside import WithRosApi
+
+    return WithRosApi(Ros2Door(terms))
+
+
 def _sensor_link(address: Address, terms: Terms) -> Door:
     from volery.bridges.sensor_link.server import SensorLink
 
@@ -107,12 +153,16 @@ def _sensor_link(address: Address, terms: Terms) -> Door:
     return SensorLink(*address, image_port=image_port, anywhere=terms.anywhere)
 
 
+_HERE = "127.0.0.1"
+_UNSAID = -1
 _KINDS = {
     "rosbridge": DoorKind(9090, _rosbridge, "rosbridge v2 server (WebSocket, JSON and CBOR)"),
     "ros-tcp": DoorKind(10000, _ros_tcp, "server for Unity's ROS-TCP-Connector, ROS 1 messages"),
     "ros-tcp-2": DoorKind(10000, _ros_tcp_2, "the same with ROS 2 messages"),
     "ros-tcp-connector": DoorKind(10000, _ros_tcp_connector, "connects to a ROS-TCP-Endpoint"),
     "ros1": DoorKind(0, _ros1, "joins the roscore of ROS_MASTER_URI"),
+    "ros2": DoorKind(_UNSAID, _ros2, "ROS 2 over DDS; =N: domain N instead of ROS_DOMAIN_ID"),
+    "ros2-zenoh": DoorKind(_UNSAID, _ros2_zenoh, "ROS 2 over zenoh; =[HOST:]PORT: its router"),
     "sensor-link": DoorKind(
         10100, _sensor_link, "binary frames with CRC-16; images on the next port"
     ),

@@ -11,9 +11,13 @@ from volery.cli.graph_commands import node, service_app, topic_app
 from volery.cli.guard import guarded
 from volery.cli.options import (
     BatchSizeOption,
+    DomainOption,
     DoorsOption,
+    InterfaceOption,
+    MiddlewareOption,
     PageCommand,
     RemoteOption,
+    Ros2Option,
     ThreadsOption,
     TokenOption,
 )
@@ -74,6 +78,10 @@ def run(
     door: DoorsOption = None,
     allow_remote: RemoteOption = False,
     token: TokenOption = None,
+    ros2: Ros2Option = False,
+    domain_id: DomainOption = None,
+    middleware: MiddlewareOption = "dds",
+    ros2_interface: InterfaceOption = None,
     recordings: Annotated[
         Path | None,
         typer.Option(help="Folder in which clients may record: /volery/start_recording."),
@@ -98,7 +106,8 @@ def run(
 ) -> None:
     """Fly a scenario.
 
-    Doors: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, sensor-link, comms.
+    Doors: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, ros2, ros2-zenoh,
+    sensor-link, comms.
 
     At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
     + and - double and halve the speed, m frees it. Ctrl-C ends the flight and still writes log and
@@ -106,13 +115,16 @@ def run(
     """
     from volery.cli.run import RunOptions, fly, parse_speed
 
+    doors = (*(door or ()), *((("ros2" if middleware == "dds" else "ros2-zenoh"),) * ros2))
     options = RunOptions(
         scenario=scenario,
         uavs=uavs,
         seconds=seconds,
         seed=seed,
-        speed=parse_speed(speed or ("1" if door else "max")),
-        doors=tuple(door or ()),
+        speed=parse_speed(speed or ("1" if doors else "max")),
+        doors=doors,
+        domain_id=domain_id,
+        interfaces=tuple(ros2_interface or ()),
         recordings=recordings,
         allow_remote=allow_remote,
         token=token,
@@ -314,11 +326,55 @@ def bench(
     markdown: Annotated[
         Path | None, typer.Option(help="Write a page with figures and bounds.")
     ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Shorter, where the bench can: forest_search, load.")
+    ] = False,
 ) -> None:
     """Measure how fast Volery is on this machine."""
     from volery.cli.benching import measure_and_show
 
-    measure_and_show(name, as_json=json, out=out, markdown=markdown)
+    measure_and_show(name, as_json=json, out=out, markdown=markdown, quick=quick)
+
+
+@app.command()
+@guarded
+def launch(
+    profile: Annotated[Path, typer.Argument(help="A .toml profile with [[launch]] in it.")],
+    via: Annotated[
+        str | None, typer.Option(help="Way into the graph, as of `volery node`.")
+    ] = None,
+    namespace: Annotated[str | None, typer.Option(help="Of the nodes, such as /uav1.")] = None,
+    lock_step: Annotated[
+        float | None, typer.Option(help="The simulation waits for them each so many seconds.")
+    ] = None,
+) -> None:
+    """Run the nodes of a launch profile in a process of their own."""
+    from volery.cli.launching import launch_profile
+
+    launch_profile(profile, via=via, namespace=namespace, lock_step_s=lock_step)
+
+
+@app.command()
+@guarded
+def report(
+    log: Annotated[Path, typer.Argument(help="A .mcap or .bag log of a simulated flight.")],
+    out: Annotated[Path, typer.Option(help="The folder to write index.html into.")] = Path(
+        "report"
+    ),
+    compare: Annotated[
+        Path | None, typer.Option(help="Log of a real flight, laid over the simulated one.")
+    ] = None,
+    compare_topic: Annotated[
+        str | None,
+        typer.Option(help="Its topic of poses, where there are several."),
+    ] = None,
+    uav: Annotated[str | None, typer.Option(help="UAV to compare with; the first.")] = None,
+) -> None:
+    """Draw the ways of a log, simulated against estimated, with a map of trunks."""
+    from volery.report.way_page import write_log_report
+
+    path = write_log_report(log, out, compare=compare, compare_topic=compare_topic, uav=uav)
+    typer.echo(f"report  {path}")
 
 
 @app.command()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from volery.core.errors import BridgeError
-from volery.graph.link import Link, TellsTopics, call_and_wait
+from volery.graph.link import Link, TellsServices, TellsTopics, call_and_wait
 from volery.graph.messages import message_type
 
 TIMEOUT_S = 10.0
@@ -33,6 +33,24 @@ def type_of_topic(link: Link, topic: str) -> str:
         found = ask_rosapi(link, "TopicType", topic=topic).type
     if not found:
         raise BridgeError(f"there is no topic '{topic}'; see `volery topic list`")
+    return found
+
+
+def service_names(link: Link) -> list[str]:
+    """Services of the graph, sorted."""
+    if isinstance(link, TellsServices):
+        return sorted(link.service_types())
+    return sorted(ask_rosapi(link, "Services").services)
+
+
+def type_of_service(link: Link, service: str) -> str:
+    """Type of a service. `BridgeError` where nobody offers it."""
+    if isinstance(link, TellsServices):
+        found = link.service_types().get(service, "")
+    else:
+        found = ask_rosapi(link, "ServiceType", service=service).type
+    if not found:
+        raise BridgeError(f"nobody offers service '{service}'; see `volery service list`")
     return found
 
 

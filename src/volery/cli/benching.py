@@ -18,16 +18,20 @@ from volery.cli.tables import print_table
 from volery.core.errors import VoleryError
 
 
-def measure_and_show(name: str, *, as_json: bool, out: Path | None, markdown: Path | None) -> None:
+def measure_and_show(
+    name: str, *, as_json: bool, out: Path | None, markdown: Path | None, quick: bool = False
+) -> None:
     """Measure one bench, or all of them each in a process of its own."""
     for path in (out, markdown):
         if path is not None and not path.parent.is_dir():
             raise VoleryError(f"{path}: there is no folder {path.parent}")
     with _progress_told():
+        if name == "all" and quick:
+            raise VoleryError("--quick is for one bench: forest_search or load")
         if name == "all":
             results = [_in_own_process(each) for each, bench in BENCHES.items() if bench.in_all]
         else:
-            results = [find(name).run()]
+            results = [find(name).run(quick=quick)]
     for result in results:
         if as_json:
             typer.echo(result.to_json())

@@ -43,6 +43,10 @@ class RunOptions:
     recordings: Path | None = None
     allow_remote: bool = False
     token: str | None = None
+    domain_id: int | None = None
+    """Of ROS 2; None: that of ROS_DOMAIN_ID."""
+    interfaces: tuple[str, ...] = ()
+    """Of the network, for ROS 2; none: this machine alone."""
     changes: Changes | None = None
     """To the scenario, by the client that loaded it."""
     page: str | None = None

@@ -47,11 +47,19 @@ def node(
         float | None,
         typer.Option(help="Have the simulation wait for the node each so many simulated s: 0.001."),
     ] = None,
+    messages: Annotated[
+        list[str] | None,
+        typer.Option(help="Folder of ROS packages with .msg and .srv files, repeatable."),
+    ] = None,
 ) -> None:
     """Run a node as a process of its own, on the graph of a simulation or a real vehicle."""
     from volery.cli.node import NodeOptions, run_node
 
-    run_node(NodeOptions(node, via, namespace, profile, tuple(param or ()), lock_step))
+    run_node(
+        NodeOptions(
+            node, via, namespace, profile, tuple(param or ()), lock_step, tuple(messages or ())
+        )
+    )
 
 
 @topic_app.command("list")

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
 
 from volery.core.errors import BridgeError
 
 if TYPE_CHECKING:
+    from volery.bridges.ros2.environment import Ros2Terms
     from volery.graph.link import Link
 
 
 DEFAULT_VIA = "rosbridge://127.0.0.1:9090"
-WAYS = "rosbridge://HOST:PORT, ros-tcp://HOST:PORT or ros1"
+WAYS = "rosbridge://HOST:PORT, ros-tcp://HOST:PORT, ros1, ros2 or ros2-zenoh"
 _ROS_TCP_PORT = 10000
 
 
@@ -34,8 +35,31 @@ def open_link(via: str, name: str) -> Link:
     if scheme == "ros1":
         from volery.bridges.ros1.client import Ros1Client
 
-        return Ros1Client(f"http://{rest}" if rest else None, _ros1_name(name))
+        return Ros1Client(f"http://{rest}" if rest else None, _own_name(name))
+    if scheme in ("ros2", "ros2-zenoh"):
+        from volery.bridges.ros2.client import Ros2Client
+
+        return Ros2Client(_ros2_terms(via), f"/{_own_name(name)}")
     raise _no_way(via)
+
+
+def _ros2_terms(via: str) -> Ros2Terms:
+    """Of `ros2://DOMAIN?interface=NAME` or `ros2-zenoh://HOST:PORT?domain=DOMAIN`."""
+    from volery.bridges.ros2.environment import Ros2Terms
+
+    parts = urlsplit(via)
+    asked = parse_qs(parts.query, keep_blank_values=True)
+    zenoh = via.startswith("ros2-zenoh")
+    domain = asked.pop("domain", [""])[-1] if zenoh else parts.netloc
+    interfaces = () if zenoh else tuple(asked.pop("interface", ()))
+    if asked or parts.path.strip("/") not in ("", "ros2", "ros2-zenoh") or parts.fragment:
+        raise _no_way(via)
+    if domain and not domain.isdecimal():
+        raise _no_way(via)
+    domain_id = int(domain) if domain else None
+    if zenoh:
+        return Ros2Terms("zenoh", domain_id, router=parts.netloc)
+    return Ros2Terms("dds", domain_id, interfaces)
 
 
 def _address(via: str, port: int) -> tuple[str, int]:
@@ -54,7 +78,7 @@ def _no_way(via: str) -> BridgeError:
     return BridgeError(f"'{via}' is no way into a graph; use {WAYS}")
 
 
-def _ros1_name(name: str) -> str:
+def _own_name(name: str) -> str:
     """A node name of its own: a ROS 1 master ends the older of two nodes of one name."""
     import os
 

@@ -26,6 +26,8 @@ class NodeOptions:
     profile: Path | None
     parameters: Sequence[str] = ()
     lock_step_s: float | None = None
+    messages: Sequence[str] = ()
+    """Folders of message definitions."""
 
 
 def run_node(options: NodeOptions) -> None:
@@ -34,10 +36,13 @@ def run_node(options: NodeOptions) -> None:
 
     from volery.bridges.nodes.host import NodeHost
     from volery.bridges.nodes.profile import Profile, absolute_names, load_profile
+    from volery.graph.messages import add_definitions
     from volery.runtime.node_loading import start_node
     from volery.scenario.schema import NodeEntry
 
     profile = Profile() if options.profile is None else load_profile(options.profile)
+    for name in (*options.messages, *profile.messages):
+        add_definitions(_folder_of(name, options.profile))
     namespace = profile.namespace if options.namespace is None else options.namespace
     parameters = {**profile.parameters, **_parameters(options.parameters)}
     try:
@@ -46,6 +51,10 @@ def run_node(options: NodeOptions) -> None:
         raise BridgeError(f"a node is named module:Class, not '{options.node}'") from None
     name = options.node.rpartition(":")[2]
     via = options.via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
+    if options.lock_step_s is not None and via.startswith("ros2"):
+        raise BridgeError(
+            "--lock-step: ROS 2 keeps no order between topics; use rosbridge or ros-tcp"
+        )
     with closing(open_link(via, name)) as link:
         host = NodeHost(link, clock=profile.clock)
         context = host.context(absolute_names(profile.remap, namespace))
@@ -58,6 +67,12 @@ def run_node(options: NodeOptions) -> None:
             host.spin()
         finally:
             node.destroy_node()
+
+
+def _folder_of(name: str, profile: Path | None) -> Path:
+    """A folder beside the profile, or in the working folder."""
+    beside = Path(name) if profile is None else profile.parent / name
+    return beside if beside.is_dir() else Path(name)
 
 
 def _parameters(words: Sequence[str]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 from typer.core import TyperCommand
@@ -16,6 +16,20 @@ RemoteOption = Annotated[
 ]
 TokenOption = Annotated[
     str | None, typer.Option(envvar="VOLERY_TOKEN", help="What remote clients must show.")
+]
+Ros2Option = Annotated[
+    bool, typer.Option("--ros2", help="Take part in a ROS 2 graph: the door ros2 or ros2-zenoh.")
+]
+DomainOption = Annotated[
+    int | None,
+    typer.Option(min=0, max=232, help="ROS 2 domain; ROS_DOMAIN_ID unless given."),
+]
+MiddlewareOption = Annotated[
+    Literal["dds", "zenoh"], typer.Option(help="How --ros2 talks to ROS 2.")
+]
+InterfaceOption = Annotated[
+    list[str] | None,
+    typer.Option(help="Network interface for ROS 2 over DDS, repeatable; else this machine alone."),
 ]
 ThreadsOption = Annotated[
     int | None, typer.Option(min=1, max=256, help="Threads; results do not depend on it.")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from volery.cli.doors import open_doors
+from volery.cli.doors import fit_out, open_doors
 from volery.cli.flight import Flight, RunOptions
 from volery.cli.guard import INTERRUPTED
 from volery.cli.interrupt import Interrupts
@@ -118,7 +118,9 @@ def _scenario_of(options: RunOptions) -> Scenario:
         seconds=options.seconds,
         seed=options.seed,
     )
-    return scenario if options.changes is None else changes.apply(scenario, options.changes)
+    if options.changes is not None:
+        scenario = changes.apply(scenario, options.changes)
+    return fit_out(scenario, options)
 
 
 def _loading(options: RunOptions, request: WorldRequest) -> RunOptions:

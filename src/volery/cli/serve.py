@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from volery.cli.doors import open_doors
+from volery.cli.doors import fit_out, open_doors
 from volery.cli.flight import RunOptions
 from volery.cli.guard import complain
 from volery.cli.interrupt import Interrupts
@@ -146,7 +146,7 @@ class _Host:
         page.building(scenario, self._trouble)
         threads = _THREADS if first.threads is None else first.threads
         with Simulation(
-            scenario,
+            fit_out(scenario, first),
             threads=threads,
             recordings=first.recordings,
             on_load=self._wish.ask,

@@ -10,8 +10,11 @@ Nothing here draws numbers or reads a clock: the same calls give the same messag
 
 from __future__ import annotations
 
+import copy
+from typing import Any
+
 from volery.comms.addresses import Identity
-from volery.comms.link import Link, ideal_link
+from volery.comms.link import Delivery, Link, ideal_link
 from volery.comms.protocol import Frame
 from volery.comms.router import Router
 from volery.comms.settings import RouterSettings
@@ -33,8 +36,10 @@ class Exchange:
         self, settings: RouterSettings | None = None, link: Link = ideal_link, now_ns: int = 0
     ) -> None:
         self._settings = settings or RouterSettings()
-        self._router = Router(self._settings, now_ns, _BOOT, link)
+        self._link = link
+        self._router = Router(self._settings, now_ns, _BOOT, self._decide)
         self._stations: dict[int, StationCore] = {}
+        """By connection."""
 
     @property
     def statistics(self) -> Statistics:
@@ -56,6 +61,41 @@ class Exchange:
         core.connected(now_ns)
         self._pass(now_ns)
         return core
+
+    def leave(self, address: int, now_ns: int) -> None:
+        """End a station. `CommsError` where there is none with this address."""
+        connection = self._connection_of(address)
+        del self._stations[connection]
+        self._router.disconnect(connection, now_ns)
+
+    def station(self, address: int) -> StationCore:
+        """The station with an address. `CommsError` where there is none."""
+        return self._stations[self._connection_of(address)]
+
+    @property
+    def next_due_ns(self) -> int | None:
+        """When something that is under way is due; None: nothing is."""
+        return self._router.next_due_ns
+
+    def get_state(self) -> Any:
+        """Everything that changes, but for what the link keeps itself."""
+        return self._copied((self._router, self._stations))
+
+    def set_state(self, state: Any) -> None:
+        """Go back to a kept state; stations are others than before: ask `station` for them."""
+        self._router, self._stations = self._copied(state)
+
+    def _copied(self, parts: Any) -> Any:
+        return copy.deepcopy(parts, {id(self): self})  # whom the router asks for the link
+
+    def _decide(self, time_ns: int, source: int, destination: int, frame: Frame) -> Delivery:
+        return self._link(time_ns, source, destination, frame)
+
+    def _connection_of(self, address: int) -> int:
+        for connection, core in self._stations.items():
+            if core.address == address:
+                return connection
+        raise CommsError(f"there is no station {address}")
 
     def advance(self, now_ns: int) -> list[tuple[int, Frame]]:
         """Pass on what is due: stations that get something, and what, in a fixed order."""

@@ -156,8 +156,9 @@ class Station:
 
     async def _connect(self) -> None:
         try:
-            connecting = self._loop.create_connection(lambda: _Pipe(self), *self._address)
-            await asyncio.wait_for(connecting, _CONNECT_S)
+            # Not `wait_for`: in Python 3.11 that can lose a cancellation.
+            async with asyncio.timeout(_CONNECT_S):
+                await self._loop.create_connection(lambda: _Pipe(self), *self._address)
         except (TimeoutError, OSError, OverflowError):
             return
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import re
 from functools import partial
 from typing import Any
 
-from volery.comms.addresses import ALL_GROUND, FIRST_GROUND, PLANES_PER_BATCH, Identity
+from volery.comms.addresses import ALL_GROUND, PLANES_PER_BATCH, Identity
+from volery.comms.naming import free_address
 from volery.comms.payloads import (
     COMMANDS,
     REPLY,
@@ -96,8 +96,9 @@ class UavStations:
             await asyncio.sleep(_PERIOD_S)
 
     async def _join(self, session: Session, uav: str) -> Station:
+        used = {station.core.address for station in self._stations.values()}
         station = Station(
-            Identity.of(self._free_address(uav), self._planes),
+            Identity.of(free_address(uav, used), self._planes),
             lambda frame: self._take(session, uav, frame),
             host=self._host,
             port=self._port,
@@ -108,13 +109,6 @@ class UavStations:
         self._stations[uav] = station
         await station.start(timeout_s=None)
         return station
-
-    def _free_address(self, uav: str) -> int:
-        used = {station.core.address for station in self._stations.values()}
-        number = re.fullmatch(r"uav([1-9]\d{0,4})", uav)
-        if number and int(number[1]) - 1 not in used and int(number[1]) <= FIRST_GROUND:
-            return int(number[1]) - 1
-        return next(address for address in range(FIRST_GROUND) if address not in used)
 
     def _take(self, session: Session, uav: str, frame: Frame) -> None:
         if frame.kind != Kind.COMMAND:

@@ -22,7 +22,7 @@ from volery.control.setpoints import (
 from volery.control.trajectory import Trajectory
 from volery.core import rotations
 from volery.core.errors import CommandError
-from volery.vehicle.airframe import Airframe
+from volery.vehicle.airframe import GRAVITY, Airframe
 from volery.vehicle.identified import IdentifiedModel
 from volery.vehicle.kinematic import Kinematic
 from volery.vehicle.plants import Plant, RigidBody
@@ -274,6 +274,47 @@ class FleetCommands:
             float(pilot["home"][2]) + height_m, float(self._believed(i).position[2])
         )
 
+    def command_acceleration(
+        self,
+        i: int,
+        acceleration: ArrayLike,
+        *,
+        yaw: float | None = None,
+        yaw_rate: float = 0.0,
+    ) -> None:
+        """Accelerate UAV `i` by `acceleration` (3,) m/s^2, map, facing `yaw` rad (None: as it is).
+
+        The thrust points along what gravity and acceleration need together, tilted no farther than
+        the airframe's limit; drag and wind are not made up for. It turns at `yaw_rate` rad/s
+        besides. Like attitudes it holds until the next command.
+        """
+        acceleration = checked("acceleration", acceleration, (3,), 1e3)
+        angle = None if yaw is None else float(checked("yaw", yaw, (), 1e4))
+        rate = float(checked("yaw rate", yaw_rate, (), 100.0))
+        self._refuse_plants(i, "accelerations", Kinematic)
+        airframe = self.airframes[i]
+        lift = max(0.0, float(acceleration[2]) + GRAVITY)
+        level = np.array(acceleration[:2])
+        size, most = (
+            float(np.linalg.norm(level)),
+            lift * math.tan(math.radians(airframe.limits.tilt_deg)),
+        )
+        if size > most:
+            level *= most / size
+        if angle is None:
+            angle = float(rotations.yaw_of(self._believed(i).attitude))
+        most_thrust = len(airframe.rotors.places) * airframe.max_rotor_thrust
+        thrust = airframe.body.mass_kg * math.hypot(*level, lift)
+        pilot = self._enter_low_level(i, ControlLevel.ATTITUDE)
+        up = np.array([-level[1], level[0], 0.0, math.hypot(*level, lift) + lift])
+        facing = [0.0, 0.0, math.sin(0.5 * angle), math.cos(0.5 * angle)]
+        upright = bool(up.any())  # else it falls freely: any attitude will do, so this one
+        pilot["attitude"] = (
+            rotations.multiply(rotations.normalize(up), facing) if upright else facing
+        )
+        pilot["thrust"] = min(thrust, most_thrust)
+        pilot["yaw_rate"] = rate
+
     def set_home(self, i: int, position: ArrayLike) -> None:
         """Place (3,) m, map, to which UAV `i` returns; else that of its last take-off."""
         self._pilots["home"][i] = checked("home", position, (3,), MAX_COORDINATE)
@@ -305,7 +346,15 @@ class FleetCommands:
         self._bodies["ground_budget"][i] = 0.0
         self._bodies["downwash_budget"][i] = 0.0
 
-    def _believed(self, i: int) -> Motion:
+    def believed(self, rows: NDArray[np.int64]) -> tuple[Motion, Array]:
+        """What the controllers of the UAVs `rows` take for their motion, a row each.
+
+        And their body rates (n, 3) rad/s, FLU.
+        """
+        rates = self._bodies["omega_body"][rows] + self._uavs["belief"]["rate_error"][rows]
+        return self._believed(rows), rates
+
+    def _believed(self, i: int | NDArray[np.int64]) -> Motion:
         """What the controllers of UAV `i` take for its motion now."""
         body, belief = self._bodies[i], self._uavs["belief"][i]
         return Motion(

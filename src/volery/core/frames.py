@@ -109,3 +109,34 @@ def q_ros_from_unity(q: ArrayLike) -> Array:
     """Unity rotation to ROS."""
     q = np.asarray(q, dtype=np.float64)
     return np.concatenate([-ros_from_unity(q[..., :3]), q[..., 3:]], axis=-1)
+
+
+# ------------------------------------------------------------------- one vehicle's, without arrays
+
+
+def ned_of_enu(v: tuple[float, float, float]) -> tuple[float, float, float]:
+    """`ned_from_enu` of one vector; its own inverse."""
+    return v[1], v[0], -v[2]
+
+
+enu_of_ned = ned_of_enu
+
+
+def frd_of_flu(v: tuple[float, float, float]) -> tuple[float, float, float]:
+    """`frd_from_flu` of one vector; its own inverse."""
+    return v[0], -v[1], -v[2]
+
+
+flu_of_frd = frd_of_flu
+
+
+def q_ned_frd_of_enu_flu(
+    q: tuple[float, float, float, float],
+) -> tuple[float, float, float, float]:
+    """`q_ned_frd_from_enu_flu` of one quaternion, multiplied out; its own inverse (up to sign)."""
+    x, y, z, w = q
+    s = 0.7071067811865476
+    return s * (x + y), s * (x - y), s * (w - z), s * (w + z)
+
+
+q_enu_flu_of_ned_frd = q_ned_frd_of_enu_flu

@@ -118,6 +118,9 @@ class Engine:
         self.partner_agenda: Agenda[Partner] = Agenda(self.dt_ns)
         self.deadlines = Deadlines(self.dt_ns)
         self.stage_seconds = {stage.__name__: 0.0 for stage in STAGES}
+        """Wall time spent in each stage so far ..."""
+        self.stage_cpu_s = dict(self.stage_seconds)
+        """... and CPU time of the thread that runs them: workers' is not in it."""
 
     @property
     def time_ns(self) -> int:
@@ -369,14 +372,15 @@ class Engine:
         return min((s for s in steps if s is not None), default=1 << 62)
 
     def _run_tick(self, tick: Tick) -> None:
-        before = time.perf_counter()
+        before, cpu_before = time.perf_counter(), time.thread_time()
         try:
             for stage in STAGES:
                 self.stands = stage is take_commands
                 stage(self, tick)
-                after = time.perf_counter()
+                after, cpu_after = time.perf_counter(), time.thread_time()
                 self.stage_seconds[stage.__name__] += after - before
-                before = after
+                self.stage_cpu_s[stage.__name__] += cpu_after - cpu_before
+                before, cpu_before = after, cpu_after
         finally:
             self.stands = True
             self.turn += 1

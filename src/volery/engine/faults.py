@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from volery.scenario.faults import (
     GnssFault,
     GustFault,
     MotorFault,
+    RadioFault,
     SensorFault,
 )
 from volery.sensors.faults import FaultableBank
@@ -29,6 +30,19 @@ from volery.world.weather import Gust
 Array = NDArray[np.float64]
 
 
+class Radios(Protocol):
+    """The radios of the UAVs."""
+
+    def check(self, name: str) -> None:
+        """`CommandError` where a UAV has none."""
+
+    def silence(self, name: str, by: int) -> None:
+        """One fault more (1) or less (-1) keeps a radio from working."""
+
+    def restore_all(self, name: str) -> None:
+        """A radio begins anew."""
+
+
 class FaultPlan:
     """Plans faults of an engine's UAVs; planned ones are part of its state.
 
@@ -36,8 +50,9 @@ class FaultPlan:
     deleted meanwhile fails no more.
     """
 
-    def __init__(self, engine: Engine) -> None:
+    def __init__(self, engine: Engine, radios: Radios | None = None) -> None:
         self._engine = engine
+        self._radios = radios
         self._sound: dict[str, Array] = {}
         """(rotors,) health without faults, by UAV: what wear has left."""
         self._weak: dict[tuple[str, int], list[float]] = {}
@@ -65,6 +80,8 @@ class FaultPlan:
             begin, end = self._motor(fault)
         elif isinstance(fault, SensorFault):
             begin, end = self._sensor(fault)
+        elif isinstance(fault, RadioFault):
+            begin, end = self._radio(fault)
         else:
             begin = self._gnss(fault)
         uav = getattr(fault, "uav", None)
@@ -74,7 +91,9 @@ class FaultPlan:
             self._at(until_s, end or _nothing, uav, f"fault over: {fault.kind}")
 
     def mend(self, uav: str) -> None:
-        """Forget what weakens the rotors of a UAV that begins anew."""
+        """Forget what weakens the rotors of a UAV that begins anew, and what silences its radio."""
+        if self._radios is not None:
+            self._radios.restore_all(uav)
         self._weak = {key: shares for key, shares in self._weak.items() if key[0] != uav}
 
     def get_state(self) -> dict[tuple[str, int], list[float]]:
@@ -142,6 +161,13 @@ class FaultPlan:
             bank.faults.clear(row)
 
         return fail, mend
+
+    def _radio(self, fault: RadioFault) -> tuple[Callable[[], Any], Callable[[], Any]]:
+        radios = self._radios
+        if radios is None:
+            raise CommandError(f"{fault.uav} has no radio: the scenario has no [radio]")
+        radios.check(fault.uav)
+        return lambda: radios.silence(fault.uav, 1), lambda: radios.silence(fault.uav, -1)
 
     def _gnss(self, fault: GnssFault) -> Callable[[], Any]:
         if not self._receivers(self._row(fault.uav)):

@@ -113,6 +113,11 @@ class Publisher:
         self._graph.enqueue(self, self._topic, message)
 
     @property
+    def heard(self) -> bool:
+        """Whether a node inside subscribes to this very topic: who takes everything is none."""
+        return len(self._topic.callbacks) > len(self._topic.outside)
+
+    @property
     def watched(self) -> bool:
         """Whether a client outside receives the topic."""
         return bool(self._topic.outside)
@@ -216,6 +221,10 @@ class Graph:
         if self._post is None:
             raise GraphError("this graph has no thread of its own to post to")
         self._post(action)
+
+    def enter(self, node: str) -> None:
+        """Note that a node of this full name stands on the graph."""
+        self.parameters.enter(node)
 
     # ---------------------------------------------------------------------------------- topics
 

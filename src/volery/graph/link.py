@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 from volery.core.errors import GraphError
 from volery.graph.mailbox import Mailbox, Wake
+from volery.graph.parameters import Parameters
 from volery.graph.reply import Reply
 from volery.graph.session import Handler
 
@@ -58,6 +60,22 @@ class TellsTopics(Protocol):
 
     def topic_types(self) -> dict[str, str]:
         """Topics of the graph and their types, by name. `GraphError` where no answer comes."""
+
+
+@runtime_checkable
+class TellsServices(Protocol):
+    """A link whose own protocol tells what services there are."""
+
+    def service_types(self) -> dict[str, str]:
+        """Services of the graph and their types, by name. `GraphError` where no answer comes."""
+
+
+@runtime_checkable
+class HostsNodes(Protocol):
+    """A link on which a node is seen by its own name, with its parameters."""
+
+    def host_node(self, name: str, parameters: Parameters, post: Callable[[Any], Any]) -> None:
+        """Be this node; parameters are set by what is handed to `post`."""
 
 
 def call_and_wait(link: Link, service: str, request: Any | None, timeout_s: float) -> Any:

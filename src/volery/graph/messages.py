@@ -20,7 +20,10 @@ from volery.graph.definition_store import DefinitionStore
 
 Time = _ros2.builtin_interfaces__msg__Time
 Point = _ros2.geometry_msgs__msg__Point
+Point32 = _ros2.geometry_msgs__msg__Point32
 PointStamped = _ros2.geometry_msgs__msg__PointStamped
+Polygon = _ros2.geometry_msgs__msg__Polygon
+PolygonStamped = _ros2.geometry_msgs__msg__PolygonStamped
 Pose = _ros2.geometry_msgs__msg__Pose
 PoseStamped = _ros2.geometry_msgs__msg__PoseStamped
 PoseWithCovariance = _ros2.geometry_msgs__msg__PoseWithCovariance

@@ -15,6 +15,7 @@ names that start with `~/` belong to the node.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Protocol
@@ -87,11 +88,14 @@ class Node:
         self._held: list[Callable[[], None]] = []
         """What gives back a publisher, a subscription, a service."""
         self._destroyed = False
+        self.busy_s = 0.0
+        """CPU time that its callbacks have taken so far."""
         self._thinker = (
             Thinker(node_name, context.latency_ns, context.timers, context.now_ns)
             if context.latency_ns
             else None
         )
+        context.graph.enter(self.full_name)
 
     # ------------------------------------------------------------------------------ the contract
 
@@ -232,6 +236,7 @@ class Node:
 
     def _guarded(self, callback: Callable[[], None], occasion: str) -> None:
         """Call back; a failure becomes a `NodeError` that tells whose it was."""
+        before = time.thread_time()
         try:
             callback()
         except VoleryError:
@@ -242,6 +247,8 @@ class Node:
                 f"node {self.full_name} failed at {at} in its {occasion}: "
                 f"{type(error).__name__}: {error}"
             ) from error
+        finally:
+            self.busy_s += time.thread_time() - before
 
     def resolve(self, name: str) -> str:
         """Absolute name of a topic or service, as the launch profile wants it."""
@@ -250,6 +257,11 @@ class Node:
         elif not name.startswith("/"):
             name = f"{self._namespace}/{name}"
         return self._context.remap.get(name, name)
+
+    @property
+    def has_worker(self) -> bool:
+        """Whether its callbacks run on a thread of its own."""
+        return self._thinker is not None
 
     def unused_overrides(self) -> list[str]:
         """Overrides that no `declare_parameter` asked for: most likely misspelt."""

@@ -53,7 +53,18 @@ class Parameters:
 
     def __init__(self) -> None:
         self._nodes: dict[str, dict[str, Parameter]] = {}
+        self._present: set[str] = set()
         self._lock = threading.Lock()
+
+    def enter(self, node: str) -> None:
+        """Note that there is a node of this full name, whether or not it declares any."""
+        with self._lock:
+            self._present.add(node)
+
+    def nodes(self) -> set[str]:
+        """Full names of all nodes."""
+        with self._lock:
+            return {*self._present, *self._nodes}
 
     def declare(self, node: str, parameter: Parameter) -> None:
         """Add a parameter of a node named absolutely. `GraphError` if it has one of that name."""
@@ -67,6 +78,7 @@ class Parameters:
         """Strike off all parameters of a node that has ended."""
         with self._lock:
             self._nodes.pop(node, None)
+            self._present.discard(node)
 
     def names(self) -> list[tuple[str, str]]:
         """Nodes and names, sorted."""

@@ -57,7 +57,7 @@ def load_chart(flight: FlightData) -> str:
     names = [name.replace("_", " ") for name, _ in stages]
     seconds = np.array([value for _, value in stages])
     total = max(flight.wall_s, float(seconds.sum()), 1e-9)
-    figure, axes = _new(height=max(1.0 + 0.3 * len(stages), 2.0))
+    figure, axes = new_axes(height=max(1.0 + 0.3 * len(stages), 2.0))
     bars = axes.barh(names, seconds / total * 100.0, height=0.62, color=UAV_COLORS[0])
     for bar, value in zip(bars, seconds, strict=True):
         load = value / flight.simulated_s if flight.simulated_s > 0.0 else 0.0
@@ -74,7 +74,7 @@ def load_chart(flight: FlightData) -> str:
     axes.set_xlabel("share of the wall time, %")
     axes.grid(visible=False, axis="y")
     axes.tick_params(axis="y", length=0, labelcolor=INK)
-    return _svg(figure)
+    return as_svg(figure)
 
 
 def _over_time(
@@ -86,7 +86,7 @@ def _over_time(
     ceiling: float | None = None,
     lowest: bool = False,
 ) -> str:
-    figure, axes = _new()
+    figure, axes = new_axes()
     many = len(flight.uavs) > _LEGEND_LIMIT
     for number, uav in enumerate(flight.uavs):
         keep = _thinned(values(uav), lowest=lowest)
@@ -118,7 +118,7 @@ def _over_time(
             labelcolor=INK,
             borderaxespad=0.1,
         )
-    return _svg(figure)
+    return as_svg(figure)
 
 
 def _thinned(values: Array, *, lowest: bool) -> NDArray[np.int64]:
@@ -131,8 +131,9 @@ def _thinned(values: Array, *, lowest: bool) -> NDArray[np.int64]:
     return np.array([a + int(np.argmin(values[a:b])) for a, b in pairwise(edges)])
 
 
-def _new(height: float = _HEIGHT) -> tuple[Figure, Axes]:
-    figure = Figure(figsize=(_WIDTH, height), layout="constrained")
+def new_axes(width: float = _WIDTH, height: float = _HEIGHT) -> tuple[Figure, Axes]:
+    """A figure, in inches, with axes in the style of the report."""
+    figure = Figure(figsize=(width, height), layout="constrained")
     figure.patch.set_alpha(0.0)
     axes = figure.add_subplot()
     axes.patch.set_alpha(0.0)
@@ -148,7 +149,7 @@ def _new(height: float = _HEIGHT) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def _svg(figure: Figure) -> str:
+def as_svg(figure: Figure) -> str:
     """The drawing as an inline <svg> that scales with the page and uses its font and colours."""
     file = io.StringIO()
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "volery"}):

@@ -59,7 +59,7 @@ def page(flight: FlightData) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         '<meta name="color-scheme" content="light dark">',
         f"<title>{title} · flight report</title>",
-        f"<style>{_STYLE}</style></head><body><main>",
+        f"<style>{STYLE}</style></head><body><main>",
         '<header><p class="kicker">Volery flight report</p>',
         f"<h1>{title}</h1>",
         f'<p class="lead">{escape(flight.description)}</p>' if flight.description else "",
@@ -246,7 +246,7 @@ def _clearance(metres: float, flight: FlightData) -> str:
     return f"{metres:.2f} m"
 
 
-_STYLE = """
+STYLE = """
 :root { --page: #fbfaf7; --ink: #1d2126; --faint: #5d6670; --grid: #e3e1da; --card: #ffffff;
   --accent: #2c6e49; --alarm: #c92a2a; }
 @media (prefers-color-scheme: dark) {

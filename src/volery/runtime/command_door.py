@@ -19,11 +19,15 @@ from volery.graph.messages import (
     TwistStamped,
     header,
 )
+from volery.runtime.raw_setpoints import steer_to_message, turn_rotors, turn_to_message
 from volery.runtime.services.offering import Close, offer_command
 from volery.runtime.trajectory_messages import follow_message
 from volery.runtime.uav import Uav
 
 _TRIGGER = "std_srvs/srv/Trigger"
+_SPEEDS = "std_msgs/msg/Float32MultiArray"
+_POSITION_TARGET = "mavros_msgs/msg/PositionTarget"
+_ATTITUDE_TARGET = "mavros_msgs/msg/AttitudeTarget"
 _BUSY = (FlightMode.TAKE_OFF, FlightMode.LAND, FlightMode.RETURN)
 """Modes that no topic ends: who asks for a landing gets it while a stream of Twists goes on."""
 
@@ -31,8 +35,9 @@ _BUSY = (FlightMode.TAKE_OFF, FlightMode.LAND, FlightMode.RETURN)
 def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Close]:
     """Listen to the topics that command one UAV, offer its plain services.
 
-    `cmd_vel`, `goal_pose`, `trajectory` and, for a kinematic UAV that something outside moves,
-    `pose_command`: where it stands from the next step on.
+    `cmd_vel`, `goal_pose`, `trajectory`, `setpoint_raw/local` and `setpoint_raw/attitude`
+    (`runtime.raw_setpoints`), `rotor_speeds` (shares of full speed) and, for a kinematic UAV that
+    something outside moves, `pose_command`: where it stands from the next step on.
 
     A Twist is taken in the level heading frame, a pose and a trajectory in the map. On the ground,
     during take-off, landing and return they are ignored, and so are those that are none: a refused
@@ -50,11 +55,14 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
             stamp = header(now_ns(), f"{uav.name}/base_link")
             applied.publish(TwistStamped(header=stamp, twist=twist))
 
-    topics: dict[str, tuple[type[Any], Callable[[Any], None]]] = {
+    topics: dict[str, tuple[type[Any] | str, Callable[[Any], None]]] = {
         "cmd_vel": (Twist, on_twist),
         "goal_pose": (PoseStamped, lambda pose: go_to_message(uav, pose)),
         "trajectory": (MultiDOFJointTrajectory, lambda message: follow_message(uav, message)),
         "pose_command": (PoseStamped, lambda pose: stand_at_message(uav, pose)),
+        "rotor_speeds": (_SPEEDS, lambda speeds: turn_rotors(uav, speeds)),
+        "setpoint_raw/local": (_POSITION_TARGET, lambda target: steer_to_message(uav, target)),
+        "setpoint_raw/attitude": (_ATTITUDE_TARGET, lambda target: turn_to_message(uav, target)),
     }
     closes: list[Close] = [applied.cancel]
     for name, (message_class, take) in topics.items():

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from volery.comms.radio.net import RadioNet
 from volery.core.errors import CommandError
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
@@ -17,7 +18,9 @@ from volery.graph.node import Node
 from volery.graph.publishing import GraphPublisher
 from volery.runtime.assembly import Assembly, assemble
 from volery.runtime.command_door import open_commands
+from volery.runtime.flight_states import FlightStates
 from volery.runtime.graph_building import announce_sensors, start_nodes, start_system_nodes
+from volery.runtime.message_loading import learn_messages
 from volery.runtime.outlet import Outlet
 from volery.runtime.placement import Start
 from volery.runtime.sensor_fitting import Fitted
@@ -55,16 +58,24 @@ class Crew:
     faults: FaultPlan
     starts: tuple[Start, ...]
     """In fleet order."""
+    radio: RadioNet | None = None
     fitted: list[Fitted] = field(default_factory=list)
     uavs: dict[str, Uav] = field(default_factory=dict)
     nodes: list[Node] = field(default_factory=list)
     """In fleet order, then those of the whole system."""
     beginnings: dict[str, Beginning] = field(default_factory=dict)
+    flight_states: FlightStates = field(init=False)
     _closes: dict[str, list[Close]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        origin = self.scenario.world.origin
+        self.flight_states = FlightStates(self.graph, self.engine, origin)
 
     def open(self, parts: Assembly) -> None:
         """Let the UAVs that the engine was made with take part in the graph."""
+        self.flight_states.start(self.engine.every)
         self._take_over(parts, self.starts)
+        learn_messages(self.scenario)
         self.start_nodes()
 
     def regroup(self, starts: Sequence[Start]) -> None:
@@ -138,10 +149,13 @@ class Crew:
         flight = self.scenario.types[start.type_name].flight
         uav = Uav(self.engine.fleet, row, start.name, flight, start.type_name)
         self.uavs[start.name] = uav
-        self._closes[start.name] = [
+        closes = self._closes[start.name] = [
             *open_commands(self.graph, uav, self._now_ns),
             *offer_uav_services(self.graph, uav),
+            *self.flight_states.open(uav),
         ]
+        if self.radio is not None and self.scenario.types[start.type_name].radio:
+            closes.append(self.radio.join(start.name))
 
     def _dismiss(self, name: str) -> None:
         own = [node for node in self.nodes if node.get_namespace() == f"/{name}"]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from volery.comms.radio.net import RadioNet
 from volery.core.errors import SnapshotError
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
@@ -48,6 +49,7 @@ class Keeper:
     partners: list[Partner]
     outlet: Outlet
     grid_world: GridWorld
+    radio: RadioNet | None = None
     _start: dict[str, Any] = field(init=False)
     _starts: tuple[Start, ...] = field(init=False)
     _new_nodes: NodeStates = field(init=False)
@@ -95,6 +97,8 @@ class Keeper:
         fleet = self.engine.fleet
         rows = np.arange(len(fleet))
         fleet.seed_turbulence(seed, rows, fleet.names)
+        if self.radio is not None:
+            self.radio.reseed(seed)
         self._restart_sensors(rows, refit(self.crew.fitted, seed))
         self.crew.take_off(fleet.names)
 
@@ -138,6 +142,7 @@ class Keeper:
             "events": list(self.outlet.events),
             "owed_ns": self.loop.owed_ns,
             "grid_map": self.grid_world.get_state(),
+            "radio": None if self.radio is None else self.radio.get_state(),
         }
 
     def _put_back(self, state: dict[str, Any]) -> None:
@@ -151,3 +156,5 @@ class Keeper:
             self.outlet.digest.set_state(state["digest"])
         self.outlet.events[:] = state["events"]
         self.loop.owed_ns = state["owed_ns"]
+        if self.radio is not None:
+            self.radio.set_state(state["radio"])

@@ -40,6 +40,7 @@ from volery.runtime.outlet import Outlet
 from volery.runtime.pilots import Pilots
 from volery.runtime.placement import Start
 from volery.runtime.progress import Progress
+from volery.runtime.radio_building import build_radio
 from volery.runtime.relocation import Relocator
 from volery.runtime.repetition import Repetition
 from volery.runtime.run_loop import RunLoop
@@ -83,6 +84,9 @@ class Simulation:
     `ScenarioError` where the scenario cannot be built.
     """
 
+    _geometry: Geometry | None = None
+    """The last answer of `geometry`."""
+
     def __init__(
         self,
         scenario: Scenario,
@@ -97,7 +101,6 @@ class Simulation:
         self.scenario = scenario
         with compiled_kernels():
             self.terrain, self.city, self.forest, self.scene = build_world(scenario, threads)
-        self._geometry: Geometry | None = None
         self._closed = False
         self._pacer = Pacer()
 
@@ -128,7 +131,9 @@ class Simulation:
         """The grid map whose blocks stand in the world, and how it is changed."""
         self._world_topic = WorldTopic(self.graph, lambda: self.geometry)
         self.grid_world.on_blocks = lambda: self.post(self._world_topic.tell)
-        self._faults = FaultPlan(self._engine)
+        self.radio = build_radio(scenario, self.graph, self._engine, self.forest)
+        """What the UAVs speak to each other by; None: the scenario has none."""
+        self._faults = FaultPlan(self._engine, self.radio)
         self._crew = Crew(
             scenario,
             self._engine,
@@ -137,6 +142,7 @@ class Simulation:
             self.outlet,
             self._faults,
             starts,
+            self.radio,
         )
         self.uavs: Mapping[str, Uav] = MappingProxyType(self._crew.uavs)
         """In fleet order."""
@@ -173,6 +179,7 @@ class Simulation:
             self._partners,
             self.outlet,
             self.grid_world,
+            self.radio,
         )
         self._spawner = Spawner(self._crew, self._keeper, self.scene, self.terrain)
         self._crew.take_off(self.uavs)
@@ -570,6 +577,11 @@ class Simulation:
     def stage_seconds(self) -> dict[str, float]:
         """Wall seconds spent in each stage of the step so far."""
         return dict(self._engine.stage_seconds)
+
+    @property
+    def stage_cpu_s(self) -> dict[str, float]:
+        """CPU seconds of this thread in each stage so far."""
+        return dict(self._engine.stage_cpu_s)
 
     def enable_digest(self) -> None:
         """Fingerprint all states and messages from now on; call before the first step."""

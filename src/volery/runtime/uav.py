@@ -167,9 +167,17 @@ class Uav:
         """
         self._fleet.command_velocity_body(self._row, velocity, yaw_rate)
 
-    def command_velocity_map(self, velocity: ArrayLike, yaw_rate: float = 0.0) -> None:
-        """Fly at `velocity` (3,) m/s in the map, turning at `yaw_rate` rad/s."""
-        self._fleet.command_velocity_map(self._row, velocity, yaw_rate)
+    def command_velocity_map(
+        self, velocity: ArrayLike, yaw_rate: float = 0.0, *, yaw: float | None = None
+    ) -> None:
+        """Fly at `velocity` (3,) m/s in the map, turning at `yaw_rate` rad/s or to `yaw` rad."""
+        self._fleet.command_velocity_map(self._row, velocity, yaw_rate, yaw=yaw)
+
+    def command_acceleration(
+        self, acceleration_map: ArrayLike, yaw: float | None = None, yaw_rate: float = 0.0
+    ) -> None:
+        """Accelerate by (3,) m/s^2 in the map, facing `yaw` rad (None: as it is)."""
+        self._fleet.command_acceleration(self._row, acceleration_map, yaw=yaw, yaw_rate=yaw_rate)
 
     def command_setpoint(
         self,

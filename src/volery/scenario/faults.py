@@ -69,6 +69,12 @@ class GnssFault(_Passing):
     kind: Literal["gnss_loss"]
 
 
+class RadioFault(_Passing):
+    """A UAV's radio neither sends nor receives."""
+
+    kind: Literal["radio"]
+
+
 class GustFault(_Fault):
     """A 1-cosine gust that reaches all places at once."""
 
@@ -90,7 +96,7 @@ class DisplacementFault(_UavFault):
 
 
 Fault: TypeAlias = Annotated[
-    MotorFault | SensorFault | GnssFault | GustFault | DisplacementFault,
+    MotorFault | SensorFault | GnssFault | RadioFault | GustFault | DisplacementFault,
     Field(discriminator="kind"),
 ]
 
@@ -99,6 +105,7 @@ _KINDS: dict[Any, type[_Fault]] = {
     "motor": MotorFault,
     "sensor": SensorFault,
     "gnss_loss": GnssFault,
+    "radio": RadioFault,
     "gust": GustFault,
     "displacement": DisplacementFault,
 }

@@ -28,6 +28,7 @@ from volery.scenario.city import City
 from volery.scenario.faults import Fault
 from volery.scenario.grid_map import GridMapWorld
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
+from volery.scenario.radio import Radio
 from volery.scenario.things import Things, check_things
 from volery.scenario.user_mesh import UserMesh
 from volery.scenario.weather import Weather
@@ -210,13 +211,19 @@ _TAKEN_NAMES = (
     "base_link",
     "battery",
     "cmd_vel",
+    "flight_state",
     "goal_pose",
     "ground_truth",
     "hold",
     "joint_states",
     "land",
+    "mavlink",
+    "mavros",
     "odom",
+    "radio",
     "return_home",
+    "rotor_speeds",
+    "setpoint_raw",
     "take_off",
     "trajectory",
 )
@@ -281,6 +288,8 @@ class UavType(Data):
     flight: Flight = Flight()
     sensors: tuple[Sensor, ...] = ()
     nodes: tuple[NodeEntry, ...] = ()
+    radio: bool = True
+    """Whether it has one, where the scenario has `[radio]`."""
 
     @model_validator(mode="after")
     def _settings_are_of_the_plant(self) -> Self:
@@ -356,11 +365,14 @@ class Scenario(Data):
     ends_when: Literal["time_is_up", "all_landed"] = "time_is_up"
     physics: Physics = Physics()
     world: World = World()
+    radio: Radio | None = None
     types: Annotated[dict[Name, UavType], Field(min_length=1)]
     uavs: Annotated[tuple[UavGroup, ...], Field(min_length=1)]
     nodes: tuple[NodeEntry, ...] = ()
     """Nodes of the whole system, one of each; their relative names begin at the root."""
     faults: tuple[Fault, ...] = ()
+    messages: tuple[str, ...] = ()
+    """Folders of ROS packages whose `.msg`, `.srv` and `.action` files the nodes use."""
 
     _folder: Path | None = PrivateAttr(default=None)
 

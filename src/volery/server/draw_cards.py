@@ -50,6 +50,7 @@ VIEWS = {
     "forest_cameras": View(10.0, (-4.0, -1.0, 1.0), 70.0),
     "forest_procedural": View(10.0, (-3.5, -1.0, 1.2), 70.0),
     "forest_rain": View(10.0, (-3.0, -1.0, 0.6), 70.0),
+    "forest_search": View(11.0, (-2.5, 2.2, 0.9), 70.0),
     "forest_survey": View(10.0, (-3.0, 1.2, 0.8), 70.0),
     "grid_map": View(14.0, (-15.0, -11.0, 12.0), 65.0),
     "hover": View(5.0, (-1.6, -1.0, 0.45)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from door_ros1 import Ros1Bench
+from door_ros2 import Ros2Bench
 from door_ros_tcp import ConnectorBench, EndpointBench
 from door_rosbridge import ClientBench, ServerBench
 from door_sensor_link import SensorLinkBench
@@ -17,6 +18,7 @@ BENCHES = {
     "rosbridge_raw": lambda: ServerBench("cbor-raw"),
     "rosbridge_client": ClientBench,
     "ros1": Ros1Bench,
+    "ros2": Ros2Bench,
     "sensor_link": SensorLinkBench,
 }
 

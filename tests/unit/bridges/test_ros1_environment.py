@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from volery.bridges.ros1 import environment as ros1_environment
-from volery.bridges.ros1.shared import Sharing
+from volery.bridges.sharing import Sharing
 from volery.core.errors import BridgeError
 
 

@@ -42,6 +42,26 @@ def test_the_option_and_its_value_that_may_be_left_away(page_of, words, page, sp
 
 
 @pytest.mark.parametrize(
+    ("words", "doors", "domain", "interfaces"),
+    [
+        (["--ros2"], ("ros2",), None, ()),
+        (["--ros2", "--domain-id", "7"], ("ros2",), 7, ()),
+        (["--ros2", "--middleware", "zenoh"], ("ros2-zenoh",), None, ()),
+        (
+            ["--door", "ros1", "--ros2", "--ros2-interface", "eth0"],
+            ("ros1", "ros2"),
+            None,
+            ("eth0",),
+        ),
+    ],
+)
+def test_ros2_is_a_door_with_options_of_its_own(page_of, words, doors, domain, interfaces):
+    options = page_of("hover", *words)
+    assert (options.doors, options.domain_id, options.interfaces) == (doors, domain, interfaces)
+    assert options.speed == 1.0
+
+
+@pytest.mark.parametrize(
     ("page", "host", "port"),
     [("8081", "127.0.0.1", 8081), ("0.0.0.0:80", "0.0.0.0", 80), ("[::1]:0", "::1", 0)],
 )

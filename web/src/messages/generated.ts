@@ -1658,12 +1658,45 @@ export interface volery_interfaces_CommandRecord {
   request: number | bigint;
 }
 
+export interface volery_interfaces_FlightState {
+  header: std_msgs_Header;
+  mode: string;
+  airborne: boolean;
+  crashed: boolean;
+  pose: geometry_msgs_Pose;
+  velocity: geometry_msgs_Vector3;
+  angular_velocity: geometry_msgs_Vector3;
+  acceleration: geometry_msgs_Vector3;
+  battery_charge: number;
+  battery_voltage: number;
+  battery_current: number;
+  rotors: Float32Array | number[];
+}
+
 export interface volery_interfaces_Gust {
   amplitude: geometry_msgs_Vector3;
   start: number;
   rise: number;
   end: number;
   front: geometry_msgs_Vector3;
+}
+
+export interface volery_interfaces_MavlinkPackets {
+  link: number;
+  profile: number;
+  closed: boolean;
+  data: Uint8Array | string;
+}
+
+export interface volery_interfaces_MissionStatus {
+  header: std_msgs_Header;
+  phase: string;
+  sector: number;
+  searched: number;
+  sectors: number;
+  team: string[];
+  targets: number;
+  trouble: string;
 }
 
 export interface volery_interfaces_PlayerState {
@@ -1696,6 +1729,35 @@ export interface volery_interfaces_SimulationStatus {
   clients: number;
   dropped: number | bigint;
   replaying: boolean;
+}
+
+export interface volery_interfaces_Target {
+  header: std_msgs_Header;
+  finder: string;
+  number: number;
+  position: geometry_msgs_Point;
+  covariance: Float64Array | number[];
+  sightings: number;
+}
+
+export interface volery_interfaces_Targets {
+  header: std_msgs_Header;
+  targets: volery_interfaces_Target[];
+}
+
+export interface volery_interfaces_TeamReport {
+  header: std_msgs_Header;
+  name: string;
+  phase: string;
+  position: geometry_msgs_Point;
+  velocity: geometry_msgs_Vector3;
+  battery: number;
+  sectors: number;
+  sector: number;
+  since: builtin_interfaces_Time;
+  searched: Uint8Array | string;
+  given_up: Uint8Array | string;
+  targets: volery_interfaces_Target[];
 }
 
 export interface volery_interfaces_VehicleState {
@@ -1742,6 +1804,25 @@ export interface volery_interfaces_ByName_Request {
 export interface volery_interfaces_ByName_Response {
   success: boolean;
   message: string;
+}
+
+export type volery_interfaces_GetBuild_Request = Record<string, never>;
+
+export interface volery_interfaces_GetBuild_Response {
+  success: boolean;
+  message: string;
+  airframe: string;
+  rotors: number;
+  hover_thrust: number;
+  speed: number;
+  climb: number;
+  descent: number;
+  tilt: number;
+  battery_cells: number;
+  battery_capacity: number;
+  latitude: number;
+  longitude: number;
+  altitude: number;
 }
 
 export type volery_interfaces_GetChoices_Request = Record<string, never>;
@@ -1924,6 +2005,15 @@ export interface volery_interfaces_Seek_Response {
   message: string;
 }
 
+export interface volery_interfaces_SetAttitudeTarget_Request {
+  target: mavros_msgs_AttitudeTarget;
+}
+
+export interface volery_interfaces_SetAttitudeTarget_Response {
+  success: boolean;
+  message: string;
+}
+
 export interface volery_interfaces_SetCommandTimeout_Request {
   seconds: number;
 }
@@ -1940,6 +2030,15 @@ export interface volery_interfaces_SetGridMap_Request {
 }
 
 export interface volery_interfaces_SetGridMap_Response {
+  success: boolean;
+  message: string;
+}
+
+export interface volery_interfaces_SetPositionTarget_Request {
+  target: mavros_msgs_PositionTarget;
+}
+
+export interface volery_interfaces_SetPositionTarget_Response {
   success: boolean;
   message: string;
 }
@@ -2146,10 +2245,16 @@ export interface Messages {
   "visualization_msgs/msg/MeshFile": visualization_msgs_MeshFile;
   "visualization_msgs/msg/UVCoordinate": visualization_msgs_UVCoordinate;
   "volery_interfaces/msg/CommandRecord": volery_interfaces_CommandRecord;
+  "volery_interfaces/msg/FlightState": volery_interfaces_FlightState;
   "volery_interfaces/msg/Gust": volery_interfaces_Gust;
+  "volery_interfaces/msg/MavlinkPackets": volery_interfaces_MavlinkPackets;
+  "volery_interfaces/msg/MissionStatus": volery_interfaces_MissionStatus;
   "volery_interfaces/msg/PlayerState": volery_interfaces_PlayerState;
   "volery_interfaces/msg/SearchState": volery_interfaces_SearchState;
   "volery_interfaces/msg/SimulationStatus": volery_interfaces_SimulationStatus;
+  "volery_interfaces/msg/Target": volery_interfaces_Target;
+  "volery_interfaces/msg/Targets": volery_interfaces_Targets;
+  "volery_interfaces/msg/TeamReport": volery_interfaces_TeamReport;
   "volery_interfaces/msg/VehicleState": volery_interfaces_VehicleState;
   "volery_interfaces/msg/VehicleStates": volery_interfaces_VehicleStates;
   "volery_interfaces/msg/Weather": volery_interfaces_Weather;
@@ -2213,6 +2318,7 @@ export interface Services {
   "std_srvs/srv/Trigger": { request: std_srvs_Trigger_Request; response: std_srvs_Trigger_Response };
   "tf2_msgs/srv/FrameGraph": { request: tf2_msgs_FrameGraph_Request; response: tf2_msgs_FrameGraph_Response };
   "volery_interfaces/srv/ByName": { request: volery_interfaces_ByName_Request; response: volery_interfaces_ByName_Response };
+  "volery_interfaces/srv/GetBuild": { request: volery_interfaces_GetBuild_Request; response: volery_interfaces_GetBuild_Response };
   "volery_interfaces/srv/GetChoices": { request: volery_interfaces_GetChoices_Request; response: volery_interfaces_GetChoices_Response };
   "volery_interfaces/srv/GetGridMap": { request: volery_interfaces_GetGridMap_Request; response: volery_interfaces_GetGridMap_Response };
   "volery_interfaces/srv/GetWeather": { request: volery_interfaces_GetWeather_Request; response: volery_interfaces_GetWeather_Response };
@@ -2228,8 +2334,10 @@ export interface Services {
   "volery_interfaces/srv/PlayerInfo": { request: volery_interfaces_PlayerInfo_Request; response: volery_interfaces_PlayerInfo_Response };
   "volery_interfaces/srv/ReleaseControl": { request: volery_interfaces_ReleaseControl_Request; response: volery_interfaces_ReleaseControl_Response };
   "volery_interfaces/srv/Seek": { request: volery_interfaces_Seek_Request; response: volery_interfaces_Seek_Response };
+  "volery_interfaces/srv/SetAttitudeTarget": { request: volery_interfaces_SetAttitudeTarget_Request; response: volery_interfaces_SetAttitudeTarget_Response };
   "volery_interfaces/srv/SetCommandTimeout": { request: volery_interfaces_SetCommandTimeout_Request; response: volery_interfaces_SetCommandTimeout_Response };
   "volery_interfaces/srv/SetGridMap": { request: volery_interfaces_SetGridMap_Request; response: volery_interfaces_SetGridMap_Response };
+  "volery_interfaces/srv/SetPositionTarget": { request: volery_interfaces_SetPositionTarget_Request; response: volery_interfaces_SetPositionTarget_Response };
   "volery_interfaces/srv/SetSpeed": { request: volery_interfaces_SetSpeed_Request; response: volery_interfaces_SetSpeed_Response };
   "volery_interfaces/srv/SetWeather": { request: volery_interfaces_SetWeather_Request; response: volery_interfaces_SetWeather_Response };
   "volery_interfaces/srv/StartRecording": { request: volery_interfaces_StartRecording_Request; response: volery_interfaces_StartRecording_Response };

@@ -113,16 +113,22 @@ class World:
 @contextmanager
 def running(scenario: Scenario) -> Iterator[World]:
     """Run `scenario` in real time until the block ends."""
+    with in_real_time(scenario) as (simulation, doors):
+        yield World(simulation, doors)
+
+
+@contextmanager
+def in_real_time(scenario: Scenario) -> Iterator[tuple[Simulation, Doors]]:
+    """Run `scenario` in real time, in a thread of its own, until the block ends."""
     with Simulation(scenario) as simulation:
         simulation.step(1)  # what compiles does so before anybody measures
         with Doors(simulation.gateway) as doors:
-            world = World(simulation, doors)
             simulation.be_prompt()
             over = threading.Event()
             thread = threading.Thread(target=_run, args=(simulation, over))
             thread.start()
             try:
-                yield world
+                yield simulation, doors
             finally:
                 over.set()
                 thread.join()
@@ -201,10 +207,10 @@ def stop_latencies(world: World) -> list[float]:
     return [1e-9 * (stop - send) for send, stop in zip(sent, stopped_ns, strict=True)]
 
 
-def stream_figures() -> dict[str, float]:
-    """Ten UAVs with two LIDARs each, to one client of either kind at once."""
+def stream_scenario() -> Scenario:
+    """Ten UAVs with two LIDARs each over a forest."""
     lidars = [{"kind": "lidar", "name": name} for name in ("horizontal", "nodding")]
-    scenario = parse_scenario(
+    return parse_scenario(
         {
             "name": "streams",
             "duration_s": 1e6,
@@ -229,7 +235,11 @@ def stream_figures() -> dict[str, float]:
             ],
         }
     )
-    with running(scenario) as world:
+
+
+def stream_figures() -> dict[str, float]:
+    """The scans of `stream_scenario`, to one client of either kind at once."""
+    with running(stream_scenario()) as world:
         topics = [
             f"/{uav}/laser/{name}/scan"
             for uav in world.simulation.uav_names

@@ -7,7 +7,7 @@ from typing import Any
 
 from volery.core.errors import GraphError
 from volery.graph.graph import AsyncHandler, Callback, Graph, Publisher, Subscription
-from volery.graph.link import Link, call_and_wait
+from volery.graph.link import HostsNodes, Link, call_and_wait
 from volery.graph.mailbox import Mailbox
 from volery.graph.messages import Published, type_name
 from volery.graph.qos import DEFAULT_QOS, QoSProfile
@@ -32,6 +32,12 @@ class MirroredGraph(Graph):
         self._readers: dict[str, list[Callback]] = {}
         self._held: list[tuple[str, Published]] = []
         self._barrier: tuple[str, Callable[[Published], None]] | None = None
+
+    def enter(self, node: str) -> None:
+        """Note a node here and, where the link can tell it, there."""
+        super().enter(node)
+        if isinstance(self._link, HostsNodes):
+            self._link.host_node(node, self.parameters, self.post)
 
     # ------------------------------------------------------------------------------------ topics
 

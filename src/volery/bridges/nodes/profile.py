@@ -14,6 +14,12 @@ changes what the node does.
 
     [parameters]
     height_m = 3.0
+
+One that names nodes launches all of them in one process (`volery launch`):
+
+    [[launch]]
+    node = "volery.autonomy.task_manager:TaskManager"
+    parameters = { area_m = [0.0, 0.0, 100.0, 100.0] }
 """
 
 from __future__ import annotations
@@ -29,8 +35,18 @@ Name = Annotated[str, Field(pattern=r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-
 Namespace = Annotated[str, Field(pattern=r"^(/[A-Za-z_][A-Za-z0-9_]*)*$")]
 
 
+class Launched(BaseModel):
+    """A node that a profile launches."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    node: Annotated[str, Field(pattern=r"^[\w.]+:\w+$")]
+    """`module:Class`"""
+    parameters: dict[str, Any] = {}
+
+
 class Profile(BaseModel):
-    """How one node is launched."""
+    """How nodes are launched."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -42,6 +58,11 @@ class Profile(BaseModel):
     remap: dict[Name, Name] = {}
     """The node's names, relative ones below its namespace, to those of the graph."""
     parameters: dict[str, Any] = {}
+    """Of the node that `volery node` starts."""
+    launch: tuple[Launched, ...] = ()
+    """What `volery launch` starts."""
+    messages: tuple[str, ...] = ()
+    """Folders of ROS packages with message definitions, beside the profile."""
 
 
 def load_profile(path: Path) -> Profile:

@@ -18,12 +18,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from volery.bridges.ros1.node import join_ros1
-from volery.bridges.ros1.shared import Shared, Sharing
+from volery.bridges.ros1.shared import Shared
+from volery.bridges.sharing import COMMANDS, Sharing
 from volery.core.errors import BridgeError
 from volery.graph.session import Gateway
 
-COMMANDS = ("*/cmd_vel", "*/trajectory", "*/goal_pose")
-"""Topics taken from ROS 1 also where the graph has publishers of its own."""
 _SURVEY_S = 0.25
 _MASTER_EACH = 4
 """Surveys between two looks at the master."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fnmatch
 import logging
 import threading
 from collections.abc import Mapping
@@ -13,34 +12,16 @@ from typing import Any
 from volery.bridges.ros1.node import Ros1Node
 from volery.bridges.ros1.outlet import Outlet
 from volery.bridges.ros1.pump import Pump
+from volery.bridges.sharing import Sharing
 from volery.core.errors import GraphError
 from volery.graph.graph import TopicInfo
 from volery.graph.reply import Reply
 from volery.graph.ros1 import ros1_codec
 from volery.graph.session import Session
 
-_NOT_SHARED = frozenset({"/rosout", "/rosout_agg"})
 _SERVICE_TIMEOUT_S = 30.0
 
 _log = logging.getLogger(__name__)
-
-
-class Sharing:
-    """Which names are shared, and in which direction."""
-
-    def __init__(self, patterns: tuple[str, ...], commands: tuple[str, ...]) -> None:
-        self._patterns = patterns
-        self._commands = commands
-
-    def has(self, name: str) -> bool:
-        """Whether a topic or service is shared at all."""
-        return name not in _NOT_SHARED and any(fnmatch.fnmatch(name, p) for p in self._patterns)
-
-    def takes(self, topic: str, publishers: int, subscribers: int) -> bool:
-        """Whether messages of a topic are taken from ROS 1."""
-        if not subscribers:
-            return False
-        return not publishers or any(fnmatch.fnmatch(topic, p) for p in self._commands)
 
 
 class Shared:

@@ -7,6 +7,7 @@ from typing import Any
 from volery.control.flight_modes import FlightMode
 from volery.core.errors import CommandError
 from volery.graph.graph import Graph
+from volery.runtime.raw_setpoints import steer_to_message, turn_to_message
 from volery.runtime.services.offering import Close, Fields, Handler, offer_command
 from volery.runtime.uav import Uav
 
@@ -25,6 +26,16 @@ def offer_uav_services(graph: Graph, uav: Uav) -> list[Close]:
         ("stop", _TRIGGER, lambda _request: uav.stop_rotors()),
         ("take_off_to", f"{_OURS}/TakeOffTo", lambda request: uav.take_off(request.altitude)),
         ("go_to", f"{_OURS}/GoTo", lambda request: _go_to(uav, request)),
+        (
+            "set_position_target",
+            f"{_OURS}/SetPositionTarget",
+            lambda request: steer_to_message(uav, request.target),
+        ),
+        (
+            "set_attitude_target",
+            f"{_OURS}/SetAttitudeTarget",
+            lambda request: turn_to_message(uav, request.target),
+        ),
         (
             "set_command_timeout",
             f"{_OURS}/SetCommandTimeout",

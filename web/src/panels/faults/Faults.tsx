@@ -10,7 +10,7 @@ import { useVehicles } from "../../state/vehicles.ts";
 import { EFFECTS, faultOf, KINDS, USUAL, type FaultForm, type FaultKind } from "./fault.ts";
 import { VectorInput } from "./VectorInput.tsx";
 
-const PASSING: readonly FaultKind[] = ["motor", "sensor", "gnss_loss"];
+const PASSING: readonly FaultKind[] = ["motor", "sensor", "gnss_loss", "radio"];
 const SENSORS = ["imu", "odom", "range", "fix", "barometer", "magnetometer", "camera"];
 
 /** Break something while it flies. */
@@ -179,6 +179,7 @@ function Details({ form, change }: DetailsProps) {
         />
       );
     case "gnss_loss":
+    case "radio":
       return null;
   }
 }

@@ -4,6 +4,7 @@ export const KINDS = [
   { value: "motor", label: "Rotor" },
   { value: "sensor", label: "Sensor" },
   { value: "gnss_loss", label: "No satellites" },
+  { value: "radio", label: "No radio" },
   { value: "gust", label: "Gust" },
   { value: "displacement", label: "Displacement" },
 ] as const;
@@ -63,6 +64,7 @@ export function faultOf(form: FaultForm, nowS: number): Record<string, unknown> 
       return form.effect === "biased" ? { ...wrong, bias: numbersOf(form.bias) } : wrong;
     }
     case "gnss_loss":
+    case "radio":
       return passing;
     case "gust":
       return { kind, velocity_m_s: form.vector, rise_s: form.riseS, hold_s: form.holdS };

@@ -1,0 +1,67 @@
+"""Where a UAV's odometry frame lies in the map, as `/tf` tells.
+
+`map -> uavN/odom` is identity until a SLAM, or whoever corrects the drift, says otherwise
+(REP-105).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.motion_history import Placement
+from volery.core import rotations
+from volery.graph.messages import TFMessage
+
+Array = NDArray[np.float64]
+
+MAP = "map"
+
+
+class MapFrame:
+    """The transform from one odometry frame to the map."""
+
+    def __init__(self) -> None:
+        self.odom_frame = ""
+        """Name of the odometry frame; empty before it is known."""
+        self._known: dict[str, Placement] = {}
+
+    def on_tf(self, message: TFMessage) -> None:
+        """Take in what `/tf` says; transforms that are not finite are left out."""
+        for stamped in message.transforms:
+            if stamped.header.frame_id != MAP or not stamped.child_frame_id.endswith("/odom"):
+                continue
+            p, q = stamped.transform.translation, stamped.transform.rotation
+            position, attitude = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
+            length = float(np.linalg.norm(attitude))
+            if np.isfinite(position).all() and 0.9 < length < 1.1:
+                self._known[stamped.child_frame_id] = Placement(position, attitude / length)
+
+    @property
+    def map_from_odom(self) -> Placement | None:
+        """`T_map_odom`; None where it is identity."""
+        return self._known.get(self.odom_frame)
+
+    def to_map(self, points_odom: Array) -> Array:
+        """Points (..., 3) of the odometry frame in the map."""
+        at = self.map_from_odom
+        if at is None:
+            return points_odom
+        return np.asarray(rotations.rotate(at.attitude, points_odom) + at.position)
+
+    def to_odom(self, points_map: Array) -> Array:
+        """Points (..., 3) of the map in the odometry frame."""
+        at = self.map_from_odom
+        if at is None:
+            return points_map
+        return rotations.rotate(rotations.conjugate(at.attitude), points_map - at.position)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {"odom_frame": self.odom_frame, "known": dict(self._known)}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self.odom_frame, self._known = state["odom_frame"], dict(state["known"])

@@ -1,0 +1,260 @@
+"""Maps what two LIDARs see: voxels for people and planners, a grid at the height of flight."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.ground_plane import GroundPlane
+from volery.autonomy.map_frame import MAP, MapFrame
+from volery.autonomy.mapping import reports
+from volery.autonomy.mapping.level_grid import LevelGrid, Slab
+from volery.autonomy.mapping.map_files import MapLimits, read_map, write_map
+from volery.autonomy.mapping.octree import Octree
+from volery.autonomy.mapping.scan_intake import ScanIntake
+from volery.autonomy.motion_history import MotionHistory, NodHistory
+from volery.autonomy.scan_points import Pose
+from volery.autonomy.scan_rays import Beams, RayMaker, Rays
+from volery.core.clock import NS_PER_S
+from volery.core.errors import DataFileError, NodeError
+from volery.core.kept import keep, put_back
+from volery.graph.messages import (
+    JointState,
+    LaserScan,
+    OccupancyGrid,
+    Odometry,
+    Range,
+    String,
+    TFMessage,
+    stamp_of,
+)
+from volery.graph.node import Node
+
+Array = NDArray[np.float64]
+
+_SONAR_MEMORY_S = 0.5
+_SILENT_S = 2.0
+"""A sensor that says nothing, or sees nothing, for so long is told of."""
+_LEAST_HEIGHT_M = 1.0
+"""Lower than this above ground nothing is drawn at the height of flight: it would be the ground."""
+_PLAIN_STATE = ("_motion", "_nod", "_intakes", "_ground", "_range", "_told", "_slab_z")
+
+
+class Mapping(Node):
+    """Publishes `octomap_binary` and `projected_map` (both latched), `~/status`.
+
+    Services: `~/octomap` (octomap_msgs/GetOctomap); `~/save` and `~/load` (ByName: a file's name in
+    `folder`).
+
+    Parameters
+    ----------
+    odometry: topic of the pose; its frame is corrected by `map -> uavN/odom` of `/tf` where
+        `corrected` is true.
+    level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
+    resolution_m: width of the cells of the octree; grid_cell_m: of the grid.
+    reach_m: farther returns are free space out to here.
+    scan_rate_hz: scans taken of each LIDAR a second; every: of their beams every so many.
+    max_nodes: bound of the octree; extent_m: of the grid, and of maps that are loaded.
+    half_height_m: half the thickness of the slab that the grid shows.
+    voxels_period_s, grid_period_s: how often they are published.
+    folder: where maps are saved and loaded; empty: nowhere.
+    map_file: a map in `folder` to begin with.
+
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("mapping", **options)
+        self._resolution = float(self.declare_parameter("resolution_m", 0.2).value)
+        self._reach = float(self.declare_parameter("reach_m", 15.0).value)
+        every = int(self.declare_parameter("every", 2).value)
+        rate = float(self.declare_parameter("scan_rate_hz", 5.0).value)
+        extent = float(self.declare_parameter("extent_m", 500.0).value)
+        nodes = int(self.declare_parameter("max_nodes", 3_000_000).value)
+        self._half = float(self.declare_parameter("half_height_m", 0.6).value)
+        self._folder = str(self.declare_parameter("folder", "").value)
+        self._limits = MapLimits(self._resolution, extent, nodes)
+        beams = Beams(reach_m=self._reach, every=every)
+        self._intakes = {
+            name: ScanIntake(
+                RayMaker(self.declare_parameter(f"{name}_mount", [0.0] * 3).value, beams), rate
+            )
+            for name in ("level", "nodding")
+        }
+        self._octree = Octree(self._resolution, nodes)
+        self._grid = LevelGrid(float(self.declare_parameter("grid_cell_m", 0.4).value), extent)
+        self._frame = MapFrame()
+        self._motion, self._nod = MotionHistory(), NodHistory()
+        self._ground = GroundPlane()
+        self._range: tuple[int, float] | None = None
+        self._slab_z = 0.0
+        self._told = ""
+        self._open()
+        map_file = str(self.declare_parameter("map_file", "").value)
+        if map_file:
+            self._load(map_file)
+
+    def _open(self) -> None:
+        odometry = str(self.declare_parameter("odometry", "slam/odom").value)
+        voxels_s = float(self.declare_parameter("voxels_period_s", 10.0).value)
+        grid_s = float(self.declare_parameter("grid_period_s", 1.0).value)
+        self._voxels = self.create_publisher(reports.OCTOMAP, "octomap_binary", 1, latched=True)
+        self._level = self.create_publisher(OccupancyGrid, "projected_map", 1, latched=True)
+        self._status = self.create_publisher(String, "~/status", 1, latched=True)
+        self.create_subscription(Odometry, odometry, self._on_odometry, 5)
+        if self.declare_parameter("corrected", True).value:
+            self.create_subscription(TFMessage, "/tf", self._frame.on_tf, 50)
+        self.create_subscription(JointState, "joint_states", self._on_joint, 5)
+        self.create_subscription(Range, "range", self._on_range, 5)
+        level, nodding = self._intakes["level"], self._intakes["nodding"]
+        self.create_subscription(LaserScan, "laser/horizontal/scan", level.add, 5)
+        self.create_subscription(LaserScan, "laser/nodding/scan", nodding.add, 5)
+        self.create_service("octomap_msgs/srv/GetOctomap", "~/octomap", self._on_get)
+        self.create_service("volery_interfaces/srv/ByName", "~/save", self._on_save)
+        self.create_service("volery_interfaces/srv/ByName", "~/load", self._on_load)
+        self.create_timer(voxels_s, self._tell_voxels)
+        self.create_timer(grid_s, self._tell_grid)
+        self.create_timer(1.0, self._tell_status)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        parts = {name: getattr(self, name).get_state() for name in ("_octree", "_grid", "_frame")}
+        return {"parts": parts, **keep(self, _PLAIN_STATE)}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        for name, part in state["parts"].items():
+            getattr(self, name).set_state(part)
+        put_back(self, {name: state[name] for name in _PLAIN_STATE})
+
+    # ------------------------------------------------------------------------------ what it hears
+
+    def _on_odometry(self, message: Odometry) -> None:
+        self._frame.odom_frame = message.header.frame_id
+        if not self._motion.add(Pose.from_odometry(message)):
+            return
+        for name, intake in self._intakes.items():
+            for rays in intake.ready(self._motion, self._nod if name == "nodding" else None):
+                self._insert(rays)
+
+    def _on_joint(self, message: JointState) -> None:
+        if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
+            angle, rate = float(message.position[0]), float(message.velocity[0])
+            self._nod.add(stamp_of(message), angle, rate)
+
+    def _on_range(self, message: Range) -> None:
+        if math.isfinite(message.range):
+            self._range = (self.get_clock().now_ns(), float(message.range))
+
+    def _insert(self, rays: Rays) -> None:
+        if len(rays.hits) == 0:
+            return
+        rays = rays._replace(
+            starts=self._frame.to_map(rays.starts), ends=self._frame.to_map(rays.ends)
+        )
+        self._octree.insert(rays, self._reach)
+        now, place = self.get_clock().now_ns(), rays.starts[len(rays.starts) // 2]
+        self._ground.add(rays.ends[rays.hits], now)
+        self._ground.fit(place, self._ground_below(float(place[2])), now)
+        if place[2] - self._ground.height < _LEAST_HEIGHT_M:
+            return
+        slope = self._ground.slope
+        self._slab_z = float(place[2])
+        self._grid.begin_at(place)
+        height = float(place[2] - slope @ place[:2])
+        self._grid.add(rays, Slab(height, slope, self._half))
+
+    def _ground_below(self, z: float) -> float | None:
+        if self._range is None:
+            return None
+        heard_ns, distance = self._range
+        fresh = 0 <= self.get_clock().now_ns() - heard_ns <= _SONAR_MEMORY_S * NS_PER_S
+        return z - distance if fresh else None
+
+    # ------------------------------------------------------------------------------ what it tells
+
+    def _tell_voxels(self) -> None:
+        if self._voxels.wanted and self._octree.nodes:
+            self._voxels.publish(self._message())
+
+    def _message(self) -> Any:
+        data, now = self._octree.binary(), self.get_clock().now_ns()
+        return reports.octomap_message(data, self._resolution, MAP, now)
+
+    def _tell_grid(self) -> None:
+        if self._level.wanted and self._grid.origin is not None:
+            now = self.get_clock().now_ns()
+            self._level.publish(reports.grid_message(self._grid, self._slab_z, MAP, now))
+
+    def _tell_status(self) -> None:
+        problems = self._problems()
+        counts = {name: dict(sorted(i.counts.items())) for name, i in self._intakes.items()}
+        told = {
+            "state": "degraded" if problems else "mapping",
+            "problems": problems,
+            "scans": counts,
+            "nodes": self._octree.nodes,
+            "trimmed": self._octree.forgotten,
+            "outside": self._grid.outside,
+        }
+        text = json.dumps(told)
+        if text != self._told:
+            self._told = text
+            self._status.publish(String(text))
+
+    def _problems(self) -> list[str]:
+        """What keeps the map from growing, in words."""
+        now, found = self.get_clock().now_ns(), []
+        newest = self._motion.newest
+        if newest is None or now - newest.time_ns > _SILENT_S * NS_PER_S:
+            found.append("no odometry")
+        for name, intake in self._intakes.items():
+            heard, seen = intake.heard_ns, intake.seen_ns
+            if heard is None or now - heard > _SILENT_S * NS_PER_S:
+                found.append(f"the {name} LIDAR is silent")
+            elif seen is None or now - seen > _SILENT_S * NS_PER_S:
+                found.append(f"the {name} LIDAR sees nothing")
+        return found
+
+    # ------------------------------------------------------------------------------ what it offers
+
+    def _on_get(self, _request: Any, response: Any) -> Any:
+        response.map = self._message()
+        return response
+
+    def _on_save(self, request: Any, response: Any) -> Any:
+        return self._answer(response, lambda: self._save(request.name))
+
+    def _on_load(self, request: Any, response: Any) -> Any:
+        return self._answer(response, lambda: self._load(request.name))
+
+    def _answer(self, response: Any, action: Any) -> Any:
+        try:
+            response.message = action()
+            response.success = True
+        except (DataFileError, NodeError) as error:
+            response.success, response.message = False, str(error)
+        return response
+
+    def _save(self, name: str) -> str:
+        path = self._path(name)
+        write_map(path, self._octree.binary(), self._resolution)
+        return f"{self._octree.nodes} nodes written to {path.name}"
+
+    def _load(self, name: str) -> str:
+        path = self._path(name)
+        found = read_map(path, self._limits)
+        self._octree.take(path)
+        return f"{found.voxels.size} cubes read from {path.name}"
+
+    def _path(self, name: str) -> Path:
+        """A file in the node's folder: clients of the graph write and read nowhere else."""
+        if not self._folder:
+            raise NodeError(f"node {self.full_name} keeps no maps: its parameter folder is empty")
+        if not name.endswith(".bt") or Path(name).name != name:
+            raise NodeError(f"'{name}' is no name of a map: a plain file name that ends in .bt")
+        return Path(self._folder) / name

@@ -1,0 +1,130 @@
+"""Merges the maps that several UAVs publish."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from volery.autonomy.map_frame import MAP
+from volery.autonomy.mapping.merging import PlacedMap, merged
+from volery.autonomy.mapping.reports import OCTOMAP, octomap_message, voxels_of
+from volery.autonomy.motion_history import Placement
+from volery.core.errors import DataFileError, PlanError
+from volery.core.kept import keep, put_back
+from volery.graph.messages import String, TFMessage
+from volery.graph.node import Node
+
+_STATE = ("_maps", "_placements", "_changed", "_told", "_reasons")
+
+
+class MapMerging(Node):
+    """Publishes `~/octomap_binary` (latched, `map`) of all `topics`; tells `~/status` (JSON).
+
+    A map in a frame other than `map` is placed by what `/tf` says of `map` and that frame; before
+    that is known it is left out, and the status says so. Service `~/merge`: merge now.
+
+    Parameters
+    ----------
+    topics: of the maps, such as `/uav1/octomap_binary`.
+    resolution_m: width of their cells; maps of another one are refused.
+    period_s: how often they are merged, where one has changed.
+    max_cells: bound of all maps' known cells together.
+
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("map_merging", **options)
+        self._topics = list(self.declare_parameter("topics", ["/uav1/octomap_binary"]).value)
+        self._resolution = float(self.declare_parameter("resolution_m", 0.2).value)
+        self._most = int(self.declare_parameter("max_cells", 20_000_000).value)
+        self._maps: dict[str, Any] = {}
+        self._placements: dict[str, Placement] = {}
+        self._changed = False
+        self._told = ""
+        self._reasons: dict[str, str] = {}
+        self._merged = self.create_publisher(OCTOMAP, "~/octomap_binary", 1, latched=True)
+        self._status = self.create_publisher(String, "~/status", 1, latched=True)
+        for topic in self._topics:
+            self.create_subscription(OCTOMAP, topic, self._listener(topic), 1)
+        self.create_subscription(TFMessage, "/tf", self._on_tf, 50)
+        self.create_service("std_srvs/srv/Trigger", "~/merge", self._on_merge)
+        self.create_timer(float(self.declare_parameter("period_s", 20.0).value), self._on_timer)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return keep(self, _STATE)
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self, state)
+
+    def _listener(self, topic: str) -> Callable[[Any], None]:
+        def on_map(message: Any) -> None:
+            self._reasons.pop(topic, None)
+            if abs(float(message.resolution) - self._resolution) > 1e-6:
+                self._reasons[topic] = (
+                    f"cells of {message.resolution:g} m; {self._resolution:g} m are merged"
+                )
+                self._maps.pop(topic, None)
+                return
+            self._maps[topic], self._changed = message, True
+
+        return on_map
+
+    def _on_tf(self, message: TFMessage) -> None:
+        for stamped in message.transforms:
+            if stamped.header.frame_id != MAP:
+                continue
+            p, q = stamped.transform.translation, stamped.transform.rotation
+            position, attitude = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
+            if np.isfinite(position).all() and abs(float(np.linalg.norm(attitude)) - 1.0) < 0.01:
+                self._placements[stamped.child_frame_id] = Placement(position, attitude)
+
+    def _on_timer(self) -> None:
+        if self._changed:
+            self._merge()
+
+    def _on_merge(self, _request: Any, response: Any) -> Any:
+        response.message = self._merge()
+        response.success = not response.message
+        return response
+
+    def _merge(self) -> str:
+        """Merge and publish; why not, if that fails."""
+        self._changed = False
+        placed = [found for topic in sorted(self._maps) if (found := self._placed(topic))]
+        reason = ""
+        try:
+            data = merged(placed, self._resolution, self._most)
+        except PlanError as error:
+            reason = str(error)
+        else:
+            now = self.get_clock().now_ns()
+            self._merged.publish(octomap_message(data, self._resolution, MAP, now))
+        self._tell(len(placed), reason)
+        return reason
+
+    def _placed(self, topic: str) -> PlacedMap | None:
+        message = self._maps[topic]
+        frame = message.header.frame_id
+        placement = self._placements.get(frame)
+        if frame not in ("", MAP) and placement is None:
+            self._reasons[topic] = f"nobody says where '{frame}' lies in '{MAP}'"
+            return None
+        try:
+            voxels = voxels_of(message)
+        except DataFileError as error:
+            self._reasons[topic] = str(error)
+            return None
+        self._reasons.pop(topic, None)
+        return PlacedMap(voxels, placement if frame not in ("", MAP) else None)
+
+    def _tell(self, count: int, reason: str) -> None:
+        told = {"merged": count, "reason": reason, "left_out": dict(sorted(self._reasons.items()))}
+        text = json.dumps(told)
+        if text != self._told:
+            self._told = text
+            self._status.publish(String(text))

@@ -1,0 +1,128 @@
+"""The map that grows: an OctoMap tree of bounded size."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.mapping.octomap_stream import Voxels, binary_from_full, decode_full
+from volery.autonomy.mapping.octomap_trimming import trimmed
+from volery.autonomy.scan_rays import Rays
+from volery.core.errors import NodeError
+
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+
+_KEPT_SHARE = 0.7
+"""Of the cells that stay where the map has become too large (modelling choice)."""
+_FREE_ABOVE_M = 1.5
+_DATA = b"\ndata\n"
+
+
+class Octree:
+    """Log-odds of occupied space by octomap's own sensor model (hit 0.7, miss 0.4).
+
+    `max_nodes` bounds its memory, some 30 bytes a node: when there are more, what lies farthest
+    from the vehicle is forgotten.
+    """
+
+    def __init__(self, resolution_m: float, max_nodes: int = 4_000_000) -> None:
+        self.resolution_m = resolution_m
+        self._max_nodes = max_nodes
+        self._tree = new_tree(resolution_m)
+        self.forgotten = 0
+        """How often the farthest part was given up for want of room."""
+
+    @property
+    def nodes(self) -> int:
+        """Nodes of the tree."""
+        return int(self._tree.size())
+
+    def insert(self, rays: Rays, reach_m: float, above_m: float = 6.0) -> None:
+        """Take in the rays of one scan, all as cast from the middle one's start.
+
+        Rays that end more than `above_m` over or below it are left out, and of those that meet
+        nothing all but the level ones: they fill the map with space that nobody flies in. The tree
+        knows free space only on the way to a point, so that rays that meet nothing end beyond the
+        reach, where octomap cuts them off without a hit; shorter ones are left out.
+        """
+        if len(rays.hits) == 0:
+            return
+        origin = rays.starts[len(rays.starts) // 2].copy()
+        way = rays.ends - origin
+        length = np.sqrt((way * way).sum(axis=1))
+        level = np.abs(way[:, 2]) <= above_m
+        ahead = np.abs(way[:, 2]) <= _FREE_ABOVE_M
+        free = ahead & ~rays.hits & (length > reach_m - 0.5)
+        taken = free | (level & rays.hits)
+        ends, stretched = rays.ends[taken], free[taken]
+        ends[stretched] = origin + (way[free] / length[free, None]) * (reach_m + 0.5)
+        if len(ends):
+            self._tree.insertPointCloud(np.ascontiguousarray(ends), origin, reach_m, True, False)
+        if self.nodes > self._max_nodes:
+            self._forget(origin)
+
+    def voxels(self) -> Voxels:
+        """All known cells."""
+        return decode_full(self._full())
+
+    def binary(self) -> Bytes:
+        """The binary stream of the map as it is now, equal cubes joined."""
+        return binary_from_full(self._full())
+
+    def take(self, path: Path) -> None:
+        """Become the map of a `.bt` file that `map_files.read_map` has accepted."""
+        tree = new_tree(self.resolution_m)
+        if not tree.readBinary(str(path)):
+            raise NodeError(f"{path}: octomap cannot read the map")
+        self._tree = tree
+
+    def get_state(self) -> dict[str, Any]:
+        """The tree as octomap writes it."""
+        return {"tree": bytes(self._tree.write()), "forgotten": self.forgotten}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept tree."""
+        self._tree, self.forgotten = self._tree_of(state["tree"]), state["forgotten"]
+
+    def _full(self) -> Bytes:
+        written = self._tree.write()
+        return np.frombuffer(written, np.uint8)[written.index(_DATA) + len(_DATA) :]
+
+    def _forget(self, near: Array) -> None:
+        """Keep what lies nearest, in plan, to a place (m)."""
+        full = self._full()
+        voxels = decode_full(full)
+        middle = near / self.resolution_m
+        away = voxels.corner[:, :2] + 0.5 * voxels.side[:, None] - middle[:2]
+        radius = float(np.quantile(np.hypot(away[:, 0], away[:, 1]), _KEPT_SHARE))
+        self._tree = self._tree_of(_with_head(trimmed(full, middle, radius), self.resolution_m))
+        self.forgotten += 1
+
+    def _tree_of(self, written: bytes) -> Any:
+        """The tree of a full stream with its head; octomap reads files only."""
+        with tempfile.NamedTemporaryFile(suffix=".ot") as file:
+            file.write(written)
+            file.flush()
+            tree = new_tree(self.resolution_m).read(file.name)
+        if tree is None:
+            raise NodeError("octomap cannot read a map that it has written")
+        return tree
+
+
+def _with_head(full: Bytes, resolution_m: float) -> bytes:
+    head = f"# Octomap OcTree file\nid OcTree\nsize {len(full) // 5}\nres {resolution_m:g}"
+    return head.encode() + _DATA + full.tobytes()
+
+
+def new_tree(resolution_m: float) -> Any:
+    """An empty tree of pyoctomap. Raises NodeError where that is not installed."""
+    try:
+        import pyoctomap
+    except ImportError:
+        raise NodeError('mapping needs pyoctomap: pip install "volery[autonomy]"') from None
+    return pyoctomap.OcTree(resolution_m)

@@ -1,0 +1,157 @@
+"""Which primitive to fly: those that are safe by what is known, and the cheapest of them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.planning.clearance import Clearance
+from volery.autonomy.planning.cost_to_go import CostToGo
+from volery.autonomy.planning.distances import Squares
+from volery.autonomy.planning.primitives import Candidates
+from volery.core.compiled import inner_kernel, kernel
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_STEP_S = 0.08
+"""Primitives are looked at so often: 0.24 m at 3 m/s, a cell."""
+
+
+class Verdicts(NamedTuple):
+    """What became of each candidate, all (C,)."""
+
+    nearest_m: Array
+    """Least distance to an obstacle."""
+    unknown: NDArray[np.bool_]
+    """Whether it comes through space that is not known."""
+    most_m_s2: Array
+    """Most horizontal acceleration."""
+    cost: Array
+    """Cost to go at the end of the cruise, and what closeness to obstacles costs on the way."""
+
+
+def judge(
+    candidates: Candidates, clearance: Clearance, costs: CostToGo, soft_m: float, near: float
+) -> Verdicts:
+    """Look along each candidate, to its very end at rest."""
+    count = len(candidates.rise_s)
+    verdicts = Verdicts(
+        np.empty(count), np.empty(count, np.bool_), np.empty(count), np.empty(count)
+    )
+    _judge(
+        *candidates.start,
+        candidates.velocity,
+        candidates.rise_s,
+        candidates.cruise_s,
+        candidates.brake_s,
+        clearance.square,
+        clearance.known,
+        clearance.low,
+        clearance.cell_m,
+        costs.cost,
+        soft_m,
+        near,
+        verdicts.nearest_m,
+        verdicts.unknown,
+        verdicts.most_m_s2,
+        verdicts.cost,
+    )
+    return verdicts
+
+
+@kernel
+def _judge(
+    position: Array,
+    velocity: Array,
+    acceleration: Array,
+    cruise_velocity: Array,
+    rise_s: Array,
+    cruise_s: Array,
+    brake_s: Array,
+    square: Squares,
+    known: NDArray[np.bool_],
+    low: Integers,
+    cell: float,
+    costs: Array,
+    soft: float,
+    near: float,
+    nearest: Array,
+    unknown: NDArray[np.bool_],
+    most: Array,
+    cost: Array,
+) -> None:
+    nx, ny, nz = square.shape
+    p, v, a = np.empty(3), np.empty(3), np.empty(3)
+    q, w, b = np.empty(3), np.empty(3), np.empty(3)
+    rest = np.zeros(3)
+    for c in range(len(rise_s)):
+        total = rise_s[c] + cruise_s[c] + brake_s[c]
+        steps = math.ceil(total / _STEP_S)
+        least, blind, peak, price = math.inf, False, 0.0, 0.0
+        go = math.inf
+        for step in range(steps + 1):
+            time = min(step * _STEP_S, total)
+            _change(
+                position,
+                velocity,
+                acceleration,
+                cruise_velocity[c],
+                rise_s[c],
+                min(time, rise_s[c]),
+                p,
+                v,
+                a,
+            )
+            if time > rise_s[c]:
+                cruised = min(time - rise_s[c], cruise_s[c])
+                for axis in range(3):
+                    q[axis] = p[axis] + v[axis] * cruised
+                    w[axis], b[axis] = v[axis], 0.0
+                braked = time - rise_s[c] - cruise_s[c]
+                if braked > 0.0:
+                    _change(q, w, b, rest, brake_s[c], min(braked, brake_s[c]), p, v, a)
+                else:
+                    p[:], a[:] = q, b
+            i = math.floor(p[0] / cell) - low[0]
+            j = math.floor(p[1] / cell) - low[1]
+            k = math.floor(p[2] / cell) - low[2]
+            if not (0 <= i < nx and 0 <= j < ny and 0 <= k < nz):
+                blind = True
+                break
+            distance = cell * math.sqrt(square[i, j, k])
+            least = min(least, distance)
+            blind |= not known[i, j, k]
+            peak = max(peak, math.hypot(a[0], a[1]))
+            if distance < soft:
+                lack = (soft - distance) / soft
+                price += near * lack * lack * math.hypot(v[0], v[1]) * _STEP_S
+            if time <= rise_s[c] + cruise_s[c] + 0.5 * _STEP_S:
+                go = costs[i, j]
+        nearest[c], unknown[c], most[c], cost[c] = least, blind, peak, go + price
+
+
+@inner_kernel
+def _change(
+    position: Array,
+    velocity: Array,
+    acceleration: Array,
+    wanted: Array,
+    duration: float,
+    t: float,
+    p: Array,
+    v: Array,
+    a: Array,
+) -> None:
+    """`primitives.changed`, into `p`, `v`, `a`."""
+    for axis in range(3):
+        v0, a0 = velocity[axis], acceleration[axis]
+        dv = wanted[axis] - v0 - a0 * duration
+        beta = (-12.0 * dv - 6.0 * duration * a0) / duration**3
+        gamma = (6.0 * duration * dv + 2.0 * duration**2 * a0) / duration**3
+        p[axis] = position[axis] + t * (v0 + t * (a0 / 2 + t * (gamma / 6 + t * beta / 24)))
+        v[axis] = v0 + t * (a0 + t * (gamma / 2 + t * beta / 6))
+        a[axis] = a0 + t * (gamma + t * beta / 2)

@@ -1,0 +1,120 @@
+"""A way through the map: OMPL's RRT-Connect over the ground, then straightened.
+
+States are (x, y, h): places and the height above ground there, so that ways follow uneven ground.
+J. Kuffner, S. LaValle, "RRT-connect: an efficient approach to single-query path planning", ICRA
+2000; I. Sucan, M. Moll, L. Kavraki, "The Open Motion Planning Library", 2012.
+
+The search is bounded by iterations, never by wall time. OMPL hands each random generator of a
+planner a seed out of one sequence of the process: that sequence is started anew for each plan,
+under a lock that is held until the plan is made, so that a plan follows from its input and its seed
+alone, whatever else plans in other threads.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.planning.voxel_space import VoxelSpace
+from volery.core.errors import NodeError, PlanError
+
+Array = NDArray[np.float64]
+
+_OMPL = threading.Lock()
+
+
+class Search(NamedTuple):
+    """How a way is searched for."""
+
+    radius_m: float = 0.8
+    """Least distance to obstacles."""
+    heights_m: tuple[float, float] = (2.0, 4.5)
+    """Least and most height above ground."""
+    iterations: int = 4000
+    range_m: float = 10.0
+    """Longest leg that the search adds at once."""
+    straighten: int = 60
+    """Attempts to leave out a bend."""
+
+
+def plan_way(
+    space: VoxelSpace, start: Array, goal: Array, height_m: float, search: Search, seed: int
+) -> Array:
+    """Places (K, 3) m from `start` to `goal` (3,), `height_m` above ground at the goal.
+
+    Both are moved aside, up to 3 m, where they are too near to obstacles. Raises PlanError that
+    says why there is none: start or goal deep inside of obstacles or off the map, or no way found
+    within the iterations.
+    """
+    low, high = search.heights_m
+    here = float(start[2] - space.ground_at(start[:2]))
+    begin = space.free_near(np.array([*start[:2], np.clip(here, low, high)]), search.radius_m)
+    end = space.free_near(np.array([*goal[:2], np.clip(height_m, low, high)]), search.radius_m)
+    if begin is None:
+        raise PlanError(f"the start ({start[0]:.1f}, {start[1]:.1f}) is off the map or blocked")
+    if end is None:
+        raise PlanError(f"the goal ({goal[0]:.1f}, {goal[1]:.1f}) is off the map or blocked")
+    if space.is_free_between(begin, end, search.radius_m):
+        states = np.stack([begin, end])
+    else:
+        with _OMPL:
+            states = _search(space, begin, end, search, seed)
+    places = np.array(states)
+    places[:, 2] += [float(space.ground_at(place[:2])) for place in places]
+    return places
+
+
+def _search(space: VoxelSpace, begin: Array, end: Array, search: Search, seed: int) -> Array:
+    """States (K, 3) of a way, by OMPL. The caller holds `_OMPL`."""
+    try:
+        from ompl import base, geometric, util
+    except ImportError:
+        raise NodeError('planning needs ompl: pip install "volery[autonomy]"') from None
+    util.setLogLevel(util.LogLevel.LOG_NONE)
+    util.RNG.setSeed(1 + seed % 1_000_000_000)
+    states = base.RealVectorStateSpace(3)
+    bounds = base.RealVectorBounds(3)
+    for axis, (low, high) in enumerate([*space.box(), search.heights_m]):
+        bounds.setLow(axis, low)
+        bounds.setHigh(axis, high)
+    states.setBounds(bounds)
+    setup = geometric.SimpleSetup(states)
+    information = setup.getSpaceInformation()
+    radius = search.radius_m
+    setup.setStateValidityChecker(lambda s: space.is_free(s[0], s[1], s[2], radius))
+
+    class CompiledMotionValidator(base.MotionValidator):  # type: ignore[misc]
+        """Looks along a leg in one compiled call."""
+
+        def checkMotion(self, a: Any, b: Any, *_last: Any) -> bool:  # noqa: N802
+            return space.is_free_leg(a[0], a[1], a[2], b[0], b[1], b[2], radius)
+
+    validator = CompiledMotionValidator(information)
+    information.setMotionValidator(validator)
+    first, last = states.allocState(), states.allocState()
+    for axis in range(3):
+        first[axis], last[axis] = float(begin[axis]), float(end[axis])
+    setup.setStartAndGoalStates(first, last)
+    planner = geometric.RRTConnect(information)
+    planner.setRange(search.range_m)
+    setup.setPlanner(planner)
+    asked = [0]
+
+    def spent() -> bool:
+        asked[0] += 1
+        return asked[0] > search.iterations
+
+    if (
+        not setup.solve(base.PlannerTerminationCondition(spent))
+        or not setup.haveExactSolutionPath()
+    ):
+        raise PlanError(f"no way was found in {search.iterations} iterations")
+    path = setup.getSolutionPath()
+    simplifier = geometric.PathSimplifier(information)
+    simplifier.reduceVertices(path, search.straighten)
+    simplifier.partialShortcutPath(path, search.straighten, search.straighten)
+    simplifier.reduceVertices(path, search.straighten)
+    return np.array([[s[0], s[1], s[2]] for s in path.getStates()])

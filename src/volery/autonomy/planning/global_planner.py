@@ -1,0 +1,237 @@
+"""Plans a way through the map to a goal, and anew when the map or the flight says so."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.map_frame import MAP, MapFrame
+from volery.autonomy.mapping.reports import OCTOMAP, voxels_of
+from volery.autonomy.planning.global_path import Search, plan_way
+from volery.autonomy.planning.voxel_space import Solid, VoxelSpace
+from volery.autonomy.scan_points import Pose as Motion
+from volery.core.clock import NS_PER_S
+from volery.core.errors import DataFileError, PlanError
+from volery.core.kept import keep, put_back
+from volery.graph.messages import (
+    Odometry,
+    PathMessage,
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    String,
+    TFMessage,
+    header,
+)
+from volery.graph.node import Node
+
+Array = NDArray[np.float64]
+
+_LEVEL = Quaternion(0.0, 0.0, 0.0, 1.0)
+_PERIOD_S = 1.0
+_STUCK_S = 6.0
+_STUCK_M = 1.0
+"""Without coming so much nearer to the goal for so long, the way is planned anew ..."""
+_MARGIN_M = 25.0
+_TRIES = 3
+"""... so often; then the goal is given up."""
+_STATE = ("_goal", "_way", "_place", "_since_ns", "_best_m", "_tries", "_plans", "_told", "_map")
+
+
+class GlobalPlanner(Node):
+    """`planning/goal` (PoseStamped, map) becomes `planning/path`; tells `planning/goal_status`.
+
+    The status is JSON: state (waiting, planned, refused, unreachable), reason, goal, length_m,
+    plans. Where nothing is known of the map the way is straight. Service `~/stop`: forget the goal
+    and stay.
+
+    Parameters
+    ----------
+    odometry: topic of the pose; `corrected`: whether `/tf` tells where its frame lies in the map.
+    height_m: height above ground of the goal; heights_m: [least, most] on the way.
+    radius_m: distance to keep from obstacles. cell_m: of the space that is planned in.
+    iterations: bound of the search. seed: of its random numbers.
+
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("global_planner", **options)
+        self._height = float(self.declare_parameter("height_m", 3.0).value)
+        low, high = self.declare_parameter("heights_m", [2.2, 4.2]).value
+        self._search = Search(
+            radius_m=float(self.declare_parameter("radius_m", 0.8).value),
+            heights_m=(float(low), float(high)),
+            iterations=int(self.declare_parameter("iterations", 4000).value),
+        )
+        self._cell = float(self.declare_parameter("cell_m", 0.4).value)
+        self._seed = int(self.declare_parameter("seed", 1).value)
+        self._frame = MapFrame()
+        self._map: Solid | None = None
+        """What is occupied in the newest map."""
+        self._goal: Array | None = None
+        self._way: Array | None = None
+        self._place: Array | None = None
+        """Where the vehicle is, (3,) m in the map."""
+        self._since_ns = 0
+        self._best_m = math.inf
+        """How near to the goal it has come, and since when no nearer."""
+        self._tries = 0
+        self._plans = 0
+        self._told = ""
+        self._open()
+
+    def _open(self) -> None:
+        odometry = str(self.declare_parameter("odometry", "slam/odom").value)
+        self._path = self.create_publisher(PathMessage, "planning/path", 1, latched=True)
+        self._status = self.create_publisher(String, "planning/goal_status", 1, latched=True)
+        self.create_subscription(Odometry, odometry, self._on_odometry, 1)
+        if self.declare_parameter("corrected", True).value:
+            self.create_subscription(TFMessage, "/tf", self._frame.on_tf, 50)
+        self.create_subscription(PoseStamped, "planning/goal", self._on_goal, 1)
+        self.create_subscription(OCTOMAP, "octomap_binary", self._on_map, 1)
+        self.create_service("std_srvs/srv/Trigger", "~/stop", self._on_stop)
+        self.create_timer(_PERIOD_S, self._on_timer)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {"frame": self._frame.get_state(), **keep(self, _STATE)}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._frame.set_state(state["frame"])
+        put_back(self, {name: state[name] for name in _STATE})
+
+    # ------------------------------------------------------------------------------ what it hears
+
+    def _on_odometry(self, message: Odometry) -> None:
+        self._frame.odom_frame = message.header.frame_id
+        place = Motion.from_odometry(message).position
+        if np.isfinite(place).all():
+            self._place = self._frame.to_map(place)
+
+    def _on_goal(self, message: PoseStamped) -> None:
+        p = message.pose.position
+        goal = np.array([p.x, p.y, p.z], dtype=np.float64)
+        if message.header.frame_id not in ("", MAP):
+            self._give_up("refused", f"goals are in 'map', not in '{message.header.frame_id}'")
+        elif not np.isfinite(goal).all():
+            self._give_up("refused", "the goal's place is not finite")
+        elif self._goal is None or not np.array_equal(goal, self._goal) or self._way is None:
+            self._goal, self._tries = goal, 0
+            self._plan()
+
+    def _on_map(self, message: Any) -> None:
+        """Plan anew where the new map shows that the way is not clear any more."""
+        try:
+            self._map = Solid.of(voxels_of(message), float(message.resolution))
+        except DataFileError as error:
+            self._tell("waiting" if self._way is None else "planned", str(error), 0.0)
+            return
+        if self._goal is None or self._way is None or self._place is None:
+            return
+        try:
+            space = self._space(self._place)
+        except PlanError as error:
+            self._give_up("refused", str(error))
+            return
+        if space is not None and not self._is_clear(space, self._way, self._place):
+            self._plan()
+
+    def _on_stop(self, _request: Any, response: Any) -> Any:
+        self._goal = None
+        self._give_up("waiting", "told to stop")
+        response.success, response.message = True, ""
+        return response
+
+    # ------------------------------------------------------------------------------- what it does
+
+    def _on_timer(self) -> None:
+        """Plan anew where the flight comes no nearer to the goal."""
+        if self._goal is None or self._place is None:
+            return
+        now = self.get_clock().now_ns()
+        if self._way is None:
+            if self._tries == 0:
+                self._plan()
+            return
+        left = float(np.hypot(*(self._goal[:2] - self._place[:2])))
+        if left < self._best_m - _STUCK_M or left < 2.0:
+            self._best_m, self._since_ns, self._tries = left, now, 0
+        elif now - self._since_ns > _STUCK_S * NS_PER_S:
+            self._tries += 1
+            if self._tries > _TRIES:
+                self._give_up("unreachable", f"no way to the goal in {_TRIES} attempts")
+            else:
+                self._plan()
+
+    def _plan(self) -> None:
+        goal, place = self._goal, self._place
+        if goal is None or place is None:
+            return
+        self._plans += 1
+        try:
+            space = self._space(place)
+            if space is None:
+                way = np.stack([place, goal])
+            else:
+                seed = self._seed * 1_000_003 + self._plans
+                way = plan_way(space, place, goal, self._height, self._search, seed)
+        except PlanError as error:
+            self._give_up("refused", str(error))
+            return
+        self._way = way
+        self._since_ns = self.get_clock().now_ns()
+        self._best_m = float(np.hypot(*(goal[:2] - place[:2])))
+        self._send(way)
+        length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+        self._tell("planned", "" if space is not None else "nothing is known: straight", length)
+
+    def _space(self, place: Array) -> VoxelSpace | None:
+        """The known map as a space; None where nothing is known there.
+
+        After each attempt in vain it is wider. Raises PlanError where start and goal are too far
+        apart.
+        """
+        assert self._goal is not None
+        if self._map is None:
+            return None
+        around, margin = np.stack([place, self._goal]), _MARGIN_M * (1 + self._tries)
+        if not self._map.is_near(around, margin):
+            return None
+        return VoxelSpace(self._map, self._cell, around, margin)
+
+    def _is_clear(self, space: VoxelSpace, way: Array, place: Array) -> bool:
+        """Whether what is left of a way is free."""
+        heights = np.array([space.ground_at(p[:2]) for p in way])
+        states = way.copy()
+        states[:, 2] -= heights
+        nearest = int(np.argmin(np.hypot(*(way[:, :2] - place[:2]).T)))
+        radius = 0.75 * self._search.radius_m
+        legs = zip(states[nearest:-1], states[nearest + 1 :], strict=True)
+        return all(space.is_free_between(a, b, radius) for a, b in legs)
+
+    # ------------------------------------------------------------------------------ what it tells
+
+    def _give_up(self, state: str, reason: str) -> None:
+        """Say why, and let the vehicle stop."""
+        self._tries, self._way = max(self._tries, 1), None
+        self._send(np.zeros((0, 3)))
+        self._tell(state, reason, 0.0)
+
+    def _send(self, way: Array) -> None:
+        stamp = header(self.get_clock().now_ns(), MAP)
+        poses = [PoseStamped(stamp, Pose(Point(*place), _LEVEL)) for place in way.tolist()]
+        self._path.publish(PathMessage(stamp, poses))
+
+    def _tell(self, state: str, reason: str, length_m: float) -> None:
+        goal = None if self._goal is None else [round(v, 2) for v in self._goal.tolist()]
+        told = {"state": state, "reason": reason, "goal": goal, "length_m": round(length_m, 1)}
+        text = json.dumps({**told, "plans": self._plans})
+        if text != self._told:
+            self._told = text
+            self._status.publish(String(text))

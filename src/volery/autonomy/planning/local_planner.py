@@ -1,0 +1,246 @@
+"""Plans what is flown in the next seconds, from what the sensors see."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.map_frame import MAP, MapFrame
+from volery.autonomy.planning.local_planning import Doing, LocalPlanning, Policy, Sight
+from volery.autonomy.planning.primitives import Limits, Path, State
+from volery.autonomy.planning.reciprocal_avoidance import Neighbour, Separation, half_planes
+from volery.autonomy.planning.sight import Surroundings
+from volery.autonomy.planning.trajectory_form import trajectory_message
+from volery.autonomy.planning.way_ahead import WayAhead
+from volery.autonomy.scan_points import Pose
+from volery.core.clock import NS_PER_S, ns_from_s
+from volery.core.kept import keep, put_back
+from volery.graph.messages import (
+    JointState,
+    LaserScan,
+    MultiDOFJointTrajectory,
+    Odometry,
+    PathMessage,
+    Range,
+    String,
+    TFMessage,
+    stamp_of,
+)
+from volery.graph.node import Node
+
+Array = NDArray[np.float64]
+
+_CARROT_M = 9.0
+"""How far ahead on its way the vehicle looks: the window of the plan reaches 12 m."""
+_LEAST_HEIGHT_M = 1.0
+"""Lower than this nothing is planned: it takes off or lands."""
+_TELL_S = 1.0
+"""The status is told at each change of state or problems, else so often."""
+_STATE = ("_way", "_way_map", "_neighbours", "_told", "_told_ns", "_plans", "_frame_was")
+
+
+class LocalPlanner(Node):
+    """Follows `planning/path` by `planning/trajectory`; tells `planning/status`.
+
+    An empty path: stay. The status is JSON: state (waiting, holding, flying, turning, blocked,
+    arrived), problems, left_m, clearance_m, plans.
+
+    Parameters
+    ----------
+    odometry: topic of the pose; `corrected`: whether `/tf` tells where its frame lies in the map.
+    level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
+    height_m: height above ground to fly at; speed_m_s: highest speed. Both may be set in flight.
+    acceleration_m_s2: highest horizontal acceleration.
+    radius_m: least distance of the UAV's centre to obstacles, at rest; 0.1 m more for each m/s.
+    unknown_stops: whether plans keep out of space that is not known.
+    period_s: time between plans. ahead_s: so long after its input a plan takes over; not less than
+        the node's latency.
+    arrival_m: so near to its end the way is done.
+    scan_rate_hz: scans taken of each LIDAR a second; cell_m: of the local grid.
+    neighbours: topics of the other UAVs' odometry; separation_m: to keep from them, in plan.
+
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("local_planner", **options)
+        mounts = {
+            name: self.declare_parameter(f"{name}_mount", [0.0] * 3).value
+            for name in ("level", "nodding")
+        }
+        cell = float(self.declare_parameter("cell_m", 0.25).value)
+        scan_rate = float(self.declare_parameter("scan_rate_hz", 10.0).value)
+        self._sight = Surroundings(mounts, cell, scan_rate)
+        self._height = self.declare_parameter("height_m", 3.0, read_only=False)
+        self._speed = self.declare_parameter("speed_m_s", 3.0, read_only=False)
+        self._acceleration = float(self.declare_parameter("acceleration_m_s2", 2.5).value)
+        self._radius = float(self.declare_parameter("radius_m", 0.6).value)
+        self._unknown_stops = bool(self.declare_parameter("unknown_stops", True).value)
+        self._ahead_ns = ns_from_s(float(self.declare_parameter("ahead_s", 0.1).value))
+        self._arrival_m = float(self.declare_parameter("arrival_m", 1.0).value)
+        radius = float(self.declare_parameter("separation_m", 2.0).value)
+        self._separation = Separation(radius_m=radius)
+        self._planning = LocalPlanning(self._policy())
+        self._frame = MapFrame()
+        self._frame_was: Any = None
+        self._way: WayAhead | None = None
+        self._way_map: Array | None = None
+        """The places of the way in the map, from which `_way` is made."""
+        self._neighbours: dict[str, Neighbour] = {}
+        self._told = ""
+        self._told_ns = 0
+        self._plans = 0
+        self._open()
+
+    def _open(self) -> None:
+        odometry = str(self.declare_parameter("odometry", "slam/odom").value)
+        period = float(self.declare_parameter("period_s", 0.18).value)
+        self._trajectory = self.create_publisher(MultiDOFJointTrajectory, "planning/trajectory", 1)
+        self._status = self.create_publisher(String, "planning/status", 1, latched=True)
+        self.create_subscription(Odometry, odometry, self._on_odometry, 5)
+        if self.declare_parameter("corrected", True).value:
+            self.create_subscription(TFMessage, "/tf", self._frame.on_tf, 50)
+        for name, topic in (("level", "horizontal"), ("nodding", "nodding")):
+            scans = f"laser/{topic}/scan"
+            self.create_subscription(LaserScan, scans, self._scan_listener(name), 5)
+        self.create_subscription(JointState, "joint_states", self._sight.on_joint, 5)
+        self.create_subscription(Range, "range", self._on_range, 5)
+        self.create_subscription(PathMessage, "planning/path", self._on_path, 1)
+        for topic in self.declare_parameter("neighbours", [""]).value:
+            if topic:
+                self.create_subscription(Odometry, topic, self._neighbour_listener(topic), 5)
+        self.create_timer(period, self._on_timer)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        parts = {
+            name: getattr(self, name).get_state() for name in ("_sight", "_planning", "_frame")
+        }
+        return {"parts": parts, **keep(self, _STATE)}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        for name, part in state["parts"].items():
+            getattr(self, name).set_state(part)
+        put_back(self, {name: state[name] for name in _STATE})
+
+    # ------------------------------------------------------------------------------ what it hears
+
+    def _on_odometry(self, message: Odometry) -> None:
+        self._frame.odom_frame = message.header.frame_id
+        self._sight.motion.add(Pose.from_odometry(message))
+
+    def _scan_listener(self, name: str) -> Callable[[LaserScan], None]:
+        return lambda scan: self._sight.on_scan(name, scan, self.get_clock().now_ns())
+
+    def _on_range(self, message: Range) -> None:
+        self._sight.on_range(message, self.get_clock().now_ns())
+
+    def _on_path(self, message: PathMessage) -> None:
+        places = [[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in message.poses]
+        found = np.array(places, dtype=np.float64).reshape(-1, 3)
+        if message.header.frame_id not in ("", MAP) or not np.isfinite(found).all():
+            self._tell(
+                "refused", ["a path that is not in 'map', or with places that are not finite"]
+            )
+            return
+        self._way_map = found if len(found) else None
+        self._way = None
+
+    def _neighbour_listener(self, topic: str) -> Callable[[Odometry], None]:
+        def on_neighbour(message: Odometry) -> None:
+            pose = Pose.from_odometry(message)
+            self._neighbours[topic] = Neighbour(pose.position, pose.velocity, stamp_of(message))
+
+        return on_neighbour
+
+    # ------------------------------------------------------------------------------- what it does
+
+    def _on_timer(self) -> None:
+        now = self.get_clock().now_ns()
+        pose, problems = self._sight.motion.newest, self._sight.problems(now)
+        if pose is None:
+            self._tell("waiting", problems)
+            return
+        height = self._sight.height_above_ground(pose, now)
+        present = State(pose.position, pose.velocity, np.zeros(3))
+        self._planning.policy = self._policy()
+        then = now + self._ahead_ns
+        if height < _LEAST_HEIGHT_M:
+            self._planning.forget()
+            self._tell("waiting", ["too low above ground to plan", *problems])
+            return
+        if self._way_map is None and not self._plans:
+            self._tell("waiting", ["no path", *problems])
+            return
+        start = self._planning.start(present, pose.yaw, now, then)
+        if problems or self._way_here() is None:
+            self._publish(self._planning.hold(start, then), then)
+            self._tell("holding", problems)
+            return
+        self._plan(pose, start, now, then)
+
+    def _plan(self, pose: Pose, start: State, now: int, then: int) -> None:
+        way = self._way_here()
+        assert way is not None
+        carrot = way.carrot(pose.position, _CARROT_M)
+        if way.left_m(pose.position) < self._arrival_m:
+            self._publish(self._planning.hold(start, then), then)
+            self._tell("arrived", [])
+            return
+        sight = Sight(
+            self._sight.clearance(pose.position),
+            self._sight.surface(float(self._height.value)),
+            half_planes(start.position, start.velocity, self._near(), self._separation, now),
+        )
+        path = self._planning.plan(start, carrot, sight, then)
+        self._plans += 1
+        self._publish(path, self._planning.began_ns)
+        self._tell(str(self._planning.doing), [])
+
+    def _way_here(self) -> WayAhead | None:
+        """The way in the odometry frame, made anew where that has been moved in the map."""
+        if self._way_map is None:
+            return None
+        at = self._frame.map_from_odom
+        if self._way is None or at is not self._frame_was:
+            passed = 0.0 if self._way is None else self._way.passed_m
+            self._way = WayAhead(self._frame.to_odom(self._way_map), passed)
+            self._frame_was = at
+        return self._way
+
+    def _near(self) -> list[Neighbour]:
+        """Neighbours in the odometry frame."""
+        moved = []
+        for topic in sorted(self._neighbours):
+            other = self._neighbours[topic]
+            place = self._frame.to_odom(other.position)
+            velocity = self._frame.to_odom(other.position + other.velocity) - place
+            moved.append(Neighbour(place, velocity, other.time_ns))
+        return moved
+
+    def _policy(self) -> Policy:
+        limits = Limits(float(self._speed.value), self._acceleration, 1.5, 1.5, 1.4)
+        return Policy(limits, radius_m=self._radius, unknown_stops=self._unknown_stops)
+
+    # ------------------------------------------------------------------------------ what it tells
+
+    def _publish(self, path: Path, begins_ns: int) -> None:
+        frame = self._frame.odom_frame
+        self._trajectory.publish(trajectory_message(path, self._planning.yaw, frame, begins_ns))
+
+    def _tell(self, state: str, problems: list[str]) -> None:
+        way, pose = self._way, self._sight.motion.newest
+        left = None if way is None or pose is None else round(way.left_m(pose.position), 1)
+        clearance = self._planning.least_m if state == Doing.FLYING else None
+        told = {"state": state, "problems": problems, "left_m": left, "plans": self._plans}
+        if clearance is not None:
+            told["clearance_m"] = round(clearance, 2)
+        now = self.get_clock().now_ns()
+        news = f"{state} {problems}"
+        if news != self._told or not 0 <= now - self._told_ns < _TELL_S * NS_PER_S:
+            self._told, self._told_ns = news, now
+            self._status.publish(String(json.dumps(told)))

@@ -1,0 +1,164 @@
+"""Keeping apart from others who do the same: optimal reciprocal collision avoidance.
+
+J. van den Berg, S. Guy, M. Lin, D. Manocha, "Reciprocal n-body collision avoidance", ISRR 2009, in
+the plane. For each neighbour a half plane of velocities is allowed in which, if it takes half of
+the trouble too, both stay apart for `horizon_s`. What was heard longer ago is carried on along its
+velocity, and its place is known less well: its radius grows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.clock import NS_PER_S
+
+Array = NDArray[np.float64]
+
+
+class Neighbour(NamedTuple):
+    """What was last heard of another vehicle, in the frame of who avoids it."""
+
+    position: Array
+    """(3,) m."""
+    velocity: Array
+    """(3,) m/s."""
+    time_ns: int
+
+
+class Separation(NamedTuple):
+    """How vehicles keep apart."""
+
+    radius_m: float = 1.5
+    """Least distance between two vehicles' centres, in plan."""
+    height_m: float = 2.5
+    """Those that are so much higher or lower are not in the way."""
+    horizon_s: float = 4.0
+    """For so long ahead."""
+    growth_m_s: float = 0.5
+    """How fast what is known of a silent neighbour's place gets worse."""
+    forget_s: float = 5.0
+    """After so long a silence nothing is known of it."""
+    step_s: float = 0.2
+    """Vehicles that are too near to each other already part within this time."""
+
+
+class HalfPlane(NamedTuple):
+    """Velocities v with (v - point) . normal >= 0 are allowed, (2,) m/s."""
+
+    point: Array
+    normal: Array
+
+
+def half_planes(
+    position: Array,
+    velocity: Array,
+    neighbours: Sequence[Neighbour],
+    separation: Separation,
+    now_ns: int,
+) -> list[HalfPlane]:
+    """Constraints on the velocity (2,) in plan of a vehicle at `position` (3,) with `velocity`."""
+    planes = []
+    for other in neighbours:
+        age = (now_ns - other.time_ns) / NS_PER_S
+        finite = np.isfinite(other.position).all() and np.isfinite(other.velocity).all()
+        if not finite or not -1.0 <= age <= separation.forget_s:
+            continue
+        age = max(age, 0.0)
+        place = other.position + age * other.velocity
+        if abs(place[2] - position[2]) > separation.height_m:
+            continue
+        radius = separation.radius_m + age * separation.growth_m_s
+        planes.append(
+            _half_plane(
+                place[:2] - position[:2], velocity[:2], other.velocity[:2], radius, separation
+            )
+        )
+    return planes
+
+
+def _half_plane(
+    way: Array, own: Array, others: Array, radius: float, separation: Separation
+) -> HalfPlane:
+    """After section 4 of the paper: `u` is the least change that leaves the velocity obstacle."""
+    relative = own - others
+    square = float(way @ way)
+    too_near = square <= radius * radius
+    horizon = separation.step_s if too_near else separation.horizon_s
+    from_centre = relative - way / horizon
+    length = float(np.linalg.norm(from_centre))
+    ahead = float(from_centre @ way)
+    cut_off = ahead < 0.0 and ahead * ahead > radius * radius * length * length
+    if too_near or cut_off:  # nearest to the round end of the cone
+        if length > 1e-9:
+            normal = from_centre / length
+        elif square > 1e-18:
+            normal = -way / math.sqrt(square)
+        else:
+            normal = np.array([1.0, 0.0])
+        change = (radius / horizon - length) * normal
+    else:
+        leg = math.sqrt(square - radius * radius)
+        left = float(way[0] * from_centre[1] - way[1] * from_centre[0]) > 0.0
+        if left:
+            along = np.array([way[0] * leg - way[1] * radius, way[0] * radius + way[1] * leg])
+        else:
+            along = -np.array([way[0] * leg + way[1] * radius, -way[0] * radius + way[1] * leg])
+        along = along / square
+        change = float(relative @ along) * along - relative
+        normal = np.array([-along[1], along[0]])
+    return HalfPlane(own + 0.5 * change, normal)
+
+
+def violation(planes: Sequence[HalfPlane], velocities: Array) -> Array:
+    """How far (m/s) each velocity (C, 2) lies outside of what is allowed, at worst."""
+    worst = np.zeros(len(velocities))
+    for plane in planes:
+        worst = np.maximum(worst, (plane.point - velocities) @ plane.normal)
+    return worst
+
+
+def avoiding_velocity(planes: Sequence[HalfPlane], preferred: Array, top_speed: float) -> Array:
+    """The allowed velocity (2,) nearest to the preferred one; where none is, the least bad.
+
+    The optimum of few constraints lies at the preferred velocity, at its projection on one of the
+    lines or the circle of `top_speed`, or where two of them cross: all are tried. Where nothing is
+    allowed, the fastest way out of each half plane is tried besides.
+    """
+    tries = [preferred, np.zeros(2)]
+    tries += [plane.point + _along(plane) * _foot(plane, preferred) for plane in planes]
+    for k, plane in enumerate(planes):
+        tries += [top_speed * plane.normal, *_on_circle(plane, top_speed)]
+        for other in planes[:k]:
+            across = float(_along(plane) @ other.normal)
+            if abs(across) > 1e-9:
+                share = float((other.point - plane.point) @ other.normal) / across
+                tries.append(plane.point + _along(plane) * share)
+    speed = float(np.linalg.norm(preferred))
+    if speed > 1e-9:
+        tries.append(preferred * min(1.0, top_speed / speed))
+    velocities = np.array([v for v in tries if np.linalg.norm(v) <= top_speed + 1e-9])
+    worst = np.maximum(violation(planes, velocities), 1e-9)
+    away = np.linalg.norm(velocities - preferred, axis=1)
+    return np.asarray(velocities[np.lexsort((away, np.round(worst, 9)))[0]])
+
+
+def _along(plane: HalfPlane) -> Array:
+    return np.array([plane.normal[1], -plane.normal[0]])
+
+
+def _foot(plane: HalfPlane, velocity: Array) -> float:
+    return float((velocity - plane.point) @ _along(plane))
+
+
+def _on_circle(plane: HalfPlane, radius: float) -> list[Array]:
+    along = _along(plane)
+    half, rest = float(plane.point @ along), float(plane.point @ plane.point) - radius * radius
+    root = half * half - rest
+    if root < 0.0:
+        return []
+    return [plane.point + along * (-half + sign * math.sqrt(root)) for sign in (-1.0, 1.0)]

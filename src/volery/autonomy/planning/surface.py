@@ -1,0 +1,22 @@
+"""The surface that a vehicle flies on: parallel to the ground, at a height over it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Surface(NamedTuple):
+    """z = level + slope . (x, y), m."""
+
+    level: float
+    slope: Array
+    """(2,)."""
+
+    def height_at(self, xy: Array) -> Array:
+        """Heights over places (..., 2)."""
+        return np.asarray(self.level + xy @ self.slope)

@@ -1,0 +1,263 @@
+"""The task manager: one UAV's part in a search that a team shares out by radio.
+
+Each UAV has one, and none leads. The area is a grid of sectors; a UAV that is free takes the one
+that falls to it by what it has heard (`team.assignment`), has it explored, and tells the others
+several times a second what it does, what has been searched and what has been found. So a report
+that is lost, repeated or late does no harm, a UAV may come late or fall silent, and parts of a team
+that do not hear each other go on, each by itself, until they do again.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from volery.autonomy.scan_points import Pose
+from volery.autonomy.team.assignment import Claim, assign, must_yield
+from volery.autonomy.team.member import POSE_S, TeamMember
+from volery.autonomy.team.mission_messages import goal_at, polygon_of
+from volery.autonomy.team.reports import ALOFT, Phase
+from volery.autonomy.team.sectors import Coverage
+from volery.core.clock import NS_PER_S
+from volery.core.errors import GraphError
+from volery.graph.client import Client
+from volery.graph.messages import PolygonStamped, PoseStamped, String, message_type
+
+_PERIOD_S = 0.2
+_REPEAT_S = 2.0
+"""A take-off or landing that has not begun is asked for again."""
+_RISE_S = 30.0
+"""A take-off that takes longer has failed."""
+_RETURN_STUCK_S = 60.0
+"""Without coming nearer to home for so long it lands where it is."""
+_HOME_M, _NEARER_M = 1.5, 1.0
+_LANDED_M, _SUNK_M, _STILL_M_S = 0.3, 0.25, 0.2
+"""All modelling choices."""
+
+
+class TaskManager(TeamMember):
+    """Takes off, has its sectors explored, shares what is found, comes home and lands.
+
+    Says `search_area` (where to explore; no corners: nowhere), the goal to fly to on `goal_topic`,
+    `mission`, `targets` and, for the radio, `team`. Hears odometry, `battery`,
+    `target_detection/targets` and, from the radio, `radio/team`. `~/return_home` ends its search.
+    An explorer may tell on `exploration/status` (JSON with a `state`: searching, then done or
+    blocked) that it is through with an area; else what has been in sight decides.
+
+    Parameters
+    ----------
+    area_m: [x_min, y_min, x_max, y_max] in the map, the same for the whole team.
+    sector_m: about how long a sector's sides are.
+    altitude_m: height to which it takes off.
+    cell_m, sight_m, enough: a sector is searched when this share of its cells has been in sight.
+    gather_s: how long to listen for the team before the take-off.
+    patience_s: after so long a silence a UAV counts as lost, and its sector is taken over.
+    stuck_s: a sector in which nothing new has been seen for so long is given up.
+    low_battery: charge, 0 to 1, at which it goes home.
+    search_s: how long it searches at most; 0: without an end.
+    alone_s: after so long without hearing anybody, once it has, it goes home; 0: it goes on.
+    gate_m: finds nearer to each other than this are of one thing.
+    odometry: topic of its pose; corrected: whether `/tf` tells where its frame lies in the map.
+    goal_topic: where goals are published. Not `goal_pose`, to which flight modes fly straight on.
+
+    """
+
+    STATE = (
+        "_home",
+        "_began_ns",
+        "_phase_ns",
+        "_asked_ns",
+        "_nearest_m",
+        "_highest_m",
+        "_ordered_home",
+        "_explores",
+        *TeamMember.STATE,
+    )
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("task_manager", **options)
+        self._home = np.zeros(3)
+        self._began_ns: int | None = None
+        self._phase_ns = 0
+        self._asked_ns = -1 << 62
+        self._nearest_m = math.inf
+        """To home, so far."""
+        self._highest_m = -math.inf
+        """Since the landing began."""
+        self._ordered_home = False
+        self._explores = False
+        """Whether the explorer has taken up the present sector."""
+        self._area = self.create_publisher(PolygonStamped, "search_area", 1, latched=True)
+        self._goal = self.create_publisher(PoseStamped, self.settings.goal_topic, 1, latched=True)
+        self._take_off = self.create_client("volery_interfaces/srv/TakeOffTo", "take_off_to")
+        self._land = self.create_client("std_srvs/srv/Trigger", "land")
+        self._hold = self.create_client("std_srvs/srv/Trigger", "hold")
+        self.create_service("std_srvs/srv/Trigger", "~/return_home", self._on_return_home)
+        self.create_subscription(String, "exploration/status", self._on_explorer, 5)
+        self.create_timer(_PERIOD_S, self._on_timer)
+
+    def _on_explorer(self, message: String) -> None:
+        """An explorer that says when it is done with an area, or cannot get on in it."""
+        now, state = self.now_ns, _state_in(message.data)
+        if state == "searching":
+            self._explores = True
+        elif self._explores and self.phase is Phase.SEARCH and state in ("done", "blocked"):
+            self.searched[self.sector] = state == "done"
+            self._given_up[self.sector] |= state == "blocked"
+            self._drop(now)
+
+    def _on_return_home(self, _request: Any, response: Any) -> Any:
+        self._ordered_home = True
+        response.success, response.message = True, str(self.phase)
+        return response
+
+    # ------------------------------------------------------------------------------- what it does
+
+    def _on_timer(self) -> None:
+        now, pose = self.now_ns, self._pose
+        if pose is None:
+            return
+        if self._began_ns is None:
+            self._began_ns = self._heard_ns = now
+            self._home = pose.position.copy()
+            self._enter(Phase.WAIT)
+        self.trouble = self.what_is_wrong(now)
+        if now - self._pose_ns > POSE_S * NS_PER_S and self.phase in ALOFT:
+            self._ask_now_and_then(self._hold)
+        else:
+            self._act(pose, now)
+        self.tell_team()
+        self.tell_status()
+
+    def _act(self, pose: Pose, now: int) -> None:
+        if self.phase in (Phase.SEARCH, Phase.IDLE) and self._must_go_home(now):
+            self._go_home(now)
+        if self.phase is Phase.WAIT:
+            if now - self._phase_ns >= self.settings.gather_s * NS_PER_S:
+                self._enter(Phase.DONE if self._ordered_home else Phase.RISE)
+        elif self.phase is Phase.RISE:
+            self._rise(pose, now)
+        elif self.phase is Phase.SEARCH:
+            self._search(now)
+        elif self.phase is Phase.IDLE:
+            self._choose(now)
+        elif self.phase is Phase.RETURN:
+            self._return(pose, now)
+        elif self.phase is Phase.LAND:
+            self._sink(pose)
+
+    def _rise(self, pose: Pose, now: int) -> None:
+        climbed = pose.position[2] - self._home[2]
+        if climbed > 0.8 * self.settings.altitude_m and abs(pose.velocity[2]) < _STILL_M_S:
+            self._enter(Phase.IDLE)
+        elif now - self._phase_ns > _RISE_S * NS_PER_S:
+            self._enter(Phase.DOWN if climbed < _LANDED_M else Phase.LAND)
+        elif climbed < _LANDED_M:
+            request = message_type("volery_interfaces/srv/TakeOffTo_Request")
+            self._ask_now_and_then(self._take_off, request(self.settings.altitude_m))
+
+    def _choose(self, now: int) -> None:
+        """Take the sector that falls to this UAV; go home where none ever will."""
+        workers = self.team.workers(now, self.settings.patience_s)
+        workers[self.settings.name] = self.as_worker()
+        chosen = assign(workers, self.searched, self.settings.sectors.centres())
+        sector = chosen.get(self.settings.name, -1)
+        if sector >= 0:
+            self._begin(sector, now)
+        elif (self.searched | self._given_up).all():
+            self._go_home(now)
+
+    def _begin(self, sector: int, now: int) -> None:
+        self.sector, self._since_ns, self._news_ns = sector, now, now
+        self._explores = False
+        area = self.settings.sectors.of(sector)
+        self._coverage = Coverage(area, self.settings.cell_m)
+        self._enter(Phase.SEARCH)
+        self._area.publish(polygon_of(area, float(self._home[2]), now))
+
+    def _search(self, now: int) -> None:
+        assert self._coverage is not None
+        others = self.team.workers(now, self.settings.patience_s)
+        mine = Claim(self._since_ns, self.settings.name)
+        if self._coverage.share >= self.settings.enough:
+            self.searched[self.sector] = True
+            self._drop(now)
+        elif self.searched[self.sector] or must_yield(mine, self.sector, others):
+            self._drop(now)
+        elif now - self._news_ns > self._patience_here_ns():
+            self._given_up[self.sector] = True
+            self._drop(now)
+
+    def _patience_here_ns(self) -> int:
+        """How long nothing new need be seen: on the way there, the way is given time too."""
+        assert self._coverage is not None
+        if self._coverage.seen.any() or self._pose is None:
+            return round(self.settings.stuck_s * NS_PER_S)
+        middle = self.settings.sectors.centres()[self.sector]
+        way = float(np.linalg.norm(middle - self._pose.position[:2]))
+        return round((self.settings.stuck_s + 2.0 * way) * NS_PER_S)
+
+    def _drop(self, now: int) -> None:
+        """Search this sector no more, and take the next one."""
+        self.sector, self._coverage = -1, None
+        self._enter(Phase.IDLE)
+        self._choose(now)
+        if self.phase is Phase.IDLE:
+            self._area.publish(polygon_of(None, float(self._home[2]), now))
+
+    def _must_go_home(self, now: int) -> bool:
+        assert self._began_ns is not None
+        settings = self.settings
+        over = 0.0 < settings.search_s * NS_PER_S < now - self._began_ns
+        alone = bool(self.team.mates) and (0.0 < settings.alone_s * NS_PER_S < now - self._heard_ns)
+        return self._ordered_home or over or alone or self._battery < settings.low_battery
+
+    def _go_home(self, now: int) -> None:
+        self.sector, self._coverage = -1, None
+        self._nearest_m, self._news_ns = math.inf, now
+        self._enter(Phase.RETURN)
+        self._area.publish(polygon_of(None, float(self._home[2]), now))
+        z = self._home[2] + self.settings.altitude_m
+        self._goal.publish(goal_at(np.array([*self._home[:2], z]), now))
+
+    def _return(self, pose: Pose, now: int) -> None:
+        away = float(np.linalg.norm(pose.position[:2] - self._home[:2]))
+        if away < self._nearest_m - _NEARER_M:
+            self._nearest_m, self._news_ns = away, now
+        if away < _HOME_M or now - self._news_ns > _RETURN_STUCK_S * NS_PER_S:
+            self._enter(Phase.LAND)
+
+    def _sink(self, pose: Pose) -> None:
+        self._highest_m = max(self._highest_m, float(pose.position[2]))
+        still = float(np.linalg.norm(pose.velocity)) < _STILL_M_S
+        if still and pose.position[2] < self._highest_m - _SUNK_M:
+            self._enter(Phase.DONE)
+        else:
+            self._ask_now_and_then(self._land)
+
+    def _enter(self, phase: Phase) -> None:
+        self._highest_m = -math.inf
+        self.phase, self._phase_ns = phase, self.now_ns
+
+    def _ask_now_and_then(self, client: Client, request: Any | None = None) -> None:
+        """Call a service unless it was called lately."""
+        now = self.now_ns
+        if now - self._asked_ns < _REPEAT_S * NS_PER_S:
+            return
+        self._asked_ns = now
+        try:
+            client.call_async(request)
+        except GraphError:
+            return  # nobody offers it at the moment
+
+
+def _state_in(text: str) -> str:
+    """The `state` of a JSON text; empty where there is none."""
+    try:
+        told = json.loads(text)
+    except json.JSONDecodeError:
+        return ""
+    return str(told.get("state", "")) if isinstance(told, dict) else ""

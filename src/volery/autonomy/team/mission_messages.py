@@ -1,0 +1,34 @@
+"""Where to explore and where to fly, as messages."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.search.places import Area
+from volery.graph.messages import (
+    Point,
+    Point32,
+    Polygon,
+    PolygonStamped,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    header,
+    single,
+)
+
+Array = NDArray[np.float64]
+
+
+def polygon_of(area: Area | None, z: float, time_ns: int) -> PolygonStamped:
+    """The corners of an area, counter-clockwise at height `z`; none where there is no area."""
+    corners = [] if area is None else [area[:2], (area[2], area[1]), area[2:], (area[0], area[3])]
+    points = [Point32(single(x), single(y), single(z)) for x, y in corners]
+    return PolygonStamped(header(time_ns, "map"), Polygon(points))
+
+
+def goal_at(place: Array, time_ns: int) -> PoseStamped:
+    """A goal at `place` (3,), in whatever heading."""
+    level = Quaternion(0.0, 0.0, 0.0, 1.0)
+    return PoseStamped(header(time_ns, "map"), Pose(Point(*place.tolist()), level))

@@ -1,0 +1,97 @@
+"""The search area as a grid of sectors, and what of a sector has been seen."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.search.places import Area
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Sectors:
+    """An area cut into equal rectangles of about `side_m`, numbered row by row from the south."""
+
+    area: Area
+    side_m: float
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows (along y) and columns (along x)."""
+        a = self.area
+        columns = max(round((a.x_max - a.x_min) / self.side_m), 1)
+        rows = max(round((a.y_max - a.y_min) / self.side_m), 1)
+        return rows, columns
+
+    def __len__(self) -> int:
+        """How many there are."""
+        rows, columns = self.shape
+        return rows * columns
+
+    def of(self, number: int) -> Area:
+        """The rectangle of a sector."""
+        rows, columns = self.shape
+        row, column = divmod(number, columns)
+        wide = (self.area.x_max - self.area.x_min) / columns
+        deep = (self.area.y_max - self.area.y_min) / rows
+        x, y = self.area.x_min + column * wide, self.area.y_min + row * deep
+        return Area(x, y, x + wide, y + deep)
+
+    def centres(self) -> Array:
+        """(S, 2) middles, m."""
+        corners = np.array([self.of(number) for number in range(len(self))])
+        middles: Array = 0.5 * (corners[:, :2] + corners[:, 2:])
+        return middles
+
+
+@dataclass
+class Coverage:
+    """Which cells of one sector have been in sight."""
+
+    sector: Area
+    cell_m: float
+    seen: Mask = field(init=False)
+    """(rows, columns)"""
+
+    def __post_init__(self) -> None:
+        wide, deep = self._size
+        self.seen = np.zeros(
+            (max(math.ceil(deep / self.cell_m), 1), max(math.ceil(wide / self.cell_m), 1)), np.bool_
+        )
+
+    @property
+    def share(self) -> float:
+        """Of the sector that has been seen."""
+        return float(self.seen.mean())
+
+    def look(self, place: Array, sight_m: float) -> int:
+        """See what lies within `sight_m` of `place` (2,); returns how many cells are new."""
+        wide, deep = self._size
+        rows, columns = self.seen.shape
+        x = self.sector.x_min + (np.arange(columns) + 0.5) * wide / columns
+        y = self.sector.y_min + (np.arange(rows) + 0.5) * deep / rows
+        near = np.hypot(x[None, :] - place[0], y[:, None] - place[1]) <= sight_m
+        new = int((near & ~self.seen).sum())
+        self.seen |= near
+        return new
+
+    @property
+    def _size(self) -> tuple[float, float]:
+        return self.sector.x_max - self.sector.x_min, self.sector.y_max - self.sector.y_min
+
+
+def to_bits(flags: Mask) -> NDArray[np.uint8]:
+    """Flags (S,) as they stand in a `TeamReport`."""
+    return np.packbits(flags, bitorder="little")
+
+
+def from_bits(data: NDArray[np.uint8], count: int) -> Mask:
+    """The first `count` flags of a report; those that it lacks are False."""
+    flags = np.unpackbits(np.asarray(data, np.uint8), bitorder="little")[:count].astype(np.bool_)
+    return np.pad(flags, (0, count - len(flags)))

@@ -1,0 +1,155 @@
+"""From single sightings to a place: rays to the ground, weighed by what each can know.
+
+A ray to a thing at horizontal distance r, seen from h above its middle, meets the height of that
+middle at r = h / tan(depression). With an angular error s and an error of the ground's height q r
+(q: how far the ground may slope), its error is
+
+    along the ray   sqrt(((r^2 + h^2) / h * s)^2 + (q r * r / h)^2)
+    across it       r s
+
+both with that of the UAV's own place. Sightings of one thing are joined by their information
+(inverse covariances), so that rays from different sides narrow each other down: y = sum(W x),
+W = sum(P^-1), as a Kalman filter does for a state that stands still.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.team.target_list import Find
+from volery.core.clock import NS_PER_S
+
+Array = NDArray[np.float64]
+
+_GATE = 9.21
+"""99th percentile of chi squared with two degrees of freedom."""
+_NEAR_M = 2.0
+"""So near to it a sighting belongs to a track whatever the covariances say. Modelling choice."""
+
+
+class Doubt(NamedTuple):
+    """What a sighting does not know."""
+
+    angle_rad: float = 0.03
+    """Of the ray: pixels, attitude, time."""
+    slope: float = 0.2
+    """How much the ground may rise or fall a metre of distance."""
+    place_m: float = 0.2
+    """Of the UAV's own place."""
+
+
+class Sighting(NamedTuple):
+    """A thing seen once."""
+
+    time_ns: int
+    place: Array
+    """(3,) m, map"""
+    covariance: Array
+    """(2, 2) of x and y, m^2"""
+
+
+def sighting_of(time_ns: int, eye: Array, place: Array, doubt: Doubt) -> Sighting:
+    """The sighting of a thing whose ray from `eye` (3,) ends at `place` (3,), below the eye."""
+    offset = place[:2] - eye[:2]
+    r, h = max(float(np.hypot(*offset)), 1e-3), float(eye[2] - place[2])
+    along = math.hypot((r * r + h * h) / h * doubt.angle_rad, doubt.slope * r * r / h)
+    across = r * doubt.angle_rad
+    c, s = offset / r
+    turn = np.array([[c, -s], [s, c]])
+    own = doubt.place_m**2 * np.eye(2)
+    return Sighting(time_ns, place, turn @ np.diag([along**2, across**2]) @ turn.T + own)
+
+
+@dataclass
+class Track:
+    """One thing, as all its sightings tell."""
+
+    first_ns: int
+    last_ns: int
+    information: Array = field(default_factory=lambda: np.zeros((2, 2)))
+    weighted: Array = field(default_factory=lambda: np.zeros(2))
+    heights: float = 0.0
+    count: int = 0
+    number: int = 0
+    """Of the finds of this UAV; 0: not confirmed yet."""
+
+    @property
+    def covariance(self) -> Array:
+        """(2, 2) of x and y, m^2."""
+        return np.asarray(np.linalg.inv(self.information))
+
+    @property
+    def place(self) -> Array:
+        """(2,) m, map."""
+        return np.asarray(self.covariance @ self.weighted)
+
+    def add(self, sighting: Sighting) -> None:
+        """Join another sighting."""
+        weight = np.linalg.inv(sighting.covariance)
+        self.information = self.information + weight
+        self.weighted = self.weighted + weight @ sighting.place[:2]
+        self.heights += float(sighting.place[2])
+        self.count += 1
+        self.last_ns = sighting.time_ns
+
+    def fits(self, sighting: Sighting) -> bool:
+        """Whether a sighting may be of this thing."""
+        off = sighting.place[:2] - self.place
+        spread = np.linalg.inv(self.covariance + sighting.covariance)
+        return float(off @ spread @ off) <= _GATE or float(np.hypot(*off)) <= _NEAR_M
+
+    def find(self, finder: str) -> Find:
+        """As others are told of it."""
+        a, b, c, d = self.covariance.ravel().tolist()
+        x, y = self.place.tolist()
+        z = self.heights / self.count
+        return Find(finder, self.number, self.last_ns, (x, y, z), (a, b, c, d), self.count)
+
+
+@dataclass
+class Tracks:
+    """Everything that one UAV sees.
+
+    sightings, within_s, spread_m: it is confirmed when seen so often, over `within_s` at least, and
+    placed to a standard deviation of `spread_m` in its worst direction. forget_s: what is not
+    confirmed and not seen again is forgotten.
+    """
+
+    sightings: int = 4
+    within_s: float = 0.5
+    spread_m: float = 2.0
+    forget_s: float = 20.0
+    tracks: list[Track] = field(default_factory=list)
+
+    def add(self, sighting: Sighting) -> Track:
+        """Join a sighting to the thing that it fits best, or begin with a new one."""
+        now = sighting.time_ns
+        self.tracks = [
+            t for t in self.tracks if t.number or now - t.last_ns <= self.forget_s * NS_PER_S
+        ]
+        fitting = [track for track in self.tracks if track.fits(sighting)]
+        if fitting:
+            place = sighting.place[:2]
+            track = min(fitting, key=lambda t: float(np.hypot(*(t.place - place))))
+        else:
+            track = Track(now, now)
+            self.tracks.append(track)
+        track.add(sighting)
+        if not track.number and self._is_sure(track):
+            track.number = 1 + max(each.number for each in self.tracks)
+        return track
+
+    def finds(self, finder: str) -> list[Find]:
+        """All that are confirmed, by number."""
+        sure = sorted((t for t in self.tracks if t.number), key=lambda t: t.number)
+        return [track.find(finder) for track in sure]
+
+    def _is_sure(self, track: Track) -> bool:
+        lasted = track.last_ns - track.first_ns >= self.within_s * NS_PER_S
+        spread = math.sqrt(float(np.linalg.eigvalsh(track.covariance)[-1]))
+        return track.count >= self.sightings and lasted and spread <= self.spread_m

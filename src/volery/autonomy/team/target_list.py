@@ -1,0 +1,132 @@
+"""What has been found: the finds of all UAVs, and which of them are the same thing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.graph.messages import Point, header, message_type, stamp_of
+
+Array = NDArray[np.float64]
+
+TYPE = "volery_interfaces/msg/Target"
+_TOLD = 2
+"""Of the newest finds, and of the others, so many stand in a report. Modelling choice."""
+_LEAST_M = 0.1
+"""Standard deviation that no place is better than: maps of two UAVs differ. Modelling choice."""
+
+
+class Find(NamedTuple):
+    """A target as one UAV knows it."""
+
+    finder: str
+    number: int
+    stamp_ns: int
+    place: tuple[float, float, float]
+    """m, map."""
+    covariance: tuple[float, float, float, float]
+    """Of x and y, m^2."""
+    sightings: int
+
+    @classmethod
+    def from_message(cls, message: Any) -> Find:
+        """Of a `Target`."""
+        p = message.position
+        a, b, c, d = map(float, message.covariance)
+        return cls(
+            message.finder,
+            int(message.number),
+            stamp_of(message),
+            (p.x, p.y, p.z),
+            (a, b, c, d),
+            int(message.sightings),
+        )
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether its numbers can be those of a find."""
+        a, b, c, d = self.covariance
+        finite = bool(np.isfinite([*self.place, *self.covariance]).all())
+        return finite and a >= 0.0 and d >= 0.0 and a * d >= b * c
+
+    def message(self) -> Any:
+        """As a `Target`."""
+        return message_type(TYPE)(
+            header(self.stamp_ns, "map"),
+            self.finder,
+            self.number,
+            Point(*self.place),
+            np.array(self.covariance),
+            self.sightings,
+        )
+
+
+@dataclass
+class TargetList:
+    """Finds by finder and number; the newest of each counts, in whatever order they come.
+
+    gate_m: finds nearer to each other than this are of one thing.
+    """
+
+    gate_m: float
+    finds: dict[tuple[str, int], Find] = field(default_factory=dict)
+
+    def take(self, finds: Iterable[Find]) -> bool:
+        """Take finds in; whether one of them told something new."""
+        changed = False
+        for find in finds:
+            if not find.is_sound:
+                continue
+            key = find.finder, find.number
+            if key not in self.finds or self.finds[key].stamp_ns < find.stamp_ns:
+                self.finds[key], changed = find, True
+        return changed
+
+    def to_tell(self, turn: int) -> list[Any]:
+        """Some finds as messages: the newest ones, and as many of the others as have their turn.
+
+        A report that held all would fill the radio's channel; after some turns all have been told.
+        """
+        keys = sorted(self.finds, key=lambda key: (-self.finds[key].stamp_ns, key))
+        newest, others = keys[:_TOLD], sorted(keys[_TOLD:])
+        first = turn * _TOLD % max(len(others), 1)
+        in_turn = (others[first:] + others[:first])[:_TOLD]
+        return [self.finds[key].message() for key in (*newest, *in_turn)]
+
+    def targets(self) -> list[Find]:
+        """One for each thing: its finds joined, weighted by their covariances."""
+        groups: list[list[Find]] = []
+        for key in sorted(self.finds):
+            find = self.finds[key]
+            for group in groups:
+                if np.hypot(*np.subtract(find.place[:2], group[0].place[:2])) <= self.gate_m:
+                    group.append(find)
+                    break
+            else:
+                groups.append([find])
+        return [_joined(group) for group in groups]
+
+
+def _joined(group: list[Find]) -> Find:
+    """One find of several of the same thing, under the name of the first."""
+    if len(group) == 1:
+        return group[0]
+    information, weighted, height = np.zeros((2, 2)), np.zeros(2), 0.0
+    for find in group:
+        weight = np.linalg.inv(np.reshape(find.covariance, (2, 2)) + _LEAST_M**2 * np.eye(2))
+        information += weight
+        weighted += weight @ find.place[:2]
+        height += find.place[2] / len(group)
+    covariance = np.linalg.inv(information)
+    x, y = covariance @ weighted
+    a, b, c, d = covariance.ravel().tolist()
+    return group[0]._replace(
+        stamp_ns=max(find.stamp_ns for find in group),
+        place=(float(x), float(y), float(height)),
+        covariance=(a, b, c, d),
+        sightings=sum(find.sightings for find in group),
+    )

@@ -1,0 +1,78 @@
+"""The bench `forest_search`: three UAVs search the Barro Colorado forest, ten times.
+
+Each flight takes five minutes; a tenth of the seeds are flown again by one UAV alone, to tell what
+a team is worth. `quick` flies one minute with one seed.
+"""
+
+from __future__ import annotations
+
+import logging
+import statistics
+from collections.abc import Sequence
+
+import numpy as np
+
+from volery.bench.forest_flight import Search, fly, search_scenario
+from volery.bench.registry import Measured
+
+_LOG = logging.getLogger(__name__)
+_UAVS = 3
+_SEEDS, _SECONDS = range(1, 11), 300.0
+_QUICK_SEEDS, _QUICK_SECONDS = range(1, 2), 60.0
+_TRUNK_M = 0.5
+
+
+def measure(*, quick: bool = False) -> Measured:
+    """Figures of the bench."""
+    seeds, seconds = (_QUICK_SEEDS, _QUICK_SECONDS) if quick else (_SEEDS, _SECONDS)
+    team = []
+    for seed in seeds:
+        team.append(fly(search_scenario(_UAVS, seed, seconds)))
+        _LOG.info("seed %d: %.2f of real time", seed, team[-1].real_time_factor)
+    alone = [fly(search_scenario(1, seed, seconds)) for seed in list(seeds)[:1]]
+    return figures_of(team, alone)
+
+
+def figures_of(team: Sequence[Search], alone: Sequence[Search]) -> Measured:
+    """What flights of a team, and of one UAV with the first of their seeds, come to."""
+    errors = [error for search in team for error in search.ate_rmse_m().values()]
+    distances = [way for search in team for way in search.distances_m().values()]
+    delays = [delay for search in team for delay in search.target_delays_s()]
+    places = [error for search in team for error in search.target_errors_m()]
+    trunks = np.concatenate([search.trunk_errors_m() for search in team])
+    figures = {
+        "realtime_factor": statistics.median(search.real_time_factor for search in team),
+        "realtime_factor_worst": min(search.real_time_factor for search in team),
+        "collisions": float(sum(search.collisions for search in team)),
+        "distance_m_least": min(distances),
+        "distance_m_median": statistics.median(distances),
+        "searched_m2": statistics.median(search.searched_m2() for search in team),
+        "searched_three_to_one": _three_to_one(team, alone),
+        "targets_found": statistics.fmean(len(s.target_errors_m()) for s in team),
+    }
+    failures = {}
+    if errors:
+        figures["ate_rmse_m_median"] = statistics.median(errors)
+        figures["ate_rmse_m_worst"] = max(errors)
+    else:
+        failures["ate_rmse_m_median"] = "nobody told where it thinks it is"
+    if len(trunks):
+        figures["trunks"] = float(len(trunks))
+        figures["trunks_within_half_m"] = float((trunks <= _TRUNK_M).mean())
+    else:
+        failures["trunks_within_half_m"] = "no trunk was seen three times"
+    if delays:
+        figures["target_delay_s_worst"] = max(delays)
+        figures["target_error_m_median"] = statistics.median(places)
+    else:
+        failures["target_delay_s_worst"] = "nothing was found"
+    return Measured(figures, failures)
+
+
+def _three_to_one(team: Sequence[Search], alone: Sequence[Search]) -> float:
+    """Area searched by the team over that of one UAV, of the same seeds in the same time."""
+    ratios = []
+    for three, one in zip(team, alone, strict=False):
+        until_s = min(three.simulated_s, one.simulated_s)
+        ratios.append(three.searched_m2(until_s) / one.searched_m2(until_s))
+    return statistics.median(ratios)

@@ -1,0 +1,139 @@
+"""The bench `ros2`: the ROS 2 door over DDS, with a subscriber in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from typing import Any
+
+import numpy as np
+
+from volery.bench.bridge.latency_figures import fit_line
+from volery.bench.bridge.measuring import in_real_time, stream_ages, stream_scenario
+from volery.bridges.ros2.door import Ros2Door
+from volery.bridges.ros2.environment import Ros2Terms
+from volery.core.errors import VoleryError
+from volery.graph.messages import Header, Time, message_type
+from volery.runtime import Simulation
+from volery.scenario.load import load_scenario
+
+_DOMAIN = 20 + os.getpid() % 80
+_SIZES = (0, 10_000, 100_000, 250_000, 500_000, 1_000_000)
+_IMAGES = 100
+_PERIOD_S = 0.02
+_STREAM_S = 10.0
+_STOPPED_S = 5.0
+_PATIENCE_S = 20.0
+_SETTLED_S = 1.0
+_IMAGE = "sensor_msgs/msg/Image"
+_TOPIC = "/bench/image"
+
+
+def measure() -> dict[str, float]:
+    """Figures of the bench."""
+    with in_real_time(load_scenario("hover")) as (simulation, doors):
+        doors.open(_door())
+        images, lost = _images(simulation)
+    alpha, beta = fit_line(images)
+    figures = {"alpha_s_per_mb": alpha, "beta_s": beta, "images_lost": float(lost)}
+    for size in (0, 100_000, 1_000_000):
+        took = [latency for length, latency in images if length == size]
+        figures[f"one_way_ms_{size // 1000}_kb"] = 1e3 * float(np.median(took))
+    return {**figures, **_streams()}
+
+
+def _door() -> Ros2Door:
+    return Ros2Door(Ros2Terms(domain_id=_DOMAIN))
+
+
+class _Peer:
+    """A subscriber in a process of its own; it tells what came when it is asked."""
+
+    def __init__(self, kind: str, topics: list[str]) -> None:
+        command = [sys.executable, "-m", "volery.bench.ros2_peer", str(_DOMAIN), kind, *topics]
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
+
+    def signal(self, number: int) -> None:
+        """Have it stand still, or go on."""
+        os.kill(self._process.pid, number)
+
+    def finish(self) -> list[tuple[str, int, int, int]]:
+        """Topic, bytes of data, stamp and time of arrival (ns) of all that came."""
+        out, _ = self._process.communicate("\n", timeout=_PATIENCE_S)
+        return [(str(t), int(size), int(stamp), int(at)) for t, size, stamp, at in json.loads(out)]
+
+
+def _images(simulation: Simulation) -> tuple[list[tuple[int, float]], int]:
+    """(bytes, s) of images published by the simulation's thread; and how many did not come."""
+    gateway, image = simulation.gateway, message_type(_IMAGE)
+    publisher = gateway.post(lambda: simulation.graph.advertise(_TOPIC, _IMAGE)).result()
+    peer = _Peer("image", [_TOPIC])
+    _wait_for_subscribers(simulation, [_TOPIC])
+    for size in _SIZES:
+        pixels = np.zeros(size, np.uint8)
+        pixels.flags.writeable = False
+
+        def publish(pixels: Any = pixels) -> None:
+            stamp = Time(*divmod(time.monotonic_ns(), 10**9))
+            width = len(pixels)
+            publisher.publish(image(Header(stamp, ""), 1, width, "mono8", 0, width, pixels))
+
+        for _ in range(_IMAGES):
+            gateway.post(publish)
+            time.sleep(_PERIOD_S)
+    time.sleep(_SETTLED_S)
+    came = [(size, 1e-9 * (at - stamp)) for _, size, stamp, at in peer.finish()]
+    return came, _IMAGES * len(_SIZES) - len(came)
+
+
+def _streams() -> dict[str, float]:
+    """Scans of ten UAVs to one subscriber; then another one that stands still."""
+    with in_real_time(stream_scenario()) as (simulation, doors):
+        doors.open(_door())
+        topics = [
+            f"/{uav}/laser/{name}/scan"
+            for uav in simulation.uav_names
+            for name in ("horizontal", "nodding")
+        ]
+        published: dict[tuple[str, int], int] = {}
+
+        def note(message: Any) -> None:
+            stamp = message.message.header.stamp
+            published[message.topic, stamp.sec * 10**9 + stamp.nanosec] = time.monotonic_ns()
+
+        for topic in topics:
+            simulation.post(lambda t=topic: simulation.graph.subscribe(t, note)).result()  # type: ignore[misc]
+        peer = _Peer("scan", topics)
+        _wait_for_subscribers(simulation, topics, least=2)
+        factor = _real_time_factor(simulation, _STREAM_S)
+        got = [(topic, stamp, at) for topic, _, stamp, at in peer.finish()]
+        figures = {**stream_ages([got], dict(published)), "stream_real_time_factor": factor}
+        stopped = _Peer("scan", topics)
+        _wait_for_subscribers(simulation, topics, least=2)
+        stopped.signal(signal.SIGSTOP)
+        figures["stopped_real_time_factor"] = _real_time_factor(simulation, _STOPPED_S)
+        stopped.signal(signal.SIGCONT)
+        stopped.finish()
+    return figures
+
+
+def _real_time_factor(simulation: Simulation, wall_s: float) -> float:
+    before_s, began_s = simulation.time_s, time.perf_counter()
+    time.sleep(wall_s)
+    return (simulation.time_s - before_s) / (time.perf_counter() - began_s)
+
+
+def _wait_for_subscribers(simulation: Simulation, topics: list[str], least: int = 1) -> None:
+    """Until each topic has so many, and a moment more for DDS to match both sides."""
+    end = time.monotonic() + _PATIENCE_S
+    wanted = set(topics)
+    while wanted - {t.name for t in simulation.graph.topics() if t.subscribers >= least}:
+        if time.monotonic() > end:
+            raise VoleryError(f"nobody subscribed within {_PATIENCE_S:.0f} s")
+        time.sleep(0.02)
+    time.sleep(_SETTLED_S)

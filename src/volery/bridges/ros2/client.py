@@ -1,0 +1,309 @@
+"""A program's part in a ROS 2 graph, with the methods of `graph.session.Session`.
+
+    link = Ros2Client(Ros2Terms(domain_id=7), "/uav1/gap_following")
+    mailbox = link.subscribe("/uav1/laser/horizontal/scan", wake=woken.set)
+
+A node that runs on it (`volery node ... --via ros2`) is a ROS 2 node of its own name, with its
+parameters.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from volery.bridges.ros2.complaints import Complaints
+from volery.bridges.ros2.environment import Ros2Terms, join_ros2
+from volery.bridges.ros2.middleware import (
+    Caller,
+    Handle,
+    Profile,
+    ServiceSpec,
+    TopicSpec,
+    Writer,
+)
+from volery.bridges.ros2.names import NodeName, check_name
+from volery.bridges.ros2.parameters import ParameterServices
+from volery.bridges.ros2.services import answerer, ask_server, wait_for
+from volery.bridges.ros2.subscriptions import Subscriptions
+from volery.bridges.ros2.worker import Worker
+from volery.core.errors import GraphError
+from volery.graph.cdr import encode_cdr
+from volery.graph.mailbox import Mailbox, Wake
+from volery.graph.messages import message_type, type_name
+from volery.graph.parameters import Parameters
+from volery.graph.qos import DEFAULT_DEPTH, check_depth
+from volery.graph.reply import Reply
+from volery.graph.session import Handler, SessionInfo
+from volery.graph.zero import zero_message
+
+_FIRST_LOOK_S = 1.0
+"""How long others may take to be found, after joining."""
+_LONGEST_LOOK_S = 3.0
+_LATCHED_DEPTH = 1
+_PUBLISHED_DEPTH = 100
+
+
+class Ros2Client:
+    """One participant in a ROS 2 graph as a `graph.link.Link`.
+
+    name: of the ROS 2 node that it is until a node of ours says what it is called.
+    `BridgeError` where the graph cannot be joined.
+    """
+
+    def __init__(self, terms: Ros2Terms | None = None, name: str = "/volery_node") -> None:
+        check_name(name)
+        self._participant = join_ros2(terms or Ros2Terms())
+        self._joined = time.monotonic()
+        self.name = f"ROS 2 node {name}"
+        self._node = NodeName.of(name)
+        self._named = False
+        self._participant.add_node(self._node)
+        self._participant.announce()
+        self._worker = Worker()
+        self._complaints = Complaints()
+        self._lock = threading.RLock()
+        self._publishers: dict[str, _Publisher] = {}
+        self._subscriptions = Subscriptions(self._participant, self._node)
+        self._servers: dict[str, Handle] = {}
+        self._callers: dict[str, tuple[ServiceSpec, Caller]] = {}
+        self._parameters: ParameterServices | None = None
+        self._closed = False
+        self._participant.when_changed(lambda: self._worker.post(self._adapt))
+
+    def host_node(self, name: str, parameters: Parameters, post: Callable[[Any], Any]) -> None:
+        """Be the ROS 2 node of this name, with its parameters, which are set through `post`."""
+        check_name(name)
+
+        def set_value(node: str, parameter: str, value: Any, done: Callable[[str], None]) -> None:
+            def set_it() -> None:
+                try:
+                    parameters.get(node, parameter).set(value)
+                except GraphError as error:
+                    done(str(error))
+                else:
+                    done("")
+
+            post(set_it)
+
+        node = NodeName.of(name)
+        if not self._named:
+            self._participant.remove_node(self._node)
+            self._named = True
+        self._participant.add_node(node)
+        self._node, self.name = node, f"ROS 2 node {name}"
+        self._subscriptions.move(node)
+        if self._parameters is None:
+            self._parameters = ParameterServices(
+                self._participant, parameters, set_value, node, self._worker, time.time_ns
+            )
+        self._parameters.survey()
+        self._participant.announce()
+
+    # ------------------------------------------------------------------------------------ topics
+
+    def topic_types(self) -> dict[str, str]:
+        """Topics that others publish, and their types."""
+        self._look_around()
+        return {p.topic: p.msgtype for p in self._participant.publishers()}
+
+    def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
+        """Announce that messages will be published on `topic`. `GraphError` for a wrong type."""
+        check_name(topic)
+        _known(msgtype)
+        depth = _LATCHED_DEPTH if latched else _PUBLISHED_DEPTH
+        with self._lock:
+            self._check_open()
+            old = self._publishers.get(topic)
+            if old is not None and (old.msgtype, old.latched) == (msgtype, latched):
+                return
+            if old is not None:
+                old.writer.close()
+            spec = TopicSpec(self._node, topic, msgtype, Profile(latched=latched, depth=depth))
+            self._publishers[topic] = _Publisher(self._participant.writer(spec), msgtype, latched)
+        self._participant.announce()
+
+    def unadvertise(self, topic: str) -> None:
+        """Publish on `topic` no more. `GraphError` if it was not announced."""
+        with self._lock:
+            publisher = self._publishers.pop(topic, None)
+        if publisher is None:
+            raise GraphError(f"{self.name} does not publish '{topic}'")
+        publisher.writer.close()
+        self._participant.announce()
+
+    def published_type(self, topic: str) -> str | None:
+        """Type that was announced for `topic`; None if none was."""
+        publisher = self._publishers.get(topic)
+        return None if publisher is None else publisher.msgtype
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Publish a message of the announced type."""
+        publisher = self._publishers.get(topic)
+        if publisher is None:
+            raise GraphError(f"{self.name} has not advertised '{topic}'")
+        if type_name(type(message)) != publisher.msgtype:
+            raise GraphError(f"topic '{topic}' carries {publisher.msgtype}")
+        if publisher.latched or publisher.writer.matched:
+            publisher.writer.write(encode_cdr(message, publisher.msgtype))
+
+    def subscribe(
+        self,
+        topic: str,
+        msgtype: str | None = None,
+        *,
+        depth: int = DEFAULT_DEPTH,
+        reliable: bool = False,
+        wake: Wake,
+    ) -> Mailbox:
+        """Begin to receive `topic`, which must be published somewhere or be given a type.
+
+        The middleware delivers reliably what all publishers offer so, whatever `reliable` says of
+        the mailbox. The time of a message is that of its arrival, by the computer's clock.
+        """
+        check_depth(depth)
+        check_name(topic)
+        found = msgtype or self._type_of(topic)
+        _known(found)
+        mailbox = Mailbox(topic, depth, wake, reliable=reliable)
+        with self._lock:
+            self._check_open()
+            self._subscriptions.open(mailbox, found, depth)
+        self._participant.announce()
+        return mailbox
+
+    def unsubscribe(self, mailbox: Mailbox) -> None:
+        """Receive no more; what waits can still be taken."""
+        self._subscriptions.close(mailbox)
+        self._participant.announce()
+
+    def _type_of(self, topic: str) -> str:
+        found = self.topic_types().get(topic)
+        if found is None:
+            raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
+        return found
+
+    def _adapt(self) -> None:
+        self._subscriptions.adapt()
+        self._participant.announce()
+
+    # ---------------------------------------------------------------------------------- services
+
+    def service_types(self) -> dict[str, str]:
+        """Services that others offer, and their types."""
+        self._look_around()
+        return dict(self._participant.service_types())
+
+    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+        """Call a service; `reply` gets the response or a `GraphError`, in another thread."""
+
+        def ask() -> None:
+            try:
+                spec, caller = self._caller(service)
+                wanted = f"{spec.srvtype}_Request"
+                question = zero_message(wanted) if request is None else request
+                if type_name(type(question)) != wanted:
+                    raise GraphError(f"service '{service}' takes {wanted}")
+                ask_server(caller, spec, question, reply)
+            except GraphError as error:
+                reply.fail(error)
+
+        threading.Thread(target=ask, name=f"volery-ros2 {service}", daemon=True).start()
+
+    def _caller(self, service: str) -> tuple[ServiceSpec, Caller]:
+        """A client of a service that is there. `GraphError` where nobody offers it in time."""
+        with self._lock:
+            known = self._callers.get(service)
+        if known is not None:
+            return known
+        check_name(service)
+        types = self._participant.service_types
+        if not wait_for(lambda: service in types(), _LONGEST_LOOK_S):
+            raise GraphError(f"nobody offers service '{service}'")
+        srvtype = types()[service]
+        _known(f"{srvtype}_Request")
+        with self._lock:
+            self._check_open()
+            spec = ServiceSpec(self._node, service, srvtype)
+            if service not in self._callers:
+                self._callers[service] = spec, self._participant.caller(spec)
+            return self._callers[service]
+
+    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+        """Offer a service; `handler(request, reply)` is called in a thread of the link's."""
+        check_name(service)
+        _known(f"{srvtype}_Request")
+        with self._lock:
+            self._check_open()
+            if service in self._servers:
+                raise GraphError(f"{self.name} offers service '{service}' already")
+            take = answerer(self._worker, srvtype, handler, self._complaints)
+            spec = ServiceSpec(self._node, service, srvtype)
+            self._servers[service] = self._participant.server(spec, take)
+        self._participant.announce()
+
+    def withdraw(self, service: str) -> None:
+        """Offer a service no more. `GraphError` if it was not offered."""
+        with self._lock:
+            server = self._servers.pop(service, None)
+        if server is None:
+            raise GraphError(f"{self.name} does not offer service '{service}'")
+        server.close()
+        self._participant.announce()
+
+    # --------------------------------------------------------------------------------------- end
+
+    def close(self) -> None:
+        """Leave the graph with everything; a second time nothing happens."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+        with contextlib.suppress(RuntimeError):
+            self._worker.close()
+        handles: list[Handle] = [p.writer for p in self._publishers.values()]
+        handles += [*self._servers.values(), *(caller for _, caller in self._callers.values())]
+        for handle in handles:
+            handle.close()
+        self._subscriptions.close_all()
+        if self._parameters is not None:
+            self._parameters.close()
+        self._participant.close()
+
+    @property
+    def info(self) -> SessionInfo:
+        """What the client does at present."""
+        with self._lock:
+            return SessionInfo(
+                self.name,
+                tuple(self._publishers),
+                self._subscriptions.infos,
+                tuple(self._servers),
+            )
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise GraphError(f"{self.name} has left")
+
+    def _look_around(self) -> None:
+        """Give others time to be found, when it is too early for a list of them."""
+        time.sleep(max(self._joined + _FIRST_LOOK_S - time.monotonic(), 0.0))
+
+
+class _Publisher:
+    """A publisher on a topic."""
+
+    def __init__(self, writer: Writer, msgtype: str, latched: bool) -> None:
+        self.writer = writer
+        self.msgtype = msgtype
+        self.latched = latched
+
+
+def _known(msgtype: str) -> None:
+    try:
+        message_type(msgtype)
+    except KeyError:
+        raise GraphError(f"message type '{msgtype}' is not known") from None

@@ -1,0 +1,1 @@
+"""ROS 2 over DDS, as rmw_cyclonedds maps it."""

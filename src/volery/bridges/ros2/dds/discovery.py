@@ -1,0 +1,113 @@
+"""Who else is there: publishers, subscriptions and services of other participants."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+)
+from cyclonedds.domain import DomainParticipant
+
+from volery.bridges.ros2.dds.listening import Ear
+from volery.bridges.ros2.dds.qos import profile_of, user_data_of
+from volery.bridges.ros2.middleware import Profile, RemotePublisher
+from volery.bridges.ros2.names import ros_type, service_of, topic_of
+
+_ALIVE = 16
+"""DDS_ALIVE_INSTANCE_STATE."""
+_REQUEST = "_Request"
+
+
+_HASH = re.compile(rb"typehash=(RIHS\d+_\w+);")
+
+
+class Endpoint(NamedTuple):
+    """A reader or writer of somebody else."""
+
+    dds_topic: str
+    msgtype: str
+    profile: Profile
+    user_data: bytes
+
+
+class Discovery:
+    """Keeps track of the endpoints of others."""
+
+    def __init__(self, participant: DomainParticipant, ear: Ear) -> None:
+        self._own = participant.guid
+        self._lock = threading.Lock()
+        self._writers: dict[Any, Endpoint] = {}
+        self._readers: dict[Any, Endpoint] = {}
+        self._told: list[Callable[[], None]] = []
+        self._sources = []
+        for topic, known in (
+            (BuiltinTopicDcpsPublication, self._writers),
+            (BuiltinTopicDcpsSubscription, self._readers),
+        ):
+            source = BuiltinDataReader(participant, topic)
+            self._sources.append(source)
+            ear.listen(source, self._taker(known))
+
+    def when_changed(self, tell: Callable[[], None]) -> None:
+        """Have `tell` called when others come or go."""
+        self._told.append(tell)
+
+    def publishers(self) -> list[RemotePublisher]:
+        """Publishers of others on topics of ROS 2."""
+        with self._lock:
+            writers = tuple(self._writers.values())
+        named = ((topic_of(w.dds_topic), w) for w in writers)
+        return [
+            RemotePublisher(topic, w.msgtype, w.profile, _hash_in(w.user_data))
+            for topic, w in named
+            if topic
+        ]
+
+    def service_types(self) -> dict[str, str]:
+        """Services that others offer."""
+        with self._lock:
+            readers = tuple(self._readers.values())
+        found = {}
+        for reader in readers:
+            service = service_of(reader.dds_topic)
+            if service and reader.msgtype.endswith(_REQUEST):
+                found[service] = reader.msgtype[: -len(_REQUEST)]
+        return found
+
+    def _taker(self, known: dict[Any, Endpoint]) -> Callable[[list[Any]], None]:
+        def take(samples: list[Any]) -> None:
+            changed = False
+            for sample in samples:
+                alive = sample.sample_info.instance_state == _ALIVE
+                if alive and sample.sample_info.valid_data:
+                    changed |= self._meet(known, sample)
+                elif not alive:
+                    with self._lock:
+                        changed |= known.pop(sample.key, None) is not None
+            if changed:
+                for tell in tuple(self._told):
+                    tell()
+
+        return take
+
+    def _meet(self, known: dict[Any, Endpoint], sample: Any) -> bool:
+        msgtype = ros_type(sample.type_name or "")
+        if sample.participant_key == self._own or msgtype is None:
+            return False
+        endpoint = Endpoint(
+            sample.topic_name, msgtype, profile_of(sample.qos), user_data_of(sample.qos)
+        )
+        with self._lock:
+            known[sample.key] = endpoint
+        return True
+
+
+def _hash_in(user_data: bytes) -> str | None:
+    found = _HASH.search(user_data)
+    return None if found is None else found[1].decode()

@@ -1,0 +1,96 @@
+"""DDS domains: which interfaces they use, and one configuration of each in a process."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from xml.sax.saxutils import quoteattr
+
+from cyclonedds.core import DDSException
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.qos import Policy, Qos
+
+from volery.bridges.ros2.dds import library
+from volery.bridges.ros2.dds.confining import confine
+from volery.core.errors import BridgeError
+
+_ENCLAVE = b"enclave=/;"
+"""Security enclave of the participant, as rmw tells it."""
+_MOST_PARTICIPANTS = 32
+"""On one machine without multicast: what rmw_cyclonedds probes for with LOCALHOST discovery."""
+_RECEIVE_BUFFER = "4 MiB"
+"""Where the system allows it: a picture of 1 MB in pieces overruns the usual 208 KiB."""
+
+_lock = threading.Lock()
+_domains: dict[int, tuple[Domain, str, int]] = {}
+"""Domains in use: their configuration and how many participants they have here."""
+
+
+def configuration(interfaces: Sequence[str] = (), lease_s: float = 10.0) -> str:
+    """Configuration of Cyclone DDS in XML.
+
+    interfaces: names or addresses; with none, peers are looked for on this machine alone, through
+    loopback without multicast, which many systems do not have there. lease_s: after how long of
+    silence others take a participant for gone.
+    """
+    if interfaces:
+        chosen = "".join(f"<NetworkInterface {_called(name)}/>" for name in interfaces)
+        how, peers = "", ""
+    else:
+        chosen = '<NetworkInterface address="127.0.0.1"/>'
+        how = "<AllowMulticast>false</AllowMulticast>"
+        peers = (
+            "<ParticipantIndex>auto</ParticipantIndex>"
+            f"<MaxAutoParticipantIndex>{_MOST_PARTICIPANTS}</MaxAutoParticipantIndex>"
+            '<Peers><Peer address="localhost"/></Peers>'
+        )
+    lease = f"<LeaseDuration>{lease_s:g} s</LeaseDuration>"
+    return (
+        '<CycloneDDS><Domain id="any">'
+        f"<General><Interfaces>{chosen}</Interfaces>{how}</General>"
+        f"<Discovery>{lease}{peers}</Discovery>"
+        f'<Internal><SocketReceiveBufferSize max="{_RECEIVE_BUFFER}"/></Internal>'
+        "</Domain></CycloneDDS>"
+    )
+
+
+def _called(interface: str) -> str:
+    key = "address" if interface.replace(".", "").isdecimal() or ":" in interface else "name"
+    return f"{key}={quoteattr(interface)}"
+
+
+def join_domain(domain_id: int, interfaces: Sequence[str]) -> DomainParticipant:
+    """A new participant. `BridgeError` where the domain cannot be joined like this."""
+    config = configuration(interfaces)
+    with _lock:
+        known = _domains.get(domain_id)
+        if known is not None and known[1] != config:
+            raise BridgeError(
+                f"DDS domain {domain_id} is in use in this process with other interfaces"
+            )
+        domain = None
+        try:
+            domain = known[0] if known else Domain(domain_id, config)
+            participant = DomainParticipant(domain_id, qos=Qos(Policy.Userdata(data=_ENCLAVE)))
+        except DDSException as error:
+            if domain is not None and known is None:
+                library.delete(domain)
+            raise BridgeError(
+                f"cannot join DDS domain {domain_id}: {error}. Do the interfaces exist, and do "
+                f"fewer than {_MOST_PARTICIPANTS} other programs of this machine take part?"
+            ) from None
+        if not interfaces:
+            confine(domain_id)
+        _domains[domain_id] = (domain, config, 1 + (known[2] if known else 0))
+        return participant
+
+
+def leave_domain(domain_id: int, participant: DomainParticipant) -> None:
+    """Delete a participant, and with the last one the domain."""
+    with _lock:
+        library.delete(participant)
+        domain, config, count = _domains.pop(domain_id)
+        if count > 1:
+            _domains[domain_id] = (domain, config, count - 1)
+        else:
+            library.delete(domain)

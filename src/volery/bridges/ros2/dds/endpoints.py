@@ -1,0 +1,247 @@
+"""Publishers, subscriptions, and the two halves of services, as rmw_cyclonedds makes them."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import random
+import struct
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+
+from volery.bridges.ros2.dds import library
+from volery.bridges.ros2.dds.idl_types import message_struct, request_struct
+from volery.bridges.ros2.dds.listening import Ear
+from volery.bridges.ros2.dds.qos import qos_of
+from volery.bridges.ros2.dds.records import Record
+from volery.bridges.ros2.middleware import (
+    ServiceSpec,
+    TakeMessage,
+    TakeRequest,
+    TopicSpec,
+)
+from volery.bridges.ros2.names import NodeName, dds_reply_topic, dds_request_topic, dds_topic
+from volery.bridges.ros2.profiles import SERVICES
+from volery.bridges.ros2.type_hashes import message_hash
+
+_HEADER = struct.Struct("<Qq")
+"""rmw_cyclonedds' cdds_request_header_t: whose question, and its number."""
+_CDR_HEADER = 4
+_LONGEST_WAIT_S = 0.1
+_PAUSE_S = 0.001
+_MOST_WAITING = 1000
+"""Questions of one client that have no answer yet; the oldest is given up beyond."""
+
+
+class Place:
+    """What endpoints are made of: the participant, its ear and its record."""
+
+    def __init__(self, participant: DomainParticipant, ear: Ear, record: Record) -> None:
+        self.participant = participant
+        self.ear = ear
+        self.record = record
+
+
+class DdsWriter:
+    """A publisher."""
+
+    def __init__(self, place: Place, spec: TopicSpec) -> None:
+        user_data = f"typehash={message_hash(spec.msgtype)};".encode()
+        topic = Topic(place.participant, dds_topic(spec.topic), message_struct(spec.msgtype))
+        self._half = _Half(place, spec.node)
+        self._writer = self._half.writer(topic, qos_of(spec.profile, user_data))
+
+    @property
+    def matched(self) -> bool:
+        """Whether anybody subscribes."""
+        return library.subscriptions(self._writer) > 0
+
+    def write(self, cdr: bytes) -> None:
+        """Send one message."""
+        library.write(self._writer, cdr)
+
+    def close(self) -> None:
+        """Publish no more."""
+        self._half.close()
+
+
+class DdsReader:
+    """A subscription."""
+
+    def __init__(self, place: Place, spec: TopicSpec, take: TakeMessage) -> None:
+        user_data = f"typehash={message_hash(spec.msgtype)};".encode()
+        topic = Topic(place.participant, dds_topic(spec.topic), message_struct(spec.msgtype))
+        self._half = _Half(place, spec.node)
+        self._half.reader(topic, qos_of(spec.profile, user_data), take)
+
+    def close(self) -> None:
+        """Subscribe no more."""
+        self._half.close()
+
+
+class DdsServer:
+    """A service on offer."""
+
+    def __init__(self, place: Place, spec: ServiceSpec, take: TakeRequest) -> None:
+        requests, replies = _topics(place, spec)
+        self._half = _Half(place, spec.node)
+        qos = qos_of(SERVICES, _identity("serviceid"))
+        self._writer = self._half.writer(replies, qos)
+        self._take = take
+        self._missed = (0, 0)
+        self._reader = self._half.reader(requests, qos, self._on_request)
+
+    def close(self) -> None:
+        """Offer it no more."""
+        self._half.close()
+
+    def _on_request(self, data: bytes) -> None:
+        header = data[_CDR_HEADER : _CDR_HEADER + _HEADER.size]
+
+        def answer(cdr: bytes) -> None:
+            self._wait_for_listeners()
+            library.write(self._writer, cdr[:_CDR_HEADER] + header + cdr[_CDR_HEADER:])
+
+        self._take(_without_header(data), answer)
+
+    def _wait_for_listeners(self) -> None:
+        """Wait until whoever asked can hear: its two halves are not discovered at once.
+
+        rmw_cyclonedds does so too, and as long. Who is waited for in vain is so only once.
+        """
+        end_s = time.monotonic() + _LONGEST_WAIT_S
+        while (halves := self._halves()) != self._missed and halves[0] < halves[1]:
+            if time.monotonic() > end_s:
+                self._missed = halves
+            time.sleep(_PAUSE_S)
+
+    def _halves(self) -> tuple[int, int]:
+        """How many can hear answers, and how many can ask."""
+        return library.subscriptions(self._writer), library.publications(self._reader)
+
+
+class DdsCaller:
+    """A client of a service."""
+
+    def __init__(self, place: Place, spec: ServiceSpec) -> None:
+        requests, replies = _topics(place, spec)
+        self._half = _Half(place, spec.node)
+        qos = qos_of(SERVICES, _identity("clientid"))
+        self._writer = self._half.writer(requests, qos)
+        self._guid = random.SystemRandom().getrandbits(64)
+        self._numbers = itertools.count(1)
+        self._waiting: dict[int, tuple[TakeMessage, Callable[[], None]]] = {}
+        self._lock = threading.Lock()
+        self._reader = self._half.reader(replies, qos, self._on_reply)
+
+    @property
+    def ready(self) -> bool:
+        """Whether a server is there, both halves of it."""
+        halves = library.subscriptions(self._writer), library.publications(self._reader)
+        return min(halves) > 0
+
+    def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
+        """Send a request."""
+        number = next(self._numbers)
+        with self._lock:
+            self._waiting[number] = (on_response, on_loss)
+            lost = len(self._waiting) > _MOST_WAITING and self._waiting.pop(min(self._waiting))
+        if lost:
+            lost[1]()
+        header = _HEADER.pack(self._guid, number)
+        library.write(self._writer, request[:_CDR_HEADER] + header + request[_CDR_HEADER:])
+
+    def give_up(self) -> None:
+        """Tell all who wait that no answer will come, if there is no server any more."""
+        if self._waiting and not self.ready:
+            with self._lock:
+                waiting, self._waiting = tuple(self._waiting.values()), {}
+            for _, on_loss in waiting:
+                on_loss()
+
+    def close(self) -> None:
+        """Call no more."""
+        self._half.close()
+        with self._lock:
+            waiting, self._waiting = tuple(self._waiting.values()), {}
+        for _, on_loss in waiting:
+            on_loss()
+
+    def _on_reply(self, data: bytes) -> None:
+        guid, number = _HEADER.unpack_from(data, _CDR_HEADER)
+        if guid != self._guid:
+            return  # somebody else's
+        with self._lock:
+            waiting = self._waiting.pop(number, None)
+        if waiting is not None:
+            waiting[0](_without_header(data))
+
+
+class _Half:
+    """The entities of one endpoint, which come and go together."""
+
+    def __init__(self, place: Place, node: NodeName) -> None:
+        self._place = place
+        self._node = node
+        self._entities: list[tuple[Any, bool]] = []
+        self._topics: list[Any] = []
+        self._numbers: list[int] = []
+
+    def writer(self, topic: Topic, qos: Any) -> Any:
+        """A writer of the node's."""
+        return self._add(topic, DataWriter(self._place.participant, topic, qos=qos), writes=True)
+
+    def reader(self, topic: Topic, qos: Any, take: TakeMessage) -> Any:
+        """A reader of the node's; `take` gets the bytes of each sample."""
+        reader = DataReader(self._place.participant, topic, qos=qos)
+
+        def take_all(samples: list[Any]) -> None:
+            for sample in samples:
+                if sample.sample_info.valid_data:  # else it only tells that a writer has left
+                    take(sample.cdr)
+
+        self._numbers.append(self._place.ear.listen(reader, take_all))
+        return self._add(topic, reader, writes=False)
+
+    def _add(self, topic: Topic, entity: Any, *, writes: bool) -> Any:
+        self._topics.append(topic)
+        self._entities.append((entity, writes))
+        self._place.record.add(self._node, entity, writes=writes)
+        return entity
+
+    def close(self) -> None:
+        """Delete them; nothing happens a second time."""
+        while self._numbers:
+            self._place.ear.forget(self._numbers.pop())
+        while self._entities:
+            entity, writes = self._entities.pop()
+            self._place.record.remove(self._node, entity, writes=writes)
+            library.delete(entity)
+        while self._topics:
+            library.delete(self._topics.pop())
+
+
+def _topics(place: Place, spec: ServiceSpec) -> tuple[Topic, Topic]:
+    """Topics of a service's requests and replies."""
+    requests = request_struct(f"{spec.srvtype}_Request")
+    responses = request_struct(f"{spec.srvtype}_Response")
+    return (
+        Topic(place.participant, dds_request_topic(spec.service), requests),
+        Topic(place.participant, dds_reply_topic(spec.service), responses),
+    )
+
+
+def _identity(word: str) -> bytes:
+    """How rmw_cyclonedds tells which halves belong together: `clientid=1.2f. ... ;`."""
+    return f"{word}={'.'.join(f'{byte:x}' for byte in os.urandom(16))};".encode()
+
+
+def _without_header(data: bytes) -> bytes:
+    return data[:_CDR_HEADER] + data[_CDR_HEADER + _HEADER.size :]

@@ -1,0 +1,103 @@
+"""A participant in a ROS 2 graph over DDS; a `middleware.Participant`."""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from collections.abc import Callable, Mapping, Sequence
+
+from volery.bridges.ros2.dds.discovery import Discovery
+from volery.bridges.ros2.dds.domain import join_domain, leave_domain
+from volery.bridges.ros2.dds.endpoints import DdsCaller, DdsReader, DdsServer, DdsWriter, Place
+from volery.bridges.ros2.dds.listening import Ear
+from volery.bridges.ros2.dds.records import Record
+from volery.bridges.ros2.middleware import (
+    RemotePublisher,
+    ServiceSpec,
+    TakeMessage,
+    TakeRequest,
+    TopicSpec,
+)
+from volery.bridges.ros2.names import NodeName
+
+
+class DdsParticipant:
+    """One process's part in a domain.
+
+    Parameters
+    ----------
+    domain_id
+        ROS_DOMAIN_ID.
+    interfaces
+        Network interfaces by name or address; with none, this machine alone.
+
+    """
+
+    def __init__(self, domain_id: int, interfaces: Sequence[str] = ()) -> None:
+        self._domain_id = domain_id
+        self._participant = join_domain(domain_id, tuple(interfaces))
+        reach = ", ".join(interfaces) or "this machine"
+        self.where = f"DDS domain {domain_id} ({reach})"
+        self._callers: weakref.WeakSet[DdsCaller] = weakref.WeakSet()
+        self._lock = threading.Lock()
+        self._ear = Ear(self._participant, self._check_callers)
+        self._record = Record(self._participant)
+        self._place = Place(self._participant, self._ear, self._record)
+        self._discovery = Discovery(self._participant, self._ear)
+        self._closed = False
+
+    def add_node(self, node: NodeName) -> None:
+        """Have a node appear with the next `announce`."""
+        self._record.add_node(node)
+
+    def remove_node(self, node: NodeName) -> None:
+        """Have a node disappear with the next `announce`."""
+        self._record.remove_node(node)
+
+    def announce(self) -> None:
+        """Publish which nodes there are and what they have."""
+        self._record.publish()
+
+    def writer(self, spec: TopicSpec) -> DdsWriter:
+        """Publish."""
+        return DdsWriter(self._place, spec)
+
+    def reader(self, spec: TopicSpec, take: TakeMessage) -> DdsReader:
+        """Subscribe."""
+        return DdsReader(self._place, spec, take)
+
+    def server(self, spec: ServiceSpec, take: TakeRequest) -> DdsServer:
+        """Offer a service."""
+        return DdsServer(self._place, spec, take)
+
+    def caller(self, spec: ServiceSpec) -> DdsCaller:
+        """Become a client of a service."""
+        caller = DdsCaller(self._place, spec)
+        with self._lock:
+            self._callers.add(caller)
+        return caller
+
+    def publishers(self) -> list[RemotePublisher]:
+        """Publishers of others."""
+        return self._discovery.publishers()
+
+    def service_types(self) -> Mapping[str, str]:
+        """Services that others offer, and their types."""
+        return self._discovery.service_types()
+
+    def when_changed(self, tell: Callable[[], None]) -> None:
+        """Have `tell` called when others come or go."""
+        self._discovery.when_changed(tell)
+
+    def close(self) -> None:
+        """Leave the graph with everything; a second time nothing happens."""
+        if not self._closed:
+            self._closed = True
+            self._ear.close()
+            leave_domain(self._domain_id, self._participant)
+
+    def _check_callers(self) -> None:
+        with self._lock:
+            callers = tuple(self._callers)
+        for caller in callers:
+            caller.give_up()

@@ -1,0 +1,50 @@
+"""Quality of service as rmw_cyclonedds sets it, and as others offer it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cyclonedds.core import Policy, Qos
+from cyclonedds.util import duration
+
+from volery.bridges.ros2.middleware import Profile
+
+_FOREVER = duration(infinite=True)
+_UNLIMITED = -1
+_SAMPLES_KEPT = 10_000
+"""Of what is latched, in all."""
+
+
+def qos_of(profile: Profile, user_data: bytes = b"") -> Qos:
+    """Policies of a reader or writer; history is keep-last, so that a writer never waits."""
+    history = Policy.History.KeepLast(profile.depth)
+    policies: list[Any] = [
+        Policy.Reliability.Reliable(_FOREVER)
+        if profile.reliable
+        else Policy.Reliability.BestEffort,
+        history,
+        Policy.Durability.TransientLocal if profile.latched else Policy.Durability.Volatile,
+        Policy.WriterDataLifecycle(autodispose=False),
+        Policy.IgnoreLocal.Participant,
+    ]
+    if profile.latched:
+        policies.append(Policy.DurabilityService(0, history, _SAMPLES_KEPT, _UNLIMITED, _UNLIMITED))
+    if user_data:
+        policies.append(Policy.Userdata(data=user_data))
+    return Qos(*policies)
+
+
+def profile_of(qos: Qos) -> Profile:
+    """What a writer of somebody else offers."""
+    reliability = qos[Policy.Reliability]
+    durability = qos[Policy.Durability]
+    return Profile(
+        reliable=reliability is not Policy.Reliability.BestEffort,
+        latched=durability not in (None, Policy.Durability.Volatile),
+    )
+
+
+def user_data_of(qos: Qos) -> bytes:
+    """Words that came with an endpoint: `typehash=...;`."""
+    found = qos[Policy.Userdata]
+    return b"" if found is None else bytes(found.data)

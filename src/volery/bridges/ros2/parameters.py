@@ -1,0 +1,223 @@
+"""Parameters of nodes as ROS 2 asks for them: six services for each node, and their events.
+
+How a value is set is up to whoever owns the parameters: see `SetValue`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from volery.bridges.ros2.complaints import Complaints
+from volery.bridges.ros2.middleware import Handle, Participant, ServiceSpec, TopicSpec
+from volery.bridges.ros2.names import NodeName, check_name
+from volery.bridges.ros2.parameter_values import NOT_SET, plain_of, type_of, value_message
+from volery.bridges.ros2.profiles import profile_of
+from volery.bridges.ros2.services import answerer
+from volery.bridges.ros2.worker import Worker
+from volery.core.errors import GraphError
+from volery.graph.cdr import encode_cdr
+from volery.graph.messages import message_type, time_from_ns
+from volery.graph.parameters import Parameters
+from volery.graph.reply import Reply
+from volery.graph.zero import zero_message
+
+_SIM_TIME = "use_sim_time"
+"""Every ROS 2 node has it; here it is true and nobody's to change."""
+_EVENTS = "/parameter_events"
+_EVENT_TYPE = "rcl_interfaces/msg/ParameterEvent"
+_SERVICES = (
+    "DescribeParameters",
+    "GetParameterTypes",
+    "GetParameters",
+    "ListParameters",
+    "SetParameters",
+    "SetParametersAtomically",
+)
+
+
+SetValue = Callable[[str, str, Any, Callable[[str], None]], None]
+"""(node, parameter, value, done): sets a value and says why not, or an empty text, some time."""
+
+
+class ParameterServices:
+    """The parameters of all nodes of a graph; `survey` brings the nodes up to date.
+
+    owner: the node that stands for the whole process, which need not have any of its own.
+    now_ns: what stamps the events.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        parameters: Parameters,
+        set_value: SetValue,
+        owner: NodeName,
+        worker: Worker,
+        now_ns: Callable[[], int],
+    ) -> None:
+        self._participant = participant
+        self._declared = parameters
+        self._set_value = set_value
+        self._owner = owner
+        self._worker = worker
+        self._now_ns = now_ns
+        self._nodes: dict[NodeName, list[Handle]] = {}
+        self._complaints = Complaints()
+        spec = TopicSpec(owner, _EVENTS, _EVENT_TYPE, profile_of(_EVENTS, "", latched=False))
+        self._events = participant.writer(spec)
+
+    def survey(self) -> None:
+        """Have nodes appear that have parameters, and those disappear that have ended."""
+        wanted = {self._owner, *map(NodeName.of, self._declared.nodes())}
+        for node in [node for node in self._nodes if node not in wanted]:
+            self._leave(node)
+        for node in wanted - self._nodes.keys():
+            self._complaints.tried(node.full, lambda n=node: self._enter(n))  # type: ignore[misc]
+
+    def _enter(self, node: NodeName) -> None:
+        check_name(node.full)
+        self._participant.add_node(node)
+        self._nodes[node] = [self._serve(node, base) for base in _SERVICES]
+
+    def close(self) -> None:
+        """Take everything back."""
+        for node in tuple(self._nodes):
+            self._leave(node)
+        self._events.close()
+
+    def _leave(self, node: NodeName) -> None:
+        for handle in self._nodes.pop(node):
+            handle.close()
+        self._participant.remove_node(node)
+
+    def _serve(self, node: NodeName, base: str) -> Handle:
+        srvtype = f"rcl_interfaces/srv/{base}"
+        word = "".join(f"_{c.lower()}" if c.isupper() else c for c in base).strip("_")
+        answers: dict[str, Callable[[NodeName, Any, Reply], None]] = {
+            "DescribeParameters": self._describe,
+            "GetParameterTypes": self._types,
+            "GetParameters": self._get,
+            "ListParameters": self._list,
+            "SetParameters": self._set,
+            "SetParametersAtomically": self._set_all,
+        }
+        take = answerer(
+            self._worker,
+            srvtype,
+            lambda request, reply: answers[base](node, request, reply),
+            self._complaints,
+        )
+        return self._participant.server(ServiceSpec(node, f"{node.full}/{word}", srvtype), take)
+
+    # ------------------------------------------------------------------------------------ asking
+
+    def _names(self, node: NodeName) -> list[str]:
+        return sorted(
+            {_SIM_TIME, *(name for at, name in self._declared.names() if at == node.full)}
+        )
+
+    def _value(self, node: NodeName, name: str) -> Any:
+        """Value of a parameter; None where there is none of that name."""
+        try:
+            return self._declared.get(node.full, name).value
+        except GraphError:
+            return True if name == _SIM_TIME else None
+
+    def _is_read_only(self, node: NodeName, name: str) -> bool:
+        try:
+            return self._declared.get(node.full, name).read_only
+        except GraphError:
+            return True
+
+    def _list(self, node: NodeName, request: Any, reply: Reply) -> None:
+        names = [n for n in self._names(node) if _is_below(n, request.prefixes, request.depth)]
+        prefixes = sorted({name.rpartition(".")[0] for name in names} - {""})
+        response = zero_message("rcl_interfaces/srv/ListParameters_Response")
+        response.result.names, response.result.prefixes = names, prefixes
+        reply.answer(response)
+
+    def _get(self, node: NodeName, request: Any, reply: Reply) -> None:
+        values = [value_message(self._value(node, name)) for name in request.names]
+        reply.answer(message_type("rcl_interfaces/srv/GetParameters_Response")(values))
+
+    def _types(self, node: NodeName, request: Any, reply: Reply) -> None:
+        found = [type_of(self._value(node, name)) for name in request.names]
+        response = message_type("rcl_interfaces/srv/GetParameterTypes_Response")
+        reply.answer(response(np.array(found, np.uint8)))
+
+    def _describe(self, node: NodeName, request: Any, reply: Reply) -> None:
+        descriptors = []
+        for name in request.names:
+            descriptor = zero_message("rcl_interfaces/msg/ParameterDescriptor")
+            descriptor.name, descriptor.type = name, type_of(self._value(node, name))
+            descriptor.read_only = self._is_read_only(node, name)
+            descriptors.append(descriptor)
+        reply.answer(message_type("rcl_interfaces/srv/DescribeParameters_Response")(descriptors))
+
+    # ----------------------------------------------------------------------------------- setting
+
+    def _set(self, node: NodeName, request: Any, reply: Reply) -> None:
+        response = message_type("rcl_interfaces/srv/SetParameters_Response")
+        self._set_each(node, request.parameters, lambda found: reply.answer(response(found)))
+
+    def _set_all(self, node: NodeName, request: Any, reply: Reply) -> None:
+        """All or none: refused before anything is set where one is read-only or unknown."""
+        response = message_type("rcl_interfaces/srv/SetParametersAtomically_Response")
+        bad = [p.name for p in request.parameters if self._is_read_only(node, p.name)]
+        if bad:
+            text = f"read-only or not declared: {', '.join(bad)}"
+            reply.answer(response(_result(text)))
+            return
+
+        def done(found: list[Any]) -> None:
+            wrong = [one for one in found if not one.successful]
+            reply.answer(response(wrong[0] if wrong else _result("")))
+
+        self._set_each(node, request.parameters, done)
+
+    def _set_each(
+        self, node: NodeName, wanted: list[Any], done: Callable[[list[Any]], None]
+    ) -> None:
+        """Set one after the other; `done` gets the results."""
+        results: list[Any] = []
+
+        def go_on() -> None:
+            if len(results) == len(wanted):
+                done(results)
+                return
+            parameter = wanted[len(results)]
+            if parameter.value.type == NOT_SET:
+                finish(f"parameter '{parameter.name}' cannot be deleted")
+            else:
+                self._set_value(node.full, parameter.name, plain_of(parameter.value), finish)
+
+        def finish(reason: str) -> None:
+            if not reason:
+                self._tell_event(node, wanted[len(results)])
+            results.append(_result(reason))
+            go_on()
+
+        go_on()
+
+    def _tell_event(self, node: NodeName, parameter: Any) -> None:
+        event = zero_message(_EVENT_TYPE)
+        event.stamp = time_from_ns(self._now_ns())
+        event.node, event.changed_parameters = node.full, [parameter]
+        self._worker.post(lambda: self._events.write(encode_cdr(event, _EVENT_TYPE)))
+
+
+def _result(reason: str) -> Any:
+    return message_type("rcl_interfaces/msg/SetParametersResult")(not reason, reason)
+
+
+def _is_below(name: str, prefixes: list[str], depth: int) -> bool:
+    """Whether a name lies below one of the prefixes, at most so many dots deep; 0: any depth."""
+    for prefix in prefixes or [""]:
+        start = f"{prefix}." if prefix else ""
+        rest = name[len(start) :]
+        if name == prefix or (name.startswith(start) and (not depth or rest.count(".") < depth)):
+            return True
+    return False

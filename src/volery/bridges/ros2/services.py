@@ -1,0 +1,175 @@
+"""Services that a simulation and a ROS 2 graph share, both ways."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from typing import Any
+
+from volery.bridges.ros2.complaints import Complaints
+from volery.bridges.ros2.middleware import Answer, Caller, Handle, Participant, ServiceSpec
+from volery.bridges.ros2.names import NodeName, check_name
+from volery.bridges.ros2.worker import Worker
+from volery.bridges.sharing import Sharing
+from volery.core.errors import GraphError
+from volery.graph.cdr import decode_cdr, encode_cdr
+from volery.graph.reply import Reply
+from volery.graph.session import Session
+from volery.graph.zero import zero_message
+
+_LONGEST_WAIT_S = 10.0
+"""For a server to appear, which DDS may take seconds to find."""
+_PAUSE_S = 0.005
+
+
+class Services:
+    """What is shared at present; `survey` brings it up to date, in one thread at a time."""
+
+    def __init__(
+        self,
+        participant: Participant,
+        session: Session,
+        sharing: Sharing,
+        node: NodeName,
+        worker: Worker,
+    ) -> None:
+        self._participant = participant
+        self._session = session
+        self._sharing = sharing
+        self._node = node
+        self._worker = worker
+        self._servers: dict[str, Handle] = {}
+        self._callers: dict[str, Caller] = {}
+        self._complaints = Complaints()
+
+    def survey(self) -> None:
+        """Offer in ROS 2 what has appeared since, take back what has gone."""
+        offered = {
+            name: srvtype
+            for name, srvtype in self._session.graph.services().items()
+            if name not in self._callers and self._sharing.has(name) and _is_of_ros2(name)
+        }
+        for name in [name for name in self._servers if name not in offered]:
+            self._servers.pop(name).close()
+        for name, srvtype in offered.items():
+            if name not in self._servers:
+                self._complaints.tried(name, lambda n=name, t=srvtype: self._offer(n, t))  # type: ignore[misc]
+
+    def _offer(self, name: str, srvtype: str) -> None:
+        check_name(name)
+        take = answerer(self._worker, srvtype, self._asker(name), self._complaints)
+        spec = ServiceSpec(self._node, name, srvtype)
+        self._servers[name] = self._participant.server(spec, take)
+
+    def take_remote(self, services: Mapping[str, str]) -> None:
+        """Offer ROS 2 services in the graph. `GraphError` for a wrong type or a taken name."""
+        for name, srvtype in services.items():
+            check_name(name)
+            spec = ServiceSpec(self._node, name, srvtype)
+            caller = self._participant.caller(spec)
+            self._session.offer(name, srvtype, _forwarder(caller, spec))
+            self._callers[name] = caller
+
+    def close(self) -> None:
+        """Take everything back."""
+        for server in self._servers.values():
+            server.close()
+        for caller in self._callers.values():
+            caller.close()
+
+    def _asker(self, name: str) -> Callable[[Any, Reply], None]:
+        return lambda request, reply: self._session.call(name, request, reply)
+
+
+def _is_of_ros2(name: str) -> bool:
+    """Whether ROS 2 has no way of its own to ask the same."""
+    return not name.startswith("/rosapi/")
+
+
+def answerer(
+    worker: Worker,
+    srvtype: str,
+    ask: Callable[[Any, Reply], None],
+    complaints: Complaints,
+) -> Callable[[bytes, Answer], None]:
+    """A `TakeRequest` that reads requests for `ask` and writes its responses.
+
+    ROS 2 has no word for a failure: it is told in the response where that has room for a reason,
+    else nothing is answered and a warning logged.
+    """
+    response_type = f"{srvtype}_Response"
+
+    def take(data: bytes, answer: Answer) -> None:
+        def respond(response: Any) -> None:
+            worker.post(lambda: answer(encode_cdr(response, response_type)))
+
+        def fail(error: GraphError) -> None:
+            complaints.tell(srvtype, str(error))
+            refusal = _refusal(response_type, str(error))
+            if refusal is not None:
+                respond(refusal)
+
+        try:
+            request = decode_cdr(data, f"{srvtype}_Request")
+        except GraphError as error:
+            complaints.tell(srvtype, str(error))
+            return
+        ask(request, Reply(respond, fail))
+
+    return take
+
+
+def _refusal(response_type: str, reason: str) -> Any | None:
+    """A response that says no and why; None where the type has no room for that."""
+    response = zero_message(response_type)
+    names = {field.name for field in fields(response)}
+    if {"success", "message"} <= names and response.success is False:
+        response.message = reason
+        return response
+    if "result" in names and hasattr(response.result, "error_message"):
+        response.result.result = response.result.RESULT_OPERATION_FAILED
+        response.result.error_message = reason
+        return response
+    return None
+
+
+def ask_server(caller: Caller, spec: ServiceSpec, request: Any, reply: Reply) -> None:
+    """Ask a ROS 2 server, waiting for it to be found; `reply` gets its response or an error."""
+
+    def respond(data: bytes) -> None:
+        try:
+            reply.answer(decode_cdr(data, f"{spec.srvtype}_Response"))
+        except GraphError as error:
+            reply.fail(error)
+
+    def lose() -> None:
+        reply.fail(GraphError(f"service '{spec.service}': its ROS 2 node has left"))
+
+    try:
+        if not wait_for(lambda: caller.ready, _LONGEST_WAIT_S):
+            raise GraphError(f"nobody offers ROS 2 service '{spec.service}'")
+        caller.call(encode_cdr(request, f"{spec.srvtype}_Request"), respond, lose)
+    except GraphError as error:
+        reply.fail(error)
+
+
+def _forwarder(caller: Caller, spec: ServiceSpec) -> Callable[[Any, Reply], None]:
+    """A handler of a service of the graph that passes requests on to a ROS 2 server."""
+
+    def handle(request: Any, reply: Reply) -> None:
+        name = f"volery-ros2 {spec.service}"
+        work = (caller, spec, request, reply)
+        threading.Thread(target=ask_server, args=work, name=name, daemon=True).start()
+
+    return handle
+
+
+def wait_for(what: Callable[[], bool], timeout_s: float) -> bool:
+    """Wait until something is true, which others bring about; whether it came to be."""
+    pause = threading.Event()
+    for _ in range(max(int(timeout_s / _PAUSE_S), 1)):
+        if what():
+            return True
+        pause.wait(_PAUSE_S)
+    return what()

@@ -1,0 +1,115 @@
+"""The subscriptions of a program in a ROS 2 graph, which ask for what their publishers offer."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+from volery.bridges.ros2.complaints import Complaints
+from volery.bridges.ros2.middleware import DEFAULT_DEPTH, Handle, Participant, Profile, TopicSpec
+from volery.bridges.ros2.names import NodeName
+from volery.core.errors import GraphError
+from volery.graph.cdr import decode_cdr
+from volery.graph.mailbox import Mailbox, MailboxInfo
+from volery.graph.messages import Published
+
+
+class Subscriptions:
+    """Mailboxes and where their messages come from. Safe to use from several threads."""
+
+    def __init__(self, participant: Participant, node: NodeName) -> None:
+        self._participant = participant
+        self._node = node
+        self._inlets: dict[Mailbox, _Inlet] = {}
+        self._complaints = Complaints()
+        self._lock = threading.RLock()
+        self._closed = False
+
+    @property
+    def infos(self) -> tuple[MailboxInfo, ...]:
+        """How they fare."""
+        with self._lock:
+            return tuple(mailbox.info for mailbox in self._inlets)
+
+    def open(self, mailbox: Mailbox, msgtype: str, depth: int) -> None:
+        """Begin to fill a mailbox."""
+        receive = self._receiver(mailbox, msgtype)
+        with self._lock:
+            inlet = _Inlet(mailbox.topic, msgtype, max(depth, DEFAULT_DEPTH), receive)
+            self._inlets[mailbox] = inlet
+            self._subscribe(inlet)
+
+    def close(self, mailbox: Mailbox) -> None:
+        """Fill it no more; nothing happens a second time."""
+        with self._lock:
+            inlet = self._inlets.pop(mailbox, None)
+            if inlet is not None and inlet.handle is not None:
+                inlet.handle.close()
+
+    def close_all(self) -> None:
+        """Fill none any more."""
+        with self._lock:
+            self._closed = True
+            for mailbox in tuple(self._inlets):
+                self.close(mailbox)
+
+    def adapt(self) -> None:
+        """Others came or went: ask for what publishers offer now."""
+        with self._lock:
+            if not self._closed:
+                for inlet in self._inlets.values():
+                    self._subscribe(inlet)
+
+    def move(self, node: NodeName) -> None:
+        """Belong to another node from now on."""
+        with self._lock:
+            self._node = node
+            for inlet in self._inlets.values():
+                inlet.profile = None
+                self._subscribe(inlet)
+
+    def _receiver(self, mailbox: Mailbox, msgtype: str) -> Callable[[bytes], None]:
+        def receive(data: bytes) -> None:
+            try:
+                message = decode_cdr(data, msgtype)
+            except GraphError as error:
+                self._complaints.tell(mailbox.topic, str(error))
+                return
+            mailbox.put(Published(mailbox.topic, msgtype, time.time_ns(), message))
+
+        return receive
+
+    def _subscribe(self, inlet: _Inlet) -> None:
+        """Subscribe so that all present publishers of a topic are heard, if that is new."""
+        offers = [
+            p.profile
+            for p in self._participant.publishers()
+            if (p.topic, p.msgtype) == (inlet.topic, inlet.msgtype)
+        ]
+        wanted = Profile(
+            reliable=all(offer.reliable for offer in offers),
+            latched=bool(offers) and all(offer.latched for offer in offers),
+            depth=inlet.depth,
+        )
+        if inlet.profile == wanted:
+            return
+        if inlet.handle is not None:
+            inlet.handle.close()
+        inlet.profile = wanted
+        spec = TopicSpec(self._node, inlet.topic, inlet.msgtype, wanted)
+        inlet.handle = self._participant.reader(spec, inlet.receive)
+
+
+class _Inlet:
+    """A subscription, and what it asks for at present."""
+
+    def __init__(
+        self, topic: str, msgtype: str, depth: int, receive: Callable[[bytes], None]
+    ) -> None:
+        self.topic = topic
+        self.msgtype = msgtype
+        self.depth = depth
+        self.receive = receive
+        self.profile: Profile | None = None
+        self.handle: Handle | None = None

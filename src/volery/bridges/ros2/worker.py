@@ -1,0 +1,37 @@
+"""The thread that writes to ROS 2, so that neither engine nor other doors wait for it."""
+
+from __future__ import annotations
+
+import logging
+import queue
+import threading
+from collections.abc import Callable
+
+_log = logging.getLogger(__name__)
+
+Job = Callable[[], object]
+
+
+class Worker:
+    """Does what it is given, one after the other."""
+
+    def __init__(self, name: str = "volery-ros2") -> None:
+        self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def post(self, job: Job) -> None:
+        """Have something done soon; from any thread, which does not wait."""
+        self._jobs.put(job)
+
+    def close(self) -> None:
+        """Do what was given so far, then end."""
+        self._jobs.put(None)
+        self._thread.join()
+
+    def _run(self) -> None:
+        while (job := self._jobs.get()) is not None:
+            try:
+                job()
+            except Exception as error:  # one topic's trouble must not end the others
+                _log.warning("ROS 2: %s: %s", type(error).__name__, error)

@@ -1,0 +1,1 @@
+"""ROS 2 over zenoh, as rmw_zenoh maps it."""

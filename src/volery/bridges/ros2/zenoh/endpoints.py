@@ -1,0 +1,243 @@
+"""Publishers, subscriptions, and the two halves of services over zenoh, as rmw_zenoh makes them."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+import zenoh.ext
+
+from volery.bridges.ros2.middleware import ServiceSpec, TakeMessage, TakeRequest, TopicSpec
+from volery.bridges.ros2.zenoh.names import (
+    CLIENT,
+    GID_BYTES,
+    PUBLISHER,
+    SERVER,
+    SUBSCRIPTION,
+    Attachment,
+    service_key,
+    service_token,
+    topic_key,
+    topic_token,
+)
+
+_LONGEST_CALL_S = 3600.0
+"""Results of actions take their time."""
+
+
+class Place:
+    """What endpoints are made of."""
+
+    def __init__(self, session: Any, domain_id: int, ids: Callable[[Any], tuple[int, int]]) -> None:
+        self.session = session
+        self.domain_id = domain_id
+        self.zid = str(session.zid())
+        self.ids = ids
+        """(node) -> number of the node and a new one for an endpoint of it."""
+
+    def declare(self, token: str) -> Any:
+        """Have a liveliness token seen."""
+        return self.session.liveliness().declare_token(token)
+
+
+class ZenohWriter:
+    """A publisher; what it latches is kept in a cache that late subscribers ask."""
+
+    def __init__(self, place: Place, spec: TopicSpec) -> None:
+        key = topic_key(place.domain_id, spec.topic, spec.msgtype)
+        profile = spec.profile
+        reliability = (
+            zenoh.Reliability.RELIABLE if profile.reliable else zenoh.Reliability.BEST_EFFORT
+        )
+        how = {
+            "reliability": reliability,
+            "congestion_control": zenoh.CongestionControl.DROP,  # nobody can hold it up
+        }
+        self._latched = profile.latched
+        if profile.latched:
+            self._publisher = zenoh.ext.declare_advanced_publisher(
+                place.session,
+                key,
+                cache=zenoh.ext.CacheConfig(profile.depth),
+                publisher_detection=True,
+                **how,
+            )
+        else:
+            self._publisher = place.session.declare_publisher(key, **how)
+        self._gid = os.urandom(GID_BYTES)
+        self._numbers = itertools.count(1)
+        ids = place.ids(spec.node)
+        self._token = place.declare(topic_token(place.domain_id, place.zid, ids, PUBLISHER, spec))
+
+    @property
+    def matched(self) -> bool:
+        """Whether anybody subscribes; of what is latched, somebody might."""
+        return self._latched or bool(self._publisher.matching_status.matching)
+
+    def write(self, cdr: bytes) -> None:
+        """Send one message."""
+        attachment = Attachment(next(self._numbers), time.time_ns(), self._gid)
+        self._publisher.put(cdr, attachment=attachment.encode())
+
+    def close(self) -> None:
+        """Publish no more."""
+        _undeclare(self._token, self._publisher)
+
+
+class ZenohReader:
+    """A subscription."""
+
+    def __init__(self, place: Place, spec: TopicSpec, take: TakeMessage) -> None:
+        key = topic_key(place.domain_id, spec.topic, spec.msgtype)
+
+        def hear(sample: Any) -> None:
+            take(sample.payload.to_bytes())
+
+        history = None
+        if spec.profile.latched:
+            history = zenoh.ext.HistoryConfig(
+                detect_late_publishers=True, max_samples=spec.profile.depth
+            )
+        self._subscriber = zenoh.ext.declare_advanced_subscriber(
+            place.session, key, hear, allowed_origin=zenoh.Locality.REMOTE, history=history
+        )
+        ids = place.ids(spec.node)
+        self._token = place.declare(
+            topic_token(place.domain_id, place.zid, ids, SUBSCRIPTION, spec)
+        )
+
+    def close(self) -> None:
+        """Subscribe no more."""
+        _undeclare(self._token, self._subscriber)
+
+
+class ZenohServer:
+    """A service on offer."""
+
+    def __init__(self, place: Place, spec: ServiceSpec, take: TakeRequest) -> None:
+        self._key = service_key(place.domain_id, spec.service, spec.srvtype)
+        self._take = take
+        self._queryable = place.session.declare_queryable(self._key, self._on_query, complete=True)
+        ids = place.ids(spec.node)
+        self._token = place.declare(service_token(place.domain_id, place.zid, ids, SERVER, spec))
+
+    def close(self) -> None:
+        """Offer it no more."""
+        _undeclare(self._token, self._queryable)
+
+    def _on_query(self, query: Any) -> None:
+        asked = query.attachment
+        attachment = None if asked is None else Attachment.decode(asked.to_bytes())
+        if attachment is None or query.payload is None:
+            query.drop()  # no client of ROS 2: it shall not wait
+            return
+
+        def answer(cdr: bytes) -> None:
+            back = attachment._replace(time_ns=time.time_ns())
+            query.reply(self._key, cdr, attachment=back.encode())
+            query.drop()
+
+        self._take(query.payload.to_bytes(), answer)
+
+
+class ZenohCaller:
+    """A client of a service."""
+
+    def __init__(
+        self, place: Place, spec: ServiceSpec, is_there: Callable[[ServiceSpec], bool]
+    ) -> None:
+        self._place = place
+        self._spec = spec
+        self._is_there = is_there
+        self._key = service_key(place.domain_id, spec.service, spec.srvtype)
+        self._gid = os.urandom(GID_BYTES)
+        self._numbers = itertools.count(1)
+        self._waiting: set[_Question] = set()
+        self._lock = threading.Lock()
+        ids = place.ids(spec.node)
+        self._token = place.declare(service_token(place.domain_id, place.zid, ids, CLIENT, spec))
+
+    @property
+    def ready(self) -> bool:
+        """Whether a server is there."""
+        return self._is_there(self._spec)
+
+    def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
+        """Send a request."""
+        question = _Question(on_response, on_loss)
+        with self._lock:
+            self._waiting.add(question)
+
+        def hear(reply: Any) -> None:
+            with self._lock:
+                self._waiting.discard(question)
+            if reply.ok is None:
+                question.lose()
+            else:
+                question.answer(reply.ok.payload.to_bytes())
+
+        attachment = Attachment(next(self._numbers), time.time_ns(), self._gid)
+        self._place.session.get(
+            self._key,
+            hear,
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=_LONGEST_CALL_S,
+            payload=request,
+            attachment=attachment.encode(),
+        )
+
+    def give_up(self) -> None:
+        """Tell all who wait that no answer will come, if there is no server any more."""
+        if self._waiting and not self.ready:
+            self._lose_all()
+
+    def close(self) -> None:
+        """Call no more."""
+        _undeclare(self._token)
+        self._lose_all()
+
+    def _lose_all(self) -> None:
+        with self._lock:
+            waiting, self._waiting = self._waiting, set()
+        for question in waiting:
+            question.lose()
+
+
+class _Question:
+    """A request that has no answer yet; it gets one or is lost, once."""
+
+    def __init__(self, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
+        self._on_response = on_response
+        self._on_loss = on_loss
+        self._lock = threading.Lock()
+        self._done = False
+
+    def answer(self, data: bytes) -> None:
+        """Hand the response out."""
+        if self._finish():
+            self._on_response(data)
+
+    def lose(self) -> None:
+        """Say that there will be none."""
+        if self._finish():
+            self._on_loss()
+
+    def _finish(self) -> bool:
+        with self._lock:
+            first, self._done = not self._done, True
+        return first
+
+
+def _undeclare(*declared: Any) -> None:
+    """Take declarations back; those of a closed session are gone anyway."""
+    for one in declared:
+        try:
+            one.undeclare()
+        except zenoh.ZError:
+            continue

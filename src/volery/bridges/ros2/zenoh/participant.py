@@ -1,0 +1,153 @@
+"""A participant in a ROS 2 graph over zenoh; a `middleware.Participant`."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import weakref
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import zenoh
+
+from volery.bridges.ros2.middleware import (
+    RemotePublisher,
+    ServiceSpec,
+    TakeMessage,
+    TakeRequest,
+    TopicSpec,
+)
+from volery.bridges.ros2.names import NodeName
+from volery.bridges.ros2.type_hashes import service_hash
+from volery.bridges.ros2.zenoh.endpoints import (
+    Place,
+    ZenohCaller,
+    ZenohReader,
+    ZenohServer,
+    ZenohWriter,
+)
+from volery.bridges.ros2.zenoh.names import (
+    PUBLISHER,
+    SERVER,
+    SPACE,
+    Endpoint,
+    node_token,
+    read_token,
+)
+from volery.bridges.ros2.zenoh.session import open_session
+
+
+class ZenohParticipant:
+    """One process's part in a domain.
+
+    Parameters
+    ----------
+    domain_id
+        ROS_DOMAIN_ID.
+    router
+        HOST:PORT; empty: that of this machine, which the participant becomes where there is none.
+
+    """
+
+    def __init__(self, domain_id: int, router: str = "") -> None:
+        self._domain_id = domain_id
+        self._session, reach = open_session(router)
+        self.where = f"{reach}, domain {domain_id}"
+        self._place = Place(self._session, domain_id, self._ids)
+        self._numbers = itertools.count()
+        self._lock = threading.RLock()
+        self._nodes: dict[NodeName, tuple[int, Any]] = {}
+        self._others: dict[str, Endpoint] = {}
+        self._told: list[Callable[[], None]] = []
+        self._callers: weakref.WeakSet[ZenohCaller] = weakref.WeakSet()
+        self._closed = False
+        self._watch = self._session.liveliness().declare_subscriber(
+            f"{SPACE}/{domain_id}/**", self._on_token, history=True
+        )
+
+    def add_node(self, node: NodeName) -> None:
+        """Have a node appear."""
+        with self._lock:
+            if node not in self._nodes:
+                number = next(self._numbers)
+                token = node_token(self._domain_id, self._place.zid, number, node)
+                self._nodes[node] = number, self._place.declare(token)
+
+    def remove_node(self, node: NodeName) -> None:
+        """Have a node disappear."""
+        with self._lock:
+            found = self._nodes.pop(node, None)
+        if found is not None:
+            found[1].undeclare()
+
+    def announce(self) -> None:
+        """Tokens tell everything at once."""
+
+    def writer(self, spec: TopicSpec) -> ZenohWriter:
+        """Publish."""
+        return ZenohWriter(self._place, spec)
+
+    def reader(self, spec: TopicSpec, take: TakeMessage) -> ZenohReader:
+        """Subscribe."""
+        return ZenohReader(self._place, spec, take)
+
+    def server(self, spec: ServiceSpec, take: TakeRequest) -> ZenohServer:
+        """Offer a service."""
+        return ZenohServer(self._place, spec, take)
+
+    def caller(self, spec: ServiceSpec) -> ZenohCaller:
+        """Become a client of a service."""
+        caller = ZenohCaller(self._place, spec, self._is_there)
+        with self._lock:
+            self._callers.add(caller)
+        return caller
+
+    def publishers(self) -> list[RemotePublisher]:
+        """Publishers of others."""
+        return [
+            RemotePublisher(e.name, e.msgtype, e.profile, e.type_hash)
+            for e in self._of_kind(PUBLISHER)
+        ]
+
+    def service_types(self) -> Mapping[str, str]:
+        """Services that others offer, and their types."""
+        return {e.name: e.msgtype for e in self._of_kind(SERVER)}
+
+    def when_changed(self, tell: Callable[[], None]) -> None:
+        """Have `tell` called when others come or go."""
+        self._told.append(tell)
+
+    def close(self) -> None:
+        """Leave the graph with everything; a second time nothing happens."""
+        if not self._closed:
+            self._closed = True
+            self._session.close()
+
+    def _ids(self, node: NodeName) -> tuple[int, int]:
+        self.add_node(node)
+        with self._lock:
+            return self._nodes[node][0], next(self._numbers)
+
+    def _of_kind(self, kind: str) -> list[Endpoint]:
+        with self._lock:
+            return [endpoint for endpoint in self._others.values() if endpoint.kind == kind]
+
+    def _is_there(self, spec: ServiceSpec) -> bool:
+        wanted = (spec.service, spec.srvtype, service_hash(spec.srvtype))
+        return any((e.name, e.msgtype, e.type_hash) == wanted for e in self._of_kind(SERVER))
+
+    def _on_token(self, sample: Any) -> None:
+        token = str(sample.key_expr)
+        endpoint = read_token(token)
+        if endpoint is None or endpoint.session == self._place.zid:
+            return
+        with self._lock:
+            if sample.kind == zenoh.SampleKind.PUT:
+                self._others[token] = endpoint
+            else:
+                self._others.pop(token, None)
+            callers = tuple(self._callers)
+        for caller in callers:
+            caller.give_up()
+        for tell in tuple(self._told):
+            tell()

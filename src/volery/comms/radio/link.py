@@ -1,0 +1,134 @@
+"""The radio model as a `comms.link.Link`: one shared channel between stations at places."""
+
+from __future__ import annotations
+
+import copy
+from collections import Counter
+from collections.abc import Callable, Mapping
+from itertools import combinations
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.comms.addresses import is_station
+from volery.comms.link import Delivery
+from volery.comms.protocol import Frame
+from volery.comms.radio.path_loss import Paths, loss_db
+from volery.comms.radio.reception import air_time_ns, packet_error_rate, snr_db
+from volery.core import rng
+from volery.core.clock import NS_PER_S
+from volery.core.kept import keep, put_back
+from volery.scenario.radio import Radio
+
+Array = NDArray[np.float64]
+Places = Callable[[], Mapping[int, Array]]
+"""Where the stations are: address to place (3,), m, map."""
+Looks = Callable[[Array, Array], Paths]
+"""What stands between places (P, 3) and (P, 3), m, map."""
+
+_LOST = Delivery(lost=True)
+_MOST_TRIES = 8
+
+
+class _Sent(NamedTuple):
+    """When the frame that a station sent last has left the air."""
+
+    session: int
+    sequence: int
+    ends_ns: int
+
+
+class RadioLink:
+    """Decides over frames; call it in the order of time.
+
+    seed: of the run; each pair has streams of its own, of which a frame's number takes its draws,
+    so that results do not depend on who else speaks.
+    """
+
+    STATE = ("_free_ns", "_sent", "_losses", "_looked_ns", "counts", "_seed")
+    """Everything that changes."""
+
+    def __init__(self, radio: Radio, seed: int, places: Places, looks: Looks) -> None:
+        self._radio = radio
+        self._seed = seed
+        self._places = places
+        self._looks = looks
+        self._free_ns = 0
+        """When the channel is free again."""
+        self._sent: dict[int, _Sent] = {}
+        self._losses: dict[tuple[int, int], float] = {}
+        self._looked_ns = -1
+        self.counts: Counter[str] = Counter()
+        """Frames `sent`, `received` and `faded` (once for each receiver), `crowded_out` before."""
+
+    def __call__(self, time_ns: int, source: int, destination: int, frame: Frame) -> Delivery:
+        """Fate of a frame on its way to one station."""
+        before = self._sent.get(source)
+        again = before is not None and before[:2] == (frame.session, frame.sequence)
+        if not again and self._free_ns - time_ns > self._radio.queue_s * NS_PER_S:
+            self.counts["crowded_out"] += 1
+            return _LOST
+        snr = self.snr_db(time_ns, source, destination)
+        tries, received = self._try(source, destination, frame, snr)
+        if again and before is not None:  # one transmission reaches all that it is meant for
+            ends_ns = before.ends_ns
+        else:
+            self.counts["sent"] += 1
+            took_ns = tries * air_time_ns(self._radio, len(frame.data))
+            ends_ns = self._free_ns = max(self._free_ns, time_ns) + took_ns
+            self._sent[source] = _Sent(frame.session, frame.sequence, ends_ns)
+        self.counts["received" if received else "faded"] += 1
+        if not received:
+            return _LOST
+        return Delivery(False, ends_ns - time_ns + round(self._radio.latency_s * NS_PER_S))
+
+    def snr_db(self, time_ns: int, one: int, other: int) -> float:
+        """Signal to noise between two stations now; -inf where one of them has no place."""
+        pair = min(one, other), max(one, other)
+        stale_ns = round(self._radio.update_s * NS_PER_S)
+        if self._looked_ns < 0 or time_ns - self._looked_ns >= stale_ns or pair not in self._losses:
+            self._look(time_ns)
+        if pair not in self._losses:
+            return -np.inf
+        block = time_ns // round(self._radio.shadowing_s * NS_PER_S)
+        key = rng.stream_key(self._seed, f"radio/{pair[0]}-{pair[1]}/shadowing")
+        fading = self._radio.shadowing_db * float(rng.normal(key, block))
+        return snr_db(self._radio, self._losses[pair]) - fading
+
+    def reseed(self, seed: int) -> None:
+        """Draw from other streams."""
+        self._seed = seed
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return copy.deepcopy(keep(self, self.STATE))
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self, copy.deepcopy(state))
+
+    def _try(self, source: int, destination: int, frame: Frame, snr: float) -> tuple[int, bool]:
+        """How often the frame is sent, and whether it is received at last."""
+        tries = 1 + (self._radio.retries if is_station(frame.destination) else 0)
+        if not np.isfinite(snr):
+            return tries, False
+        lost = packet_error_rate(self._radio, snr, len(frame.data))
+        key = rng.stream_key(self._seed, f"radio/{source}-{destination}/frames")
+        for k in range(tries):
+            if float(rng.uniform(key, _MOST_TRIES * frame.sequence + k)) >= lost:
+                return k + 1, True
+        return tries, False
+
+    def _look(self, time_ns: int) -> None:
+        """See anew what stands between all stations."""
+        places = self._places()
+        pairs = list(combinations(sorted(places), 2))
+        self._looked_ns, self._losses = time_ns, {}
+        if not pairs:
+            return
+        starts = np.array([places[one] for one, _ in pairs])
+        ends = np.array([places[other] for _, other in pairs])
+        distance = np.linalg.norm(ends - starts, axis=1)
+        losses = loss_db(self._radio, distance, self._looks(starts, ends))
+        self._losses = dict(zip(pairs, losses.tolist(), strict=True))

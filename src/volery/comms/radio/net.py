@@ -1,0 +1,203 @@
+"""Every UAV a station, inside a run: topics go out by radio and come in from the others.
+
+What a UAV publishes on a relayed topic `/uav1/NAME` is sent to all stations, each of which
+publishes what it hears on `/uav2/radio/NAME`. Nodes cannot tell this from a station of a real radio
+network (`comms.radio_node`) with the same topics.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from volery.comms.addresses import ALL, Identity
+from volery.comms.exchange import Exchange
+from volery.comms.link import Delivery, Link, ideal_link
+from volery.comms.naming import free_address
+from volery.comms.payloads import decode_named, encode_named
+from volery.comms.protocol import Frame, Kind
+from volery.comms.radio.link import RadioLink
+from volery.core.errors import CommandError, CommsError
+from volery.graph.graph import Graph, Publisher, Subscription
+from volery.graph.messages import Published
+from volery.scenario.radio import RelayedTopic
+
+_TICK_S = 0.5
+"""More often than stations have to tell that they are there, see `StationCore.tick`."""
+_LOST = Delivery(lost=True)
+
+
+class Timers(Protocol):
+    """Whoever can call back at simulated times."""
+
+    def at(self, time_ns: int, action: Callable[[], Any]) -> None:
+        """Call `action` once, at `time_ns`."""
+
+    def every(
+        self,
+        period_s: float,
+        callback: Callable[[], Any],
+        *,
+        wanted: Callable[[], bool] | None = None,
+    ) -> None:
+        """Call `callback` each period."""
+
+
+@dataclass
+class _Member:
+    """A UAV on the network: what it says and where it hears others."""
+
+    address: int
+    said: list[Subscription] = field(default_factory=list)
+    heard: dict[str, Publisher] = field(default_factory=dict)
+
+
+class RadioNet:
+    """The stations of a run.
+
+    link: None for ideal ones. A message too long for a frame is dropped and counted.
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        timers: Timers,
+        topics: tuple[RelayedTopic, ...],
+        link: RadioLink | None = None,
+    ) -> None:
+        self._graph = graph
+        self._timers = timers
+        self._topics = topics
+        self._radio = link
+        self._inner: Link = link or ideal_link
+        self._exchange = Exchange(link=self._decide, now_ns=graph.now_ns())
+        self._members: dict[str, _Member] = {}
+        self._silent: Counter[int] = Counter()
+        """How many faults there are of each station."""
+        self._due_ns: int | None = None
+        """For when the next look at what is under way is planned."""
+        self.too_long = 0
+        timers.every(_TICK_S, self._advance, wanted=lambda: bool(self._members))
+
+    @property
+    def link(self) -> RadioLink | None:
+        """The model; None: links are ideal."""
+        return self._radio
+
+    @property
+    def statistics(self) -> Any:
+        """What the server has counted."""
+        return self._exchange.statistics
+
+    def addresses(self) -> dict[str, int]:
+        """Linear ids by UAV."""
+        return {name: member.address for name, member in self._members.items()}
+
+    def join(self, name: str) -> Callable[[], None]:
+        """Give a UAV a radio; returns what takes it away again."""
+        address = free_address(name, {m.address for m in self._members.values()})
+        self._exchange.join(Identity.of(address), self._graph.now_ns())
+        member = self._members[name] = _Member(address)
+        for topic in self._topics:
+            member.heard[topic.name] = self._graph.advertise(
+                f"/{name}/radio/{topic.name}", topic.type
+            )
+            said = f"/{name}/{topic.name}"
+            send = self._sender(name, topic)
+            member.said.append(self._graph.subscribe(said, send, topic.type))
+        return lambda: self._leave(name)
+
+    def silence(self, name: str, by: int) -> None:
+        """Let one fault more (by = 1) or less (by = -1) keep a UAV's radio from working."""
+        address = self._address_of(name)
+        self._silent[address] = max(self._silent[address] + by, 0)
+
+    def check(self, name: str) -> None:
+        """`CommandError` where a UAV has no radio."""
+        self._address_of(name)
+
+    def restore_all(self, name: str) -> None:
+        """Forget the faults of a UAV's radio."""
+        member = self._members.get(name)
+        if member is not None:
+            self._silent.pop(member.address, None)
+
+    def reseed(self, seed: int) -> None:
+        """Draw from other random streams."""
+        if self._radio is not None:
+            self._radio.reseed(seed)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps; who takes part stands elsewhere."""
+        return {
+            "exchange": self._exchange.get_state(),
+            "link": None if self._radio is None else self._radio.get_state(),
+            "silent": Counter(self._silent),
+            "due_ns": self._due_ns,
+            "too_long": self.too_long,
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state with the same members."""
+        self._exchange.set_state(state["exchange"])
+        if self._radio is not None:
+            self._radio.set_state(state["link"])
+        self._silent = Counter(state["silent"])
+        self._due_ns = state["due_ns"]
+        self.too_long = state["too_long"]
+
+    # ---------------------------------------------------------------------------------- inside
+
+    def _sender(self, name: str, topic: RelayedTopic) -> Callable[[Published], None]:
+        def send(published: Published) -> None:
+            now_ns = self._graph.now_ns()
+            station = self._exchange.station(self._members[name].address)
+            try:
+                payload = encode_named(topic.name, topic.type, published.message)
+                station.send(Kind.SENSING, ALL, payload, now_ns)
+            except CommsError:
+                self.too_long += 1
+                return
+            self._advance()
+
+        return send
+
+    def _advance(self) -> None:
+        """Pass on what is due, and come again when more is."""
+        now_ns = self._graph.now_ns()
+        for address, frame in self._exchange.advance(now_ns):
+            self._hear(address, frame)
+        due_ns = self._exchange.next_due_ns
+        if self._due_ns is not None and self._due_ns <= now_ns:
+            self._due_ns = None
+        if due_ns is not None and (self._due_ns is None or due_ns < self._due_ns):
+            self._due_ns = due_ns
+            self._timers.at(due_ns, self._advance)
+
+    def _hear(self, address: int, frame: Frame) -> None:
+        named = decode_named(frame.payload)
+        for member in self._members.values():
+            if member.address == address and named.name in member.heard:
+                member.heard[named.name].publish(named.message)
+
+    def _decide(self, time_ns: int, source: int, destination: int, frame: Frame) -> Delivery:
+        if self._silent[source] > 0 or self._silent[destination] > 0:
+            return _LOST
+        return self._inner(time_ns, source, destination, frame)
+
+    def _leave(self, name: str) -> None:
+        member = self._members.pop(name)
+        self._silent.pop(member.address, None)
+        self._exchange.leave(member.address, self._graph.now_ns())
+        for subscription in member.said:
+            subscription.cancel()
+        for publisher in member.heard.values():
+            publisher.cancel()
+
+    def _address_of(self, name: str) -> int:
+        if name not in self._members:
+            known = ", ".join(self._members) or "none"
+            raise CommandError(f"{name} has no radio; with one: {known}")
+        return self._members[name].address

@@ -1,0 +1,147 @@
+r"""A UAV's radio as a node: its topics over a real communication server instead of a run's radio.
+
+In flight, and wherever UAVs run in processes of their own, this takes the place of a scenario's
+`[radio]`; the other nodes stay as they are:
+
+    volery node volery.comms.radio_node:RadioNode --via ros1 --namespace /uav1 \
+        --param 'topics=["team volery_interfaces/msg/TeamReport"]' --param server=10.0.0.1:10200
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import queue
+import threading
+from typing import Any
+
+from volery.comms.addresses import ALL, PLANES_PER_BATCH, Identity
+from volery.comms.naming import free_address
+from volery.comms.payloads import decode_named, encode_named
+from volery.comms.protocol import Frame, Kind
+from volery.comms.server import PORT
+from volery.comms.station import Station
+from volery.core.errors import CommsError, GraphError
+from volery.graph.messages import message_type
+from volery.graph.node import Node
+
+_PERIOD_S = 0.02
+"""How often what was heard is published: messages come in another thread."""
+_HEARD_MOST = 1000
+_END_S = 2.0
+
+
+class RadioNode(Node):
+    """Sends what is published on `topics` to all stations, publishes theirs on `radio/...`.
+
+    A server that is not there is waited for, and joined again after a break. Messages that are too
+    long, or more than a station can hold, are dropped.
+
+    Parameters
+    ----------
+    topics: "NAME TYPE" each, NAME below the UAV's namespace.
+    server: HOST:PORT of `volery comms`.
+    station: linear id; -1: that of the namespace, uavN is N - 1.
+    planes_per_batch, token: as the server wants them.
+
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("radio", **options)
+        topics = self.declare_parameter("topics", [""]).value
+        host, port = _server_of(str(self.declare_parameter("server", f"127.0.0.1:{PORT}").value))
+        number = int(self.declare_parameter("station", -1).value)
+        planes = int(self.declare_parameter("planes_per_batch", PLANES_PER_BATCH).value)
+        token = str(self.declare_parameter("token", "").value) or None
+        name = self.get_namespace().strip("/")
+        identity = Identity.of(free_address(name, ()) if number < 0 else number, planes)
+
+        self._heard: queue.Queue[Frame] = queue.Queue(_HEARD_MOST)
+        self._publishers = {}
+        for text in topics:
+            topic, msgtype = _topic_of(text)
+            kind = message_type(msgtype)
+            self._publishers[topic] = self.create_publisher(kind, f"radio/{topic}")
+            self.create_subscription(kind, topic, self._sender(topic, msgtype))
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
+        self._thread.start()
+
+        async def make() -> Station:
+            station = Station(
+                identity,
+                self._take,
+                host=host,
+                port=port,
+                name=name,
+                token=token,
+                planes_per_batch=planes,
+            )
+            await station.start(timeout_s=None)
+            return station
+
+        self._station = asyncio.run_coroutine_threadsafe(make(), self._loop).result()
+        self.create_timer(_PERIOD_S, self._publish_heard)
+
+    @property
+    def joined(self) -> bool:
+        """Whether the server has welcomed it."""
+        return self._station.joined
+
+    def destroy_node(self) -> None:
+        """Leave the network."""
+        super().destroy_node()
+        if self._thread.is_alive():
+            asyncio.run_coroutine_threadsafe(self._station.stop(), self._loop).result(_END_S)
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join(_END_S)
+            self._loop.close()
+
+    def _sender(self, topic: str, msgtype: str) -> Any:
+        def send(message: Any) -> None:
+            with contextlib.suppress(CommsError):  # too long: as good as lost
+                payload = encode_named(topic, msgtype, message)
+                self._loop.call_soon_threadsafe(self._send, payload)
+
+        return send
+
+    def _send(self, payload: bytes) -> None:
+        with contextlib.suppress(CommsError):  # no room: as good as lost
+            self._station.send(Kind.SENSING, ALL, payload)
+
+    def _take(self, frame: Frame) -> None:
+        """In the loop's thread: keep for the node's own; the oldest goes where there is no room."""
+        while True:
+            with contextlib.suppress(queue.Full):
+                self._heard.put_nowait(frame)
+                return
+            with contextlib.suppress(queue.Empty):
+                self._heard.get_nowait()
+
+    def _publish_heard(self) -> None:
+        with contextlib.suppress(queue.Empty):
+            while True:
+                frame = self._heard.get_nowait()
+                with contextlib.suppress(CommsError):  # of a program that says other things
+                    named = decode_named(frame.payload)
+                    publisher = self._publishers.get(named.name)
+                    if publisher is not None and publisher.msgtype == named.msgtype:
+                        publisher.publish(named.message)
+
+
+def _server_of(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdigit():
+        raise GraphError(f"radio: server must be HOST:PORT, not '{text}'")
+    return host, int(port)
+
+
+def _topic_of(text: str) -> tuple[str, str]:
+    try:
+        topic, msgtype = str(text).split()
+        message_type(msgtype)
+    except (ValueError, KeyError):
+        raise GraphError(
+            f"radio: topics must be like 'team std_msgs/msg/String', not '{text}'"
+        ) from None
+    return topic, msgtype

@@ -1,0 +1,100 @@
+"""Arming: what must be well before the rotors may turn, and when they stop for good.
+
+The rotors of an armed UAV stand still until it takes off: its flight modes know no idling.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from volery.mavlink.modes import Mode
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot import Autopilot
+    from volery.mavlink.vehicle import Vector
+
+
+def troubles(pilot: Autopilot) -> list[str]:
+    """What keeps the UAV from being armed; nothing where all is well."""
+    memory = pilot.memory
+    state = memory.state
+    if state is None:
+        return ["nothing is known of the vehicle"]
+    found = []
+    if state.crashed:
+        found.append("the vehicle has crashed")
+    if memory.fix_lost and not pilot.parameter("COM_ARM_WO_GPS"):
+        found.append("no satellite fix")
+    if math.isfinite(state.charge) and state.charge < float(pilot.parameter("BAT_LOW_THR")):
+        found.append("low battery")
+    tilt = 1.0 - 2.0 * (state.attitude[0] ** 2 + state.attitude[1] ** 2)
+    if not state.airborne and tilt < 0.7:  # PX4 refuses beyond about 45 deg
+        found.append("the vehicle lies on its side")
+    if memory.mode.by_sticks and not sticks_are_there(pilot):
+        found.append("no manual control input")
+    return found
+
+
+def sticks_are_there(pilot: Autopilot) -> bool:
+    """Whether MANUAL_CONTROL has come within COM_RC_LOSS_T."""
+    age_ns = pilot.memory.now_ns - pilot.memory.sticks.time_ns
+    return age_ns <= float(pilot.parameter("COM_RC_LOSS_T")) * 1e9
+
+
+def arm(pilot: Autopilot, *, forced: bool) -> str:
+    """Arm; why not, empty where it is armed."""
+    memory = pilot.memory
+    if memory.armed:
+        return ""
+    if memory.mode in (Mode.RETURN, Mode.LAND):
+        memory.mode = Mode.HOLD
+    found = troubles(pilot)
+    if pilot.state.crashed or (found and not forced):
+        return found[0]
+    memory.armed, memory.armed_ns = True, memory.now_ns
+    memory.airborne, memory.failsafe = False, False
+    memory.warned.clear()
+    set_home(pilot, pilot.state.position)
+    pilot.say(6, "Armed by external command")
+    pilot.announce()
+    return ""
+
+
+def disarm(pilot: Autopilot, *, forced: bool) -> str:
+    """Disarm; in the air only by force, and then it falls. Why not, empty where it is done."""
+    state = pilot.state
+    landed = state.mode in ("LANDED", "CRASHED")
+    if not landed:
+        if not forced:
+            return "not landed"
+        why = pilot.vehicle.stop()
+        if why:
+            return why
+    finish(pilot, "Disarmed by external command")
+    pilot.memory.order = "" if landed else "stop"
+    pilot.memory.ordered_ns = pilot.memory.now_ns
+    return ""
+
+
+def finish(pilot: Autopilot, text: str) -> None:
+    """Be disarmed from now on."""
+    memory = pilot.memory
+    if not memory.armed:
+        return
+    memory.armed, memory.airborne, memory.failsafe = False, False, False
+    memory.leg = memory.way_home = memory.target = None
+    if memory.mode in (Mode.RETURN, Mode.LAND, Mode.TAKE_OFF, Mode.OFFBOARD):
+        memory.mode = Mode.HOLD
+    pilot.say(6, text)
+    pilot.announce()
+
+
+def set_home(pilot: Autopilot, place: Vector) -> None:
+    """Let home be a place in the map."""
+    from volery.mavlink.telemetry import BUILDERS, HOME_POSITION
+
+    pilot.memory.home = place
+    message = BUILDERS[HOME_POSITION](pilot)
+    if message is not None:
+        pilot.send(message)

@@ -1,0 +1,85 @@
+"""The dialect `common` of MAVLink 2, as pymavlink packs and unpacks it."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from volery.core.errors import BridgeError
+
+AUTOPILOT = 1
+"""MAV_COMP_ID_AUTOPILOT1."""
+
+
+@cache
+def dialect() -> Any:
+    """The module of pymavlink with messages and enumerations. `BridgeError` where it is missing."""
+    try:
+        from pymavlink.dialects.v20 import common
+    except ImportError:
+        raise BridgeError(
+            'MAVLink needs pymavlink: pip install "volery[mavlink]" brings it'
+        ) from None
+    return common
+
+
+_HEAD = struct.Struct("<BBBBBBBHB")
+_CHECK = struct.Struct("<H")
+_MAGIC = 0xFD
+
+
+def check_of(data: bytes) -> int:
+    """MAVLink's checksum, CRC-16/MCRF4XX, as pymavlink has it computed."""
+    return _crc()(data)
+
+
+@cache
+def _crc() -> Callable[[bytes], int]:
+    dialect()
+    from fastcrc import crc16
+
+    check: Callable[[bytes], int] = crc16.mcrf4xx
+    return check
+
+
+class Codec:
+    """Packs messages of one vehicle.
+
+    Frames are those of pymavlink's own `pack`, in a third of its time: ten vehicles with all their
+    streams send 5,000 a second.
+    """
+
+    def __init__(self, system: int, component: int = AUTOPILOT) -> None:
+        self._mav = dialect().MAVLink(None, system, component)
+        self._source = (system, component)
+
+    def pack(self, message: Any, sequence: int) -> bytes:
+        """A frame with a sequence number from 0 to 255."""
+        if any(message.array_lengths):
+            self._mav.seq = sequence
+            packed: bytes = message.pack(self._mav)
+            return packed
+        payload = message.unpacker.pack(*map(message.__dict__.get, message.ordered_fieldnames))
+        payload = payload.rstrip(b"\0") or b"\0"
+        number = type(message).id  # some have a field of that name
+        head = _HEAD.pack(
+            _MAGIC, len(payload), 0, 0, sequence, *self._source, number & 0xFFFF, number >> 16
+        )
+        frame: bytes = head + payload
+        return frame + _CHECK.pack(check_of(frame[1:] + bytes((message.crc_extra,))))
+
+
+class Parser:
+    """Unpacks the messages of whole frames."""
+
+    def __init__(self) -> None:
+        self._mav = dialect().MAVLink(None, 0, 0)
+
+    def decode(self, frame: bytes) -> Any | None:
+        """The message of a frame; None where its payload does not fit."""
+        try:
+            return self._mav.decode(bytearray(frame))
+        except (dialect().MAVError, struct.error, UnicodeError):
+            return None

@@ -1,0 +1,255 @@
+"""Commands and their answers: each COMMAND_LONG and COMMAND_INT gets one COMMAND_ACK."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+from volery.core.errors import CommandError
+from volery.mavlink import arming, plans, streams, switching, telemetry, transfers
+from volery.mavlink.codec import dialect
+from volery.mavlink.modes import Mode, mode_of
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot import Autopilot
+    from volery.mavlink.memory import Source
+    from volery.mavlink.vehicle import Vector
+
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
+UNSUPPORTED_FRAME = 8
+"""MAV_RESULT."""
+DO_SET_MODE = 176
+_ABOVE_HOME = (3, 6, 10, 11)
+_RETIRED_REQUESTS = {410: 242, 519: 300, 520: 148}
+"""MAV_CMD that MAV_CMD_REQUEST_MESSAGE replaced, and the message that each asked for."""
+
+
+class Command(NamedTuple):
+    """A command with seven parameters; frame: of a COMMAND_INT."""
+
+    number: int
+    params: tuple[float, ...]
+    frame: int | None
+
+
+def take(pilot: Autopilot, source: Source, command: Command) -> None:
+    """Do it, and answer whoever asked."""
+    link, system, component = source
+    result = do(pilot, source, command)
+    ack = dialect().MAVLink_command_ack_message
+    pilot.send(ack(command.number, result, 255, 0, system, component), link)
+
+
+def do(pilot: Autopilot, source: Source, command: Command) -> int:
+    """MAV_RESULT of doing it."""
+    handler = _HANDLERS.get(command.number)
+    if handler is None:
+        return UNSUPPORTED
+    if pilot.memory.state is None:
+        return TEMPORARILY_REJECTED
+    try:
+        return handler(pilot, source, command)
+    except CommandError as error:
+        pilot.say(4, str(error))
+        return TEMPORARILY_REJECTED
+
+
+def _arm(pilot: Autopilot, _source: Source, command: Command) -> int:
+    wanted, force = command.params[0], command.params[1]
+    forced = round(force) == 21196 if math.isfinite(force) else False  # PX4's magic number
+    if wanted not in (0.0, 1.0):
+        return DENIED
+    why = arming.arm(pilot, forced=forced) if wanted else arming.disarm(pilot, forced=forced)
+    if why:
+        pilot.say(2, f"{'Arming' if wanted else 'Disarming'} denied: {why}")
+    return TEMPORARILY_REJECTED if why else ACCEPTED
+
+
+def _take_off(pilot: Autopilot, _source: Source, command: Command) -> int:
+    altitude = command.params[6]
+    if math.isinf(altitude):
+        return DENIED
+    height = math.nan
+    if math.isfinite(altitude):
+        height = _height_in_map(pilot, altitude, command.frame) - pilot.state.position[2]
+        if height <= 0.0:
+            pilot.say(4, "Take-off altitude is below the vehicle")
+            return DENIED
+    pilot.memory.take_off_height = height
+    return _switch(pilot, Mode.TAKE_OFF)
+
+
+def _land(pilot: Autopilot, _source: Source, _command: Command) -> int:
+    return _switch(pilot, Mode.LAND)
+
+
+def _return(pilot: Autopilot, _source: Source, _command: Command) -> int:
+    return _switch(pilot, Mode.RETURN)
+
+
+def _set_mode(pilot: Autopilot, _source: Source, command: Command) -> int:
+    base, main, sub = command.params[:3]
+    if not (math.isfinite(base) and int(base) & 1 and math.isfinite(main)):
+        return DENIED  # PX4's modes are custom ones
+    mode = mode_of(int(main), int(sub) if math.isfinite(sub) else 0)
+    if mode is None:
+        pilot.say(4, "This flight mode is not offered")
+        return UNSUPPORTED
+    return _switch(pilot, mode)
+
+
+def _switch(pilot: Autopilot, mode: Mode) -> int:
+    why = switching.ask_for(pilot, mode)
+    if why:
+        pilot.say(2, f"Switching to mode '{mode.mavros}' not possible: {why}")
+    return TEMPORARILY_REJECTED if why else ACCEPTED
+
+
+def _reposition(pilot: Autopilot, _source: Source, command: Command) -> int:
+    """DO_REPOSITION: fly somewhere, hold there; what is nan stays as it is."""
+    speed, _, _, yaw, latitude, longitude, altitude = command.params
+    if any(math.isinf(param) for param in command.params):
+        return DENIED
+    if not switching.flies(pilot):
+        return DENIED
+    x, y, z = pilot.state.position
+    if math.isfinite(latitude) and math.isfinite(longitude):
+        if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
+            return DENIED
+        x, y, _ = pilot.earth.place(latitude, longitude, pilot.build.origin[2])
+    if math.isfinite(altitude):
+        z = _height_in_map(pilot, altitude, command.frame)
+    result = _switch(pilot, Mode.HOLD)
+    if result == ACCEPTED:
+        if math.isfinite(speed) and speed > 0.0:
+            pilot.memory.cruise = speed
+        facing = 0.5 * math.pi - yaw if math.isfinite(yaw) else None
+        switching.go_to(pilot, (x, y, z), facing)
+    return result
+
+
+def _change_speed(pilot: Autopilot, _source: Source, command: Command) -> int:
+    speed = command.params[1]
+    if speed in (-1.0, -2.0):  # as it was
+        speed = math.nan
+    elif not (math.isfinite(speed) and speed > 0.0):
+        return DENIED
+    if pilot.memory.mode is Mode.MISSION:
+        pilot.memory.mission.speed = speed
+    pilot.memory.cruise = speed
+    if pilot.memory.leg is not None:
+        pilot.memory.leg.speed = switching.cruise(pilot)
+    return ACCEPTED
+
+
+def _set_home(pilot: Autopilot, _source: Source, command: Command) -> int:
+    latitude, longitude, altitude = command.params[4:7]
+    if command.params[0] == 1.0:
+        arming.set_home(pilot, pilot.state.position)
+        return ACCEPTED
+    finite = math.isfinite(latitude) and math.isfinite(longitude) and math.isfinite(altitude)
+    if not finite or abs(latitude) > 90.0 or abs(longitude) > 180.0:
+        return DENIED
+    x, y, _ = pilot.earth.place(latitude, longitude, pilot.build.origin[2])
+    arming.set_home(pilot, (x, y, _height_in_map(pilot, altitude, command.frame)))
+    return ACCEPTED
+
+
+def _start_mission(pilot: Autopilot, _source: Source, command: Command) -> int:
+    first = command.params[0]
+    if math.isfinite(first) and first > 0.0 and not transfers.jump_to(pilot, int(first)):
+        return DENIED
+    if pilot.memory.mission.complete:
+        transfers.jump_to(pilot, 0)
+    result = _switch(pilot, Mode.MISSION)
+    if result == ACCEPTED and not pilot.memory.armed:
+        why = arming.arm(pilot, forced=False)
+        if why:
+            pilot.say(2, f"Arming denied: {why}")
+            return TEMPORARILY_REJECTED
+    return result
+
+
+def _jump(pilot: Autopilot, _source: Source, command: Command) -> int:
+    number = command.params[0]
+    there = math.isfinite(number) and transfers.jump_to(pilot, int(number))
+    return ACCEPTED if there else DENIED
+
+
+def _pause(pilot: Autopilot, _source: Source, command: Command) -> int:
+    return _switch(pilot, Mode.MISSION if command.params[0] == 1.0 else Mode.HOLD)
+
+
+def _interval(pilot: Autopilot, source: Source, command: Command) -> int:
+    number, period_us = command.params[:2]
+    if not (math.isfinite(number) and math.isfinite(period_us)):
+        return DENIED
+    link = pilot.memory.links[source[0]]
+    return ACCEPTED if streams.ask_for(pilot, link, int(number), period_us) else UNSUPPORTED
+
+
+def _request(pilot: Autopilot, source: Source, command: Command) -> int:
+    number = command.params[0]
+    if not math.isfinite(number):
+        return DENIED
+    return _send_once(pilot, source, int(number), command.params[1])
+
+
+def _request_as_of_old(pilot: Autopilot, source: Source, command: Command) -> int:
+    return _send_once(pilot, source, _RETIRED_REQUESTS[command.number], math.nan)
+
+
+def _send_once(pilot: Autopilot, source: Source, number: int, what: float) -> int:
+    if number == telemetry.MESSAGE_INTERVAL:
+        asked = int(what) if math.isfinite(what) else -1
+        message = streams.interval_of(pilot.memory.links[source[0]], asked)
+    else:
+        build = telemetry.BUILDERS.get(number)
+        message = None if build is None else build(pilot)
+    if message is None:
+        return UNSUPPORTED
+    pilot.send(message, source[0])
+    return ACCEPTED
+
+
+def _terminate(pilot: Autopilot, _source: Source, command: Command) -> int:
+    """DO_FLIGHTTERMINATION: rotors off for good."""
+    if not command.params[0] > 0.5:
+        return ACCEPTED
+    why = arming.disarm(pilot, forced=True)
+    return FAILED if why else ACCEPTED
+
+
+def _reboot(pilot: Autopilot, _source: Source, _command: Command) -> int:
+    """A simulated autopilot goes on as it is; `/reset_uav` begins anew."""
+    return DENIED if pilot.memory.armed else UNSUPPORTED
+
+
+def _height_in_map(pilot: Autopilot, altitude: float, frame: int | None) -> float:
+    """Z in the map of an altitude: above home in frames that say so, else above the sea."""
+    home: Vector = pilot.memory.home or pilot.memory.origin
+    if frame is not None and frame in _ABOVE_HOME:
+        return home[2] + altitude
+    return altitude - pilot.build.origin[2]
+
+
+_HANDLERS: dict[int, Callable[[Autopilot, Source, Command], int]] = {
+    plans.RETURN_TO_LAUNCH: _return,
+    plans.LAND: _land,
+    plans.TAKE_OFF: _take_off,
+    DO_SET_MODE: _set_mode,
+    plans.CHANGE_SPEED: _change_speed,
+    plans.SET_HOME: _set_home,
+    185: _terminate,
+    192: _reposition,
+    193: _pause,
+    224: _jump,
+    246: _reboot,
+    300: _start_mission,
+    400: _arm,
+    511: _interval,
+    512: _request,
+    **dict.fromkeys(_RETIRED_REQUESTS, _request_as_of_old),
+}
+"""By MAV_CMD."""

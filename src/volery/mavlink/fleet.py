@@ -1,0 +1,167 @@
+"""The autopilots of a graph as a door sees them: frames to them and from them, vehicles that come.
+
+Works in the loop of the door; the session carries everything to the simulation's thread.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from volery.core.errors import GraphError
+from volery.graph.mailbox import Mailbox
+from volery.graph.messages import message_type
+from volery.graph.session import Gateway, Session
+
+PACKETS = "volery_interfaces/msg/MavlinkPackets"
+_IN, _OUT = "/mavlink/in", "/mavlink/out"
+_DEPTH = 1000
+_LOOK_S = 0.2
+"""Between two looks who has come and gone."""
+_BEAT_S = 1.0
+"""Of wall time without a frame after which the last heartbeat is repeated: while the simulation
+stands still, its vehicles are still there."""
+
+Sink = Callable[[int, bytes], None]
+"""Takes frames for a link, by its number."""
+
+
+@dataclass(eq=False)
+class Craft:
+    """One vehicle with an autopilot."""
+
+    name: str
+    system: int
+    mailbox: Mailbox
+    sink: Sink
+    heartbeat: bytes = b""
+    heard_s: float = 0.0
+
+
+class Fleet:
+    """All vehicles of a gateway's graph that have autopilots.
+
+    `joined(craft)` is called for each, and gives back what takes its frames; `left(craft)` when it
+    is there no more.
+    """
+
+    def __init__(
+        self,
+        gateway: Gateway,
+        name: str,
+        joined: Callable[[str, int], Sink],
+        left: Callable[[int], None],
+    ) -> None:
+        self._session: Session = gateway.open(name)
+        self._joined, self._left = joined, left
+        self._loop = asyncio.get_running_loop()
+        self._craft: dict[int, Craft] = {}
+        self._packets = message_type(PACKETS)
+        self._closed = False
+
+    @property
+    def systems(self) -> tuple[int, ...]:
+        """Ids of those that are there."""
+        return tuple(self._craft)
+
+    def look(self) -> None:
+        """See who has come and gone, and what has been silent."""
+        graph = self._session.graph
+        there = {
+            info.name.removesuffix(_OUT)[1:]
+            for info in graph.topics()
+            if info.name.endswith(_OUT) and info.msgtype == PACKETS and info.publishers
+        }
+        for craft in tuple(self._craft.values()):
+            if craft.name not in there:
+                self._forget(craft)
+        for name in sorted(there - {craft.name for craft in self._craft.values()}):
+            self._meet(name)
+        now_s = self._loop.time()
+        for craft in self._craft.values():
+            if craft.heartbeat and now_s - craft.heard_s > _BEAT_S:
+                craft.heard_s = now_s
+                craft.sink(-1, craft.heartbeat)
+
+    async def keep_looking(self) -> None:
+        """Look again and again."""
+        while True:
+            await asyncio.sleep(_LOOK_S)
+            self.look()
+
+    def send(self, system: int, link: int, profile: int, data: bytes) -> None:
+        """Bring frames of a link to a vehicle; a link begins with the first ones, or none."""
+        self._publish(system, link=link, profile=profile, closed=False, data=data)
+
+    def close_link(self, system: int, link: int) -> None:
+        """Tell a vehicle that a link is there no more."""
+        self._publish(system, link=link, profile=0, closed=True, data=b"")
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._closed = True
+        for craft in tuple(self._craft.values()):
+            self._forget(craft)
+        self._session.close()
+
+    def _publish(self, system: int, *, data: bytes, **fields: Any) -> None:
+        craft = self._craft.get(system)
+        if craft is None or self._closed:
+            return
+        message = self._packets(data=np.frombuffer(data, np.uint8), **fields)
+        with contextlib.suppress(GraphError):  # the simulation is closing
+            self._session.publish(f"/{craft.name}{_IN}", message)
+
+    def _meet(self, name: str) -> None:
+        system = self._system_of(name)
+        if system is None or system in self._craft:
+            return
+        self._session.advertise(f"/{name}{_IN}", PACKETS)
+
+        def wake() -> None:
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                self._loop.call_soon_threadsafe(self._drain, system)
+
+        mailbox = self._session.subscribe(f"/{name}{_OUT}", PACKETS, depth=_DEPTH, wake=wake)
+        craft = Craft(name, system, mailbox, _nowhere)
+        self._craft[system] = craft
+        craft.sink = self._joined(name, system)
+
+    def _system_of(self, name: str) -> int | None:
+        try:
+            parameter = self._session.graph.parameters.get(f"/{name}/autopilot", "mavlink_id")
+        except GraphError:
+            return None
+        return int(parameter.value)
+
+    def _drain(self, system: int) -> None:
+        craft = self._craft.get(system)
+        if craft is None:
+            return
+        for published in craft.mailbox.take():
+            message = published.message
+            data = np.asarray(message.data, np.uint8).tobytes()
+            craft.heard_s = self._loop.time()
+            if data[7:10] == b"\0\0\0" and data[0] == _MAGIC:
+                craft.heartbeat = data[: _HEAD + data[1] + 2]
+            craft.sink(message.link, data)
+
+    def _forget(self, craft: Craft) -> None:
+        del self._craft[craft.system]
+        self._session.unsubscribe(craft.mailbox)
+        with contextlib.suppress(GraphError):
+            self._session.unadvertise(f"/{craft.name}{_IN}")
+        self._left(craft.system)
+
+
+_MAGIC, _HEAD = 0xFD, 10
+"""A frame of MAVLink 2: ten bytes, the payload, two of its checksum."""
+
+
+def _nowhere(_link: int, _data: bytes) -> None:
+    """Take frames of a vehicle whose door is not open yet."""

@@ -1,0 +1,64 @@
+"""What each mode does at each state of the UAV."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from volery.mavlink import mission_flight, offboard, return_flight, sticks, switching
+from volery.mavlink.legs import fly_leg
+from volery.mavlink.modes import Mode
+from volery.mavlink.setpoints import Setpoint
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot import Autopilot
+    from volery.mavlink.vehicle import FlightState
+
+
+def fly(pilot: Autopilot, state: FlightState) -> None:
+    """Go on with the present mode; nothing while it is disarmed or somebody else flies."""
+    memory = pilot.memory
+    if not memory.armed or state.crashed or memory.order.isupper():
+        return
+    _FLIGHTS[memory.mode](pilot, state)
+
+
+def _take_off(pilot: Autopilot, state: FlightState) -> None:
+    memory = pilot.memory
+    if state.mode == "LANDED":
+        if memory.order != "take_off":
+            switching.rise(pilot)
+        return
+    there = state.mode == "HOLD" if memory.leg is None else fly_leg(pilot, memory.leg)
+    if there:
+        wants_mission = pilot.parameter("COM_TAKEOFF_ACT") == 1
+        goes_on = wants_mission and not switching.obstacle_to(pilot, Mode.MISSION)
+        leg = memory.leg
+        switching.enter(pilot, Mode.MISSION if goes_on else Mode.HOLD)
+        memory.leg = None if goes_on else leg
+
+
+def _hold(pilot: Autopilot, state: FlightState) -> None:
+    if pilot.memory.leg is not None and state.mode != "LANDED":
+        fly_leg(pilot, pilot.memory.leg)
+
+
+def _land(pilot: Autopilot, state: FlightState) -> None:
+    if state.mode not in ("LANDED", "LAND") and pilot.memory.order != "land":
+        switching.order(pilot, "land", pilot.vehicle.land())
+    if pilot.memory.target is None:
+        x, y, _ = state.position
+        pilot.memory.target = Setpoint(position=(x, y, math.nan))
+
+
+_FLIGHTS: dict[Mode, Callable[[Autopilot, FlightState], None]] = {
+    Mode.ALTITUDE: sticks.fly_altitude,
+    Mode.POSITION: sticks.fly_position,
+    Mode.TAKE_OFF: _take_off,
+    Mode.HOLD: _hold,
+    Mode.MISSION: mission_flight.fly,
+    Mode.RETURN: return_flight.fly,
+    Mode.LAND: _land,
+    Mode.OFFBOARD: offboard.fly,
+}

@@ -1,0 +1,290 @@
+"""MAVROS's topics and services for one autopilot, so that offboard programs run unchanged.
+
+Names, types and frames are MAVROS's: ENU and FLU, places from the autopilot's local origin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from volery.core.errors import CommandError
+from volery.core.rotations import conjugate, rotate, yaw_of
+from volery.graph.messages import (
+    BatteryState,
+    NavSatFix,
+    NavSatStatus,
+    Odometry,
+    Point,
+    Pose,
+    PoseStamped,
+    PoseWithCovariance,
+    Quaternion,
+    Twist,
+    TwistStamped,
+    TwistWithCovariance,
+    Vector3,
+    header,
+    message_type,
+)
+from volery.graph.zero import zero_message
+from volery.mavlink import commands, offboard, switching
+from volery.mavlink.modes import mode_named
+from volery.mavlink.setpoints import Setpoint
+
+if TYPE_CHECKING:
+    from volery.graph.node import Node
+    from volery.mavlink.autopilot import Autopilot
+    from volery.mavlink.memory import Source
+    from volery.mavlink.vehicle import Vector
+
+_STATE, _EXTENDED = "mavros_msgs/msg/State", "mavros_msgs/msg/ExtendedState"
+_TARGET, _ATTITUDE = "mavros_msgs/msg/PositionTarget", "mavros_msgs/msg/AttitudeTarget"
+_BOOL, _MODE = "mavros_msgs/srv/CommandBool", "mavros_msgs/srv/SetMode"
+_TOL, _LONG = "mavros_msgs/srv/CommandTOL", "mavros_msgs/srv/CommandLong"
+_SLOW_NS, _FAST_NS = 1_000_000_000, 30_000_000
+"""The state comes with each heartbeat, the place at about PX4's rate of LOCAL_POSITION_NED."""
+_SOURCE: Source = (-1, 1, 240)
+"""System and component of MAVROS itself; the link is none of the doors'."""
+_NOTHING = (math.nan, math.nan, math.nan)
+
+
+class Mavros:
+    """The topics below `prefix` of the autopilot `pilot`, on the graph of `node`."""
+
+    def __init__(self, node: Node, pilot: Autopilot, prefix: str) -> None:
+        self._pilot = pilot
+        self._told: dict[str, int] = {}
+        self._last_state: tuple[Any, ...] = ()
+
+        def publisher(name: str, kind: type[Any]) -> Any:
+            return node.create_publisher(kind, f"{prefix}/{name}")
+
+        self._state = publisher("state", message_type(_STATE))
+        self._extended = publisher("extended_state", message_type(_EXTENDED))
+        self._battery = publisher("battery", BatteryState)
+        self._pose = publisher("local_position/pose", PoseStamped)
+        self._velocity = publisher("local_position/velocity_local", TwistStamped)
+        self._odom = publisher("local_position/odom", Odometry)
+        self._global = publisher("global_position/global", NavSatFix)
+        subscriptions: dict[str, tuple[type[Any], Callable[[Any], Setpoint]]] = {
+            "setpoint_position/local": (PoseStamped, self._place),
+            "setpoint_velocity/cmd_vel": (TwistStamped, lambda m: _velocity(m.twist)),
+            "setpoint_velocity/cmd_vel_unstamped": (Twist, _velocity),
+            "setpoint_raw/local": (message_type(_TARGET), self._raw),
+            "setpoint_raw/attitude": (message_type(_ATTITUDE), _attitude),
+        }
+        for name, (kind, read) in subscriptions.items():
+            node.create_subscription(kind, f"{prefix}/{name}", self._heard(read))
+        node.create_service(_BOOL, f"{prefix}/cmd/arming", self._arm)
+        node.create_service(_MODE, f"{prefix}/set_mode", self._set_mode)
+        node.create_service(_TOL, f"{prefix}/cmd/takeoff", self._take_off)
+        node.create_service(_TOL, f"{prefix}/cmd/land", self._land)
+        node.create_service(_LONG, f"{prefix}/cmd/command", self._command)
+
+    # --------------------------------------------------------------------------------------- out
+
+    def tell(self) -> None:
+        """Publish what is due."""
+        pilot, memory = self._pilot, self._pilot.memory
+        state = (memory.armed, memory.mode)
+        if self._is_due("slow", _SLOW_NS) or state != self._last_state:
+            self._last_state = state
+            for publisher, build in (
+                (self._state, self._state_message),
+                (self._extended, self._extended_message),
+                (self._battery, self._battery_message),
+            ):
+                if publisher.wanted:
+                    publisher.publish(build(pilot))
+        if self._is_due("fast", _FAST_NS):
+            for publisher, build in (
+                (self._pose, self._pose_message),
+                (self._velocity, self._velocity_message),
+                (self._odom, self._odom_message),
+                (self._global, self._global_message),
+            ):
+                if publisher.wanted:
+                    publisher.publish(build(pilot))
+
+    def _is_due(self, what: str, period_ns: int) -> bool:
+        now_ns = self._pilot.memory.now_ns
+        last_ns = self._told.get(what, -period_ns)
+        if 0 <= now_ns - last_ns < period_ns:
+            return False
+        self._told[what] = now_ns
+        return True
+
+    def _header(self, frame: str = "map") -> Any:
+        return header(self._pilot.memory.now_ns, frame)
+
+    def _state_message(self, pilot: Autopilot) -> Any:
+        memory = pilot.memory
+        message = zero_message(_STATE)
+        message.header = self._header("")
+        message.connected, message.armed = True, memory.armed
+        message.guided = not memory.mode.by_sticks
+        message.manual_input = memory.mode.by_sticks
+        message.mode = memory.mode.mavros
+        message.system_status = 4 if memory.armed else 3
+        return message
+
+    def _extended_message(self, pilot: Autopilot) -> Any:
+        message = zero_message(_EXTENDED)
+        message.header = self._header("")
+        landed = {"LANDED": 1, "CRASHED": 1, "TAKE_OFF": 3, "LAND": 4}
+        message.landed_state = landed.get(pilot.state.mode, 2)
+        return message
+
+    def _battery_message(self, pilot: Autopilot) -> Any:
+        message = zero_message("sensor_msgs/msg/BatteryState")
+        message.header = self._header("")
+        message.voltage, message.current = pilot.state.voltage, -pilot.state.current
+        message.percentage, message.present = pilot.state.charge, math.isfinite(pilot.state.charge)
+        return message
+
+    def _local_pose(self, pilot: Autopilot) -> Any:
+        origin = pilot.memory.origin
+        x, y, z = (p - o for p, o in zip(pilot.state.position, origin, strict=True))
+        return Pose(Point(x, y, z), Quaternion(*pilot.state.attitude))
+
+    def _pose_message(self, pilot: Autopilot) -> Any:
+        return PoseStamped(self._header(), self._local_pose(pilot))
+
+    def _velocity_message(self, pilot: Autopilot) -> Any:
+        twist = Twist(Vector3(*pilot.state.velocity), Vector3(*pilot.state.rates))
+        return TwistStamped(self._header(), twist)
+
+    def _odom_message(self, pilot: Autopilot) -> Any:
+        turned = rotate(conjugate(pilot.state.attitude), pilot.state.velocity).tolist()
+        twist = Twist(Vector3(*turned), Vector3(*pilot.state.rates))
+        nothing = np.zeros(36)
+        return Odometry(
+            self._header(),
+            "base_link",
+            PoseWithCovariance(self._local_pose(pilot), nothing),
+            TwistWithCovariance(twist, nothing),
+        )
+
+    def _global_message(self, pilot: Autopilot) -> Any:
+        latitude, longitude, altitude = pilot.earth.geodetic(pilot.state.position)
+        status: Any = NavSatStatus(-1 if pilot.memory.fix_lost else 0, 1)
+        covariance = np.zeros(9)
+        return NavSatFix(
+            self._header("base_link"), status, latitude, longitude, altitude, covariance, 0
+        )
+
+    # ---------------------------------------------------------------------------------------- in
+
+    def _heard(self, read: Callable[[Any], Setpoint]) -> Callable[[Any], None]:
+        def take(message: Any) -> None:
+            try:
+                setpoint = read(message)
+            except CommandError:
+                return  # a setpoint that is none has nobody to tell
+            offboard.take(self._pilot, _SOURCE, setpoint)
+
+        return take
+
+    def _in_map(self, point: Any) -> Vector:
+        x, y, z = self._pilot.memory.origin
+        return x + point.x, y + point.y, z + point.z
+
+    def _place(self, message: Any) -> Setpoint:
+        q = message.pose.orientation
+        turn = [q.x, q.y, q.z, q.w]
+        yaw = float(yaw_of(turn)) if 0.5 < math.hypot(*turn) < 2.0 else math.nan
+        return _checked(Setpoint(position=self._in_map(message.pose.position), yaw=yaw))
+
+    def _raw(self, message: Any) -> Setpoint:
+        mask = int(message.type_mask)
+        if message.coordinate_frame not in (1, 8) or mask & 512:
+            raise CommandError("no such setpoints")
+        place = self._in_map(message.position) if message.coordinate_frame == 1 else _NOTHING
+        push = message.acceleration_or_force
+        return _checked(
+            Setpoint(
+                _masked(place, mask),
+                _masked(_parts(message.velocity), mask >> 3),
+                _masked(_parts(push), mask >> 6),
+                math.nan if mask & 1024 else message.yaw,
+                math.nan if mask & 2048 else message.yaw_rate,
+                message.coordinate_frame == 8,
+            )
+        )
+
+    def _arm(self, request: Any, response: Any) -> Any:
+        why = self._do(400, (1.0 if request.value else 0.0, 0.0))
+        response.success, response.result = why == 0, why
+        return response
+
+    def _set_mode(self, request: Any, response: Any) -> Any:
+        mode = mode_named(request.custom_mode)
+        response.mode_sent = mode is not None and not self._switched(mode)
+        return response
+
+    def _switched(self, mode: Any) -> str:
+        return switching.ask_for(self._pilot, mode)
+
+    def _take_off(self, request: Any, response: Any) -> Any:
+        params = (0.0, 0.0, 0.0, request.yaw, request.latitude, request.longitude)
+        result = self._do(22, (*params, request.altitude))
+        response.success, response.result = result == 0, result
+        return response
+
+    def _land(self, _request: Any, response: Any) -> Any:
+        result = self._do(21, ())
+        response.success, response.result = result == 0, result
+        return response
+
+    def _command(self, request: Any, response: Any) -> Any:
+        params = tuple(float(getattr(request, f"param{k}")) for k in range(1, 8))
+        result = self._do(int(request.command), params)
+        response.success, response.result = result == 0, result
+        return response
+
+    def _do(self, number: int, params: tuple[float, ...]) -> int:
+        filled = (*params, *(math.nan,) * (7 - len(params)))
+        return commands.do(self._pilot, _SOURCE, commands.Command(number, filled, None))
+
+
+def _velocity(twist: Any) -> Setpoint:
+    return _checked(Setpoint(velocity=_parts(twist.linear), yaw_rate=twist.angular.z))
+
+
+def _attitude(message: Any) -> Setpoint:
+    mask, thrust = int(message.type_mask), float(message.thrust)
+    if mask & 64 or not 0.0 <= thrust <= 1.0:
+        raise CommandError("an attitude needs a thrust from 0 to 1")
+    if mask & 128:
+        rates = _parts(message.body_rate)
+        if mask & 7 or not all(map(math.isfinite, rates)):
+            raise CommandError("three finite body rates are needed")
+        return Setpoint(rates=rates, thrust=thrust)
+    q = message.orientation
+    length = math.hypot(q.x, q.y, q.z, q.w)
+    if not 0.9 <= length <= 1.1:
+        raise CommandError("an attitude must be a unit quaternion")
+    x, y, z, w = (part / length for part in (q.x, q.y, q.z, q.w))
+    return Setpoint(attitude=(x, y, z, w), thrust=thrust)
+
+
+def _parts(vector: Any) -> Vector:
+    return vector.x, vector.y, vector.z
+
+
+def _masked(vector: Vector, mask: int) -> Vector:
+    x, y, z = (math.nan if mask >> k & 1 else part for k, part in enumerate(vector))
+    return x, y, z
+
+
+def _checked(setpoint: Setpoint) -> Setpoint:
+    parts = (*setpoint.position, *setpoint.velocity, *setpoint.acceleration)
+    if all(map(math.isnan, parts)) or any(abs(part) > 1e6 for part in parts):
+        raise CommandError("a setpoint without a number, or out of range")
+    if math.isinf(setpoint.yaw) or math.isinf(setpoint.yaw_rate):
+        raise CommandError("a heading is out of range")
+    return setpoint

@@ -1,0 +1,113 @@
+"""The autopilot as a node of the simulation: in lock step with its UAV, so that flights repeat.
+
+    [[types.iris.nodes]]
+    node = "volery.mavlink.node:Autopilot"
+    parameters = { px4 = { MIS_TAKEOFF_ALT = 5.0 } }
+
+Frames come on `mavlink/in` and go out on `mavlink/out`; `udp_door`, `tcp_door` and `serial_door`
+carry them. Beside them stand MAVROS's topics and services below `mavros/`, those of system 1 below
+`/mavros/` too.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from volery.core.errors import NodeError
+from volery.graph.messages import NavSatFix, message_type
+from volery.graph.node import Node
+from volery.mavlink import autopilot, streams
+from volery.mavlink.graph_vehicle import GraphVehicle, build_of, state_of
+from volery.mavlink.mavros import Mavros
+from volery.mavlink.memory import Memory
+
+PACKETS = "volery_interfaces/msg/MavlinkPackets"
+_STATE = "volery_interfaces/msg/FlightState"
+MOST_SYSTEMS = 250
+"""Ids above are ground stations' by custom."""
+
+
+class Autopilot(Node):
+    """A PX4-like autopilot.
+
+    Parameters: `system_id` (0: that of uavN is N; of other names the highest that is free), `px4`:
+    values of its own parameters by name, see docs/mavlink.md.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("autopilot", **options)
+        wanted = int(self.declare_parameter("system_id", 0).value)
+        given = self.declare_parameter("px4", {}).value
+        self.system_id = wanted or self._own_number() or self._free_number()
+        if not 1 <= self.system_id <= MOST_SYSTEMS:
+            raise NodeError(f"system_id {self.system_id}: 1 to {MOST_SYSTEMS} is allowed")
+        self.declare_parameter("mavlink_id", self.system_id)
+        build = build_of(self)
+        self.core = autopilot.Autopilot(self.system_id, GraphVehicle(self), build, given)
+        self._packets = message_type(PACKETS)
+        self._out = self.create_publisher(self._packets, "mavlink/out", 1000)
+        self._mavros = [Mavros(self, self.core, "mavros")]
+        if self.system_id == 1:
+            self._mavros.append(Mavros(self, self.core, "/mavros"))
+        self.create_subscription(self._packets, "mavlink/in", self._take, 1000)
+        self.create_subscription(message_type(_STATE), "flight_state", self._fly, 1)
+        self.create_subscription(NavSatFix, "fix", self._take_fix, 1)
+
+    def get_state(self) -> Memory:
+        """Everything that changes; links are the doors', who goes back keeps those there are."""
+        return self.core.memory
+
+    def set_state(self, state: Memory) -> None:
+        """Go on from a kept state, with the links of now."""
+        links = self.core.memory.links
+        self.core.memory = state
+        state.links = links
+        for link in links.values():
+            streams.begin(link, state.now_ns)
+
+    def _take(self, message: Any) -> None:
+        if message.closed:
+            self.core.close_link(message.link)
+            return
+        data = np.asarray(message.data, np.uint8).tobytes()
+        self.core.receive(message.link, message.profile, data, self.get_clock().now_ns())
+        self._flush()
+
+    def _fly(self, message: Any) -> None:
+        self.core.update(state_of(message))
+        for mavros in self._mavros:
+            mavros.tell()
+        self._flush()
+
+    def _take_fix(self, fix: Any) -> None:
+        memory = self.core.memory
+        memory.has_receiver = True
+        if fix.status.status >= 0:
+            memory.fix_ns = self.get_clock().now_ns()
+
+    def _flush(self) -> None:
+        """Hand out what was sent, in one message a link."""
+        frames: dict[int, list[bytes]] = {}
+        for link, data in self.core.take_sent():
+            frames.setdefault(link, []).append(data)
+        for link, parts in frames.items():
+            joined = np.frombuffer(b"".join(parts), np.uint8)
+            self._out.publish(self._packets(link=link, profile=0, closed=False, data=joined))
+
+    def _own_number(self) -> int:
+        """N of uavN; 0 of other names."""
+        found = re.fullmatch(r"/uav([1-9]\d{0,2})", self.get_namespace())
+        return int(found[1]) if found and int(found[1]) <= MOST_SYSTEMS else 0
+
+    def _free_number(self) -> int:
+        """The highest id that no other autopilot of the graph has."""
+        parameters = self._context.graph.parameters
+        taken = {
+            parameters.get(node, name).value
+            for node, name in parameters.names()
+            if name == "mavlink_id"
+        }
+        return next(n for n in range(MOST_SYSTEMS, 0, -1) if n not in taken)

@@ -1,0 +1,52 @@
+"""Gives the UAVs of a scenario autopilots."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from volery.mavlink.codec import dialect
+from volery.scenario.load import parse_scenario
+from volery.scenario.schema import Scenario
+
+NODE = "volery.mavlink.node:Autopilot"
+
+
+def with_autopilots(scenario: Scenario) -> Scenario:
+    """The scenario with an autopilot beside each UAV whose type has none.
+
+    It is part of what is flown then: logs tell of it, and repeated flights have it too.
+    `BridgeError` where pymavlink is not installed.
+    """
+    dialect()
+    data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
+    for name, uav_type in scenario.types.items():
+        if all(entry.node != NODE for entry in uav_type.nodes):
+            kept = [entry.model_dump(exclude_unset=True) for entry in uav_type.nodes]
+            data["types"][name] = {**data["types"][name], "nodes": [*kept, {"node": NODE}]}
+    changed = parse_scenario(data, where=scenario.name)
+    changed._folder = scenario.folder
+    return changed
+
+
+def with_px4(scenario: Scenario) -> Scenario:
+    """The scenario for real PX4s: every type has the sensors that they need, none starts by itself.
+
+    An IMU at 250 Hz, so that each step has a reading; magnetometer, barometer and GNSS where a type
+    has none.
+    """
+    dialect()
+    data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
+    for name, uav_type in scenario.types.items():
+        sensors = [sensor.model_dump(exclude_unset=True) for sensor in uav_type.sensors]
+        kinds = {sensor["kind"] for sensor in sensors}
+        sensors += [{"kind": kind} for kind in _NEEDED if kind not in kinds]
+        for sensor in sensors:
+            sensor.update({"rate_hz": 250.0} if sensor["kind"] == "imu" else {})
+        data["types"][name] = {**data["types"][name], "sensors": sensors}
+    data["uavs"] = [{**group, "on_start": "wait"} for group in data["uavs"]]
+    changed = parse_scenario(data, where=scenario.name)
+    changed._folder = scenario.folder
+    return changed
+
+
+_NEEDED = ("imu", "magnetometer", "barometer", "gnss")

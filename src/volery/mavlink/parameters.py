@@ -1,0 +1,108 @@
+"""Parameters: all of them act, under PX4's names and with PX4's defaults where it has them.
+
+`DEFAULTS` is the documented set; docs/mavlink.md lists it. Values are ints (INT32) or floats
+(REAL32), which travel as PX4 sends them: the bytes of an int in place of a float's.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import NamedTuple
+
+Value = int | float
+INT32, REAL32 = 6, 9
+"""MAV_PARAM_TYPE."""
+
+
+class Parameter(NamedTuple):
+    """One parameter: default, allowed range, what it does. `fixed` ones cannot be set."""
+
+    default: Value
+    low: float
+    high: float
+    what: str
+    fixed: bool = False
+
+
+DEFAULTS: dict[str, Parameter] = {
+    "BAT_CRIT_THR": Parameter(0.07, 0.05, 0.5, "charge below which the battery is critical"),
+    "BAT_EMERGEN_THR": Parameter(0.05, 0.03, 0.5, "charge below which it is an emergency"),
+    "BAT_LOW_THR": Parameter(0.15, 0.12, 0.5, "charge below which the battery is low"),
+    "COM_ARM_WO_GPS": Parameter(0, 0, 1, "1: arms without a fix"),
+    "COM_DISARM_LAND": Parameter(2.0, -1, 20, "s from landing to disarming; <= 0: never"),
+    "COM_DISARM_PRFLT": Parameter(10.0, -1, 60, "s from arming without take-off to disarming"),
+    "COM_DL_LOSS_T": Parameter(10, 5, 300, "s without a ground station's heartbeat: link lost"),
+    "COM_LOW_BAT_ACT": Parameter(
+        0, 0, 3, "0 warning, 2 land when critical, 3 return when critical, land in an emergency"
+    ),
+    "COM_OBL_RC_ACT": Parameter(
+        0, 0, 5, "offboard lost: 0 1 2 sticks, else hold; 3 return, 4 land, 5 hold"
+    ),
+    "COM_OF_LOSS_T": Parameter(1.0, 0.0, 60.0, "s without a setpoint after which offboard is lost"),
+    "COM_RC_LOSS_T": Parameter(0.5, 0.0, 35.0, "s without MANUAL_CONTROL: sticks lost"),
+    "COM_TAKEOFF_ACT": Parameter(0, 0, 1, "after take-off: 0 hold, 1 mission"),
+    "GF_ACTION": Parameter(2, 0, 5, "fence: 0 none, 1 warning, 2 hold, 3 return, 4 end, 5 land"),
+    "GF_MAX_HOR_DIST": Parameter(0.0, 0.0, 10000.0, "m from home; 0: any"),
+    "GF_MAX_VER_DIST": Parameter(0.0, 0.0, 10000.0, "m above home; 0: any"),
+    "MAV_SYS_ID": Parameter(1, 1, 250, "system id", fixed=True),
+    "MAV_TYPE": Parameter(2, 0, 22, "2 quadrotor, 13 hexarotor, 14 octorotor", fixed=True),
+    "MIS_TAKEOFF_ALT": Parameter(2.5, 0.0, 80.0, "m: height of a take-off that names none"),
+    "MPC_ACC_HOR": Parameter(3.0, 0.5, 15.0, "m/s^2 of the way to places"),
+    "MPC_MAN_TILT_MAX": Parameter(35.0, 1.0, 70.0, "deg at full stick, altitude mode"),
+    "MPC_MAN_Y_MAX": Parameter(150.0, 0.0, 400.0, "deg/s of yaw at full stick"),
+    "MPC_THR_HOVER": Parameter(0.5, 0.1, 0.8, "share of the full thrust that carries", fixed=True),
+    "MPC_VEL_MANUAL": Parameter(10.0, 3.0, 20.0, "m/s at full stick, position mode"),
+    "MPC_XY_CRUISE": Parameter(5.0, 3.0, 20.0, "m/s of the way to places"),
+    "MPC_XY_VEL_MAX": Parameter(12.0, 0.0, 20.0, "m/s: no setpoint is flown faster"),
+    "MPC_Z_VEL_MAX_DN": Parameter(1.5, 0.5, 4.0, "m/s of descent"),
+    "MPC_Z_VEL_MAX_UP": Parameter(3.0, 0.5, 8.0, "m/s of climb"),
+    "NAV_ACC_RAD": Parameter(2.0, 0.05, 200.0, "m from a waypoint that count as there"),
+    "NAV_DLL_ACT": Parameter(0, 0, 3, "link lost: 0 nothing, 1 hold, 2 return, 3 land"),
+    "NAV_MC_ALT_RAD": Parameter(0.8, 0.05, 200.0, "m above or below that count as there"),
+    "NAV_RCL_ACT": Parameter(2, 1, 3, "sticks lost: 1 hold, 2 return, 3 land"),
+    "RTL_DESCEND_ALT": Parameter(30.0, 0.0, 100.0, "m above home: returns come down to there"),
+    "RTL_LAND_DELAY": Parameter(0.0, -1.0, 300.0, "s that a return waits there; -1: for ever"),
+    "RTL_MIN_DIST": Parameter(10.0, 0.5, 100.0, "m from home: nearer returns do not climb"),
+    "RTL_RETURN_ALT": Parameter(60.0, 0.0, 150.0, "m above home: height of a return"),
+    "SYS_AUTOSTART": Parameter(4001, 0, 9999999, "PX4's number of a generic quadrotor", fixed=True),
+}
+NAMES = tuple(sorted(DEFAULTS))
+
+
+def defaults() -> dict[str, Value]:
+    """All values as they begin."""
+    return {name: DEFAULTS[name].default for name in NAMES}
+
+
+def type_of(name: str) -> int:
+    """MAV_PARAM_TYPE of a parameter."""
+    return INT32 if isinstance(DEFAULTS[name].default, int) else REAL32
+
+
+def refusal(name: str, value: Value) -> str:
+    """Why a parameter cannot be set to a value; empty where it can."""
+    parameter = DEFAULTS.get(name)
+    if parameter is None:
+        return f"no parameter {name}"
+    if parameter.fixed:
+        return f"{name} cannot be set"
+    if not (math.isfinite(value) and parameter.low <= value <= parameter.high):
+        return f"{name}: {parameter.low:g} to {parameter.high:g}"
+    return ""
+
+
+def on_wire(name: str, value: Value) -> float:
+    """The float that carries a value."""
+    if type_of(name) == INT32:
+        packed: float = struct.unpack("<f", struct.pack("<i", int(value)))[0]
+        return packed
+    return float(value)
+
+
+def from_wire(kind: int, carried: float) -> Value | None:
+    """The value in a float of MAV_PARAM_TYPE `kind`; None for types that PX4 does not have."""
+    if kind == INT32:
+        value: int = struct.unpack("<i", struct.pack("<f", carried))[0]
+        return value
+    return float(carried) if kind == REAL32 else None

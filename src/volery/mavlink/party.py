@@ -1,0 +1,43 @@
+"""What MAVLink's doors share: one connection that carries all vehicles."""
+
+from __future__ import annotations
+
+import errno
+
+from volery.mavlink.codec import Parser
+from volery.mavlink.fleet import Fleet
+from volery.mavlink.framing import Framer
+
+
+class Party:
+    """One connection that carries all vehicles: TCP clients and serial lines."""
+
+    def __init__(self, fleet: Fleet, number: int, profile: int) -> None:
+        self.number = number
+        self._fleet, self._profile = fleet, profile
+        self._framer, self._parser = Framer(), Parser()
+        self._systems: set[int] = set()
+
+    def greet(self, system: int) -> None:
+        """Have a vehicle send on it."""
+        self._systems.add(system)
+        self._fleet.send(system, self.number, self._profile, b"")
+
+    def take(self, data: bytes) -> None:
+        """Bring what came to the vehicles that it is for."""
+        for frame in self._framer.feed(data):
+            target = getattr(self._parser.decode(frame.data), "target_system", 0)
+            chosen = self._systems if target == 0 else self._systems & {target}
+            for system in sorted(chosen):
+                self._fleet.send(system, self.number, self._profile, frame.data)
+
+    def leave(self) -> None:
+        """Tell the vehicles that it is there no more."""
+        for system in self._systems:
+            self._fleet.close_link(system, self.number)
+
+
+def why_not(error: Exception) -> str:
+    """Why an address cannot be listened at."""
+    taken = isinstance(error, OSError) and error.errno == errno.EADDRINUSE
+    return "the port is taken" if taken else str(error)

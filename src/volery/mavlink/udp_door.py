@@ -1,0 +1,165 @@
+"""MAVLink over UDP, as PX4's simulations have it: `doors.open(MavlinkUdp())`.
+
+UAVs without an autopilot are not there for it; see `volery.mavlink.outfit`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+
+from volery.core.errors import BridgeError
+from volery.core.listening import LOOPBACK, check_address
+from volery.graph.session import Gateway
+from volery.mavlink import ports
+from volery.mavlink.codec import dialect
+from volery.mavlink.fleet import Fleet, Sink
+from volery.mavlink.framing import Framer
+from volery.mavlink.party import why_not
+from volery.mavlink.streams import GROUND, ONBOARD
+
+_MOST_DATAGRAM = 1400
+"""Bytes: below the MTU of Ethernet."""
+
+
+class MavlinkUdp:
+    """Two links for each vehicle: to a companion computer and to a ground station.
+
+    host: where those are. port: of the first companion computer, 14540; the others follow, and the
+    vehicles' own ports keep their distance to it, so that several runs can stand side by side.
+    Vehicles send from the beginning, to the stated ports and to whoever has spoken to them last.
+    """
+
+    def __init__(
+        self,
+        host: str = "127.0.0.1",
+        port: int = ports.ONBOARD_TO,
+        *,
+        ground_port: int | None = None,
+        anywhere: bool = False,
+    ) -> None:
+        self._host = host
+        self._shift = port - ports.ONBOARD_TO
+        self._ground = ports.GROUND_TO + self._shift if ground_port is None else ground_port
+        self._anywhere = anywhere
+        self._links: dict[int, list[_UdpLink]] = {}
+        self._fleet: Fleet | None = None
+        self._looks: asyncio.Task[None] | None = None
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        onboard = ports.ONBOARD_TO + self._shift
+        return f"MAVLink UDP {self._host}:{onboard} and following, {self._ground}"
+
+    async def start(self, gateway: Gateway) -> None:
+        """Begin to send. `BridgeError` where a port is taken."""
+        dialect()
+        check_address(self._host, anywhere=self._anywhere, flag="--allow-remote")
+        self._fleet = Fleet(gateway, self.name, self._join, self._leave)
+        self._fleet.look()
+        self._looks = asyncio.create_task(self._fleet.keep_looking())
+
+    async def stop(self) -> None:
+        """Give all ports back."""
+        if self._looks is not None:
+            self._looks.cancel()
+            await asyncio.gather(self._looks, return_exceptions=True)
+        for system in tuple(self._links):
+            self._leave(system)
+        if self._fleet is not None:
+            self._fleet.close()
+
+    def _join(self, name: str, system: int) -> Sink:
+        assert self._fleet is not None
+        k = ports.number_of(system) + self._shift
+        links = [
+            (ports.ONBOARD_FROM + k, ports.ONBOARD_TO + k, ONBOARD),
+            (ports.GROUND_FROM + k, self._ground, GROUND),
+        ]
+        opened: list[_UdpLink] = []
+        try:
+            for own, to, profile in links:
+                opened.append(_UdpLink(self._fleet, system, profile, own, (self._host, to)))
+        except BridgeError as error:
+            for link in opened:
+                link.close()
+            raise BridgeError(f"{name}: {error}") from None
+        self._links[system] = opened
+
+        def sink(number: int, data: bytes) -> None:
+            for link in opened:
+                if number in (-1, link.number):
+                    link.send(data)
+
+        return sink
+
+    def _leave(self, system: int) -> None:
+        for link in self._links.pop(system, ()):
+            link.close()
+
+
+class _UdpLink:
+    """One socket of one vehicle; its own port is the link's number."""
+
+    def __init__(
+        self, fleet: Fleet, system: int, profile: int, own: int, to: tuple[str, int]
+    ) -> None:
+        self.number = own
+        self._fleet, self._system, self._profile = fleet, system, profile
+        self._peers = [to]
+        self._framer = Framer()
+        family = socket.AF_INET6 if ":" in to[0] else socket.AF_INET
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        try:
+            self._socket.bind((to[0] if to[0] in LOOPBACK else "", own))
+        except (OSError, OverflowError) as error:
+            self._socket.close()
+            raise BridgeError(f"cannot listen on UDP port {own}: {why_not(error)}") from None
+        self._loop = asyncio.get_running_loop()
+        self._loop.add_reader(self._socket, self._read)
+        fleet.send(system, own, profile, b"")
+
+    def send(self, data: bytes) -> None:
+        """Send frames; where nobody listens they are lost, as by radio."""
+        for peer in self._peers:
+            for part in _pieces(data):
+                with contextlib.suppress(OSError):
+                    self._socket.sendto(part, peer)
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._loop.remove_reader(self._socket)
+        self._socket.close()
+        self._fleet.close_link(self._system, self.number)
+
+    def _read(self) -> None:
+        while True:
+            try:
+                data, peer = self._socket.recvfrom(65535)
+            except (BlockingIOError, InterruptedError):
+                return
+            except OSError:  # what was sent found nobody
+                continue
+            if peer not in self._peers:  # the place agreed upon, and who spoke last
+                self._peers = [self._peers[0], peer[:2]]
+            frames = b"".join(frame.data for frame in self._framer.datagram(data))
+            if frames:
+                self._fleet.send(self._system, self.number, self._profile, frames)
+
+
+def _pieces(data: bytes) -> list[bytes]:
+    """Frames in datagrams, none of them cut."""
+    if len(data) <= _MOST_DATAGRAM:
+        return [data]
+    pieces, start, at = [], 0, 0
+    while at < len(data):
+        length = data[at + 1] + 12 + (13 if data[at + 2] & 1 else 0)
+        if at + length - start > _MOST_DATAGRAM and at > start:
+            pieces.append(data[start:at])
+            start = at
+        at += length
+    pieces.append(data[start:])
+    return pieces

@@ -1,0 +1,96 @@
+"""How far an estimated way is from the true one: alignment in time and space, and what is left.
+
+The rigid alignment is that of S. Umeyama, Least-squares estimation of transformation parameters
+between two point patterns, IEEE PAMI 13(4), 1991, without scale; the RMSE of what is left is the
+absolute trajectory error (J. Sturm et al., A benchmark for the evaluation of RGB-D SLAM systems,
+IROS 2012).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_RATE_HZ, _SMOOTHED = 10.0, 5
+_LEAST_COMMON = 0.3
+_LEAST_SPREAD = 1e-12
+
+
+class Alignment(NamedTuple):
+    """y = rotation x + translation."""
+
+    rotation: Array
+    """(3, 3)"""
+    translation: Array
+    """(3,)"""
+
+    def apply(self, places: Array) -> Array:
+        """Places (N, 3) in the other frame."""
+        moved: Array = places @ self.rotation.T + self.translation
+        return moved
+
+
+def umeyama(places: Array, onto: Array) -> Alignment:
+    """The rotation and translation that bring (N, 3) as near to (N, 3) as may be."""
+    from_mean, to_mean = places.mean(axis=0), onto.mean(axis=0)
+    covariance = (onto - to_mean).T @ (places - from_mean) / len(places)
+    u, _, vt = np.linalg.svd(covariance)
+    mirror = np.ones(3)
+    if np.linalg.det(u) * np.linalg.det(vt) < 0.0:
+        mirror[2] = -1.0
+    rotation = u @ np.diag(mirror) @ vt
+    return Alignment(rotation, to_mean - rotation @ from_mean)
+
+
+def ate_rmse_m(estimate: Array, truth: Array) -> float:
+    """Root mean square distance, m, of places (N, 3) from the true ones after alignment."""
+    left = umeyama(estimate, truth).apply(estimate) - truth
+    return float(np.sqrt((left * left).sum(axis=1).mean()))
+
+
+def at_times(time_s: Array, places: Array, wanted_s: Array) -> Array:
+    """Places (M, 3) at `wanted_s` (M,) of a way with places (N, 3) at `time_s` (N,), rising."""
+    return np.stack([np.interp(wanted_s, time_s, column) for column in places.T], axis=1)
+
+
+def common_times(one_s: Array, other_s: Array) -> NDArray[np.bool_]:
+    """(N,) which of the times `one_s` lie within those of `other_s`."""
+    if not len(other_s):
+        return np.zeros(len(one_s), np.bool_)
+    within: NDArray[np.bool_] = (one_s >= other_s[0]) & (one_s <= other_s[-1])
+    return within
+
+
+def time_shift_s(one_s: Array, one: Array, other_s: Array, other: Array) -> float:
+    """What to add to the times of the other way so that both are flown at the same time.
+
+    The shift at which their speeds, over a second, are most alike (by their correlation, where at
+    least three tenths of the shorter way are in common); frames need not agree.
+    """
+    mine, theirs = _speeds(one_s, one), _speeds(other_s, other)
+    least = max(round(_LEAST_COMMON * min(len(mine), len(theirs))), 3)
+    best, best_lag = -np.inf, 0
+    for lag in range(least - len(theirs), len(mine) - least + 1):
+        a = mine[max(lag, 0) : lag + len(theirs)]
+        b = theirs[max(-lag, 0) : max(-lag, 0) + len(a)]
+        a, b = a - a.mean(), b - b.mean()
+        spread = float(np.sqrt((a @ a) * (b @ b)))
+        alike = float(a @ b) / spread if spread > _LEAST_SPREAD else -1.0
+        if alike > best:
+            best, best_lag = alike, lag
+    return float(one_s[0] - other_s[0]) + best_lag / _RATE_HZ
+
+
+def _speeds(time_s: Array, places: Array) -> Array:
+    """Ten a second, each over the second that follows, of a way smoothed over half a second."""
+    times = np.arange(time_s[0], time_s[-1], 1.0 / _RATE_HZ)
+    rough = at_times(time_s, places, times)
+    window = np.full(_SMOOTHED, 1.0 / _SMOOTHED)
+    smooth = np.stack([np.convolve(column, window, "valid") for column in rough.T], axis=1)
+    over = round(_RATE_HZ)
+    speeds: Array = np.linalg.norm(smooth[over:] - smooth[:-over], axis=1)
+    return speeds

@@ -1,0 +1,58 @@
+"""The way of one UAV: poses by time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_LONGEST_GAP_S = 0.5
+"""Poses farther apart than this have nothing between them."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """N poses, their times rising."""
+
+    time_s: Array
+    """(N,)"""
+    position: Array
+    """(N, 3) m"""
+    attitude: Array
+    """(N, 4) x y z w"""
+
+    @classmethod
+    def of_rows(cls, rows: Sequence[Sequence[float]]) -> Way:
+        """Of rows of time, position and attitude."""
+        table = np.array(rows, np.float64).reshape(-1, 8)
+        return cls(table[:, 0], table[:, 1:4], table[:, 4:])
+
+    @property
+    def lasts_s(self) -> float:
+        """From the first pose to the last one."""
+        return float(self.time_s[-1] - self.time_s[0]) if len(self.time_s) else 0.0
+
+    @property
+    def length_m(self) -> float:
+        """Over ground."""
+        return float(np.hypot(*np.diff(self.position[:, :2], axis=0).T).sum())
+
+    def pose_at(self, time_s: float) -> tuple[Array, Array] | None:
+        """Position and attitude at a time, between the poses around it; None outside of them."""
+        k = int(np.searchsorted(self.time_s, time_s))
+        if k < len(self.time_s) and self.time_s[k] == time_s:
+            return self.position[k], self.attitude[k]
+        if not 0 < k < len(self.time_s):
+            return None
+        gap = self.time_s[k] - self.time_s[k - 1]
+        if gap > _LONGEST_GAP_S:
+            return None
+        share = (time_s - self.time_s[k - 1]) / gap
+        position = (1.0 - share) * self.position[k - 1] + share * self.position[k]
+        one, other = self.attitude[k - 1], self.attitude[k]
+        turn = (1.0 - share) * one + share * (other if one @ other >= 0.0 else -other)
+        return position, turn / np.linalg.norm(turn)

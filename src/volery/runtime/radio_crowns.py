@@ -1,0 +1,67 @@
+"""How much foliage lies along a line: crowns as upright ellipsoids around their leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.world.forest import Forest
+from volery.world.trees.model import TreeModel
+
+Array = NDArray[np.float64]
+
+_WITHIN = 0.9
+"""Share of a crown's leaves that its ellipsoid reaches to. Modelling choice."""
+_THINNEST_M = 0.05
+
+
+class Crowns:
+    """The crowns of a forest's trees. Those without leaves have none."""
+
+    def __init__(self, forest: Forest) -> None:
+        shapes = np.array([_shape(model) for model in forest.models]).reshape(-1, 3)
+        of_tree = shapes[np.asarray(forest.model_index)]
+        scale = np.asarray(forest.scale, np.float64)
+        has_leaves = of_tree[:, 0] > 0.0
+        across = of_tree[:, 0] * scale[:, :2].mean(axis=1)
+        upward = of_tree[:, 2] * scale[:, 2]
+        centre = np.asarray(forest.position_map, np.float64).copy()
+        centre[:, 2] += of_tree[:, 1] * scale[:, 2]
+        self._centre = centre[has_leaves]
+        self._radii = np.stack([across, across, upward], axis=1)[has_leaves]
+
+    def along(self, start: Array, end: Array) -> float:
+        """Length of the line from `start` (3,) to `end` (3,), m, that lies in crowns."""
+        if not len(self._centre):
+            return 0.0
+        # the unit sphere of each crown: |o + s d| = 1 where the line enters and leaves, s in 0..1
+        o = (start - self._centre) / self._radii
+        d = (end - start) / self._radii
+        a, b = (d * d).sum(axis=1), (o * d).sum(axis=1)
+        c = (o * o).sum(axis=1) - 1.0
+        root = b * b - a * c
+        met = (root > 0.0) & (a > 0.0)
+        half = np.sqrt(root[met])
+        enter = np.clip((-b[met] - half) / a[met], 0.0, 1.0)
+        leave = np.clip((-b[met] + half) / a[met], 0.0, 1.0)
+        return float(np.linalg.norm(end - start)) * _length_of_union(enter, leave)
+
+
+def _shape(model: TreeModel) -> tuple[float, float, float]:
+    """Radius, height of the middle, half the height of a model's crown; zeros without leaves."""
+    level = min(model.levels.values(), key=lambda tree: len(tree.leaves.vertices))
+    leaves = np.asarray(level.leaves.vertices, np.float64)
+    if not len(leaves):
+        return 0.0, 0.0, 0.0
+    low, high = np.quantile(leaves[:, 2], [0.5 - 0.5 * _WITHIN, 0.5 + 0.5 * _WITHIN])
+    radius = np.quantile(np.hypot(leaves[:, 0], leaves[:, 1]), _WITHIN)
+    return float(radius), float(0.5 * (low + high)), max(float(0.5 * (high - low)), _THINNEST_M)
+
+
+def _length_of_union(enter: Array, leave: Array) -> float:
+    """Length that intervals cover together."""
+    covered, end = 0.0, 0.0
+    for k in np.argsort(enter, kind="stable"):
+        covered += max(float(leave[k]) - max(float(enter[k]), end), 0.0)
+        end = max(end, float(leave[k]))
+    return covered

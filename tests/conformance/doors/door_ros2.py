@@ -1,0 +1,180 @@
+"""Native ROS 2: our door, and plain DDS programs in processes of their own."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import queue
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from types import MappingProxyType
+
+from door_bench import IMAGE, PATIENCE_S, STRING, TRIGGER, Bench, Client, Refused
+from door_ros_tcp import Form
+from ros2_bench import DOMAIN
+from ros_tcp_client import until
+
+from volery.bridges.ros2.door import Ros2Door
+from volery.bridges.ros2.environment import Ros2Terms
+
+LATCHED = ("/map", "/plan")
+_PEER = Path(__file__).with_name("plain_ros2.py")
+_BASE_PORT, _PORTS_A_DOMAIN, _UNICAST = 7400, 250, 10  # RTPS 2.5, 9.6.2.3
+_HALF = b"RTPS\2\5\1\x10" + bytes(12) + b"\x15\5\xff\xff\0\0"
+_SUCCESS_AT = 4  # of a Trigger's response, behind the four bytes that name the encoding
+
+
+class PeerClient(Client):
+    """A plain ROS 2 node in another process."""
+
+    def __init__(self, bench, reading):
+        super().__init__()
+        self._bench = bench
+        self._reading = reading
+        self._form = Form("ros2")
+        self._kinds = {}
+        self._done = queue.Queue()
+        self._process = subprocess.Popen(
+            [sys.executable, str(_PEER), str(DOMAIN)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self._done.get(timeout=PATIENCE_S)
+
+    def _read(self):
+        for line in self._process.stdout:
+            told = json.loads(line)
+            if "heard" in told:
+                self._take(told["heard"], base64.b64decode(told["data"]), told["size"])
+            else:
+                self._done.put(told.get("done"))
+
+    def _take(self, topic, data, total):
+        if self._kinds[topic] == IMAGE:
+            head = len(self._form.image_head(0))
+            (size,) = struct.unpack_from("<I", data, head - 4)
+            self.messages.put(size if head + size <= total < head + size + 4 else None)
+        else:
+            (length,) = struct.unpack_from("<I", data, 4)
+            self.messages.put(data[8 : 8 + length - 1].decode())
+
+    def _do(self, op, **fields):
+        self._process.stdin.write(json.dumps({"op": op, **fields}) + "\n")
+        self._process.stdin.flush()
+        return self._done.get(timeout=PATIENCE_S)
+
+    def advertise(self, topic, msgtype=STRING, *, latched=False):
+        self._do("advertise", topic=topic, type=msgtype, latched=latched, wait=True)
+
+    def publish(self, topic, text):
+        self.publish_bytes(topic, text.encode())
+
+    def publish_bytes(self, topic, data):
+        self._publish(topic, self._form.string(data))
+
+    def publish_image(self, topic, size):
+        self._publish(topic, self._form.image(size))
+
+    def _publish(self, topic, cdr):
+        self._do("publish", topic=topic, data=base64.b64encode(cdr).decode())
+
+    def subscribe(self, topic, msgtype=STRING):
+        self._kinds[topic] = msgtype
+        latched = topic in LATCHED
+        assert self._do("subscribe", topic=topic, type=msgtype, reliable=True, latched=latched)
+        until(lambda: self._bench.is_heard(topic))
+        if not self._reading:
+            os.kill(self._process.pid, signal.SIGSTOP)
+
+    def call(self, service):
+        answer = self._do("call", service=service)
+        if answer is None:
+            raise Refused("no answer")
+        data = base64.b64decode(answer)
+        (length,) = struct.unpack_from("<I", data, 8)
+        text = data[12 : 12 + length - 1].decode()
+        if not data[_SUCCESS_AT]:  # ROS 2 has no word for a failure but the response's own
+            raise Refused(text)
+        return text
+
+    def offer(self, service):
+        answer = None if self.their_answer is None else self._form.triggered(self.their_answer)
+        data = None if answer is None else base64.b64encode(answer).decode()
+        self._do("offer", service=service, answer=data)
+
+    def settle(self):
+        """Nothing is answered; matches are waited for when they are made."""
+
+    def send_half_a_frame(self):
+        """The beginning of an RTPS message, to all who may listen in the domain."""
+        base = _BASE_PORT + _PORTS_A_DOMAIN * DOMAIN + _UNICAST
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+            for port in range(base, base + 20):
+                sock.sendto(
+                    b"RTPS\2\5\1\x10" + bytes(12) + b"\x15\5\xff\xff\0\0", ("127.0.0.1", port)
+                )
+
+    def reset(self):
+        self._process.kill()
+        self._end()
+
+    def close(self):
+        if self._process.poll() is None:
+            os.kill(self._process.pid, signal.SIGCONT)
+            self._process.stdin.close()  # it reads the end of its orders, and leaves
+            try:
+                self._process.wait(PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+        self._end()
+
+    def _end(self):
+        self._process.wait()
+        self._reader.join()
+        self._process.stdin.close()
+        self._process.stdout.close()
+
+
+class Ros2Bench(Bench):
+    """Our door in a domain of the test run's own."""
+
+    cannot = MappingProxyType(
+        {
+            "own types": "in DDS types are matched by all who see them; publishers are not told",
+            "reliability": "publishers keep the last messages, so that nobody can hold them up",
+            "limits": "DDS knows none",
+            "listening": "participants take free ports",
+            "leaving": "the door stands for all nodes, those that are gone too",
+            "errors": "DDS has no way to tell a publisher what was wrong",
+        }
+    )
+    topics = 25  # each is discovered with four endpoints
+
+    def __init__(self):
+        super().__init__()
+        self.door = Ros2Door(
+            Ros2Terms(domain_id=DOMAIN),
+            remote_services={self.remote_service: TRIGGER},
+            reliable=("/image_out",),
+        )
+        self.ours.doors.open(self.door)
+
+    def subscriptions(self, clients):
+        """The door subscribes once for all."""
+        return 1
+
+    def is_heard(self, topic):
+        """Whether a subscription has reached the graph."""
+        return any(t.name == topic and t.subscribers for t in self.ours.live.graph.topics())
+
+    def _connect(self, reading):
+        return PeerClient(self, reading)

@@ -1,0 +1,228 @@
+"""A plain DDS program that speaks as a ROS 2 node does. It shares no code with the door.
+
+It runs as a process of its own and does what comes as lines of JSON on stdin; what it hears goes to
+stdout. Its types are written by hand in the package's IDL, their bytes come from the tests.
+
+    {"op": "subscribe", "topic": "/chatter", "type": "std_msgs/msg/String"}
+"""
+
+import base64
+import json
+import struct
+import sys
+import threading
+import time
+from dataclasses import dataclass
+
+from cyclonedds.core import (
+    InstanceState,
+    Policy,
+    Qos,
+    ReadCondition,
+    SampleState,
+    ViewState,
+    WaitSet,
+)
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import int32, int64, sequence, uint8, uint32, uint64
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+CONFIG = """<CycloneDDS><Domain id="any">
+  <General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>
+    <AllowMulticast>false</AllowMulticast></General>
+  <Discovery><LeaseDuration>1 s</LeaseDuration><SPDPInterval>500 ms</SPDPInterval>
+    <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
+    <Peers><Peer address="localhost"/></Peers></Discovery>
+</Domain></CycloneDDS>"""
+MATCH_S = 3.0
+HEAD = 100_000
+"""Bytes of a message that are told; of larger ones the rest are zeros of a picture."""
+
+
+@dataclass
+class String_(IdlStruct, typename="std_msgs.msg.dds_.String_"):
+    data: str
+
+
+@dataclass
+class Time_(IdlStruct, typename="builtin_interfaces.msg.dds_.Time_"):
+    sec: int32
+    nanosec: uint32
+
+
+@dataclass
+class Header_(IdlStruct, typename="std_msgs.msg.dds_.Header_"):
+    stamp: Time_
+    frame_id: str
+
+
+@dataclass
+class Image_(IdlStruct, typename="sensor_msgs.msg.dds_.Image_"):
+    header: Header_
+    height: uint32
+    width: uint32
+    encoding: str
+    is_bigendian: uint8
+    step: uint32
+    data: sequence[uint8]
+
+
+@dataclass
+class Request_(IdlStruct, typename="std_srvs.srv.dds_.Trigger_Request_"):
+    guid: uint64
+    seq: int64
+    structure_needs_at_least_one_member: uint8
+
+
+@dataclass
+class Response_(IdlStruct, typename="std_srvs.srv.dds_.Trigger_Response_"):
+    guid: uint64
+    seq: int64
+    success: bool
+    message: str
+
+
+TYPES = {"std_msgs/msg/String": String_, "sensor_msgs/msg/Image": Image_}
+
+
+def stay_bytes(kind):
+    """Have samples of a type written and read as they are."""
+
+    def keep(cls, data, **_):
+        sample = cls.__new__(cls)
+        sample.raw = data
+        return sample
+
+    kind.serialize = lambda self, **_: self.raw
+    kind.deserialize = classmethod(keep)
+    kind.deserialize_key = classmethod(keep)
+
+
+for kind in (*TYPES.values(), Request_, Response_):
+    stay_bytes(kind)
+
+
+def qos(*, reliable=True, latched=False):
+    kept = Policy.History.KeepLast(1 if latched else 1000)
+    return Qos(
+        Policy.Reliability.Reliable(duration(infinite=True))
+        if reliable
+        else Policy.Reliability.BestEffort,
+        kept,
+        Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile,
+        Policy.DurabilityService(0, kept, -1, -1, -1),
+        Policy.WriterDataLifecycle(autodispose=False),
+    )
+
+
+class Peer:
+    def __init__(self, domain_id):
+        self.domain = Domain(domain_id, CONFIG)
+        self.participant = DomainParticipant(domain_id)
+        self.writers, self.readers, self.told = {}, [], threading.Lock()
+        self.waitset = WaitSet(self.participant)
+        self.hearers = []
+        threading.Thread(target=self.listen, daemon=True).start()
+
+    def tell(self, **fields):
+        with self.told:
+            sys.stdout.write(json.dumps(fields) + "\n")
+            sys.stdout.flush()
+
+    def listen(self):
+        while True:
+            self.waitset.wait(duration(milliseconds=50))
+            for reader, hear in tuple(self.hearers):
+                for sample in reader.take(100):
+                    if sample.sample_info.valid_data:
+                        hear(sample.raw)
+
+    def write(self, writer, kind, data):
+        writer.write(kind.deserialize(data))
+
+    def hear(self, topic, kind, take, quality):
+        reader = DataReader(self.participant, Topic(self.participant, topic, kind), qos=quality)
+        self.hearers.append((reader, take))
+        any_state = ViewState.Any | InstanceState.Any | SampleState.NotRead
+        self.waitset.attach(ReadCondition(reader, any_state))
+        return reader
+
+    def speak(self, topic, kind, quality):
+        return DataWriter(self.participant, Topic(self.participant, topic, kind), qos=quality)
+
+    def matched(self, what):
+        end = time.monotonic() + MATCH_S
+        while not what() and time.monotonic() < end:
+            time.sleep(0.005)
+        return bool(what())
+
+    # -------------------------------------------------------------------------------- operations
+
+    def advertise(self, topic, type, latched, wait):
+        kind = TYPES[type]
+        writer = self.speak(f"rt{topic}", kind, qos(latched=latched))
+        self.writers[topic] = writer, kind
+        return self.matched(writer.get_matched_subscriptions) if wait else True
+
+    def publish(self, topic, data):
+        self.write(*self.writers[topic], base64.b64decode(data))
+        return True
+
+    def subscribe(self, topic, type, reliable, latched):
+        def take(raw):
+            head = base64.b64encode(raw[:HEAD]).decode()
+            self.tell(heard=topic, data=head, size=len(raw))
+
+        quality = qos(reliable=reliable, latched=latched)
+        reader = self.hear(f"rt{topic}", TYPES[type], take, quality)
+        return self.matched(reader.get_matched_publications)
+
+    def call(self, service):
+        come = threading.Event()
+        found = []
+
+        def take(raw):
+            if raw[4:20] == header:
+                found.append(raw[:4] + raw[20:])
+                come.set()
+
+        header = struct.pack("<Qq", 77, time.monotonic_ns())
+        writer = self.speak(f"rq{service}Request", Request_, qos())
+        reader = self.hear(f"rr{service}Reply", Response_, take, qos())
+        both = self.matched(
+            lambda: writer.get_matched_subscriptions() and reader.get_matched_publications()
+        )
+        if both:
+            self.write(writer, Request_, b"\0\1\0\0" + header + b"\0")
+            come.wait(MATCH_S)
+        self.hearers = [known for known in self.hearers if known[0] is not reader]
+        return base64.b64encode(found[0]).decode() if found else None
+
+    def offer(self, service, answer):
+        writer = self.speak(f"rr{service}Reply", Response_, qos())
+
+        def take(raw):
+            if answer is not None:
+                body = base64.b64decode(answer)
+                self.write(writer, Response_, body[:4] + raw[4:20] + body[4:])
+
+        self.hear(f"rq{service}Request", Request_, take, qos())
+        self.writers[f"service {service}"] = writer, Response_
+        return self.matched(writer.get_matched_subscriptions)
+
+
+def main():
+    peer = Peer(int(sys.argv[1]))
+    peer.tell(ready=True)
+    for line in sys.stdin:
+        fields = json.loads(line)
+        operation = fields.pop("op")
+        peer.tell(done=getattr(peer, operation)(**fields))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,186 @@
+"""The same node files in lock step, in a process's place over rosbridge, and on a played bag."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from volery import Simulation
+from volery.bridges.doors import Doors
+from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.reader import summarize
+from volery.bridges.logs.replay import Replay
+from volery.bridges.nodes.host import NodeHost
+from volery.bridges.nodes.profile import Profile, load_profile
+from volery.bridges.rosbridge.client import RosbridgeClient
+from volery.bridges.rosbridge.server import RosbridgeServer
+from volery.cli.launching import start_profile
+from volery.runtime.node_loading import start_node
+from volery.scenario.load import parse_scenario
+from volery.scenario.schema import NodeEntry
+
+PROFILES = Path(__file__).parents[2] / "examples/profiles"
+SECONDS = 9.0
+OUTPUTS = ("team", "mission", "search_area", "targets", "target_detection/targets")
+INPUTS = ("/uav1/odom", "/uav1/range", "/uav1/battery", "/uav1/camera/**", "/uav1/radio/**")
+NODES = [
+    {
+        "node": "volery.autonomy.task_manager:TaskManager",
+        "parameters": {"area_m": [0.0, -20.0, 40.0, 20.0], "sector_m": 20.0, "altitude_m": 4.0},
+    },
+    {
+        "node": "volery.autonomy.target_detection:TargetDetection",
+        "parameters": {"mount_rpy_deg": [0.0, 30.0, 0.0], "spread_m": 5.0},
+    },
+]
+Said = dict[str, list[tuple[int, bytes]]]
+
+
+def scenario_of(nodes: list[dict[str, Any]], *, blind: bool = False) -> Any:
+    """A UAV before a red cube; a blind one has no sensors, and is told what another one saw."""
+    camera = {
+        "kind": "camera",
+        "name": "camera",
+        "rpy_deg": [0.0, 30.0, 0.0],
+        "width": 80,
+        "height": 60,
+        "rate_hz": 5.0,
+        "compressed": "none",
+    }
+    sonar = {"kind": "sonar", "rpy_deg": [0.0, 90.0, 0.0]}
+    sensors = [camera, sonar, {"kind": "odometry"}, {"kind": "battery"}]
+    return parse_scenario(
+        {
+            "name": "profiles",
+            "world": {
+                "meshes": [
+                    {
+                        "file": "meshes/target_cube.obj",
+                        "position_m": [7.0, 0.5, 0.0],
+                        "colour": [0.6, 0.01, 0.01],
+                    }
+                ]
+            },
+            "types": {"one": {"sensors": [] if blind else sensors, "nodes": nodes}},
+            "uavs": [{"type": "one", "position_m": [0.0, 0.0]}],
+        }
+    )
+
+
+def listen(simulation: Any) -> Said:
+    """What the nodes say from now on."""
+    said: Said = {}
+    for name in OUTPUTS:
+        rows = said.setdefault(name, [])
+        kinds = {
+            "team": "volery_interfaces/msg/TeamReport",
+            "mission": "volery_interfaces/msg/MissionStatus",
+            "search_area": "geometry_msgs/msg/PolygonStamped",
+        }
+        kind = kinds.get(name, "volery_interfaces/msg/Targets")
+        simulation.graph.subscribe(
+            f"/uav1/{name}", lambda p, rows=rows: rows.append((p.time_ns, p.cdr)), kind
+        )
+    return said
+
+
+@pytest.fixture(name="inside", scope="module")
+def _inside(tmp_path_factory: pytest.TempPathFactory) -> tuple[Said, Path]:
+    """What nodes inside the simulation say, and a log of all that was said."""
+    path = tmp_path_factory.mktemp("profiles") / "flight.mcap"
+    with Simulation(scenario_of(NODES)) as simulation, closing(open_log(path)) as log:
+        said = listen(simulation)
+        simulation.graph.subscribe_all(log.write)
+        simulation.run(SECONDS)
+    return said, path
+
+
+def test_nodes_inside_see_and_say_something(inside: tuple[Said, Path]) -> None:
+    said, _ = inside
+    assert len(said["team"]) > 40
+    assert said["search_area"]
+    assert said["targets"]
+    assert said["target_detection/targets"]
+
+
+@pytest.mark.parametrize("outside", [0, 1], ids=["task manager", "target detection"])
+def test_the_same_over_rosbridge_in_lock_step(inside: tuple[Said, Path], outside: int) -> None:
+    """One of the nodes, by a profile, while the other stays: between two that are both outside a
+    message takes a physics step."""
+    own = NODES[outside : outside + 1]
+    profile = Profile(name="forest", namespace="/uav1", clock="simulated", launch=own)
+    server = RosbridgeServer(port=0)
+    with (
+        Simulation(scenario_of(NODES[1 - outside : 2 - outside])) as simulation,
+        Doors(simulation.gateway) as doors,
+    ):
+        doors.open(server)
+        said = listen(simulation)
+        flying, trouble = threading.Event(), []
+
+        def run_nodes() -> None:
+            link = RosbridgeClient(f"ws://127.0.0.1:{server.port}", name="forest")
+            try:
+                host = NodeHost(link, clock=profile.clock)
+                start_profile(profile, host)
+                host.join_lock_step(profile.name, 0.001)
+                flying.set()
+                host.spin(lambda: not flying.is_set())
+            except Exception as error:
+                trouble.append(error)
+            finally:
+                link.close()
+
+        thread = threading.Thread(target=run_nodes)
+        thread.start()
+        while not flying.is_set() and not trouble:
+            simulation.post(lambda: None)
+            simulation.take_in()
+        simulation.run(SECONDS)
+        flying.clear()
+        thread.join()
+        assert not trouble
+    names = OUTPUTS[:4] if outside == 0 else OUTPUTS[4:]
+    for name in names:
+        assert messages(said)[name] == messages(inside[0])[name]
+
+
+def test_the_same_on_a_played_bag(inside: tuple[Said, Path]) -> None:
+    """Nothing is simulated but a UAV that stands still: the nodes live on what the log holds."""
+    said_inside, path = inside
+    replay = Replay(path, topics=INPUTS, offset_s=summarize(path).start_ns * 1e-9)
+    with Simulation(scenario_of(NODES, blind=True)) as simulation:
+        said = listen(simulation)
+        simulation.play(replay)
+        simulation.run(SECONDS)
+    assert messages(said) == messages(said_inside)
+
+
+def messages(said: Said) -> dict[str, list[bytes]]:
+    """Without the time of delivery."""
+    return {name: [cdr for _, cdr in rows] for name, rows in said.items()}
+
+
+# -------------------------------------------------------------------------------- shipped profiles
+
+
+@pytest.mark.parametrize("name", ["simulation", "ground_test", "flight_test"])
+def test_shipped_profiles_start_the_nodes_of_the_scenario(name: str) -> None:
+    """The same classes with parameters that they know; only names and drivers differ."""
+    profile = load_profile(PROFILES / f"{name}.toml")
+    shipped = load_profile(PROFILES / "simulation.toml")
+    autonomy = [e for e in profile.launch if e.node.startswith("volery.autonomy.")]
+    assert [e.node for e in autonomy] == [e.node for e in shipped.launch]
+    assert profile.name == name
+    with Simulation(scenario_of([], blind=True)) as simulation:
+        from volery.graph.node import Context
+
+        context = Context(simulation.graph, simulation._engine, simulation.graph.now_ns)
+        for entry in autonomy:
+            plain = NodeEntry(node=entry.node, parameters=entry.parameters)
+            node = start_node(plain, context, profile.namespace, name, None)
+            node.destroy_node()

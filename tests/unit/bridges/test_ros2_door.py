@@ -1,0 +1,415 @@
+"""The ROS 2 door seen by another participant: nodes, parameters, actions, and what goes wrong."""
+
+from __future__ import annotations
+
+import os
+import socket
+import struct
+import time
+
+import numpy as np
+import pytest
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from live_graph import NOW_NS, LiveGraph
+from ros2_bench import DOMAIN, Other
+from ros_tcp_client import until
+
+from volery.bridges.doors import Doors
+from volery.bridges.ros2.dds.idl_types import message_struct
+from volery.bridges.ros2.dds.qos import qos_of
+from volery.bridges.ros2.dds.records import TYPE as RECORD
+from volery.bridges.ros2.dds.records import record_message
+from volery.bridges.ros2.door import Ros2Door
+from volery.bridges.ros2.environment import Ros2Terms, join_ros2
+from volery.bridges.ros2.middleware import Profile
+from volery.bridges.ros2.names import NodeName
+from volery.bridges.ros2.parameter_values import parameter_message, plain_of
+from volery.bridges.rosbridge.beside import WithRosApi
+from volery.core.errors import BridgeError, GraphError
+from volery.graph.cdr import decode_cdr, encode_cdr
+from volery.graph.messages import (
+    Clock,
+    LaserScan,
+    String,
+    Twist,
+    header,
+    message_type,
+    time_from_ns,
+    typestore,
+)
+from volery.graph.parameters import Parameter
+from volery.graph.zero import zero_message
+
+STRING = "std_msgs/msg/String"
+TRIGGER = "std_srvs/srv/Trigger"
+STEPS = "simulation_interfaces/action/SimulateSteps"
+NODE = "/uav1/gap_following"
+
+
+class World(LiveGraph):
+    """A graph with all that a simulation has, and a door."""
+
+    def __init__(self):
+        super().__init__()
+        self.goals, self.commands = [], []
+        self.chatter = self.graph.advertise("/chatter", STRING)
+        self.graph.advertise("/größe", STRING)
+        self.graph.parameters.declare(NODE, Parameter("height_m", 3.0, like=3.0, read_only=False))
+        self.graph.parameters.declare(NODE, Parameter("name", "x", like="x"))
+        self.graph.parameters.enter("/uav1/quiet")
+        self.graph.actions.offer("/simulate_steps", STEPS, self.goals.append)
+        self.graph.offer("/broken", TRIGGER, self.break_down)
+        self.do(lambda: self.graph.subscribe("/uav1/cmd_vel", self.commands.append, Twist))
+        self.doors = Doors(self.gateway)
+        self.door = Ros2Door(Ros2Terms(domain_id=DOMAIN))
+        self.doors.open(WithRosApi(self.door))
+
+    def break_down(self, _request):
+        raise GraphError("no such luck")
+
+    def close(self):
+        self.doors.close()
+        super().close()
+
+
+@pytest.fixture(scope="module")
+def world():
+    made = World()
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def other(world):
+    made = Other()
+    yield made
+    made.close()
+
+
+def test_nodes_and_their_endpoints_are_told(world, other):
+    """As rmw_dds_common tells them: a latched record a participant."""
+    heard = []
+    inner = other.participant._participant
+    reader = DataReader(
+        inner,
+        Topic(inner, "ros_discovery_info", message_struct(RECORD)),
+        qos=qos_of(Profile(latched=True, depth=100)),
+    )
+
+    def names():
+        heard.extend(decode_cdr(s.cdr, RECORD) for s in reader.take(10) if s.sample_info.valid_data)
+        found = {}
+        for record in heard:
+            for entry in record.node_entities_info_seq:
+                found[entry.node_namespace, entry.node_name] = entry
+        return found
+
+    until(lambda: {("/", "volery"), ("/uav1", "gap_following"), ("/uav1", "quiet")} <= set(names()))
+    volery = names()["/", "volery"]
+    assert len({gid.data.tobytes() for gid in volery.writer_gid_seq}) > 5
+    node = names()["/uav1", "gap_following"]
+    assert len(node.reader_gid_seq) == len(node.writer_gid_seq) == 6  # services of parameters
+
+
+def test_a_record_has_the_bytes_of_rmw():
+    nodes = {NodeName("/uav1", "a"): ([bytes(range(16))], [])}
+    data = encode_cdr(record_message(b"\7" * 16, nodes), RECORD)
+    text = struct.pack("<I6s2xI2s2x", 6, b"/uav1\0", 2, b"a\0")
+    assert data == (
+        b"\0\1\0\0" + b"\7" * 16 + struct.pack("<I", 1) + text
+        + struct.pack("<I", 1) + bytes(range(16)) + struct.pack("<I", 0)
+    )  # fmt: skip
+
+
+def test_messages_are_made_into_bytes_only_while_somebody_listens(world, other):
+    topic = {t.name: t for t in world.graph.topics()}["/chatter"]
+    assert topic.subscribers == 0
+    heard = other.hear("/chatter", STRING)
+    until(lambda: {t.name: t for t in world.graph.topics()}["/chatter"].subscribers)
+    world.do(lambda: world.chatter.publish(String("hello")))
+    assert heard.get(timeout=5.0).data == "hello"
+
+
+def test_bytes_are_made_once_for_all_doors(world, other, monkeypatch):
+    second = Ros2Door(Ros2Terms(domain_id=DOMAIN + 1), "/twin")
+    doors = Doors(world.gateway)
+    doors.open(second)
+    there = Other(Ros2Terms(domain_id=DOMAIN + 1))
+    try:
+        image = world.graph.advertise("/once", STRING)
+        heard = [one.hear("/once", STRING) for one in (other, there)]
+        until(lambda: {t.name: t for t in world.graph.topics()}["/once"].subscribers == 2)
+        store, made = typestore(), []
+        original = store.serialize_cdr
+        monkeypatch.setattr(store, "serialize_cdr", lambda *a: made.append(a) or original(*a))
+        world.do(lambda: image.publish(String("once")))
+        assert [h.get(timeout=5.0).data for h in heard] == ["once", "once"]
+        assert len([1 for message, _ in made if getattr(message, "data", "") == "once"]) == 1
+    finally:
+        there.close()
+        doors.close()
+
+
+def test_best_effort_publishers_are_heard_too(world, other):
+    writer, publish = other.speak(
+        "/uav1/cmd_vel", "geometry_msgs/msg/Twist", Profile(reliable=False)
+    )
+    twist = zero_message("geometry_msgs/msg/Twist")
+    before = len(world.commands)
+
+    def arrives():
+        publish(twist)
+        time.sleep(0.02)
+        return len(world.commands) > before
+
+    until(arrives)
+    writer.close()
+
+
+def test_foreign_types_and_other_definitions_are_warned_of(world, other, caplog):
+    wrong, _ = other.speak("/uav1/cmd_vel", STRING)
+    until(lambda: "publisher of std_msgs/msg/String is not heard" in caplog.text)
+    wrong.close()
+    topics = world.door._shared.topics
+    fake = next(p for p in other.participant.publishers() if p.topic == "/chatter")
+    topic = {t.name: t for t in world.graph.topics()}["/chatter"]
+    topics._look_at(topic, [fake._replace(type_hash="RIHS01_00")])
+    assert "another definition of std_msgs/msg/String (RIHS01_00)" in caplog.text
+    assert caplog.text.count("RIHS01_00") == 1
+    topics._look_at(topic, [fake._replace(type_hash="RIHS01_00"), fake])
+    assert caplog.text.count("RIHS01_00") == 1
+
+
+def test_names_that_ros2_does_not_allow_stay_inside(world, other):
+    until(lambda: any(p.topic == "/chatter" for p in other.participant.publishers()))
+    assert not any("gr" in p.topic for p in other.participant.publishers())
+
+
+def test_other_domains_are_not_heard(world):
+    stranger = Other(Ros2Terms(domain_id=DOMAIN + 2))
+    _, publish = stranger.speak("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
+    before = len(world.commands)
+    for _ in range(20):
+        publish(zero_message("geometry_msgs/msg/Twist"))
+        time.sleep(0.01)
+    assert len(world.commands) == before
+    assert stranger.participant.publishers() == []
+    stranger.close()
+
+
+def test_one_domain_has_one_configuration_in_a_process(world):
+    with pytest.raises(BridgeError, match="other interfaces"):
+        join_ros2(Ros2Terms(domain_id=DOMAIN, interfaces=("eth0",)))
+
+
+def test_sockets_hear_this_machine_alone(world):
+    # Otherwise Python makes every socket non-blocking that it wraps, for its owner as well.
+    default = socket.getdefaulttimeout()
+    socket.setdefaulttimeout(None)
+    try:
+        assert _confined() >= 2
+    finally:
+        socket.setdefaulttimeout(default)
+
+
+def _confined():
+    """Sockets of the domain, each bound to loopback."""
+    found = 0
+    for name in os.listdir("/proc/self/fd"):
+        try:
+            sock = socket.socket(fileno=os.dup(int(name)))
+        except OSError:
+            continue  # no socket, or one that has closed
+        with sock:
+            port = sock.getsockname()[1] if sock.type == socket.SOCK_DGRAM else 0
+            if 0 <= port - 7400 - 250 * DOMAIN < 250:
+                device = sock.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16)
+                assert device.rstrip(b"\0") == b"lo"
+                found += 1
+    return found
+
+
+def test_interfaces_that_there_are_not_are_told():
+    with pytest.raises(BridgeError, match=rf"cannot join DDS domain {DOMAIN + 3}"):
+        join_ros2(Ros2Terms(domain_id=DOMAIN + 3, interfaces=("no_such_interface",)))
+
+
+def test_failures_are_told_where_there_is_room(world, other):
+    answer = other.call("/broken", TRIGGER)
+    assert not answer.success
+    assert answer.message
+
+
+def test_rosapi_is_not_shown(world, other):
+    until(lambda: "/broken" in other.participant.service_types())
+    assert not any(name.startswith("/rosapi") for name in other.participant.service_types())
+
+
+# ------------------------------------------------------------------------------------- parameters
+
+
+def parameters(other, base, node=NODE, **fields):
+    word = "".join(f"_{c.lower()}" if c.isupper() else c for c in base).strip("_")
+    return other.call(f"{node}/{word}", f"rcl_interfaces/srv/{base}", **fields)
+
+
+def test_parameters_are_listed_described_and_read(world, other):
+    names = parameters(other, "ListParameters").result.names
+    assert names == ["height_m", "name", "use_sim_time"]
+    values = parameters(other, "GetParameters", names=["height_m", "use_sim_time", "none"]).values
+    assert [plain_of(value) for value in values] == [3.0, True, None]
+    assert parameters(other, "GetParameterTypes", names=["name", "none"]).types.tolist() == [4, 0]
+    found = parameters(other, "DescribeParameters", names=["height_m", "name"]).descriptors
+    assert [(d.name, d.type, d.read_only) for d in found] == [
+        ("height_m", 3, False),
+        ("name", 4, True),
+    ]
+    assert parameters(other, "ListParameters", node="/volery").result.names == ["use_sim_time"]
+
+
+def test_parameters_are_set_and_that_is_told(world, other):
+    events = other.hear("/parameter_events", "rcl_interfaces/msg/ParameterEvent")
+    until(lambda: any(p.topic == "/parameter_events" for p in other.participant.publishers()))
+    time.sleep(0.1)
+    wanted = [parameter_message("height_m", 4.5), parameter_message("name", "y")]
+    results = parameters(other, "SetParameters", parameters=wanted).results
+    assert [r.successful for r in results] == [True, False]
+    assert "read-only" in results[1].reason
+    assert world.graph.parameters.get(NODE, "height_m").value == 4.5
+    event = events.get(timeout=5.0)
+    assert (event.node, event.changed_parameters[0].name) == (NODE, "height_m")
+
+
+def test_parameters_are_set_all_or_none(world, other):
+    before = world.graph.parameters.get(NODE, "height_m").value
+    wanted = [parameter_message("height_m", 9.0), parameter_message("name", "y")]
+    result = parameters(other, "SetParametersAtomically", parameters=wanted).result
+    assert not result.successful
+    assert "name" in result.reason
+    assert world.graph.parameters.get(NODE, "height_m").value == before
+    wanted = [parameter_message("height_m", 6.0)]
+    assert parameters(other, "SetParametersAtomically", parameters=wanted).result.successful
+    assert world.graph.parameters.get(NODE, "height_m").value == 6.0
+
+
+# ---------------------------------------------------------------------------------------- actions
+
+
+def uuid(number):
+    message = zero_message("unique_identifier_msgs/msg/UUID")
+    message.uuid = np.full(16, number, np.uint8)
+    return message
+
+
+def send_goal(world, other, number):
+    goal = zero_message(f"{STEPS}_Goal")
+    goal.steps = 10
+    response = other.call(
+        "/simulate_steps/_action/send_goal", f"{STEPS}_SendGoal", goal_id=uuid(number), goal=goal
+    )
+    return response, world.goals[-1]
+
+
+def result_of(other, number):
+    return other.call(
+        "/simulate_steps/_action/get_result", f"{STEPS}_GetResult", goal_id=uuid(number)
+    )
+
+
+def test_an_action_gives_feedback_and_a_result(world, other):
+    feedback = other.hear("/simulate_steps/_action/feedback", f"{STEPS}_FeedbackMessage")
+    status = other.hear(
+        "/simulate_steps/_action/status",
+        "action_msgs/msg/GoalStatusArray",
+        Profile(latched=True, depth=1),
+    )
+    response, goal = send_goal(world, other, 1)
+    assert response.accepted
+    assert response.stamp == time_from_ns(NOW_NS)
+    assert goal.request.steps == 10
+    progress = zero_message(f"{STEPS}_Feedback")
+    progress.completed_steps = 4
+    until(lambda: any("feedback" in p.topic for p in other.participant.publishers()))
+    world.do(lambda: goal.feedback(progress))
+    told = feedback.get(timeout=5.0)
+    assert told.feedback.completed_steps == 4
+    assert told.goal_id.uuid.tolist() == [1] * 16
+    world.do(lambda: goal.succeed(zero_message(f"{STEPS}_Result")))
+    assert result_of(other, 1).status == 4
+    until(lambda: [s.status for s in status.get(timeout=5.0).status_list][-1:] == [4])
+
+
+def test_a_goal_is_cancelled(world, other):
+    _, goal = send_goal(world, other, 2)
+    goal.when_cancelled(lambda: goal.canceled(zero_message(f"{STEPS}_Result")))
+    info = zero_message("action_msgs/msg/GoalInfo")
+    info.goal_id = uuid(2)
+    cancel = "/simulate_steps/_action/cancel_goal", "action_msgs/srv/CancelGoal"
+    response = other.call(*cancel, goal_info=info)
+    assert (response.return_code, len(response.goals_canceling)) == (0, 1)
+    assert result_of(other, 2).status == 5
+    assert other.call(*cancel, goal_info=info).return_code == 3  # it has ended
+    info.goal_id = uuid(9)
+    assert other.call(*cancel, goal_info=info).return_code == 2  # unknown
+
+
+def test_a_goal_of_an_id_that_is_taken_is_refused(world, other):
+    response, goal = send_goal(world, other, 3)
+    assert response.accepted
+    again, same = send_goal(world, other, 3)
+    assert not again.accepted
+    assert same is goal
+    world.do(lambda: goal.abort(zero_message(f"{STEPS}_Result")))
+    assert result_of(other, 3).status == 6
+    assert result_of(other, 77).status == 0
+
+
+def test_scans_go_out_best_effort_and_the_clock_reliably(world, other):
+    world.graph.advertise("/uav1/scan", LaserScan)
+    world.graph.advertise("/clock", Clock)
+    world.graph.advertise("/map", STRING, latched=True)
+
+    def profiles():
+        return {p.topic: p.profile for p in other.participant.publishers()}
+
+    until(lambda: {"/uav1/scan", "/clock", "/map"} <= set(profiles()))
+    found = profiles()
+    assert not found["/uav1/scan"].reliable
+    assert found["/clock"].reliable
+    assert found["/map"].latched
+    assert not found["/clock"].latched
+
+
+def test_who_does_not_fit_is_left_out_and_the_rest_goes_on(world, other, caplog):
+    odd = world.graph.advertise("/odd", "std_msgs/msg/Header")
+    heard = other.hear("/odd", "std_msgs/msg/Header")
+    until(lambda: {t.name: t for t in world.graph.topics()}["/odd"].subscribers)
+    broken = header(1, "x")
+    broken.frame_id = 7
+    world.do(lambda: odd.publish(broken))
+    world.do(lambda: odd.publish(header(2, "fine")))
+    assert heard.get(timeout=5.0).frame_id == "fine"
+    assert "/odd" in caplog.text
+
+
+def test_a_door_without_a_name_of_ros2_does_not_open(world):
+    doors = Doors(world.gateway)
+    with pytest.raises(BridgeError, match="does not allow"):
+        doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN), "/my-node"))
+    doors.close()
+
+
+def test_everything_is_given_back():
+    made = LiveGraph()
+    message_type(f"{TRIGGER}_Request")
+    doors = Doors(made.gateway)
+    doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN + 4)))
+    watcher = Other(Ros2Terms(domain_id=DOMAIN + 4))
+    made.graph.advertise("/x", STRING)
+    until(watcher.participant.publishers)
+    doors.close()
+    until(lambda: not watcher.participant.publishers())
+    assert made.gateway.sessions() == []
+    watcher.close()
+    made.close()

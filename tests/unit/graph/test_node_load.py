@@ -1,0 +1,46 @@
+"""Nodes count the CPU time of their callbacks."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from volery.graph.graph import Graph
+from volery.graph.messages import String
+from volery.graph.node import Context, Node
+
+
+class _NoTimers:
+    def every(self, *_arguments: Any, **_options: Any) -> None:
+        """Never ring."""
+
+    def at(self, *_arguments: Any) -> None:
+        """Never act."""
+
+
+class Busy(Node):
+    """Computes for as much CPU time as it is told, then sleeps as long."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("busy", **options)
+        self.create_subscription(String, "work", self._work)
+
+    def _work(self, message: String) -> None:
+        seconds = float(message.data)
+        end = time.thread_time() + seconds
+        while time.thread_time() < end:
+            pass
+        time.sleep(seconds)
+
+
+def test_work_counts_and_sleep_does_not() -> None:
+    graph = Graph(lambda: 0)
+    busy, idle = (
+        Busy(context=Context(graph, _NoTimers(), lambda: 0), namespace=f"/{n}") for n in "ab"
+    )
+    for _ in range(3):
+        graph.advertise("/a/work", String).publish(String("0.02"))
+        graph.deliver()
+    assert 0.06 <= busy.busy_s < 0.09
+    assert idle.busy_s == 0.0
+    assert not busy.has_worker

@@ -1,0 +1,180 @@
+"""Sockets and serial lines: pymavlink as a client of a running simulation."""
+
+import os
+import socket
+import threading
+import time
+
+import pytest
+from flying_bench import scenario
+
+from volery.bridges.door_names import Terms, make_door
+from volery.bridges.doors import Doors
+from volery.cli.doors import open_doors
+from volery.cli.flight import RunOptions
+from volery.core.errors import BridgeError
+from volery.mavlink.serial_door import MavlinkSerial
+from volery.mavlink.tcp_door import MavlinkTcp
+from volery.mavlink.udp_door import MavlinkUdp
+from volery.runtime import Simulation
+
+mavutil = pytest.importorskip("pymavlink.mavutil")
+
+BASE = 24540
+"""Away from 14540, where a run of the user's may stand."""
+
+
+class Running:
+    """A simulation that runs in real time in a thread of its own, and its doors."""
+
+    def __init__(self, simulation):
+        self.simulation = simulation
+        self.doors = Doors(simulation.gateway)
+        self._thread = threading.Thread(target=lambda: simulation.run(600.0, speed=1.0))
+
+    def __enter__(self):
+        self.simulation.be_prompt()
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self.simulation.resume()
+        self.simulation.quit()
+        self._thread.join()
+        self.doors.close()
+        self.simulation.close()
+
+
+@pytest.fixture(scope="module")
+def running():
+    with Running(Simulation(scenario(count=2), threads=1)) as running:
+        running.doors.open(MavlinkUdp(port=BASE))
+        yield running
+
+
+@pytest.fixture
+def client(running):
+    link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{BASE}", source_system=245)
+    yield link
+    link.close()
+
+
+def ack_of(client, command, *params):
+    client.mav.command_long_send(1, 1, command, 0, *params, *(0,) * (7 - len(params)))
+    ack = client.recv_match(type="COMMAND_ACK", blocking=True, timeout=20)
+    assert ack.command == command
+    return ack.result
+
+
+def test_a_client_is_found_and_answered(client):
+    assert client.wait_heartbeat(timeout=20).autopilot == 12
+    assert client.target_system == 1
+    assert ack_of(client, 512, 242) == 0
+    client.mav.param_request_read_send(1, 1, b"MIS_TAKEOFF_ALT", -1)
+    value = client.recv_match(type="PARAM_VALUE", blocking=True, timeout=20)
+    assert value.param_value == 2.5
+
+
+def test_every_vehicle_has_a_port_and_the_ground_station_hears_all(running):
+    second = mavutil.mavlink_connection(f"udpin:127.0.0.1:{BASE + 1}")
+    ground = mavutil.mavlink_connection(f"udpin:127.0.0.1:{BASE + 10}")
+    try:
+        assert second.wait_heartbeat(timeout=20).get_srcSystem() == 2
+        heard = set()
+        end = time.monotonic() + 20
+        while heard != {1, 2} and time.monotonic() < end:
+            message = ground.recv_match(type="HEARTBEAT", blocking=True, timeout=1)
+            heard |= {message.get_srcSystem()} if message else set()
+        assert heard == {1, 2}
+    finally:
+        second.close()
+        ground.close()
+
+
+def test_heartbeats_go_on_while_the_simulation_stands_still(running, client):
+    assert client.wait_heartbeat(timeout=20)
+    running.simulation.pause()
+    time.sleep(0.3)
+    while client.recv_msg():
+        pass
+    beats = [client.recv_match(type="HEARTBEAT", blocking=True, timeout=20) for _ in range(2)]
+    running.simulation.resume()
+    assert all(beats)
+
+
+def test_a_port_that_is_taken_is_told(running):
+    other = Simulation(scenario(), threads=1)
+    with other, Doors(other.gateway) as doors, pytest.raises(BridgeError) as told:
+        doors.open(MavlinkUdp(port=BASE))
+    assert str(told.value) == f"uav1: cannot listen on UDP port {BASE + 40}: the port is taken"
+    with pytest.raises(BridgeError, match="other machines"):
+        running.doors.open(make_door("mavlink=0.0.0.0:14540", Terms(), _kinds()))
+
+
+def _kinds():
+    from volery.bridges.door_names import DoorKind
+
+    return {"mavlink": DoorKind(1, lambda a, t: MavlinkUdp(*a, anywhere=t.anywhere), "")}
+
+
+def test_tcp_carries_all_vehicles_on_each_connection(running):
+    door = MavlinkTcp(port=0)
+    running.doors.open(door)
+    first, second = (
+        mavutil.mavlink_connection(f"tcp:127.0.0.1:{door.port}", source_system=s)
+        for s in (250, 251)
+    )
+    try:
+        systems = set()
+        end = time.monotonic() + 20
+        while systems != {1, 2} and time.monotonic() < end:
+            message = first.recv_match(type="HEARTBEAT", blocking=True, timeout=1)
+            systems |= {message.get_srcSystem()} if message else set()
+        assert systems == {1, 2}
+        second.mav.command_long_send(2, 1, 512, 0, 242, 0, 0, 0, 0, 0, 0)
+        ack = second.recv_match(type="COMMAND_ACK", blocking=True, timeout=20)
+        assert (ack.get_srcSystem(), ack.target_system, ack.result) == (2, 251, 0)
+    finally:
+        first.close()
+        second.close()
+
+
+def test_a_serial_line_carries_them_too(running):
+    ours, theirs = os.openpty()
+    path = os.ttyname(theirs)
+    running.doors.open(MavlinkSerial(path, 57600))
+    station = mavutil.mavlink.MAVLink(None, 249, 190)
+    station.robust_parsing = True
+    heard, asked = set(), False
+    end = time.monotonic() + 20
+    while "COMMAND_ACK" not in heard and time.monotonic() < end:
+        for message in station.parse_buffer(os.read(ours, 4096)) or ():
+            heard.add(message.get_type())
+        if not asked and "HEARTBEAT" in heard:
+            request = station.command_long_encode(1, 1, 512, 0, 242, 0, 0, 0, 0, 0, 0)
+            os.write(ours, request.pack(station))
+            asked = True
+    assert "COMMAND_ACK" in heard
+    os.close(theirs)
+    os.close(ours)
+
+
+def test_noise_on_the_socket_disturbs_nobody(running, client):
+    assert client.wait_heartbeat(timeout=20)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
+        for data in (b"", b"\xfd", bytes(300), b"\xfd" * 5000, os.urandom(1000)):
+            noise.sendto(data, ("127.0.0.1", BASE + 40))
+    assert ack_of(client, 512, 242) == 0
+
+
+def test_names_of_the_command_line():
+    simulation = Simulation(scenario(), threads=1)
+    with simulation:
+        options = RunOptions("flat", doors=(f"mavlink={BASE + 200}", "mavlink-tcp=0"))
+        with open_doors(simulation, options):
+            simulation.run(0.1)
+        with (
+            pytest.raises(BridgeError, match="no serial line"),
+            open_doors(simulation, RunOptions("flat", doors=("mavlink-serial=/dev/null:57600",))),
+        ):
+            pass

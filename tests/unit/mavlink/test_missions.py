@@ -1,0 +1,182 @@
+"""Plans up and down, what is refused of them, and missions flown."""
+
+import math
+
+import pytest
+from flying_bench import NAN, Station, fly
+
+ACCEPTED, REJECTED = 0, 1
+WAYPOINT, LOITER, RETURN, LAND, TAKE_OFF, DELAY, YAW, JUMP, SPEED = (
+    *(16, 19, 20, 21, 22, 93, 115, 177, 178),
+)
+LATITUDE, LONGITUDE = 47.397742, 8.545594
+RADIUS_M = 6.37e6
+
+
+def at(north, east, up, command=WAYPOINT, params=(0.0, 0.0, 0.0, NAN)):
+    """An item at a place from the first UAV's start, above home."""
+    latitude = LATITUDE + math.degrees(north / RADIUS_M)
+    longitude = LONGITUDE + math.degrees(east / RADIUS_M / math.cos(math.radians(LATITUDE)))
+    return command, 6, params, latitude, longitude, up
+
+
+def do(command, *params):
+    return command, 2, (*params, *(0.0,) * (4 - len(params))), 0.0, 0.0, 0.0
+
+
+TOUR = [
+    do(SPEED, 1.0, 4.0),
+    at(0.0, 0.0, 3.0, TAKE_OFF),
+    at(6.0, 0.0, 4.0),
+    at(6.0, 6.0, 4.0, WAYPOINT, (1.0, 0.0, 0.0, 90.0)),
+    do(DELAY, 1.0),
+    do(YAW, 180.0),
+    do(JUMP, 3.0, 1.0),
+    at(0.0, 6.0, 3.0, LOITER, (0.5, 0.0, 0.0, NAN)),
+    at(0.0, 0.0, 3.0),
+    at(0.0, 0.0, 0.0, LAND),
+]
+
+
+@pytest.fixture
+def flight():
+    simulation, station = fly()
+    with simulation:
+        station.seconds(0.1)
+        yield simulation, station
+
+
+def test_a_mission_of_ten_items_is_flown_and_ends_where_it_began(flight):
+    simulation, station = flight
+    assert station.upload(TOUR) == ACCEPTED
+    assert station.command(300, 0.0, 0.0) == ACCEPTED  # arms and begins
+    fastest, corner = 0.0, 1e9
+    uav = simulation.uavs["uav1"]
+    for _ in range(200):
+        station.seconds(0.3)
+        fastest = max(fastest, math.hypot(*uav.velocity_map[:2]))
+        corner = min(corner, math.dist(uav.position_map, (6.0, 6.0, 4.1)))
+        if not station.armed and station.of("MISSION_ITEM_REACHED"):
+            break
+    reached = [message.seq for message in station.of("MISSION_ITEM_REACHED")]
+    assert reached == [0, 1, 2, 3, 4, 5, 6, 3, 4, 5, 6, 7, 8, 9]  # the jump goes back once
+    assert fastest < 4.3
+    assert corner < 0.5
+    assert "Mission finished, loitering" in station.texts
+    assert uav.position_map[:2] == pytest.approx([0.0, 0.0], abs=0.5)
+    assert not station.armed
+
+
+def test_plans_come_back_as_they_went(flight):
+    _, station = flight
+    fence = [
+        (5003, 0, (80.0, 0.0, 0.0, 0.0), LATITUDE, LONGITUDE, 0.0),
+        *(
+            (5001, 0, (3.0, 0.0, 0.0, 0.0), LATITUDE + a * 1e-4, LONGITUDE + b * 1e-4, 0.0)
+            for a, b in ((0, 0), (0, 9), (9, 0))
+        ),
+    ]
+    rally = [(5100, 3, (0.0, 0.0, 0.0, 0.0), LATITUDE, LONGITUDE, 20.0)]
+    for kind, items in ((0, TOUR), (1, fence), (2, rally)):
+        assert station.upload(items, kind) == ACCEPTED
+        station.send("mission_request_list", 1, 1, kind)
+        assert station.last("MISSION_COUNT").count == len(items)
+        for k, (command, frame, params, x, y, z) in enumerate(items):
+            station.send("mission_request_int", 1, 1, k, kind)
+            item = station.last("MISSION_ITEM_INT")
+            assert (item.seq, item.command, item.frame, item.mission_type) == (
+                k,
+                command,
+                frame,
+                kind,
+            )
+            told = (item.param1, item.param2, item.param3, item.param4)
+            assert told == pytest.approx(params, nan_ok=True)
+            assert (item.x, item.y, item.z) == (round(x * 1e7), round(y * 1e7), z)
+        station.send("mission_ack", 1, 1, 0, kind)
+        station.send("mission_request_int", 1, 1, len(items), kind)
+        assert station.last("MISSION_ACK").type == 13
+    station.send("mission_clear_all", 1, 1, 255)
+    assert station.last("MISSION_ACK").type == ACCEPTED
+    for kind in (0, 1, 2):
+        station.send("mission_request_list", 1, 1, kind)
+        assert station.last("MISSION_COUNT").count == 0
+
+
+@pytest.mark.parametrize(
+    ("items", "kind", "result"),
+    [
+        ([at(0, 0, 3), do(JUMP, 9.0, 1.0)], 0, 6),  # there is no such item
+        ([do(SPEED, 1.0, 3.0), do(JUMP, 0.0, -1.0)], 0, 5),  # goes round without flying
+        ([at(0, 0, NAN)], 0, 12),
+        ([(*at(0, 0, 3)[:3], 95.0, 8.5, 3.0)], 0, 10),
+        ([(*at(0, 0, 3)[:3], 47.0, 190.0, 3.0)], 0, 11),
+        ([(WAYPOINT, 1, (0, 0, 0, 0), LATITUDE, LONGITUDE, 3.0)], 0, 2),  # a local frame
+        ([do(2000, 0.0)], 0, 3),  # no camera is on board
+        ([do(DELAY, NAN)], 0, 6),
+        ([(5001, 0, (3.0, 0, 0, 0), LATITUDE, LONGITUDE, 0.0)] * 2, 1, 5),  # a corner is missing
+        ([(5003, 0, (0.0, 0, 0, 0), LATITUDE, LONGITUDE, 0.0)], 1, 6),
+        ([at(0, 0, 3)], 1, 3),  # no waypoints in fences
+    ],
+)
+def test_contradictory_plans_are_refused_with_the_reason(flight, items, kind, result):
+    _, station = flight
+    assert station.upload([at(0, 0, 5)]) == ACCEPTED
+    assert station.upload(items, kind) == result
+    station.send("mission_request_list", 1, 1, 0)
+    assert station.last("MISSION_COUNT").count == 1  # what was there is there still
+
+
+def test_too_many_items_wrong_order_and_strangers(flight):
+    simulation, station = flight
+    station.send("mission_count", 1, 1, 501, 0)
+    assert station.last("MISSION_ACK").type == 4
+    station.send("mission_count", 1, 1, 3, 0)
+    other = Station(simulation, system=200, link=9)
+    other.send("mission_count", 1, 1, 1, 0)
+    assert other.last("MISSION_ACK").type == 14
+    other.item(0, at(0, 0, 3))  # nobody asked it
+    station.item(0, at(0, 0, 3))
+    station.item(0, at(0, 0, 3))  # comes twice: passed over
+    station.item(2, at(0, 0, 3))
+    assert station.last("MISSION_ACK").type == 13
+
+
+def test_items_that_are_lost_are_asked_for_again_and_given_up(flight):
+    _, station = flight
+    station.send("mission_count", 1, 1, 2, 0)
+    station.seconds(1.0)
+    asked = [message.seq for message in station.of("MISSION_REQUEST_INT")]
+    assert asked == [0] * len(asked)
+    assert 3 <= len(asked) <= 5
+    station.item(0, at(0, 0, 3))
+    assert station.last("MISSION_REQUEST_INT").seq == 1
+    station.seconds(5.3)
+    assert station.last("MISSION_ACK").type == 15
+
+
+def test_pausing_setting_the_item_and_going_on(flight):
+    simulation, station = flight
+    assert station.upload([at(0, 0, 3, TAKE_OFF), at(30, 0, 3), at(0, 0, 3)]) == ACCEPTED
+    assert station.command(300, 0.0, 0.0) == ACCEPTED
+    station.seconds(6.0)
+    assert station.command(193, 0.0) == ACCEPTED
+    station.seconds(2.5)
+    place = simulation.uavs["uav1"].position_map
+    station.seconds(1.0)
+    assert simulation.uavs["uav1"].position_map == pytest.approx(place, abs=0.2)
+    assert station.command(224, 7.0) == 2  # no such item
+    assert station.command(224, 2.0) == ACCEPTED
+    assert station.mode(4, 4) == ACCEPTED
+    station.seconds(6.0)
+    assert [m.seq for m in station.of("MISSION_ITEM_REACHED")][-1] == 2
+
+
+def test_a_mission_that_leaves_the_fence_is_not_begun(flight):
+    _, station = flight
+    assert station.upload([at(0, 0, 3, TAKE_OFF), at(50, 0, 3)]) == ACCEPTED
+    station.set("GF_MAX_HOR_DIST", 20.0)
+    assert station.command(300, 0.0, 0.0) == REJECTED
+    assert any("geofence" in text for text in station.texts)
+    station.set("GF_MAX_HOR_DIST", 0.0)
+    assert station.command(300, 0.0, 0.0) == ACCEPTED

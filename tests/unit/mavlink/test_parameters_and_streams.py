@@ -1,0 +1,147 @@
+"""Parameters as PX4 carries them, streams and their rates, what is told on request."""
+
+import math
+from collections import Counter
+
+import pytest
+from flying_bench import NAN, Station, fly
+
+from volery.mavlink.codec import Codec, dialect
+from volery.mavlink.parameters import DEFAULTS, NAMES
+from volery.mavlink.streams import RATES_HZ
+
+ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
+
+
+@pytest.fixture(scope="module")
+def station():
+    simulation, station = fly()
+    with simulation:
+        station.seconds(0.1)
+        yield station
+
+
+def test_the_whole_list_comes_and_single_ones(station):
+    station.send("param_request_list", 1, 1)
+    station.seconds(1.0)
+    told = {m.param_id: m for m in station.of("PARAM_VALUE")}
+    assert set(told) == set(NAMES)
+    assert {m.param_count for m in told.values()} == {len(NAMES)}
+    assert sorted(m.param_index for m in told.values()) == list(range(len(NAMES)))
+    station.heard.clear()
+    station.send("param_request_read", 1, 1, b"COM_DL_LOSS_T", -1)
+    whole = station.last("PARAM_VALUE")
+    assert whole.param_type == 6
+    assert int.from_bytes(whole.get_msgbuf()[10:14], "little") == 10
+    station.send("param_request_read", 1, 1, b"", NAMES.index("RTL_RETURN_ALT"))
+    assert station.last("PARAM_VALUE").param_value == 60.0
+    count = len(station.of("PARAM_VALUE"))
+    station.send("param_request_read", 1, 1, b"NO_SUCH", -1)
+    station.send("param_request_read", 1, 1, b"", 9999)
+    assert len(station.of("PARAM_VALUE")) == count
+
+
+def test_setting_checks_type_and_range(station):
+    assert station.set("MIS_TAKEOFF_ALT", 7.5) == 7.5
+    assert station.set("MIS_TAKEOFF_ALT", 500.0) == 7.5
+    assert station.set("MIS_TAKEOFF_ALT", NAN) == 7.5
+    assert station.set("MIS_TAKEOFF_ALT", 3) == 7.5  # an int for a float
+    assert station.set("NAV_DLL_ACT", 2) == 2
+    assert station.set("NAV_DLL_ACT", 9) == 2
+    assert station.set("MAV_SYS_ID", 7) == 1  # fixed
+    assert station.set("NO_SUCH", 1.0) is None
+    assert "unknown param: NO_SUCH" in station.texts
+    assert station.set("NAV_DLL_ACT", 0) == 0
+
+
+def test_every_default_is_allowed():
+    for name, parameter in DEFAULTS.items():
+        assert parameter.low <= parameter.default <= parameter.high, name
+        assert len(name) <= 16
+
+
+@pytest.mark.parametrize("profile", [1, 2])
+def test_streams_come_at_their_rates(profile):
+    simulation, station = fly(sensors=())
+    with simulation:
+        station = Station(simulation, link=11, profile=profile)
+        station.seconds(1.0)
+        station.heard.clear()
+        station.seconds(10.0)
+        counts = Counter(message.get_msgId() for message in station.heard)
+        silent = {83, 85}  # targets: nothing is flown; the battery is ideal
+        if 147 not in counts:
+            silent |= {147}
+        for number, rate in RATES_HZ[profile].items():
+            wanted = 0 if number in silent else 10.0 * rate
+            assert counts[number] == pytest.approx(wanted, abs=1.0), number
+
+
+def test_intervals_are_set_told_and_taken_back(station):
+    assert station.command(511, 30.0, 50_000.0) == ACCEPTED
+    station.heard.clear()
+    station.seconds(1.0)
+    assert len(station.of("ATTITUDE")) == pytest.approx(20, abs=1)
+    assert station.command(512, 244.0, 30.0) == ACCEPTED
+    assert station.last("MESSAGE_INTERVAL").interval_us == 50_000
+    assert station.command(511, 30.0, -1.0) == ACCEPTED
+    station.heard.clear()
+    station.seconds(0.5)
+    assert not station.of("ATTITUDE")
+    assert station.command(511, 9999.0, 1000.0) == UNSUPPORTED
+    assert station.command(511, NAN, 1000.0) == DENIED
+    assert station.command(511, 30.0, 0.0) == ACCEPTED  # this link begins without it
+
+
+def test_what_is_told_on_request(station):
+    assert station.command(512, 148.0) == ACCEPTED
+    version = station.last("AUTOPILOT_VERSION")
+    assert version.capabilities & 4
+    assert version.capabilities & 16384
+    assert station.command(512, 242.0) == ACCEPTED
+    home = station.last("HOME_POSITION")
+    assert home.latitude == pytest.approx(473977420, abs=2)
+    assert station.command(512, 1234.0) == UNSUPPORTED
+    assert station.command(9999, 0.0) == UNSUPPORTED
+    station.send("ping", 5, 77, 0, 0)
+    assert (station.last("PING").seq, station.last("PING").target_system) == (77, 255)
+    station.send("timesync", 0, 123456)
+    sync = station.last("TIMESYNC")
+    assert sync.ts1 == 123456
+    assert sync.tc1 == station.simulation.time_ns
+
+
+def test_health_is_all_well_and_place_agrees_with_the_map(station):
+    assert station.command(512, 1.0) == ACCEPTED
+    status = station.last("SYS_STATUS")
+    present = status.onboard_control_sensors_present
+    assert present & status.onboard_control_sensors_health == present
+    for number in (33, 32, 30, 31, 24, 245, 105):
+        assert station.command(512, float(number)) == ACCEPTED
+    place = station.last("GLOBAL_POSITION_INT")
+    assert place.lat == pytest.approx(473977420, abs=2)
+    assert place.hdg == pytest.approx(9000, abs=10)  # looks east
+    assert station.last("ATTITUDE").yaw == pytest.approx(math.pi / 2, abs=1e-3)
+    q = station.last("ATTITUDE_QUATERNION")
+    assert (q.q1, q.q4) == pytest.approx((math.sqrt(0.5), math.sqrt(0.5)), abs=1e-3)
+    assert station.last("HIGHRES_IMU").zacc == pytest.approx(-9.80665, abs=1e-3)
+    assert station.last("LOCAL_POSITION_NED").z == pytest.approx(0.0, abs=0.01)
+    assert station.last("EXTENDED_SYS_STATE").landed_state == 1
+
+
+def test_frames_are_those_of_pymavlink():
+    """The quick way to pack against the library's own, and back."""
+    common = dialect()
+    messages = [
+        common.MAVLink_attitude_message(1, 0.1, 0.2, 0.3, 0.0, 0.0, 0.0),
+        common.MAVLink_heartbeat_message(2, 12, 29, 50593792, 3, 3),
+        common.MAVLink_system_time_message(0, 0),
+        common.MAVLink_statustext_message(6, b"words", 0, 0),
+        common.MAVLink_extended_sys_state_message(0, 0),
+        common.MAVLink_mission_current_message(0, 65535, 1, 2),
+        common.MAVLink_highres_imu_message(1, *(0.5,) * 13, 63, 3),
+    ]
+    codec, theirs = Codec(7), common.MAVLink(None, 7, 1)
+    for k, message in enumerate(messages):
+        theirs.seq = k
+        assert codec.pack(message, k) == bytes(message.pack(theirs))

@@ -1,0 +1,134 @@
+"""The server for real PX4s against a strict stand-in, and its frames against the physics."""
+
+import logging
+import socket
+import time
+
+import pytest
+from px4_stand_in import StandIn
+
+from volery.bridges.doors import Doors
+from volery.core.errors import BridgeError
+from volery.mavlink.outfit import with_px4
+from volery.mavlink.px4_door import Px4Door
+from volery.runtime import Simulation
+from volery.scenario.load import parse_scenario
+
+CLIMB = 0.78
+"""Share of full speed; 0.73 carries an iris: the root of its share of thrust."""
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def scenario(count=1):
+    data = {
+        "name": "flat",
+        "duration_s": 1000.0,
+        "types": {"iris": {"airframe": "iris"}},
+        "uavs": [
+            {
+                "type": "iris",
+                "count": count,
+                "position_m": [0.0, 0.0],
+                "last_position_m": [5.0, 0.0],
+            }
+        ],
+    }
+    return with_px4(parse_scenario(data, where="flat"))
+
+
+@pytest.fixture
+def opened():
+    """A simulation of `count` UAVs, its door and the first port."""
+    closing = []
+
+    def open_one(count=1, timeout_s=20.0):
+        simulation = Simulation(scenario(count), threads=1)
+        doors = Doors(simulation.gateway)
+        closing.extend([doors, simulation])
+        door = Px4Door(port=free_port(), timeout_s=timeout_s)
+        doors.open(door)
+        simulation.take_in()
+        return simulation, door
+
+    yield open_one
+    for one in closing:
+        one.close()
+
+
+def meet(simulation, door, count):
+    """Run until all PX4s of the stand-ins are connected."""
+    end = time.monotonic() + 20.0
+    while len(door.connected) < count and time.monotonic() < end:
+        time.sleep(0.01)
+        simulation.take_in()
+    assert len(door.connected) == count
+
+
+def test_a_vehicle_flies_in_lock_step(opened):
+    simulation, door = opened()
+    pilot = StandIn(door._port, 400, throttle=CLIMB, arm_at=100)
+    meet(simulation, door, 1)
+    pilot.start()
+    simulation.run(2.0)
+    assert pilot.done.wait(20.0)
+    if pilot.fault:
+        raise pilot.fault
+    assert len(pilot.sensors) == 400
+    assert pilot.groups & 0x1FFF == 0x1BFF  # all groups but the differential pressure
+    assert len(pilot.fixes) >= 3
+    at_rest, climbing = pilot.sensors[50], pilot.sensors[390]
+    assert at_rest.zacc == pytest.approx(-9.81, abs=0.4)
+    assert climbing.zacc < -10.0
+    assert simulation.uavs["uav1"].position_map[2] > 0.3
+
+
+def test_several_vehicles_share_one_clock(opened):
+    simulation, door = opened(count=2)
+    pilots = [StandIn(door._port + k, 150) for k in range(2)]
+    meet(simulation, door, 2)
+    for pilot in pilots:
+        pilot.start()
+    simulation.run(1.0)
+    for pilot in pilots:
+        assert pilot.done.wait(20.0)
+        assert pilot.fault is None
+    first, second = ([s.time_usec for s in pilot.sensors[2:]] for pilot in pilots)
+    assert set(first) & set(second)
+
+
+def test_a_silent_one_is_given_up_with_a_warning_and_may_come_back(opened, caplog):
+    simulation, door = opened(timeout_s=0.5)
+    pilot = StandIn(door._port, 50, throttle=CLIMB, falls_silent=True)
+    meet(simulation, door, 1)
+    pilot.start()
+    with caplog.at_level(logging.WARNING, logger="volery.mavlink.px4_door"):
+        simulation.run(1.0)
+    assert simulation.time_s == pytest.approx(1.0)
+    told = "uav1: its PX4 has been silent for 0.5 s; it is not waited for"
+    assert told in caplog.messages
+    again = StandIn(door._port, 50)
+    meet(simulation, door, 1)
+    again.start()
+    simulation.run(0.5)
+    assert again.done.wait(20.0)
+    assert again.fault is None
+    pilot.close()
+
+
+def test_a_port_that_is_taken_is_told():
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        simulation = Simulation(scenario(), threads=1)
+        with simulation, Doors(simulation.gateway) as doors:
+            with pytest.raises(BridgeError) as told:
+                doors.open(Px4Door(port=port))
+            assert str(told.value) == (
+                f"uav1: cannot listen on 127.0.0.1:{port}: the port is taken"
+            )

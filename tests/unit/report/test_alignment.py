@@ -1,0 +1,94 @@
+"""Alignment of ways in space and time, and the trunk map that poses are measured by."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from volery.core import rotations
+from volery.report.alignment import at_times, ate_rmse_m, common_times, time_shift_s, umeyama
+from volery.report.trunks import TrunkMap, in_map, trunks_of_scan
+
+ANGLES = st.floats(-3.0, 3.0)
+
+
+def way_of(seconds: float, rate_hz: float = 20.0, seed: int = 4) -> tuple[np.ndarray, np.ndarray]:
+    """A way with stops and turns."""
+    time_s = np.arange(0.0, seconds, 1.0 / rate_hz)
+    random = np.random.default_rng(seed)
+    knots = random.uniform(-1.0, 1.0, (int(seconds // 3) + 2, 3)).cumsum(axis=0) * 3.0
+    return time_s, at_times(3.0 * np.arange(len(knots)), knots, time_s)
+
+
+@given(ANGLES, ANGLES, ANGLES)
+def test_a_moved_way_is_brought_back(roll: float, pitch: float, yaw: float) -> None:
+    _, way = way_of(30.0)
+    turn = rotations.matrix(rotations.from_rpy(roll, pitch, yaw))
+    found = umeyama(way, way @ turn.T + [3.0, -2.0, 1.0])
+    np.testing.assert_allclose(found.rotation, turn, atol=1e-9)
+    np.testing.assert_allclose(found.translation, [3.0, -2.0, 1.0], atol=1e-8)
+
+
+def test_a_mirrored_way_is_turned_and_not_mirrored() -> None:
+    _, way = way_of(30.0)
+    assert np.linalg.det(umeyama(way, way * [1.0, 1.0, -1.0]).rotation) == pytest.approx(1.0)
+
+
+def test_what_is_left_is_the_noise() -> None:
+    _, way = way_of(200.0)
+    noise = np.random.default_rng(1).normal(0.0, 0.2, way.shape)
+    turn = rotations.matrix(rotations.from_rpy(0.0, 0.0, 1.0))
+    assert ate_rmse_m((way + noise) @ turn.T + 5.0, way) == pytest.approx(0.2 * 3**0.5, rel=0.02)
+    assert ate_rmse_m(way + 7.0, way) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("late_s", [-7.3, 0.0, 12.4])
+def test_two_logs_of_one_flight_find_their_common_time(late_s: float) -> None:
+    time_s, way = way_of(60.0)
+    turn = rotations.matrix(rotations.from_rpy(0.0, 0.0, 2.0))
+    other_s, other = time_s[100:1000] + late_s, way[100:1000] @ turn.T + 30.0
+    assert time_shift_s(time_s, way, other_s, other) == pytest.approx(-late_s, abs=0.06)
+
+
+def test_times_in_common() -> None:
+    assert common_times(np.arange(5.0), np.array([1.0, 2.5])).tolist() == [0, 1, 1, 0, 0]
+    assert not common_times(np.arange(5.0), np.zeros(0)).any()
+
+
+def scan_of(trunks: list[tuple[float, float, float]], wall_m: float = 20.0) -> np.ndarray:
+    """Ranges of a scanner at the origin that sees circles (x, y, radius) before a round wall."""
+    angles = np.radians(np.linspace(-135.0, 135.0, 1081))
+    ranges = np.full(1081, wall_m)
+    for x, y, r in trunks:
+        along = x * np.cos(angles) + y * np.sin(angles)
+        aside = np.abs(-x * np.sin(angles) + y * np.cos(angles))
+        hit = (aside < r) & (along > 0.0)
+        near = along - np.sqrt(np.maximum(r * r - aside**2, 0.0))
+        ranges[hit] = np.minimum(ranges[hit], near[hit])
+    return ranges
+
+
+def test_trunks_are_found_where_they_stand() -> None:
+    trunks = [(5.0, 1.0, 0.15), (8.0, -4.0, 0.3), (2.0, 3.0, 0.05), (0.0, -6.0, 2.0)]
+    found = trunks_of_scan(scan_of(trunks), np.radians(-135.0), np.radians(0.25))
+    expected = np.array([t[:2] for t in trunks[:3]])  # the last one is no trunk
+    assert len(found) == 3
+    away = np.linalg.norm(found[None] - expected[:, None], axis=2).min(axis=1)
+    assert away.max() < 0.05
+    none = trunks_of_scan(np.full(1081, np.inf), np.radians(-135.0), np.radians(0.25))
+    assert none.shape == (0, 2)
+
+
+def test_a_map_from_several_poses() -> None:
+    tree, trunks = np.array([10.0, 5.0]), TrunkMap()
+    for yaw in (0.0, 0.7, -0.7):
+        place = np.array([6.0, 3.0 + yaw, 2.0])
+        turn = rotations.from_rpy(0.0, 0.0, yaw)
+        seen = (tree - place[:2]) @ rotations.matrix(turn)[:2, :2]
+        scan = scan_of([(*seen, 0.2)])
+        found = trunks_of_scan(scan, np.radians(-135.0), np.radians(0.25))
+        trunks.add(in_map(found, place, turn))
+    assert trunks.sightings.tolist() == [3]
+    np.testing.assert_allclose(trunks.places[0], tree, atol=0.05)

@@ -1,0 +1,121 @@
+"""Reports of logs: ways, errors, trunks, and a real flight over the simulated one."""
+
+from __future__ import annotations
+
+import re
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from volery.bridges.logs.bag import open_log
+from volery.core import rotations
+from volery.core.errors import VoleryError
+from volery.graph import messages as m
+from volery.graph.zero import zero_message
+from volery.report.logged_flights import read_uavs, read_way
+from volery.report.way_page import write_log_report
+
+S = 1_000_000_000
+TREES = np.array([[5.0, 3.0], [12.0, -3.0], [20.0, 4.0]])
+OFF = np.array([0.3, -0.4, 0.0])
+"""How far the estimate is off."""
+
+
+def place_at(seconds: float) -> np.ndarray:
+    return np.array([0.5 * seconds + np.sin(0.7 * seconds), 2.0 * np.sin(0.2 * seconds), 3.0])
+
+
+def odometry(time_ns: int, place: np.ndarray) -> Any:
+    message = zero_message("nav_msgs/msg/Odometry")
+    message.header = m.header(time_ns, "map")
+    message.pose.pose = m.Pose(m.Point(*place.tolist()), m.Quaternion(0.0, 0.0, 0.0, 1.0))
+    return message
+
+
+def scan_at(time_ns: int, place: np.ndarray) -> Any:
+    """Trunks of 15 cm radius before a wall that is out of reach."""
+    scan = zero_message("sensor_msgs/msg/LaserScan")
+    scan.header = m.header(time_ns, "laser")
+    scan.angle_min, scan.angle_increment = np.radians(-135.0), np.radians(0.25)
+    angles = scan.angle_min + scan.angle_increment * np.arange(1081)
+    ranges = np.full(1081, np.inf, np.float32)
+    for tree in TREES - place[:2]:
+        along = tree @ [np.cos(angles), np.sin(angles)]
+        aside = np.abs(tree @ [-np.sin(angles), np.cos(angles)])
+        hit = (aside < 0.15) & (along > 0.0)
+        ranges[hit] = along[hit] - np.sqrt(0.15**2 - aside[hit] ** 2)
+    scan.ranges = ranges
+    return scan
+
+
+@pytest.fixture(name="log", scope="module")
+def _log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A minute of uav1, whose estimate is half a metre off."""
+    path = tmp_path_factory.mktemp("logs") / "flight.mcap"
+    with closing(open_log(path)) as log:
+        for k in range(0, 1200):
+            time_ns = k * S // 20
+            place = place_at(k / 20.0)
+            write(log, "/uav1/ground_truth/odom", time_ns, odometry(time_ns, place))
+            write(log, "/uav1/odom", time_ns, odometry(time_ns, place + OFF))
+            if k % 10 == 0:
+                scan = scan_at(time_ns, place)
+                write(log, "/uav1/laser/horizontal/scan", time_ns, scan)
+            write(log, "/uav1/other", time_ns, m.String("x"))
+    return path
+
+
+def write(log: Any, topic: str, time_ns: int, message: Any) -> None:
+    log.write(m.Published(topic, m.type_name(type(message)), time_ns, message))
+
+
+def test_ways_and_trunks_of_a_log(log: Path) -> None:
+    (uav,) = read_uavs(log)
+    assert uav.name == "uav1"
+    assert uav.truth is not None
+    assert uav.estimate is not None
+    np.testing.assert_allclose(uav.estimate.position - uav.truth.position, np.tile(OFF, (1200, 1)))
+    away = np.linalg.norm(uav.trunks[None] - (TREES + OFF[:2])[:, None], axis=2)
+    assert len(uav.trunks) == 3
+    assert away.min(axis=1).max() < 0.08
+
+
+def test_the_page_tells_the_error(log: Path, tmp_path: Path) -> None:
+    page = write_log_report(log, tmp_path / "new").read_text(encoding="utf-8")
+    assert "error 0.50 m as it stands, 0.00 m after" in page
+    assert page.count("<svg") == 3
+    assert "uav1" in page
+
+
+def test_a_real_flight_is_laid_over_it(log: Path, tmp_path: Path) -> None:
+    """The same way, elsewhere, turned, at another hour, with noise of 0.1 m."""
+    real, turn = tmp_path / "real.bag", rotations.matrix(rotations.from_rpy(0.0, 0.0, 1.1))
+    noise = np.random.default_rng(2).normal(0.0, 0.1, (1000, 3))
+    with closing(open_log(real)) as out:
+        for k in range(1000):
+            time_ns = (k + 5000) * S // 20
+            place = (place_at((k + 100) / 20.0) + noise[k]) @ turn.T + [40.0, 7.0, 1.0]
+            write(out, "/mavros/odom", time_ns, odometry(time_ns, place))
+    page = write_log_report(log, tmp_path / "out", compare=real).read_text(encoding="utf-8")
+    (moved,) = re.findall(r"its clock moved by (\S+) s", page)
+    assert float(moved) == pytest.approx(-245.0, abs=0.11)
+    (left,) = re.findall(r"Root mean square distance (\S+) m", page)
+    assert float(left) == pytest.approx(0.1 * 3**0.5, abs=0.05)
+    assert page.count("<svg") == 6
+    with pytest.raises(VoleryError, match="there is no uav7 in it; known: uav1"):
+        write_log_report(log, tmp_path, compare=real, uav="uav7")
+    with pytest.raises(VoleryError, match="there is no /odom\\? Poses stand on: /mavros/odom"):
+        read_way(real, "/odom")
+
+
+def test_a_log_without_uavs(tmp_path: Path) -> None:
+    path = tmp_path / "empty.mcap"
+    with closing(open_log(path)) as log:
+        write(log, "/talk", 0, m.String("x"))
+    with pytest.raises(VoleryError, match="no UAV tells its pose"):
+        read_uavs(path)
+    with pytest.raises(VoleryError, match="Poses stand on: nothing"):
+        read_way(path)

@@ -1,0 +1,188 @@
+"""The radio of a running simulation: topics, what stands in the way, faults, snapshots."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from volery.core.errors import CommandError, ScenarioError
+from volery.graph.messages import String
+from volery.graph.node import Node
+from volery.runtime import Simulation
+from volery.runtime.radio_sight import RadioSight
+from volery.scenario.load import parse_scenario
+
+TOPICS = [{"name": "hello", "type": "std_msgs/msg/String"}]
+
+
+class Talker(Node):
+    """Says its name ten times a second, and counts what it hears from whom."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("talker", **options)
+        self.heard: list[tuple[int, str]] = []
+        self._says = self.create_publisher(String, "hello")
+        self.create_subscription(String, "radio/hello", self._hear)
+        self.create_timer(0.1, lambda: self._says.publish(String(self.get_namespace())))
+
+    def _hear(self, message: String) -> None:
+        self.heard.append((self.get_clock().now_ns(), message.data))
+
+    def get_state(self) -> dict[str, Any]:
+        return {"heard": list(self.heard)}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        self.heard = list(state["heard"])
+
+
+def scenario_of(last_x: float = 60.0, count: int = 3, **radio: Any) -> Any:
+    return parse_scenario(
+        {
+            "name": "talk",
+            "radio": {"topics": TOPICS, **radio},
+            "types": {
+                "talker": {"nodes": [{"node": f"{__name__}:Talker"}], "sensors": []},
+                "mute": {"radio": False},
+            },
+            "uavs": [
+                {
+                    "type": "talker",
+                    "count": count,
+                    "position_m": [0.0, 0.0],
+                    "last_position_m": [last_x, 0.0],
+                },
+                {"type": "mute", "position_m": [0.0, 30.0]},
+            ],
+        }
+    )
+
+
+def heard(simulation: Simulation, row: int = 0) -> list[tuple[int, str]]:
+    node = simulation.nodes[row]
+    assert isinstance(node, Talker)
+    return node.heard
+
+
+def test_everybody_with_a_radio_hears_the_others() -> None:
+    with Simulation(scenario_of()) as simulation:
+        simulation.run(1.0)
+        for row in range(3):
+            said = [name for _, name in heard(simulation, row)]
+            others = [f"/uav{k + 1}" for k in range(3) if k != row]
+            assert set(said) == set(others)
+            assert len(said) >= 16
+        late = [time_ns % 100_000_000 for time_ns, _ in heard(simulation)]
+        assert min(late) >= 2_000_000  # latency and time on the air
+        assert "/uav4/radio/hello" not in [topic.name for topic in simulation.graph.topics()]
+        assert simulation.radio is not None
+        assert simulation.radio.statistics.lost_on_link <= 4
+
+
+def test_ideal_links_take_no_time() -> None:
+    with Simulation(scenario_of(links="ideal")) as simulation:
+        simulation.run(1.0)
+        assert len(heard(simulation)) == 20
+        assert {time_ns % 100_000_000 for time_ns, _ in heard(simulation)} == {0}
+
+
+def test_a_lost_radio_neither_sends_nor_hears() -> None:
+    with Simulation(scenario_of(links="ideal")) as simulation:
+        simulation.inject({"kind": "radio", "uav": "uav2", "at_s": 1.05, "until_s": 2.05})
+        simulation.run(3.0)
+        missing = [t for t, _ in heard(simulation, 1) if 1.05e9 < t < 2.05e9]
+        assert missing == []
+        to_first = [t for t, name in heard(simulation) if name == "/uav2"]
+        assert len(to_first) == 20
+        assert len(heard(simulation, 1)) == 40
+        with pytest.raises(CommandError, match="uav4 has no radio; with one: uav1"):
+            simulation.inject({"kind": "radio", "uav": "uav4"})
+
+
+def test_a_snapshot_holds_what_is_on_the_air() -> None:
+    with Simulation(scenario_of(latency_s=0.03, power_dbm=-18.0)) as simulation:
+        simulation.enable_digest()
+        simulation.run(1.01)  # said, not yet heard
+        kept = simulation.snapshot()
+        simulation.run(1.5)
+        first, digest = heard(simulation), simulation.digest()
+        simulation.restore(kept)
+        simulation.run(1.5)
+        assert heard(simulation) == first
+        assert simulation.digest() == digest
+        simulation.reset(seed=9)
+        simulation.run(2.51)
+        assert heard(simulation) != first
+
+
+@pytest.mark.parametrize("slices", [1, 7])
+def test_slicing_and_threads_change_nothing(slices: int) -> None:
+    digests = []
+    for threads, parts in ((1, 1), (2, slices)):
+        with Simulation(scenario_of(power_dbm=-18.0), threads=threads) as simulation:
+            simulation.enable_digest()
+            for _ in range(parts):
+                simulation.run(1.4 / parts)
+            digests.append(simulation.digest())
+    assert digests[0] == digests[1]
+
+
+def test_a_uav_that_comes_later_is_heard() -> None:
+    with Simulation(scenario_of(links="ideal")) as simulation:
+        simulation.run(0.5)
+        simulation.spawn_uav("late", "talker", [30.0, 20.0, 0.0])
+        simulation.run(0.5)
+        assert "/late" in {name for _, name in heard(simulation)}
+        simulation.delete_uav("late")
+        simulation.run(0.5)
+        assert heard(simulation)[-1][0] > 1.3e9
+
+
+def test_what_stands_between() -> None:
+    """A block, an oak and a hill in three lines of sight, and nothing in a fourth."""
+    scenario = parse_scenario(
+        {
+            "name": "between",
+            "world": {
+                "forest": {
+                    "kind": "procedural",
+                    "region_m": [-60.0, 5.0, 60.0, 65.0],
+                    "trees": 90,
+                    "minimum_spacing_m": 4.0,
+                    "species": {"broadleaf": 1.0},
+                },
+                "grid_map": {
+                    "maps": [{"file": "gridmaps/one_block.csv"}],
+                    "cell_size_m": 2.0,
+                    "origin_m": [0.0, -20.0],
+                },
+            },
+            "types": {"one": {}},
+            "uavs": [{"type": "one", "position_m": [0.0, -40.0]}],
+        }
+    )
+    with Simulation(scenario) as simulation:
+        forest = simulation.forest
+        assert forest is not None
+        sight = RadioSight(simulation.scene, forest)
+        tree = int(np.argmax(forest.height_m))
+        x, y, _ = forest.position_map[tree]
+        crown = 0.65 * forest.height_m[tree]
+        starts = np.array([[-10, -19, 1], [x - 30, y, crown], [-10, -30, 1], [0, -60, 2]])
+        ends = np.array([[10, -19, 1], [x + 30, y, crown], [10, -30, 1], [9, -60, -2]])
+        paths = sight(starts, ends)
+        assert paths.walls.tolist() == [2, 0, 0, 0]
+        assert paths.ground.tolist() == [False, False, False, True]
+        assert 3.0 < paths.foliage_m[1] < 45.0
+        assert paths.foliage_m[[0, 2, 3]].tolist() == [0.0, 0.0, 0.0]
+        back = sight(ends, starts)
+        np.testing.assert_allclose(back.foliage_m, paths.foliage_m)
+        assert back.walls.tolist() == paths.walls.tolist()
+        low = sight(np.array([[x - 1.5, y, 1.3]]), np.array([[x + 1.5, y, 1.3]]))
+        assert low.trunks.tolist() == [1]
+
+
+def test_topics_are_named_once() -> None:
+    with pytest.raises(ScenarioError, match="named twice: hello"):
+        scenario_of(topics=TOPICS * 2)
