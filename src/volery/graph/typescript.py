@@ -39,6 +39,7 @@ _PACKAGES = frozenset(
         "builtin_interfaces",
         "diagnostic_msgs",
         "geometry_msgs",
+        "mavros_msgs",
         "nav_msgs",
         "octomap_msgs",
         "rosapi_msgs",

@@ -210,6 +210,331 @@ export interface geometry_msgs_WrenchStamped {
   wrench: geometry_msgs_Wrench;
 }
 
+export interface mavros_msgs_AttitudeTarget {
+  header: std_msgs_Header;
+  type_mask: number;
+  orientation: geometry_msgs_Quaternion;
+  body_rate: geometry_msgs_Vector3;
+  thrust: number;
+}
+
+export const mavros_msgs_AttitudeTarget_ = {
+  IGNORE_ROLL_RATE: 1,
+  IGNORE_PITCH_RATE: 2,
+  IGNORE_YAW_RATE: 4,
+  IGNORE_THRUST: 64,
+  IGNORE_ATTITUDE: 128,
+} as const;
+
+export interface mavros_msgs_ExtendedState {
+  header: std_msgs_Header;
+  vtol_state: number;
+  landed_state: number;
+}
+
+export const mavros_msgs_ExtendedState_ = {
+  VTOL_STATE_UNDEFINED: 0,
+  VTOL_STATE_TRANSITION_TO_FW: 1,
+  VTOL_STATE_TRANSITION_TO_MC: 2,
+  VTOL_STATE_MC: 3,
+  VTOL_STATE_FW: 4,
+  LANDED_STATE_UNDEFINED: 0,
+  LANDED_STATE_ON_GROUND: 1,
+  LANDED_STATE_IN_AIR: 2,
+  LANDED_STATE_TAKEOFF: 3,
+  LANDED_STATE_LANDING: 4,
+} as const;
+
+export interface mavros_msgs_ParamValue {
+  integer: number | bigint;
+  real: number;
+}
+
+export interface mavros_msgs_PositionTarget {
+  header: std_msgs_Header;
+  coordinate_frame: number;
+  type_mask: number;
+  position: geometry_msgs_Point;
+  velocity: geometry_msgs_Vector3;
+  acceleration_or_force: geometry_msgs_Vector3;
+  yaw: number;
+  yaw_rate: number;
+}
+
+export const mavros_msgs_PositionTarget_ = {
+  FRAME_LOCAL_NED: 1,
+  FRAME_LOCAL_OFFSET_NED: 7,
+  FRAME_BODY_NED: 8,
+  FRAME_BODY_OFFSET_NED: 9,
+  IGNORE_PX: 1,
+  IGNORE_PY: 2,
+  IGNORE_PZ: 4,
+  IGNORE_VX: 8,
+  IGNORE_VY: 16,
+  IGNORE_VZ: 32,
+  IGNORE_AFX: 64,
+  IGNORE_AFY: 128,
+  IGNORE_AFZ: 256,
+  FORCE: 512,
+  IGNORE_YAW: 1024,
+  IGNORE_YAW_RATE: 2048,
+} as const;
+
+export interface mavros_msgs_State {
+  header: std_msgs_Header;
+  connected: boolean;
+  armed: boolean;
+  guided: boolean;
+  manual_input: boolean;
+  mode: string;
+  system_status: number;
+}
+
+export const mavros_msgs_State_ = {
+  MODE_APM_PLANE_MANUAL: "MANUAL",
+  MODE_APM_PLANE_CIRCLE: "CIRCLE",
+  MODE_APM_PLANE_STABILIZE: "STABILIZE",
+  MODE_APM_PLANE_TRAINING: "TRAINING",
+  MODE_APM_PLANE_ACRO: "ACRO",
+  MODE_APM_PLANE_FBWA: "FBWA",
+  MODE_APM_PLANE_FBWB: "FBWB",
+  MODE_APM_PLANE_CRUISE: "CRUISE",
+  MODE_APM_PLANE_AUTOTUNE: "AUTOTUNE",
+  MODE_APM_PLANE_AUTO: "AUTO",
+  MODE_APM_PLANE_RTL: "RTL",
+  MODE_APM_PLANE_LOITER: "LOITER",
+  MODE_APM_PLANE_LAND: "LAND",
+  MODE_APM_PLANE_GUIDED: "GUIDED",
+  MODE_APM_PLANE_INITIALISING: "INITIALISING",
+  MODE_APM_PLANE_QSTABILIZE: "QSTABILIZE",
+  MODE_APM_PLANE_QHOVER: "QHOVER",
+  MODE_APM_PLANE_QLOITER: "QLOITER",
+  MODE_APM_PLANE_QLAND: "QLAND",
+  MODE_APM_PLANE_QRTL: "QRTL",
+  MODE_APM_COPTER_STABILIZE: "STABILIZE",
+  MODE_APM_COPTER_ACRO: "ACRO",
+  MODE_APM_COPTER_ALT_HOLD: "ALT_HOLD",
+  MODE_APM_COPTER_AUTO: "AUTO",
+  MODE_APM_COPTER_GUIDED: "GUIDED",
+  MODE_APM_COPTER_LOITER: "LOITER",
+  MODE_APM_COPTER_RTL: "RTL",
+  MODE_APM_COPTER_CIRCLE: "CIRCLE",
+  MODE_APM_COPTER_POSITION: "POSITION",
+  MODE_APM_COPTER_LAND: "LAND",
+  MODE_APM_COPTER_OF_LOITER: "OF_LOITER",
+  MODE_APM_COPTER_DRIFT: "DRIFT",
+  MODE_APM_COPTER_SPORT: "SPORT",
+  MODE_APM_COPTER_FLIP: "FLIP",
+  MODE_APM_COPTER_AUTOTUNE: "AUTOTUNE",
+  MODE_APM_COPTER_POSHOLD: "POSHOLD",
+  MODE_APM_COPTER_BRAKE: "BRAKE",
+  MODE_APM_COPTER_THROW: "THROW",
+  MODE_APM_COPTER_AVOID_ADSB: "AVOID_ADSB",
+  MODE_APM_COPTER_GUIDED_NOGPS: "GUIDED_NOGPS",
+  MODE_APM_ROVER_MANUAL: "MANUAL",
+  MODE_APM_ROVER_LEARNING: "LEARNING",
+  MODE_APM_ROVER_STEERING: "STEERING",
+  MODE_APM_ROVER_HOLD: "HOLD",
+  MODE_APM_ROVER_AUTO: "AUTO",
+  MODE_APM_ROVER_RTL: "RTL",
+  MODE_APM_ROVER_GUIDED: "GUIDED",
+  MODE_APM_ROVER_INITIALISING: "INITIALISING",
+  MODE_PX4_MANUAL: "MANUAL",
+  MODE_PX4_ACRO: "ACRO",
+  MODE_PX4_ALTITUDE: "ALTCTL",
+  MODE_PX4_POSITION: "POSCTL",
+  MODE_PX4_OFFBOARD: "OFFBOARD",
+  MODE_PX4_STABILIZED: "STABILIZED",
+  MODE_PX4_RATTITUDE: "RATTITUDE",
+  MODE_PX4_MISSION: "AUTO.MISSION",
+  MODE_PX4_LOITER: "AUTO.LOITER",
+  MODE_PX4_RTL: "AUTO.RTL",
+  MODE_PX4_LAND: "AUTO.LAND",
+  MODE_PX4_RTGS: "AUTO.RTGS",
+  MODE_PX4_READY: "AUTO.READY",
+  MODE_PX4_TAKEOFF: "AUTO.TAKEOFF",
+} as const;
+
+export interface mavros_msgs_Waypoint {
+  frame: number;
+  command: number;
+  is_current: boolean;
+  autocontinue: boolean;
+  param1: number;
+  param2: number;
+  param3: number;
+  param4: number;
+  x_lat: number;
+  y_long: number;
+  z_alt: number;
+}
+
+export const mavros_msgs_Waypoint_ = {
+  FRAME_GLOBAL: 0,
+  FRAME_LOCAL_NED: 1,
+  FRAME_MISSION: 2,
+  FRAME_GLOBAL_REL_ALT: 3,
+  FRAME_LOCAL_ENU: 4,
+  FRAME_GLOBAL_INT: 5,
+  FRAME_GLOBAL_RELATIVE_ALT_INT: 6,
+  FRAME_LOCAL_OFFSET_NED: 7,
+  FRAME_BODY_NED: 8,
+  FRAME_BODY_OFFSET_NED: 9,
+  FRAME_GLOBAL_TERRAIN_ALT: 10,
+  FRAME_GLOBAL_TERRAIN_ALT_INT: 11,
+  FRAME_BODY_FRD: 12,
+  FRAME_RESERVED_13: 13,
+  FRAME_RESERVED_14: 14,
+  FRAME_RESERVED_15: 15,
+  FRAME_RESERVED_16: 16,
+  FRAME_RESERVED_17: 17,
+  FRAME_RESERVED_18: 18,
+  FRAME_RESERVED_19: 19,
+  FRAME_LOCAL_FRD: 20,
+  FRAME_LOCAL_FLU: 21,
+} as const;
+
+export interface mavros_msgs_WaypointList {
+  current_seq: number;
+  waypoints: mavros_msgs_Waypoint[];
+}
+
+export interface mavros_msgs_CommandBool_Request {
+  value: boolean;
+}
+
+export interface mavros_msgs_CommandBool_Response {
+  success: boolean;
+  result: number;
+}
+
+export interface mavros_msgs_CommandHome_Request {
+  current_gps: boolean;
+  yaw: number;
+  latitude: number;
+  longitude: number;
+  altitude: number;
+}
+
+export interface mavros_msgs_CommandHome_Response {
+  success: boolean;
+  result: number;
+}
+
+export interface mavros_msgs_CommandLong_Request {
+  broadcast: boolean;
+  command: number;
+  confirmation: number;
+  param1: number;
+  param2: number;
+  param3: number;
+  param4: number;
+  param5: number;
+  param6: number;
+  param7: number;
+}
+
+export interface mavros_msgs_CommandLong_Response {
+  success: boolean;
+  result: number;
+}
+
+export interface mavros_msgs_CommandTOL_Request {
+  min_pitch: number;
+  yaw: number;
+  latitude: number;
+  longitude: number;
+  altitude: number;
+}
+
+export interface mavros_msgs_CommandTOL_Response {
+  success: boolean;
+  result: number;
+}
+
+export interface mavros_msgs_ParamGet_Request {
+  param_id: string;
+}
+
+export interface mavros_msgs_ParamGet_Response {
+  success: boolean;
+  value: mavros_msgs_ParamValue;
+}
+
+export interface mavros_msgs_SetMode_Request {
+  base_mode: number;
+  custom_mode: string;
+}
+
+export const mavros_msgs_SetMode_Request_ = {
+  MAV_MODE_PREFLIGHT: 0,
+  MAV_MODE_STABILIZE_DISARMED: 80,
+  MAV_MODE_STABILIZE_ARMED: 208,
+  MAV_MODE_MANUAL_DISARMED: 64,
+  MAV_MODE_MANUAL_ARMED: 192,
+  MAV_MODE_GUIDED_DISARMED: 88,
+  MAV_MODE_GUIDED_ARMED: 216,
+  MAV_MODE_AUTO_DISARMED: 92,
+  MAV_MODE_AUTO_ARMED: 220,
+  MAV_MODE_TEST_DISARMED: 66,
+  MAV_MODE_TEST_ARMED: 194,
+} as const;
+
+export interface mavros_msgs_SetMode_Response {
+  mode_sent: boolean;
+}
+
+export interface mavros_msgs_StreamRate_Request {
+  stream_id: number;
+  message_rate: number;
+  on_off: boolean;
+}
+
+export const mavros_msgs_StreamRate_Request_ = {
+  STREAM_ALL: 0,
+  STREAM_RAW_SENSORS: 1,
+  STREAM_EXTENDED_STATUS: 2,
+  STREAM_RC_CHANNELS: 3,
+  STREAM_RAW_CONTROLLER: 4,
+  STREAM_POSITION: 6,
+  STREAM_EXTRA1: 10,
+  STREAM_EXTRA2: 11,
+  STREAM_EXTRA3: 12,
+} as const;
+
+export type mavros_msgs_StreamRate_Response = Record<string, never>;
+
+export type mavros_msgs_WaypointClear_Request = Record<string, never>;
+
+export interface mavros_msgs_WaypointClear_Response {
+  success: boolean;
+}
+
+export type mavros_msgs_WaypointPull_Request = Record<string, never>;
+
+export interface mavros_msgs_WaypointPull_Response {
+  success: boolean;
+  wp_received: number;
+}
+
+export interface mavros_msgs_WaypointPush_Request {
+  start_index: number;
+  waypoints: mavros_msgs_Waypoint[];
+}
+
+export interface mavros_msgs_WaypointPush_Response {
+  success: boolean;
+  wp_transfered: number;
+}
+
+export interface mavros_msgs_WaypointSetCurrent_Request {
+  wp_seq: number;
+}
+
+export interface mavros_msgs_WaypointSetCurrent_Response {
+  success: boolean;
+}
+
 export interface nav_msgs_GridCells {
   header: std_msgs_Header;
   cell_width: number;
@@ -2144,6 +2469,13 @@ export interface Messages {
   "geometry_msgs/msg/VelocityStamped": geometry_msgs_VelocityStamped;
   "geometry_msgs/msg/Wrench": geometry_msgs_Wrench;
   "geometry_msgs/msg/WrenchStamped": geometry_msgs_WrenchStamped;
+  "mavros_msgs/msg/AttitudeTarget": mavros_msgs_AttitudeTarget;
+  "mavros_msgs/msg/ExtendedState": mavros_msgs_ExtendedState;
+  "mavros_msgs/msg/ParamValue": mavros_msgs_ParamValue;
+  "mavros_msgs/msg/PositionTarget": mavros_msgs_PositionTarget;
+  "mavros_msgs/msg/State": mavros_msgs_State;
+  "mavros_msgs/msg/Waypoint": mavros_msgs_Waypoint;
+  "mavros_msgs/msg/WaypointList": mavros_msgs_WaypointList;
   "nav_msgs/msg/GridCells": nav_msgs_GridCells;
   "nav_msgs/msg/MapMetaData": nav_msgs_MapMetaData;
   "nav_msgs/msg/OccupancyGrid": nav_msgs_OccupancyGrid;
@@ -2261,6 +2593,17 @@ export interface Messages {
 }
 
 export interface Services {
+  "mavros_msgs/srv/CommandBool": { request: mavros_msgs_CommandBool_Request; response: mavros_msgs_CommandBool_Response };
+  "mavros_msgs/srv/CommandHome": { request: mavros_msgs_CommandHome_Request; response: mavros_msgs_CommandHome_Response };
+  "mavros_msgs/srv/CommandLong": { request: mavros_msgs_CommandLong_Request; response: mavros_msgs_CommandLong_Response };
+  "mavros_msgs/srv/CommandTOL": { request: mavros_msgs_CommandTOL_Request; response: mavros_msgs_CommandTOL_Response };
+  "mavros_msgs/srv/ParamGet": { request: mavros_msgs_ParamGet_Request; response: mavros_msgs_ParamGet_Response };
+  "mavros_msgs/srv/SetMode": { request: mavros_msgs_SetMode_Request; response: mavros_msgs_SetMode_Response };
+  "mavros_msgs/srv/StreamRate": { request: mavros_msgs_StreamRate_Request; response: mavros_msgs_StreamRate_Response };
+  "mavros_msgs/srv/WaypointClear": { request: mavros_msgs_WaypointClear_Request; response: mavros_msgs_WaypointClear_Response };
+  "mavros_msgs/srv/WaypointPull": { request: mavros_msgs_WaypointPull_Request; response: mavros_msgs_WaypointPull_Response };
+  "mavros_msgs/srv/WaypointPush": { request: mavros_msgs_WaypointPush_Request; response: mavros_msgs_WaypointPush_Response };
+  "mavros_msgs/srv/WaypointSetCurrent": { request: mavros_msgs_WaypointSetCurrent_Request; response: mavros_msgs_WaypointSetCurrent_Response };
   "octomap_msgs/srv/BoundingBoxQuery": { request: octomap_msgs_BoundingBoxQuery_Request; response: octomap_msgs_BoundingBoxQuery_Response };
   "octomap_msgs/srv/GetOctomap": { request: octomap_msgs_GetOctomap_Request; response: octomap_msgs_GetOctomap_Response };
   "rosapi_msgs/srv/ActionType": { request: rosapi_msgs_ActionType_Request; response: rosapi_msgs_ActionType_Response };
