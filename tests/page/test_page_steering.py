@@ -10,8 +10,6 @@ from working import WIDE, inspect, open_panel, set_slider, tab_to
 
 pytestmark = pytest.mark.slow
 
-PHONE = {"width": 390, "height": 844}
-
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory, chromium):
@@ -32,24 +30,6 @@ def opened(module_browsing, served):
 @pytest.fixture
 def page(opened, shared):
     return opened
-
-
-def test_thumbs_fly_on_a_screen_that_is_touched(browsing, served):
-    vehicle(served, "uav2", lambda uav: uav["airborne"])
-    page = browsing.open(served.url + "#uav=uav2", viewport=PHONE, has_touch=True)
-    page.get_by_role("button", name="Fly by hand").click()
-    hands = page.get_by_role("group", name="Flight by hand")
-    stick = hands.get_by_role("application", name=re.compile("^Ahead"))
-    box = stick.bounding_box()
-    middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    before = place(served, "uav2")[0]
-    page.mouse.move(*middle)
-    page.mouse.down()
-    page.mouse.move(middle[0], box["y"])
-    vehicle(served, "uav2", lambda uav: uav["position"]["x"] > before + 1.0)
-    keep_picture(page, "sticks")
-    page.mouse.up()
-    vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["x"]) < 0.2)
 
 
 # ------------------------------------------------------------------------------------------- time
