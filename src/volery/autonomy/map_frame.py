@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.motion_history import Placement
+from volery.autonomy.scan_points import Pose
 from volery.core import rotations
-from volery.graph.messages import TFMessage
+from volery.graph.messages import Odometry, TFMessage
 
 Array = NDArray[np.float64]
 
@@ -57,6 +58,20 @@ class MapFrame:
         if at is None:
             return points_map
         return rotations.rotate(rotations.conjugate(at.attitude), points_map - at.position)
+
+    def pose_in_map(self, message: Odometry) -> Pose:
+        """The pose that odometry tells, in the map; its frame is the one looked up from now on."""
+        self.odom_frame = message.header.frame_id
+        pose, at = Pose.from_odometry(message), self.map_from_odom
+        if at is None:
+            return pose
+        return Pose(
+            pose.time_ns,
+            self.to_map(pose.position),
+            rotations.multiply(at.attitude, pose.attitude),
+            rotations.rotate(at.attitude, pose.velocity),
+            pose.omega_body,
+        )
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.autonomy.map_frame import MapFrame
 from volery.autonomy.scan_points import Pose
 from volery.autonomy.search.colour_blob import ColourRange, colour_mask, largest_blob, pixels_of
 from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
-from volery.autonomy.team.map_poses import MapPoses
 from volery.autonomy.team.sightings import Doubt, Tracks, sighting_of
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
@@ -58,7 +58,7 @@ class TargetDetection(Node):
 
     """
 
-    STATE = ("_mates", "_poses", "_pose", "_range", "_intrinsics", "_tracks")
+    STATE = ("_mates", "_frame", "_pose", "_range", "_intrinsics", "_tracks")
     """Everything that changes."""
 
     def __init__(self, **options: Any) -> None:
@@ -81,7 +81,7 @@ class TargetDetection(Node):
             int(declare("sightings", 4).value), spread_m=float(declare("spread_m", 2.0).value)
         )
         self._doubt = Doubt()
-        self._poses = MapPoses()
+        self._frame = MapFrame()
         self._mates: dict[str, tuple[int, Array]] = {}
         """When each was heard, ns, and where it was."""
         self._pose: Pose | None = None
@@ -106,10 +106,10 @@ class TargetDetection(Node):
         put_back(self, state)
 
     def _on_tf(self, message: TFMessage) -> None:
-        self._poses.on_tf(message)
+        self._frame.on_tf(message)
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._pose = self._poses.of(message)
+        self._pose = self._frame.pose_in_map(message)
 
     def _on_range(self, message: Range) -> None:
         if math.isfinite(message.range):

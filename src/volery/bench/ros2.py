@@ -13,24 +13,27 @@ from typing import Any
 import numpy as np
 
 from volery.bench.bridge.latency_figures import fit_line
-from volery.bench.bridge.measuring import in_real_time, stream_ages, stream_scenario
+from volery.bench.bridge.measuring import (
+    IMAGE_TOPIC,
+    IMAGES_A_SIZE,
+    advertise_images,
+    in_real_time,
+    publish_images,
+    stream_ages,
+    stream_scenario,
+)
 from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
 from volery.core.errors import VoleryError
-from volery.graph.messages import Header, Time, message_type
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario
 
 _DOMAIN = 20 + os.getpid() % 80
 _SIZES = (0, 10_000, 100_000, 250_000, 500_000, 1_000_000)
-_IMAGES = 100
-_PERIOD_S = 0.02
 _STREAM_S = 10.0
 _STOPPED_S = 5.0
 _PATIENCE_S = 20.0
 _SETTLED_S = 1.0
-_IMAGE = "sensor_msgs/msg/Image"
-_TOPIC = "/bench/image"
 
 
 def measure() -> dict[str, float]:
@@ -70,25 +73,13 @@ class _Peer:
 
 def _images(simulation: Simulation) -> tuple[list[tuple[int, float]], int]:
     """(bytes, s) of images published by the simulation's thread; and how many did not come."""
-    gateway, image = simulation.gateway, message_type(_IMAGE)
-    publisher = gateway.post(lambda: simulation.graph.advertise(_TOPIC, _IMAGE)).result()
-    peer = _Peer("image", [_TOPIC])
-    _wait_for_subscribers(simulation, [_TOPIC])
-    for size in _SIZES:
-        pixels = np.zeros(size, np.uint8)
-        pixels.flags.writeable = False
-
-        def publish(pixels: Any = pixels) -> None:
-            stamp = Time(*divmod(time.monotonic_ns(), 10**9))
-            width = len(pixels)
-            publisher.publish(image(Header(stamp, ""), 1, width, "mono8", 0, width, pixels))
-
-        for _ in range(_IMAGES):
-            gateway.post(publish)
-            time.sleep(_PERIOD_S)
+    publisher = advertise_images(simulation)
+    peer = _Peer("image", [IMAGE_TOPIC])
+    _wait_for_subscribers(simulation, [IMAGE_TOPIC])
+    publish_images(simulation, publisher, _SIZES)
     time.sleep(_SETTLED_S)
     came = [(size, 1e-9 * (at - stamp)) for _, size, stamp, at in peer.finish()]
-    return came, _IMAGES * len(_SIZES) - len(came)
+    return came, IMAGES_A_SIZE * len(_SIZES) - len(came)
 
 
 def _streams() -> dict[str, float]:

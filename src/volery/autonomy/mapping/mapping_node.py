@@ -99,7 +99,7 @@ class Mapping(Node):
             self._load(map_file)
 
     def _open(self) -> None:
-        odometry = str(self.declare_parameter("odometry", "slam/odom").value)
+        odometry = str(self.declare_parameter("odometry", "odom").value)
         voxels_s = float(self.declare_parameter("voxels_period_s", 10.0).value)
         grid_s = float(self.declare_parameter("grid_period_s", 1.0).value)
         self._voxels = self.create_publisher(reports.OCTOMAP, "octomap_binary", 1, latched=True)

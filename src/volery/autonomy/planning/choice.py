@@ -86,8 +86,7 @@ def _judge(
 ) -> None:
     nx, ny, nz = square.shape
     p, v, a = np.empty(3), np.empty(3), np.empty(3)
-    q, w, b = np.empty(3), np.empty(3), np.empty(3)
-    rest = np.zeros(3)
+    q, w, rest = np.empty(3), np.empty(3), np.zeros(3)
     for c in range(len(rise_s)):
         total = rise_s[c] + cruise_s[c] + brake_s[c]
         steps = math.ceil(total / _STEP_S)
@@ -95,27 +94,12 @@ def _judge(
         go = math.inf
         for step in range(steps + 1):
             time = min(step * _STEP_S, total)
+            rising = min(time, rise_s[c])
             _change(
-                position,
-                velocity,
-                acceleration,
-                cruise_velocity[c],
-                rise_s[c],
-                min(time, rise_s[c]),
-                p,
-                v,
-                a,
+                position, velocity, acceleration, cruise_velocity[c], rise_s[c], rising, p, v, a
             )
             if time > rise_s[c]:
-                cruised = min(time - rise_s[c], cruise_s[c])
-                for axis in range(3):
-                    q[axis] = p[axis] + v[axis] * cruised
-                    w[axis], b[axis] = v[axis], 0.0
-                braked = time - rise_s[c] - cruise_s[c]
-                if braked > 0.0:
-                    _change(q, w, b, rest, brake_s[c], min(braked, brake_s[c]), p, v, a)
-                else:
-                    p[:], a[:] = q, b
+                _after_rise(time - rise_s[c], cruise_s[c], brake_s[c], p, v, a, q, w, rest)
             i = math.floor(p[0] / cell) - low[0]
             j = math.floor(p[1] / cell) - low[1]
             k = math.floor(p[2] / cell) - low[2]
@@ -132,6 +116,32 @@ def _judge(
             if time <= rise_s[c] + cruise_s[c] + 0.5 * _STEP_S:
                 go = costs[i, j]
         nearest[c], unknown[c], most[c], cost[c] = least, blind, peak, go + price
+
+
+@inner_kernel
+def _after_rise(
+    t: float,
+    cruise_s: float,
+    brake_s: float,
+    p: Array,
+    v: Array,
+    a: Array,
+    q: Array,
+    w: Array,
+    rest: Array,
+) -> None:
+    """Carry the state at the end of the rise on by `t`: it cruises, then brakes to rest.
+
+    `q`, `w`: room for where the braking begins; `rest`: zeros.
+    """
+    cruised = min(t, cruise_s)
+    for axis in range(3):
+        p[axis] += v[axis] * cruised
+        a[axis] = 0.0
+    if t > cruise_s:
+        for axis in range(3):
+            q[axis], w[axis] = p[axis], v[axis]
+        _change(q, w, rest, rest, brake_s, min(t - cruise_s, brake_s), p, v, a)
 
 
 @inner_kernel

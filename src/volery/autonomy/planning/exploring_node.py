@@ -109,7 +109,7 @@ class Exploring(Node):
         self._open()
 
     def _open(self) -> None:
-        odometry = str(self.declare_parameter("odometry", "slam/odom").value)
+        odometry = str(self.declare_parameter("odometry", "odom").value)
         self._goals = self.create_publisher(PoseStamped, "planning/goal", 1)
         self._status = self.create_publisher(String, "exploration/status", 1, latched=True)
         self._covered = self.create_publisher(Float32, "exploration/covered", 1)

@@ -44,7 +44,7 @@ class TrajectoryFollower(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("follower", **options)
-        odometry = str(self.declare_parameter("odometry", "slam/odom").value)
+        odometry = str(self.declare_parameter("odometry", "odom").value)
         self._gain = float(self.declare_parameter("gain", 1.2).value)
         self._lead_ns = ns_from_s(float(self.declare_parameter("lead_s", 0.25).value))
         self._pose: Pose | None = None

@@ -86,7 +86,7 @@ class GlobalPlanner(Node):
         self._open()
 
     def _open(self) -> None:
-        odometry = str(self.declare_parameter("odometry", "slam/odom").value)
+        odometry = str(self.declare_parameter("odometry", "odom").value)
         self._path = self.create_publisher(PathMessage, "planning/path", 1, latched=True)
         self._status = self.create_publisher(String, "planning/goal_status", 1, latched=True)
         self.create_subscription(Odometry, odometry, self._on_odometry, 1)

@@ -96,7 +96,7 @@ class LocalPlanner(Node):
         self._open()
 
     def _open(self) -> None:
-        odometry = str(self.declare_parameter("odometry", "slam/odom").value)
+        odometry = str(self.declare_parameter("odometry", "odom").value)
         period = float(self.declare_parameter("period_s", 0.18).value)
         self._trajectory = self.create_publisher(MultiDOFJointTrajectory, "planning/trajectory", 1)
         self._status = self.create_publisher(String, "planning/status", 1, latched=True)

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.autonomy.map_frame import MapFrame
 from volery.autonomy.scan_points import Pose
 from volery.autonomy.team.assignment import Worker
-from volery.autonomy.team.map_poses import MapPoses
 from volery.autonomy.team.reports import TYPE as REPORT_TYPE
 from volery.autonomy.team.reports import Phase, Team
 from volery.autonomy.team.sectors import Coverage, from_bits, to_bits
@@ -54,7 +54,7 @@ class TeamMember(Node):
         "trouble",
         "_pose",
         "_pose_ns",
-        "_poses",
+        "_frame",
         "_since_ns",
         "_given_up",
         "_coverage",
@@ -84,7 +84,7 @@ class TeamMember(Node):
         self.targets = TargetList(settings.gate_m)
         self.team = Team(count)
         self.trouble = ""
-        self._poses = MapPoses()
+        self._frame = MapFrame()
         self._pose: Pose | None = None
         self._pose_ns = 0
         self._battery = math.nan
@@ -127,10 +127,10 @@ class TeamMember(Node):
     # ------------------------------------------------------------------------------ what it hears
 
     def _on_tf(self, message: TFMessage) -> None:
-        self._poses.on_tf(message)
+        self._frame.on_tf(message)
 
     def _on_odometry(self, message: Odometry) -> None:
-        pose = self._poses.of(message)
+        pose = self._frame.pose_in_map(message)
         if not np.isfinite(pose.position).all():
             return
         self._pose, self._pose_ns = pose, self.now_ns

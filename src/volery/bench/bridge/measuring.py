@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -27,12 +27,14 @@ from volery.bridges.doors import Doors
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import VoleryError
+from volery.graph.graph import Publisher
 from volery.graph.messages import Header, Time, message_type
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import Scenario
 
-_IMAGES = 100
+IMAGES_A_SIZE = 100
+IMAGE_TOPIC = "/bench/image"
 _IMAGE_PERIOD_S = 0.02
 _ROUND_TRIPS = 1000
 _STOPS = 100
@@ -141,12 +143,25 @@ def _run(simulation: Simulation, over: threading.Event) -> None:
 
 def image_latencies(world: World) -> list[tuple[int, float]]:
     """(bytes, s) of images published by the simulation's thread, one size after the other."""
-    gateway, topic = world.simulation.gateway, "/bench/image"
-    publisher = gateway.post(lambda: world.simulation.graph.advertise(topic, _IMAGE)).result()
+    publisher = advertise_images(world.simulation)
+    count = IMAGES_A_SIZE * len(IMAGE_BYTES)
+    finish = world.start("plain_ros_tcp", "sizes", IMAGE_TOPIC, count)
+    _wait_for_subscriber(world.simulation, IMAGE_TOPIC)
+    publish_images(world.simulation, publisher, IMAGE_BYTES)
+    return [(size, latency) for size, latency in finish()["latencies"]]
+
+
+def advertise_images(simulation: Simulation) -> Publisher:
+    """Announce `IMAGE_TOPIC`."""
+    advertising = simulation.gateway.post(lambda: simulation.graph.advertise(IMAGE_TOPIC, _IMAGE))
+    publisher: Publisher = advertising.result()
+    return publisher
+
+
+def publish_images(simulation: Simulation, publisher: Publisher, sizes: Sequence[int]) -> None:
+    """`IMAGES_A_SIZE` pictures of each size (bytes), stamped when the simulation's thread sends."""
     image = message_type(_IMAGE)
-    finish = world.start("plain_ros_tcp", "sizes", topic, _IMAGES * len(IMAGE_BYTES))
-    _wait_for_subscriber(world.simulation, topic)
-    for size in IMAGE_BYTES:
+    for size in sizes:
         pixels = np.zeros(size, np.uint8)
         pixels.flags.writeable = False
 
@@ -155,10 +170,9 @@ def image_latencies(world: World) -> list[tuple[int, float]]:
             width = len(pixels)
             publisher.publish(image(Header(stamp, ""), 1, width, "mono8", 0, width, pixels))
 
-        for _ in range(_IMAGES):
-            gateway.post(publish)
+        for _ in range(IMAGES_A_SIZE):
+            simulation.gateway.post(publish)
             time.sleep(_IMAGE_PERIOD_S)
-    return [(size, latency) for size, latency in finish()["latencies"]]
 
 
 def command_figures(world: World) -> dict[str, float]:
