@@ -136,6 +136,34 @@ def test_flight_by_keyboard(page, served):
     assert ahead["position"]["x"] > flying["position"]["x"]
 
 
+SLOW_FRAMES = """
+() => {
+  const work = (ms) => { for (const from = performance.now(); performance.now() - from < ms; ); };
+  window.slow = setInterval(() => work(700), 710);
+  window.hang = (ms) => { setTimeout(() => work(ms), 0); };
+}
+"""
+
+
+def test_flight_goes_on_while_frames_are_slow_and_ends_when_the_page_hangs(page, served):
+    page.get_by_role("option", name="uav2").click()
+    vehicle(served, "uav2", lambda uav: uav["airborne"])
+    page.keyboard.press("c")
+    page.get_by_role("group", name="Flight by hand").wait_for()
+    page.evaluate(SLOW_FRAMES)
+    page.keyboard.down("KeyS")
+    vehicle(served, "uav2", lambda uav: uav["velocity"]["x"] < -2.0)
+    seen = [vehicle(served, "uav2") for _ in range(20)]
+    assert {uav["mode"] for uav in seen} == {"VELOCITY"}  # no hold in between
+    assert max(uav["velocity"]["x"] for uav in seen) < -2.0
+    page.evaluate("clearInterval(window.slow); window.hang(4000)")
+    vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["x"]) < 0.2, timeout_s=20.0)
+    vehicle(served, "uav2", lambda uav: uav["velocity"]["x"] < -1.0)  # the key is still down
+    page.keyboard.up("KeyS")
+    vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["x"]) < 0.2)
+    page.keyboard.press("Escape")
+
+
 def test_a_uav_is_chosen_and_flown_without_a_mouse(page, served):
     vehicle(served, "uav2", lambda uav: uav["mode"] in ("HOLD", "VELOCITY"))
     before = place(served, "uav2")

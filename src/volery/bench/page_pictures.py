@@ -121,7 +121,7 @@ def _kept(shot: Shot) -> str:
     lines = [{"topic": topic, "type": kind, "path": path} for topic, kind, path in shot.lines]
     kept = {"volery.layout": shot.layout}
     if lines:
-        kept["volery.plots"] = {"plots": [{"id": 1, "lines": lines}], "windowS": 30}
+        kept["volery.plots"] = {"plots": [{"id": 1, "lines": lines}], "windowS": 20}
     return "".join(
         f"localStorage.setItem({json.dumps(key)}, {json.dumps(json.dumps(value))});"
         for key, value in kept.items()
