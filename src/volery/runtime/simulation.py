@@ -372,8 +372,8 @@ class Simulation:
 
         `timeout_s` is wall time; a partner that lets more pass ends the run with `PartnerError`, or
         is waited for no more. `on_meeting(time_ns)` is called when a meeting begins; a partner that
-        is not there any more, as `is_there()` says, is waited for no more. `restarts`: it begins anew
-        where a meeting's time is earlier than the last one's, so that `reset` is possible.
+        is not there any more, as `is_there()` says, is waited for no more. `restarts`: it begins
+        anew where a meeting's time is earlier than the last one's, so that `reset` is possible.
         """
         self._check_open()
         check_terms(period_s, timeout_s, on_timeout, self._engine.fleet.dt_ns)
