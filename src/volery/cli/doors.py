@@ -28,6 +28,10 @@ def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
         from volery.mavlink.outfit import with_px4
 
         scenario = with_px4(scenario)
+    if "ardupilot" in names:
+        from volery.mavlink.outfit import with_ardupilot
+
+        scenario = with_ardupilot(scenario)
     return scenario
 
 
@@ -49,6 +53,11 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
             4560,
             lambda address, terms: _px4(address, terms, patience),
             "real PX4s fly the UAVs, in lock step",
+        ),
+        "ardupilot": DoorKind(
+            9002,
+            lambda address, terms: _ardupilot(address, terms, patience, simulation),
+            "real ArduCopters fly the UAVs, in lock step",
         ),
         "mavlink-tcp": DoorKind(5760, _mavlink_tcp, "MAVLink over TCP, all UAVs on each link"),
         "mavlink-serial": DoorKind(
@@ -93,6 +102,19 @@ def _px4(address: Address, terms: Terms, patience: Patience) -> Door:
     from volery.mavlink.px4_door import Px4Door
 
     return Px4Door(*address, patience=patience, anywhere=terms.anywhere)
+
+
+def _ardupilot(address: Address, terms: Terms, patience: Patience, simulation: Any) -> Door:
+    from volery.mavlink.ardupilot_door import ArdupilotDoor
+    from volery.mavlink.json_frames import Rotor
+
+    rotors = {
+        name: [
+            Rotor(*place.position_m[:2], place.direction) for place in uav.airframe.rotors.places
+        ]
+        for name, uav in getattr(simulation, "uavs", {}).items()
+    }
+    return ArdupilotDoor(rotors, *address, patience=patience, anywhere=terms.anywhere)
 
 
 def _patience_of(options: RunOptions) -> Patience:
