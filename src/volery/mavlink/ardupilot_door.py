@@ -213,14 +213,14 @@ def _state_of(news: News) -> State | None:
     q = truth.pose.pose.orientation
     attitude = (float(q.x), float(q.y), float(q.z), float(q.w))
     sonar, battery = news.get("range"), news.get("battery")
-    seen = sonar is not None and math.isfinite(sonar.range)
+    distance = math.inf if sonar is None else float(sonar.range)
     return State(
         inertial.force,
         inertial.rates,
         parts(truth.pose.pose.position),
         attitude,
         _turned(attitude, parts(truth.twist.twist.linear)),
-        float(sonar.range) if seen else None,
+        distance if math.isfinite(distance) else None,
         None if battery is None else (float(battery.voltage), -float(battery.current)),
     )
 
