@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -9,12 +10,17 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from volery.cli.flight import RunOptions
+from volery.core.errors import BridgeError
 
 if TYPE_CHECKING:
     from volery.bridges.door_names import Address, Terms
     from volery.bridges.doors import Door
     from volery.mavlink.meetings import Patience
     from volery.scenario.schema import Scenario
+
+_LONGEST_START_S = 60.0
+"""Wall time in which PX4s must have connected."""
+_LOOK_S = 0.05
 
 
 def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
@@ -76,7 +82,7 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
             doors.open(door)
             typer.echo(f"open    {door.name}", err=True)
         simulation.be_prompt()
-        with _px4_instances(len(simulation.uav_names), options):
+        with _px4_instances(simulation, wanted, options):
             yield
 
 
@@ -137,14 +143,21 @@ def _patience_of(options: RunOptions) -> Patience:
 
 
 @contextmanager
-def _px4_instances(count: int, options: RunOptions) -> Iterator[None]:
-    """Run a PX4 for each UAV where that was asked for."""
+def _px4_instances(simulation: Any, doors: list[Door], options: RunOptions) -> Iterator[None]:
+    """Run a PX4 for each UAV where that was asked for, and wait until all are connected."""
     if options.px4_dir is None:
         yield
         return
+    from volery.mavlink.px4_door import Px4Door
     from volery.mavlink.px4_processes import Px4Instances, find_px4
 
-    build = find_px4(options.px4_dir)
-    with Px4Instances(build, count, speed=options.speed):
+    build, count = find_px4(options.px4_dir), len(simulation.uav_names)
+    door = next(door for door in doors if isinstance(door, Px4Door))
+    with Px4Instances(build, count, speed=options.speed) as instances:
         typer.echo(f"started {build.binary}, instances 0 to {count - 1}", err=True)
+        end_s = time.monotonic() + _LONGEST_START_S
+        while len(door.connected) < count:
+            if instances.wait(_LOOK_S) or time.monotonic() > end_s:
+                missing = count - len(door.connected)
+                raise BridgeError(instances.failure or f"{missing} PX4s have not connected")
         yield

@@ -233,7 +233,7 @@ def _environment(host: str, speed: float | None) -> dict[str, str]:
         if not name.startswith("PX4_") or name.startswith("PX4_PARAM_")
     }
     kept |= {"PX4_SIM_MODEL": AIRFRAME, "PX4_SIM_HOSTNAME": host}
-    if speed is not None:
+    if speed not in (None, 1.0):  # PX4's script needs the program bc for it
         kept["PX4_SIM_SPEED_FACTOR"] = f"{speed:g}"
     return kept
 
