@@ -25,6 +25,10 @@ _LOOK_S = 0.05
 
 def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
     """The scenario with what the doors of `options` need: autopilots, or sensors for real ones."""
+    if options.px4_dir is not None:
+        from volery.mavlink.px4_processes import find_px4
+
+        find_px4(options.px4_dir)  # a wrong folder is told before anything is built
     names = {text.partition("=")[0] for text in options.doors}
     if any(name.startswith("mavlink") for name in names):
         from volery.mavlink.outfit import with_autopilots
