@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from node_bench import NodeBench, nod, odometry, scan
 
+from volery.autonomy.map_frame import MapFrame
 from volery.autonomy.mapping.merging import PlacedMap, merged
 from volery.autonomy.mapping.octomap_stream import Voxels
 from volery.autonomy.mapping.reports import grid_values_message, octomap_message
@@ -14,6 +15,7 @@ from volery.autonomy.planning.exploring_node import POLYGON, Exploring
 from volery.autonomy.planning.follower import TrajectoryFollower
 from volery.autonomy.planning.global_planner import GlobalPlanner
 from volery.autonomy.planning.local_planner import LocalPlanner
+from volery.autonomy.planning.neighbours import Neighbours
 from volery.autonomy.planning.primitives import Path, State
 from volery.autonomy.planning.trajectory_form import samples_of, trajectory_message
 from volery.graph.messages import (
@@ -23,9 +25,11 @@ from volery.graph.messages import (
     PoseStamped,
     Quaternion,
     Range,
+    Vector3,
     header,
     message_type,
 )
+from volery.graph.zero import zero_message
 
 S = 1_000_000_000
 MS = 1_000_000
@@ -141,22 +145,44 @@ def test_a_path_that_is_none_is_refused(bad):
     assert glade.plans == []
 
 
-def test_it_gives_way_to_a_neighbour_that_comes_towards_it():
+def report(name, time_ns, place, velocity=(0.0, 0.0, 0.0)):
+    """What a teammate says over the radio."""
+    message = zero_message("volery_interfaces/msg/TeamReport")
+    message.header, message.name = header(time_ns, "map"), name
+    message.position, message.velocity = Point(*place), Vector3(*velocity)
+    return message
+
+
+def test_it_gives_way_to_a_teammate_that_comes_towards_it():
     ends = []
-    for neighbours in ([""], ["/uav2/odom"]):
-        glade = Glade(neighbours=neighbours)
+    for coming in (False, True):
+        glade = Glade()
         glade.go_on(1.0)
         glade.bench.send("/uav1/planning/path", path((0.0, 0.0), (9.0, 0.0)))
         for _ in range(5):
-            glade.bench.send(
-                "/uav2/odom", odometry(glade.now, (5.0, 0.2, HEIGHT), (-2.0, 0.0, 0.0), frame="map")
-            )
+            if coming:
+                said = report("uav2", glade.now, (5.0, 0.2, HEIGHT), (-2.0, 0.0, 0.0))
+                glade.bench.send("/uav1/radio/team", said)
             glade.go_on(0.2)
         ends.append(samples_of(glade.plans[-1]).position[-1])
     alone, beside = ends
     assert alone[0] > 2.0
     assert abs(alone[1]) < 1.0
     assert beside[0] < alone[0] - 0.5 or beside[1] < -1.0
+
+
+def test_reports_that_are_late_repeated_or_no_numbers_move_no_teammate():
+    near, frame = Neighbours(), MapFrame()
+    near.hear(report("uav2", 5 * S, (5.0, 0.0, HEIGHT), (1.0, 0.0, 0.0)), 6 * S)
+    near.hear(report("uav2", 4 * S, (9.0, 0.0, HEIGHT)), 7 * S)
+    near.hear(report("uav2", 5 * S, (9.0, 0.0, HEIGHT)), 7 * S)
+    near.hear(report("uav2", 7 * S, (math.nan, 0.0, HEIGHT)), 7 * S)
+    near.hear(report("uav3", 7 * S, (0.0, 0.0, HEIGHT), (math.inf, 0.0, 0.0)), 7 * S)
+    (other,) = near.in_odom(frame)
+    assert other.position.tolist() == [5.0, 0.0, HEIGHT]
+    assert other.time_ns == 6 * S  # by the hearer's clock
+    near.hear(report("uav2", S, (2.0, 0.0, HEIGHT)), 30 * S)  # its clock began anew
+    assert near.in_odom(frame)[0].position.tolist() == [2.0, 0.0, HEIGHT]
 
 
 # --------------------------------------------------------------------------------------- follower
