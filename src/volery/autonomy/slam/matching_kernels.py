@@ -150,7 +150,7 @@ def _gather(
 
 @inner_kernel
 def _place_of(i: int) -> int:
-    """Row among the 15 errors of one of the six of the pose."""
+    """Row among the 17 errors of one of the six of the pose."""
     return i if i < 3 else i + 3
 
 
@@ -160,7 +160,7 @@ def update(
     upright_keys: Keys, cells: Cells, upright_variance: float, ground_variance: float,
     trust: float, rounds: int, information: Array, told: Array,
 ) -> bool:
-    """Correct state (16,) and covariance (15, 15) by classified returns; False: nothing was solved.
+    """Correct state (19,) and covariance (17, 17) by classified returns; False: nothing was solved.
 
     `information` (6, 6) and `told` (4,) are what they said at the end; see `_gather`.
     """
@@ -252,7 +252,7 @@ def seed_ground(keys: Keys, sums: Array, x: float, y: float, z: float) -> None:
 
 @kernel
 def carry_along(states: Array, before: Array, after: Array) -> None:
-    """Correct earlier states (M, 16) rigidly, as the newest one was: from `before` to `after`."""
+    """Correct earlier states (M, 19) rigidly, as the newest one was: from `before` to `after`."""
     bx, by, bz, bw = -before[Q], -before[Q + 1], -before[Q + 2], before[Q + 3]
     ax, ay, az, aw = after[Q], after[Q + 1], after[Q + 2], after[Q + 3]
     tx = aw * bx + ax * bw + ay * bz - az * by

@@ -30,6 +30,8 @@ class Matching:
     upright_sigma_m: float = 0.05
     """Of a return about the upright that it met: range, angle, bark."""
     ground_sigma_m: float = 0.05
+    gravity_walk_rad_sqrt_s: float = 2e-4
+    """How the frame of the local map turns against gravity as the map grows."""
     trust: float = 0.05
     """Share of the returns' information that is believed: their errors have the map's in common."""
     insert_m: float = 0.25

@@ -31,7 +31,7 @@ def unskew(
     states: Array,
     points: Array,
 ) -> int:
-    """Fill `points` (K, 3), m in the body at the newest of `states` (M, 16), return their number.
+    """Fill `points` (K, 3), m in the body at the newest of `states` (M, 19), return their number.
 
     `times` (M,) rise; a beam's pose is interpolated between the two around its time. `nod` and
     `last_nod` are the mount's angles (rad, positive down) at the first and last beam.

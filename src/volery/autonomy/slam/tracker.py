@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from volery.autonomy.slam.ground_kernels import GROUND_CELLS
 from volery.autonomy.slam.inertial_kernels import (
     BG,
+    G,
     P,
     Q,
     STATE_NUMBERS,
@@ -133,7 +134,7 @@ class Tracker:
         n = self.imu_noise
         self._noise = np.array(
             [n.gyro_rad_s_sqrt_hz, n.accel_m_s2_sqrt_hz, n.gyro_walk_rad_s2_sqrt_hz,
-             n.accel_walk_m_s3_sqrt_hz]
+             n.accel_walk_m_s3_sqrt_hz, self.matching.gravity_walk_rad_sqrt_s]
         )  # fmt: skip
 
     # ---------------------------------------------------------------------------------- readings
@@ -184,9 +185,7 @@ class Tracker:
         mean_gyro, mean_accel = 0.5 * (before[1] + gyro), 0.5 * (before[2] + accel)
         while dt > 0.0:
             step = min(dt, _LONGEST_STEP_S)
-            move(
-                self.state, self.covariance, mean_gyro, mean_accel, step, GRAVITY_M_S2, self._noise
-            )
+            move(self.state, self.covariance, mean_gyro, mean_accel, step, self._noise)
             dt -= step
         self.travelled_m += float(np.hypot(*(self.state[:2] - here[:2])))
         self._remember(time_ns)
@@ -218,14 +217,15 @@ class Tracker:
         attitude = rotations.from_rpy(roll, pitch, float(self.start[3]))
         self.state[:] = 0.0
         self.state[:3], self.state[Q : Q + 4] = self.start[:3], attitude
+        self.state[G + 2] = -GRAVITY_M_S2
         n = self.imu_noise
         sigma = np.array(
-            [1e-3] * 3 + [0.01] * 3 + [2e-3, 2e-3, 1e-4]
-            + [n.gyro_turn_on_rad_s] * 3 + [n.accel_turn_on_m_s2] * 3
+            [1e-3] * 3 + [0.01] * 3 + [1e-4] * 3
+            + [n.gyro_turn_on_rad_s] * 3 + [n.accel_turn_on_m_s2] * 3 + [2e-3] * 2
         )  # fmt: skip
         mixing, turn = np.eye(STATES), rotations.matrix(attitude)
-        mixing[6, 12:15] = -turn[1] / GRAVITY_M_S2  # a bias looks like a tilt
-        mixing[7, 12:15] = turn[0] / GRAVITY_M_S2
+        mixing[15, 12:15] = turn[1] / GRAVITY_M_S2  # a bias looks like a tilt
+        mixing[16, 12:15] = -turn[0] / GRAVITY_M_S2
         spread = mixing * sigma
         self.covariance[:] = spread @ spread.T
         self._times[:] = time_ns - np.arange(_KEPT)[::-1] * 1_000_000
