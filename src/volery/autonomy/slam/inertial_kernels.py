@@ -143,7 +143,9 @@ def add_error(state: Array, error: Array) -> None:
 
 
 @kernel
-def observe(state: Array, covariance: Array, row: Array, innovation: float, variance: float) -> float:
+def observe(
+    state: Array, covariance: Array, row: Array, innovation: float, variance: float
+) -> float:
     """Take in one number; `row` (17,) is its derivative. Returns the normalised innovation."""
     gain = np.zeros(STATES)
     for i in range(STATES):

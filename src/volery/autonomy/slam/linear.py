@@ -11,6 +11,22 @@ Array = NDArray[np.float64]
 
 
 @inner_kernel
+def _pivot(matrix: Array, j: int) -> int:
+    """The row from j on with the largest number in column j."""
+    found = j
+    for i in range(j + 1, matrix.shape[0]):
+        if abs(matrix[i, j]) > abs(matrix[found, j]):
+            found = i
+    return found
+
+
+@inner_kernel
+def _swap(matrix: Array, one: int, other: int) -> None:
+    for k in range(matrix.shape[1]):
+        matrix[one, k], matrix[other, k] = matrix[other, k], matrix[one, k]
+
+
+@inner_kernel
 def eliminate(matrix: Array, right: Array) -> bool:
     """Replace `right` (n, m) by the solution of `matrix` (n, n) X = right; False: singular.
 
@@ -18,17 +34,11 @@ def eliminate(matrix: Array, right: Array) -> bool:
     """
     n, m = right.shape
     for j in range(n):
-        pivot = j
-        for i in range(j + 1, n):
-            if abs(matrix[i, j]) > abs(matrix[pivot, j]):
-                pivot = i
+        pivot = _pivot(matrix, j)
         if not abs(matrix[pivot, j]) > 1e-14:
             return False
-        if pivot != j:
-            for k in range(n):
-                matrix[j, k], matrix[pivot, k] = matrix[pivot, k], matrix[j, k]
-            for k in range(m):
-                right[j, k], right[pivot, k] = right[pivot, k], right[j, k]
+        _swap(matrix, j, pivot)
+        _swap(right, j, pivot)
         for i in range(j + 1, n):
             share = matrix[i, j] / matrix[j, j]
             for k in range(j, n):

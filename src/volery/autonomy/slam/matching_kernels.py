@@ -47,8 +47,14 @@ def _placed(state: Array, turn: Array, point: Array) -> tuple[float, float, floa
 
 @kernel
 def classify(
-    points: Array, state: Array, keys: Keys, sums: Array, broad: Array, is_broad: bool,
-    kinds: Kinds, planes: Array,
+    points: Array,
+    state: Array,
+    keys: Keys,
+    sums: Array,
+    broad: Array,
+    is_broad: bool,
+    kinds: Kinds,
+    planes: Array,
 ) -> None:
     """Say of what returns (K, 3) are; `planes` (K, 3) gets height and slopes where it is ground.
 
@@ -99,12 +105,20 @@ def _fill_row(row: Array, nx: float, ny: float, nz: float, ax: float, ay: float,
 
 
 @owning_kernel
-def _gather(
-    state: Array, points: Array, kinds: Kinds, planes: Array, upright_keys: Keys, cells: Cells,
-    upright_variance: float, ground_variance: float, information: Array, gradient: Array,
+def gather(
+    state: Array,
+    points: Array,
+    kinds: Kinds,
+    planes: Array,
+    upright_keys: Keys,
+    cells: Cells,
+    upright_variance: float,
+    ground_variance: float,
+    information: Array,
+    gradient: Array,
     told: Array,
 ) -> None:
-    """Sum up what all returns say at a pose; `told` (4,): uprights met, of how many, ground, cost."""
+    """Sum up what returns say; `told` (4,): uprights met again, of how many, ground, cost."""
     turn, row, found = np.empty((3, 3)), np.empty(6), np.empty(5)
     rotation_matrix(state, turn)
     information[:] = 0.0
@@ -112,7 +126,7 @@ def _gather(
     told[:] = 0.0
     for n in range(points.shape[0]):
         kind = kinds[n]
-        if kind == LEFT_OUT or kind == NEW_GROUND:
+        if kind in (LEFT_OUT, NEW_GROUND):
             continue
         x, y, z = _placed(state, turn, points[n])
         ax, ay, az = x - state[P], y - state[P + 1], z - state[P + 2]
@@ -156,20 +170,39 @@ def _place_of(i: int) -> int:
 
 @kernel
 def update(
-    state: Array, covariance: Array, points: Array, kinds: Kinds, planes: Array,
-    upright_keys: Keys, cells: Cells, upright_variance: float, ground_variance: float,
-    trust: float, rounds: int, information: Array, told: Array,
+    state: Array,
+    covariance: Array,
+    points: Array,
+    kinds: Kinds,
+    planes: Array,
+    upright_keys: Keys,
+    cells: Cells,
+    upright_variance: float,
+    ground_variance: float,
+    trust: float,
+    rounds: int,
+    information: Array,
+    told: Array,
 ) -> bool:
     """Correct state (19,) and covariance (17, 17) by classified returns; False: nothing was solved.
 
-    `information` (6, 6) and `told` (4,) are what they said at the end; see `_gather`.
+    `information` (6, 6) and `told` (4,) are what they said at the end; see `gather`.
     """
     prior, error = state.copy(), np.zeros(STATES)
     gradient, right, left = np.empty(6), np.empty((6, 1)), np.empty((6, 6))
     for _ in range(rounds):
-        _gather(
-            state, points, kinds, planes, upright_keys, cells, upright_variance, ground_variance,
-            information, gradient, told,
+        gather(
+            state,
+            points,
+            kinds,
+            planes,
+            upright_keys,
+            cells,
+            upright_variance,
+            ground_variance,
+            information,
+            gradient,
+            told,
         )
         for i in range(6):
             right[i, 0] = -trust * gradient[i]
@@ -219,8 +252,14 @@ def _shrink(covariance: Array, information: Array, trust: float) -> bool:
 
 @kernel
 def insert(
-    points: Array, kinds: Kinds, state: Array, is_upright: bool, upright_keys: Keys, cells: Cells,
-    ground_keys: Keys, sums: Array,
+    points: Array,
+    kinds: Kinds,
+    state: Array,
+    is_upright: bool,
+    upright_keys: Keys,
+    cells: Cells,
+    ground_keys: Keys,
+    sums: Array,
 ) -> None:
     """Draw classified returns into the maps; what stands only if `is_upright`."""
     turn = np.empty((3, 3))

@@ -53,9 +53,13 @@ def unskew(
         bx, by, bz = math.cos(tilt) * x + mount[0], y + mount[1], -math.sin(tilt) * x + mount[2]
         one, two = states[row], states[row + 1]
         keep = 1.0 - share
-        if one[Q] * two[Q] + one[Q + 1] * two[Q + 1] + one[Q + 2] * two[Q + 2] + (
-            one[Q + 3] * two[Q + 3]
-        ) < 0.0:
+        if (
+            one[Q] * two[Q]
+            + one[Q + 1] * two[Q + 1]
+            + one[Q + 2] * two[Q + 2]
+            + (one[Q + 3] * two[Q + 3])
+            < 0.0
+        ):
             share = -share
         qx, qy = keep * one[Q] + share * two[Q], keep * one[Q + 1] + share * two[Q + 1]
         qz, qw = keep * one[Q + 2] + share * two[Q + 2], keep * one[Q + 3] + share * two[Q + 3]

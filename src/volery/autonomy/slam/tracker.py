@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from volery.autonomy.slam.ground_kernels import GROUND_CELLS
 from volery.autonomy.slam.inertial_kernels import (
     BG,
+    STATE_NUMBERS,
+    STATES,
     G,
     P,
     Q,
-    STATE_NUMBERS,
-    STATES,
     V,
     move,
     observe,
@@ -51,6 +51,7 @@ _STILL = 100
 _STILL_GYRO, _STILL_ACCEL = 0.02, 0.25
 """Most standard deviation of readings at rest, rad/s, m/s^2: four times the ADIS16448's."""
 _STANDING_M_S = 0.3
+_UNKNOWN_SPEED_M_S = 3.0
 
 
 class Sweep(NamedTuple):
@@ -70,6 +71,17 @@ class Sweep(NamedTuple):
     def last_ns(self) -> int:
         """When the last beam was cast."""
         return self.first_ns + round(self.beam_ns * (len(self.ranges) - 1))
+
+
+class Seen(NamedTuple):
+    """Returns of a sweep as the filter has taken them in."""
+
+    points: Array
+    """(K, 3) m in the frame of the odometry."""
+    kinds: NDArray[np.int8]
+    """(K,) what they are of; see `matching_kernels`."""
+    is_drawn: bool
+    """Whether it was from a new place, and what stood there entered the map."""
 
 
 @dataclass
@@ -144,8 +156,8 @@ class Tracker:
         """Time of the state."""
         return 0 if self._imu is None else self._imu[0]
 
-    def add_imu(self, time_ns: int, gyro: Array, accel: Array) -> list[Sweep]:
-        """Carry the state on to a reading (rad/s, m/s^2, body axes); the sweeps that it took in."""
+    def add_imu(self, time_ns: int, gyro: Array, accel: Array) -> list[Seen]:
+        """Carry the state on to a reading (rad/s, m/s^2, body axes); what sweeps were due then."""
         if self._imu is not None and time_ns <= self._imu[0]:
             self.refused += 1
             return []
@@ -159,9 +171,9 @@ class Tracker:
         self._keep_still(time_ns)
         done = []
         while self._waiting and self._waiting[0].last_ns <= time_ns:
-            sweep = self._waiting.popleft()
-            if self._take_in(sweep):
-                done.append(sweep)
+            seen = self._take_in(self._waiting.popleft())
+            if seen is not None:
+                done.append(seen)
         return done
 
     def add_sweep(self, sweep: Sweep) -> None:
@@ -179,7 +191,9 @@ class Tracker:
             self._near_ground_ns = None
             self._seed_below(distance)
 
-    def _move(self, before: tuple[int, Array, Array], time_ns: int, gyro: Array, accel: Array) -> None:
+    def _move(
+        self, before: tuple[int, Array, Array], time_ns: int, gyro: Array, accel: Array
+    ) -> None:
         dt = (time_ns - before[0]) / NS_PER_S
         here = self.state[:3].copy()
         mean_gyro, mean_accel = 0.5 * (before[1] + gyro), 0.5 * (before[2] + accel)
@@ -238,7 +252,7 @@ class Tracker:
         seed_ground(self._maps.ground_keys, self._maps.sums, float(x), float(y), float(z))
 
     def _keep_still(self, time_ns: int) -> None:
-        """While it stands neither position nor attitude change, and the gyroscope tells its bias."""
+        """While it stands its velocity is zero, and the gyroscope tells its bias."""
         if time_ns - self._standing_ns < NS_PER_S // 10:
             return
         self._standing_ns = time_ns
@@ -263,11 +277,11 @@ class Tracker:
 
     # ------------------------------------------------------------------------------------ sweeps
 
-    def _take_in(self, sweep: Sweep) -> bool:
+    def _take_in(self, sweep: Sweep) -> Seen | None:
         m = self.matching
         if sweep.first_ns < self._times[0]:
             self.refused += 1
-            return False
+            return None
         points = np.empty((len(sweep.ranges), 3))
         count = unskew(
             sweep.ranges, m.nearest_m, m.reach_m, sweep.angle_min, sweep.angle_step,
@@ -289,16 +303,15 @@ class Tracker:
         self.match[sweep.name] = Match(
             self.time_ns, float(told[0]), float(told[1]), float(told[2]), count
         )
-        self._draw(sweep, points, kinds)
-        return True
+        is_drawn = self._draw(sweep, points, kinds)
+        turned = rotations.rotate(self.state[Q : Q + 4], points) + self.state[:3]
+        return Seen(turned, kinds, is_drawn)
 
     def _classify(self, points: Array, kinds: NDArray[np.int8], planes: Array, known: bool) -> None:
         maps = self._maps
-        classify(
-            points, self.state, maps.ground_keys, maps.sums, self._broad, known, kinds, planes
-        )
+        classify(points, self.state, maps.ground_keys, maps.sums, self._broad, known, kinds, planes)
 
-    def _draw(self, sweep: Sweep, points: Array, kinds: NDArray[np.int8]) -> None:
+    def _draw(self, sweep: Sweep, points: Array, kinds: NDArray[np.int8]) -> bool:
         """Let returns enter the map; uprights only of sweeps from a new place, or after a while."""
         m, maps, yaw = self.matching, self._maps, float(rotations.yaw_of(self.state[Q : Q + 4]))
         last = self._inserted.get(sweep.name)
@@ -314,6 +327,7 @@ class Tracker:
             points, kinds, self.state, is_new, maps.upright_keys, maps.cells, maps.ground_keys,
             maps.sums,
         )  # fmt: skip
+        return is_new
 
     def _seed_below(self, distance: float) -> None:
         """Where no LIDAR has seen ground below, the sonar tells of it."""
@@ -323,6 +337,26 @@ class Tracker:
             return
         x, y, z = (float(v) for v in self.state[P : P + 3])
         seed_ground(maps.ground_keys, maps.sums, x, y, z - distance)
+
+    def set_clock(self, time_ns: int) -> None:
+        """Go on from here at another time; what waits is given up."""
+        self._imu = None
+        self._waiting.clear()
+        self._still.clear()
+        self._near_ground_ns = None
+        self._standing_ns = time_ns
+        self._times[:] = time_ns - np.arange(_KEPT)[::-1] * 1_000_000
+        self._states[:] = self.state
+
+    def begin_anew(self) -> None:
+        """Forget the maps: from here on it follows the motion in new ones, at an unknown speed."""
+        self._maps = Maps()
+        self._inserted, self.match = {}, {}
+        keep_rows = self.covariance[6:, 6:].copy()
+        self.covariance[:] = 0.0
+        self.covariance[6:, 6:] = keep_rows
+        self.covariance[np.arange(3), np.arange(3)] = 1e-4
+        self.covariance[np.arange(3, 6), np.arange(3, 6)] = _UNKNOWN_SPEED_M_S**2
 
     # ------------------------------------------------------------------------------------- state
 
