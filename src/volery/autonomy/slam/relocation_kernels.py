@@ -71,7 +71,7 @@ def search(
                 if total > most:
                     most = total
                     best[0], best[1], best[2] = x, y, yaw
-    return most / (4.0 * max(count, 1))
+    return float(most / (4.0 * max(count, 1)))
 
 
 @kernel
