@@ -15,7 +15,7 @@ const PERIOD_MS = 50;
 /** Renewals come every 50 ms; so much later they are late. */
 const LATE_MS = 90;
 /** How long after the last renewal a command still counts. */
-export const LEASE_MS = 800;
+export const LEASE_MS = 1000;
 
 interface Stream {
   order: StreamOrder;
