@@ -113,7 +113,8 @@ def run(
     """Fly a scenario.
 
     Doors: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, ros2, ros2-zenoh,
-    sensor-link, comms, mavlink, mavlink-tcp, mavlink-serial, px4.
+    sensor-link, comms, mavlink, mavlink-tcp, mavlink-serial, px4,
+    px4-serial, ardupilot.
 
     At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
     + and - double and halve the speed, m frees it. Ctrl-C ends the flight and still writes log and

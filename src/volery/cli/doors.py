@@ -24,10 +24,14 @@ def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
         from volery.mavlink.outfit import with_autopilots
 
         scenario = with_autopilots(scenario)
-    if "px4" in names:
+    if names & {"px4", "px4-serial"}:
         from volery.mavlink.outfit import with_px4
 
         scenario = with_px4(scenario)
+    if "ardupilot" in names:
+        from volery.mavlink.outfit import with_ardupilot
+
+        scenario = with_ardupilot(scenario)
     return scenario
 
 
@@ -49,6 +53,17 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
             4560,
             lambda address, terms: _px4(address, terms, patience),
             "real PX4s fly the UAVs, in lock step",
+        ),
+        "px4-serial": DoorKind(
+            921600,
+            lambda address, _terms: _px4_serial(address, patience),
+            "a PX4 on a serial line flies a UAV",
+            on_line=True,
+        ),
+        "ardupilot": DoorKind(
+            9002,
+            lambda address, terms: _ardupilot(address, terms, patience, simulation),
+            "real ArduCopters fly the UAVs, in lock step",
         ),
         "mavlink-tcp": DoorKind(5760, _mavlink_tcp, "MAVLink over TCP, all UAVs on each link"),
         "mavlink-serial": DoorKind(
@@ -93,6 +108,26 @@ def _px4(address: Address, terms: Terms, patience: Patience) -> Door:
     from volery.mavlink.px4_door import Px4Door
 
     return Px4Door(*address, patience=patience, anywhere=terms.anywhere)
+
+
+def _px4_serial(address: Address, patience: Patience) -> Door:
+    from volery.mavlink.px4_serial_door import Px4Serial
+
+    return Px4Serial(*address, patience=patience)
+
+
+def _ardupilot(address: Address, terms: Terms, patience: Patience, simulation: Any) -> Door:
+    from volery.mavlink.ardupilot_door import ArdupilotDoor
+    from volery.mavlink.json_frames import Rotor
+
+    rotors = {
+        name: [
+            Rotor(place.position_m[0], place.position_m[1], place.direction)
+            for place in uav.airframe.rotors.places
+        ]
+        for name, uav in getattr(simulation, "uavs", {}).items()
+    }
+    return ArdupilotDoor(rotors, *address, patience=patience, anywhere=terms.anywhere)
 
 
 def _patience_of(options: RunOptions) -> Patience:

@@ -25,6 +25,8 @@ SIMULATOR = 51
 ACCELEROMETER, GYROSCOPE, MAGNETOMETER, BAROMETER = 0x7, 0x38, 0x1C0, 0x1A00
 """Groups of HIL_SENSOR's `fields_updated`."""
 _ARMED = 128
+_GENERIC, _NO_AUTOPILOT = 0, 8
+"""MAV_TYPE and MAV_AUTOPILOT of the simulator."""
 _LOCK_STEP = 1
 """Of HIL_ACTUATOR_CONTROLS: PX4 was built to take its time from the simulator."""
 _GAUSS_A_TESLA = 1e4
@@ -87,6 +89,10 @@ class HilLink:
         if sensed.fix is not None:
             frames += self._gps(time_ns // 1000, sensed.fix)
         return frames
+
+    def heartbeat(self) -> bytes:
+        """A frame that says that a simulator is there, as nobody's ground station."""
+        return self._pack(dialect().MAVLink_heartbeat_message(_GENERIC, _NO_AUTOPILOT, 0, 0, 0, 3))
 
     def feed(self, data: bytes) -> list[Actuators]:
         """Answers in what PX4 sent; its other messages need none."""

@@ -54,6 +54,10 @@ class HilSeat:
         self._link = HilLink(self._system)
         return self._hear
 
+    def heartbeat(self) -> bytes:
+        """A frame that says who is there."""
+        return self._link.heartbeat()
+
     def leave(self, why: str) -> None:
         """The connection has ended; the rotors stop."""
         if self._way is None:

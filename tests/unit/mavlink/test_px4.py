@@ -5,13 +5,14 @@ import socket
 import time
 
 import pytest
-from px4_stand_in import StandIn
+from px4_stand_in import StandIn, Terminal
 
 from volery.bridges.doors import Doors
 from volery.core.errors import BridgeError, PartnerError
 from volery.mavlink.meetings import PATIENCE, Patience
 from volery.mavlink.outfit import with_px4
 from volery.mavlink.px4_door import Px4Door
+from volery.mavlink.px4_serial_door import Px4Serial
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
 
@@ -166,6 +167,40 @@ def test_one_with_a_clock_of_its_own_is_not_waited_for(opened):
     assert pilot.done.wait(20.0)
     assert pilot.fault is None
     pilot.close()
+
+
+def test_one_on_a_serial_line_flies_the_uav_that_is_left():
+    terminals = [Terminal(), Terminal()]
+    simulation = Simulation(scenario(count=2), threads=1)
+    with simulation, Doors(simulation.gateway) as doors:
+        lines = [Px4Serial(terminal.path) for terminal in terminals]
+        pilots = []
+        for terminal, line in zip(terminals, lines, strict=True):
+            doors.open(line)
+            simulation.take_in()
+            pilots.append(StandIn(0, 10_000, throttle=CLIMB, arm_at=50, link=terminal))
+        assert [line.uav for line in lines] == ["uav1", "uav2"]
+        with pytest.raises(BridgeError, match="no UAV with an IMU is left"):
+            doors.open(Px4Serial(terminals[0].path))
+        for pilot in pilots:
+            pilot.start()
+        simulation.run(1.0)
+        assert simulation.uavs["uav1"].position_map[2] > 0.2
+        assert simulation.uavs["uav2"].position_map[2] > 0.2
+    for pilot in pilots:
+        pilot.close()
+        assert pilot.done.wait(20.0)
+        assert len(pilot.sensors) > 200
+        assert str(pilot.fault) == "the simulator closed the connection"
+
+
+def test_a_serial_line_that_is_too_slow_is_told():
+    simulation = Simulation(scenario(), threads=1)
+    with simulation, Doors(simulation.gateway) as doors:
+        with pytest.raises(BridgeError, match="57600 baud is too slow for HIL; 230400 or more"):
+            doors.open(Px4Serial("/dev/null", 57600))
+        with pytest.raises(BridgeError, match="/dev/null is no serial line"):
+            doors.open(Px4Serial("/dev/null"))
 
 
 def test_a_port_that_is_taken_is_told():
