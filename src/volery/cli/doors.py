@@ -13,6 +13,7 @@ from volery.cli.flight import RunOptions
 if TYPE_CHECKING:
     from volery.bridges.door_names import Address, Terms
     from volery.bridges.doors import Door
+    from volery.mavlink.meetings import Patience
     from volery.scenario.schema import Scenario
 
 
@@ -39,11 +40,16 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
     from volery.bridges.door_names import DoorKind, Terms, make_door
     from volery.bridges.doors import Doors
 
+    patience = _patience_of(options)
     terms = Terms(options.allow_remote, options.token, options.domain_id, options.interfaces)
     more = {
         "comms": DoorKind(10200, _comms, "makes UAVs stations of a communication server"),
         "mavlink": DoorKind(14540, _mavlink, "MAVLink over UDP, ports as PX4's simulations"),
-        "px4": DoorKind(4560, _px4, "real PX4s fly the UAVs, in lock step"),
+        "px4": DoorKind(
+            4560,
+            lambda address, terms: _px4(address, terms, patience),
+            "real PX4s fly the UAVs, in lock step",
+        ),
         "mavlink-tcp": DoorKind(5760, _mavlink_tcp, "MAVLink over TCP, all UAVs on each link"),
         "mavlink-serial": DoorKind(
             57600, _mavlink_serial, "MAVLink on a serial line", on_line=True
@@ -55,7 +61,8 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
             doors.open(door)
             typer.echo(f"open    {door.name}", err=True)
         simulation.be_prompt()
-        yield
+        with _px4_instances(len(simulation.uav_names), options):
+            yield
 
 
 def _comms(address: Address, terms: Terms) -> Door:
@@ -82,7 +89,27 @@ def _mavlink_serial(address: Address, _terms: Terms) -> Door:
     return MavlinkSerial(*address)
 
 
-def _px4(address: Address, terms: Terms) -> Door:
+def _px4(address: Address, terms: Terms, patience: Patience) -> Door:
     from volery.mavlink.px4_door import Px4Door
 
-    return Px4Door(*address, anywhere=terms.anywhere)
+    return Px4Door(*address, patience=patience, anywhere=terms.anywhere)
+
+
+def _patience_of(options: RunOptions) -> Patience:
+    from volery.mavlink.meetings import Patience
+
+    return Patience(options.autopilot_timeout_s, options.drop_silent)
+
+
+@contextmanager
+def _px4_instances(count: int, options: RunOptions) -> Iterator[None]:
+    """Run a PX4 for each UAV where that was asked for."""
+    if options.px4_dir is None:
+        yield
+        return
+    from volery.mavlink.px4_processes import Px4Instances, find_px4
+
+    build = find_px4(options.px4_dir)
+    with Px4Instances(build, count, speed=options.speed):
+        typer.echo(f"started {build.binary}, instances 0 to {count - 1}", err=True)
+        yield

@@ -20,11 +20,13 @@ WHOLE_GROUPS = (0x7, 0x38, 0x1C0, 0x1A00, 0x400)
 class StandIn(threading.Thread):
     """Connects at once; answers `answers` times with `throttle`, armed from the `arm_at`-th on."""
 
-    def __init__(self, port, answers, *, throttle=0.0, arm_at=0, falls_silent=False):
+    def __init__(
+        self, port, answers, *, throttle=0.0, arm_at=0, falls_silent=False, in_lock_step=True
+    ):
         super().__init__(daemon=True)
         self.port, self.answers = port, answers
         self.throttle, self.arm_at = throttle, arm_at
-        self.falls_silent = falls_silent
+        self.falls_silent, self.in_lock_step = falls_silent, in_lock_step
         self.fault = None
         self.sensors, self.fixes, self.groups = [], [], 0
         self.done = threading.Event()
@@ -47,6 +49,7 @@ class StandIn(threading.Thread):
                 self._link.close()
         except Exception as fault:
             self.fault = fault
+            self._link.close()
         finally:
             self.done.set()
 
@@ -68,7 +71,7 @@ class StandIn(threading.Thread):
             self._check_fix(message)
 
     def _check(self, sensor):
-        if len(self.sensors) > 1:  # before the first answer it runs freely
+        if self.in_lock_step and len(self.sensors) > 1:  # before the first answer it runs freely
             assert sensor.time_usec - self.sensors[-1].time_usec == PERIOD_US, "a step is missing"
         fields = sensor.fields_updated
         for group in WHOLE_GROUPS:
@@ -97,6 +100,6 @@ class StandIn(threading.Thread):
         controls = [self.throttle if armed else 0.0] * 4 + [0.0] * 12
         time_us = self.sensors[-1].time_usec
         message = dialect().MAVLink_hil_actuator_controls_message(
-            time_us, controls, 128 if armed else 0, 1
+            time_us, controls, 128 if armed else 0, int(self.in_lock_step)
         )
         self._link.sendall(self._codec.pack(message, number % 256))
