@@ -1,5 +1,6 @@
 """The planning nodes on messages alone: what they answer to good and to bad ones."""
 
+import copy
 import json
 import math
 
@@ -64,7 +65,7 @@ class Glade:
         self.now = 0
         self.ranges = np.full(720, 12.0)
 
-    def go_on(self, seconds, odom=True, level=True, blind=False, height=HEIGHT):
+    def go_on(self, seconds, odom=True, level=True, blind=False, stuck=False, height=HEIGHT):
         for _ in range(round(seconds / 0.02)):
             self.now += 20 * MS
             self.bench.run_to(self.now)
@@ -77,6 +78,8 @@ class Glade:
             r = Range(header(self.now, ""), 0, 0.4, 0.2, 7.0, np.float32(height), 0.0)
             self.bench.send("/uav1/range", r)
             ranges = np.full(720, np.inf) if blind else self.ranges
+            if not stuck:
+                ranges = ranges + 1e-3 * math.sin(self.now * 1e-9)  # no two scans are alike
             if level:
                 self.bench.send("/uav1/laser/horizontal/scan", scan(self.now, ranges))
             down = height / max(math.sin(tilt), 1e-9) if tilt > 0.0 else 12.0
@@ -112,6 +115,7 @@ def test_it_plans_towards_the_path_several_times_a_second():
         ({"odom": False}, "no odometry"),
         ({"level": False}, "the level LIDAR is silent"),
         ({"blind": True}, "no LIDAR sees anything"),
+        ({"stuck": True}, "the level LIDAR repeats itself"),
     ],
 )
 def test_without_its_senses_it_stops_and_says_why(fault, problem):
@@ -392,13 +396,30 @@ def test_a_uav_that_gets_nowhere_is_blocked_in_the_end():
 
 @pytest.mark.parametrize("node_class", [LocalPlanner, GlobalPlanner, Exploring, TrajectoryFollower])
 def test_states_go_back(node_class):
+    """A twin that takes over a state says from then on what the first one says."""
+    said = []
     first, second = NodeBench(), NodeBench()
-    node = first.start(node_class, odometry="odom")
-    if node_class is Exploring:
-        first.send("/uav1/search_area", polygon((0, 0), (9, 0), (0, 9)))
-    first.send("/uav1/odom", odometry(5 * MS, (1.0, 2.0, 3.0)))
-    twin = second.start(node_class, odometry="odom")
-    twin.set_state(node.get_state())
-    assert repr(twin.get_state().keys()) == repr(node.get_state().keys())
-    first.run_to(S)
-    second.run_to(S)
+    node, twin = (bench.start(node_class, odometry="odom") for bench in (first, second))
+    grid = grid_values_message(np.zeros((50, 50), np.int8), 0.4, (-5.0, -5.0, 0.0), "map", 0)
+    for topic, message in (
+        ("odom", odometry(5 * MS, (1.0, 2.0, HEIGHT))),
+        ("search_area", polygon((0, 0), (9, 0), (0, 9))),
+        ("projected_map", grid),
+        ("planning/goal", pose(8.0, 0.0)),
+        ("planning/path", path((0.0, 0.0), (9.0, 0.0))),
+        ("planning/trajectory", plan_message(5 * MS)),
+        ("range", Range(header(0, ""), 0, 0.4, 0.2, 7.0, np.float32(HEIGHT), 0.0)),
+    ):
+        first.send(f"/uav1/{topic}", message)
+    twin.set_state(copy.deepcopy(node.get_state()))
+    for bench in (first, second):
+        heard = []
+        bench.graph.subscribe_all(lambda p, heard=heard: heard.append((p.topic, p.cdr)))
+        bench.graph.deliver()
+        heard.clear()  # what was latched before
+        for k in range(1, 80):
+            bench.run_to(k * 100 * MS)
+            bench.send("/uav1/odom", odometry(bench.now_ns, (1.0 + 0.01 * k, 2.0, HEIGHT)))
+        said.append([each for each in heard if each[0] != "/uav1/odom"])
+    assert said[0] == said[1]
+    assert len(said[0]) > 1
