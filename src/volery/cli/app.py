@@ -355,6 +355,22 @@ def recover(
 
 @app.command()
 @guarded
+def convert(
+    file: Annotated[Path, typer.Argument(help="A plain text log with one scan a line.")],
+    out: Annotated[Path, typer.Argument(help="The new log, .mcap or .bag.")],
+    layout: Annotated[
+        Path, typer.Option(help="A TOML file that says what stands in which column.")
+    ],
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the new log.")] = False,
+) -> None:
+    """Turn a scanner's text log into one that can be played, shown and mapped."""
+    from volery.cli.logs import convert_log
+
+    convert_log(file, out, layout, overwrite=overwrite)
+
+
+@app.command()
+@guarded
 def bench(
     name: Annotated[
         str, typer.Argument(help="lidar, fleet, dynamics, start, all of them, or peers.")

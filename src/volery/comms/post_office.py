@@ -113,6 +113,11 @@ class PostOffice:
             self._post(station, frame, now_ns)
         return station
 
+    def forget(self, address: int) -> None:
+        """A station that will not come again: what waits for it is done with."""
+        for frame in self.directory.remove(address):
+            self._settle(frame)
+
     def _post(self, station: Known, frame: Frame, now_ns: int) -> None:
         """Put one message into one mailbox."""
         delivery = self._link(now_ns, frame.source, station.address, frame)
