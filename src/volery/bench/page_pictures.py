@@ -145,8 +145,7 @@ def _pause_at(server: PageProcess, time_s: float) -> None:
 def _settle(page: Page) -> None:
     seen = page.evaluate("window.volery.frames")
     drawn = f"window.volery.frames >= {seen + _FRAMES}"
-    # a slow frame may have looked like silence
-    heard = "document.querySelector('.banner') === null"
+    heard = "document.querySelector('.banner') === null"  # a slow frame may look like silence
     wait_until(page, f"{drawn} && {heard}", _PATIENCE_MS / 1000.0)
 
 
