@@ -39,7 +39,7 @@ def announce_sensors(publisher: GraphPublisher, fitted: Sequence[Fitted]) -> Non
 
 
 START_POSE = "{start_pose}"
-"""A node's parameter with this value gets the place of take-off, which people measure and type in."""
+"""A node's parameter with this value gets the place of take-off, as people measure it."""
 
 
 def start_nodes(
