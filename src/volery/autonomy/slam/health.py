@@ -6,17 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from volery.autonomy.slam.tracker import Tracker
+from volery.autonomy.slam.tracker import MANY, MISFIT, Tracker
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back
 
 _SILENT_NS = NS_PER_S
 _LOST_NS = NS_PER_S
-_LEAST_SHARE, _LEAST_MET = 0.3, 3.0
-"""Share and number of uprights met again below which a sweep does not fit its map."""
-_MANY = 15.0
-"""Uprights seen from which on a bad share says something."""
 _FEW = 6.0
+"""Uprights met again by both LIDARs below which a place is too empty to hold on to."""
 _UNSURE_M = 1.0
 """Standard deviation of the place since which nobody knows where it is."""
 
@@ -61,10 +58,11 @@ class Health:
     def _is_lost(self, tracker: Tracker) -> bool:
         now = tracker.time_ns
         fresh = [m for m in tracker.match.values() if now - m.time_ns < NS_PER_S // 2]
-        met, seen = sum(m.met for m in fresh), sum(m.seen for m in fresh)
+        met = sum(m.met for m in fresh)
         few = met < _FEW and not tracker.is_standing
         self._scarce_ns = (self._scarce_ns or now) if few else None
-        unfit = seen >= _MANY and (met < _LEAST_MET or met < _LEAST_SHARE * seen)
+        seen, usual = sum(m.seen for m in fresh), sum(m.usual * m.seen for m in fresh)
+        unfit = seen >= MANY and met < MISFIT * usual
         self._misfit_ns = (self._misfit_ns or now) if unfit and tracker.has_flown else None
         sigma = float(np.sqrt(max(tracker.covariance[0, 0], tracker.covariance[1, 1])))
         long = self._misfit_ns is not None and now - self._misfit_ns > _LOST_NS

@@ -22,9 +22,9 @@ _PICTURE, _FINE_M, _COARSE_M = 400, 0.2, 0.4
 _ROUNDS = 8
 _BEFORE, _AROUND = 2, 3
 """Keyframes before the newest one, and on both sides of the older one, that are matched."""
-_LEAST_SHARE, _LEAST_MET = 0.5, 30.0
+_LEAST_SHARE, _LEAST_MET = 0.42, 30.0
 """Share and number of uprights that must be met again, each counted by how well."""
-_LEAST_SHARE_LOST = 0.6
+_LEAST_SHARE_LOST = 0.5
 _LEAST_INFORMATION = 2000.0
 """1/m^2, of the place in the weakest direction: what three trunks tell, seen ten times each."""
 _FLOOR = np.array([0.06, 0.06, 0.06, 0.004])

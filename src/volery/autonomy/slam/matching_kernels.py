@@ -29,6 +29,8 @@ _OVER_GROUND_M = 0.5
 """Nothing lower than this counts as upright: grass, feet of trees, errors of the ground's map."""
 _PER_M = 0.12
 """How much farther ground that nobody has seen may be off, per metre (modelling choice)."""
+_YOUNG = 25
+"""Cells of known ground around the vehicle below which it may begin away from them."""
 _GATE_M = 0.6
 _ROBUST = 2.0
 """Normalised distance at which a return counts half (Cauchy's weight)."""
@@ -52,13 +54,13 @@ def classify(
     keys: Keys,
     sums: Array,
     broad: Array,
-    is_broad: bool,
+    known_broad: int,
     kinds: Kinds,
     planes: Array,
 ) -> None:
     """Say of what returns (K, 3) are; `planes` (K, 3) gets height and slopes where it is ground.
 
-    `broad` (6,) is the plane of the ground around the vehicle, if `is_broad`.
+    `broad` (6,) is the plane of the ground around the vehicle, of `known_broad` cells.
     """
     turn = np.empty((3, 3))
     rotation_matrix(state, turn)
@@ -66,7 +68,7 @@ def classify(
     for n in range(points.shape[0]):
         x, y, z = _placed(state, turn, points[n])
         kinds[n] = UPRIGHT
-        if not is_broad:
+        if known_broad == 0:
             continue
         away = math.hypot(x - broad[3], y - broad[4])
         over = z - broad[5] - broad[1] * (x - broad[3]) - broad[2] * (y - broad[4])
@@ -75,7 +77,8 @@ def classify(
         known = plane_at(keys, sums, x, y, 2, broad[1:3], plane)
         if known == 0:
             if over < _OVER_GROUND_M + _PER_M * max(away - 4.0, 0.0):
-                kinds[n] = LEFT_OUT
+                is_first = known_broad < _YOUNG and away < 6.0 and abs(over) < 0.1 + _PER_M * away
+                kinds[n] = NEW_GROUND if is_first else LEFT_OUT
             continue
         off = z - plane[0]
         near = math.hypot(x - plane[3], y - plane[4])

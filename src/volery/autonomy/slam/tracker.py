@@ -52,6 +52,10 @@ _STILL_GYRO, _STILL_ACCEL = 0.02, 0.25
 """Most standard deviation of readings at rest, rad/s, m/s^2: four times the ADIS16448's."""
 _STANDING_M_S = 0.3
 _UNKNOWN_SPEED_M_S = 3.0
+MANY, MISFIT = 15.0, 0.6
+"""Returns from which on their share says something, and how far below the usual one is too low."""
+_USUAL_S = 10.0
+"""Time over which what is usual changes (modelling choices)."""
 
 
 class Sweep(NamedTuple):
@@ -94,7 +98,13 @@ class Match:
     seen: float = 0.0
     """Returns that should have met one."""
     ground: float = 0.0
-    returns: int = 0
+    usual: float = 0.0
+    """Share of the returns that lately met something again."""
+
+    @property
+    def fits(self) -> bool:
+        """Whether about as much is met again as is usual."""
+        return self.seen < MANY or self.met >= MISFIT * self.usual * self.seen
 
 
 class Maps:
@@ -178,6 +188,8 @@ class Tracker:
 
     def add_sweep(self, sweep: Sweep) -> None:
         """Take in a sweep as soon as the motion until its end is known."""
+        if not self.is_ready:
+            return
         self._waiting.append(sweep)
         while len(self._waiting) > 8:
             self._waiting.popleft()
@@ -292,7 +304,7 @@ class Tracker:
         maps, slope = self._maps, self._broad[1:3].copy()
         known = broad_plane(self.state, maps.ground_keys, maps.sums, 6, slope, self._broad)
         kinds, planes = np.empty(count, np.int8), np.zeros((count, 3))
-        self._classify(points, kinds, planes, known > 0)
+        self._classify(points, kinds, planes, known)
         told, information = np.zeros(4), np.zeros((6, 6))
         before = self.state.copy()
         update(
@@ -300,16 +312,26 @@ class Tracker:
             m.upright_sigma_m**2, m.ground_sigma_m**2, m.trust, m.rounds, information, told,
         )  # fmt: skip
         carry_along(self._states, before, self.state)
-        self.match[sweep.name] = Match(
-            self.time_ns, float(told[0]), float(told[1]), float(told[2]), count
-        )
+        self.match[sweep.name] = self._judged(sweep.name, told)
         is_drawn = self._draw(sweep, points, kinds)
         turned = rotations.rotate(self.state[Q : Q + 4], points) + self.state[:3]
         return Seen(turned, kinds, is_drawn)
 
-    def _classify(self, points: Array, kinds: NDArray[np.int8], planes: Array, known: bool) -> None:
+    def _classify(self, points: Array, kinds: NDArray[np.int8], planes: Array, known: int) -> None:
         maps = self._maps
         classify(points, self.state, maps.ground_keys, maps.sums, self._broad, known, kinds, planes)
+
+    def _judged(self, name: str, told: Array) -> Match:
+        """What a sweep said, beside what it usually says."""
+        before = self.match.get(name)
+        found = Match(self.time_ns, float(told[0]), float(told[1]), float(told[2]))
+        if before is not None:
+            found.usual = before.usual
+            if found.seen >= MANY and found.fits:
+                passed = (self.time_ns - before.time_ns) / NS_PER_S
+                share = found.met / found.seen
+                found.usual += min(passed / _USUAL_S, 1.0) * (share - found.usual)
+        return found
 
     def _draw(self, sweep: Sweep, points: Array, kinds: NDArray[np.int8]) -> bool:
         """Let returns enter the map; uprights only of sweeps from a new place, or after a while."""
@@ -321,6 +343,9 @@ class Tracker:
             or abs(math.remainder(yaw - last[2], math.tau)) > m.insert_rad
             or self.time_ns - last[0] > m.insert_s * NS_PER_S
         )
+        is_new = (
+            is_new and self.match[sweep.name].fits
+        )  # or a wrong place would become the right one
         if is_new:
             self._inserted[sweep.name] = (self.time_ns, self.state[:3].copy(), yaw)
         insert(

@@ -28,7 +28,7 @@ _PER_ROOT_M = np.array([0.015, 0.015, 0.015, 0.0006])
 """How odometry goes astray over sqrt(m): m and rad (measured on recorded flights)."""
 _APART_M = 40.0
 """Way flown between a keyframe and one that it may be matched with."""
-_NEAR_M = 5.0
+_NEAR_M = 12.0
 _ASTRAY = np.array([1000.0, 1000.0, 1000.0, 3.0])
 """Standard deviations of the step over which the motion was lost."""
 _LOST_TRIES = 4
