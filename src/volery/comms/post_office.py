@@ -126,11 +126,11 @@ class PostOffice:
             self._settle(frame)
             return
         posted, due_ns = station.mailbox.put(frame, now_ns, delivery.delay_ns)
+        for dropped in posted.dropped:
+            self._dispose(dropped, Reason.FULL, station.address)
         if not posted.kept:
             self._dispose(frame, Reason.FULL, station.address)
             return
-        if posted.dropped is not None:
-            self._dispose(posted.dropped, Reason.FULL, station.address)
         if station.connection is None:
             self.tally.counts["stored"] += 1
         elif due_ns <= now_ns:
