@@ -33,8 +33,6 @@ def scenario_of(*, blind):
     }
     sensors = [] if blind else [*sensors, {"kind": "imu"}, {"kind": "ground_truth"}]
     uav = {"type": "surveyor", "position_m": [60.0, 120.0], "placement": "nearest_free"}
-    if not blind:
-        uav["on_start"] = "take_off"
     types = {"surveyor": {**kind, "sensors": sensors, "nodes": [node]}}
     return parse_scenario({**FOREST, "types": types, "uavs": [uav]})
 
@@ -69,7 +67,9 @@ def test_it_follows_a_flight_and_says_the_same_on_its_log_in_another_process(tmp
         said, truth = listen(simulation), []
         simulation.graph.subscribe("/uav1/ground_truth/odom", truth.append)
         simulation.graph.subscribe_all(log.write)
-        simulation.run(SECONDS)
+        simulation.run(1.5)  # it wants half a second of standing still
+        simulation.uavs["uav1"].take_off()
+        simulation.run(SECONDS - 1.5)
     assert len(said["odom"]) > 300
     last, true = said["odom"][-1].message.pose.pose.position, truth[-1].message.pose.pose.position
     first = truth[0].message.pose.pose.position

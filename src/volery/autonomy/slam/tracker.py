@@ -51,6 +51,8 @@ _STILL = 100
 _STILL_GYRO, _STILL_ACCEL = 0.02, 0.25
 """Most standard deviation of readings at rest, rad/s, m/s^2: four times the ADIS16448's."""
 _STANDING_M_S = 0.3
+_LOW_M = 0.35
+"""What the sonar says at most where the vehicle stands."""
 _UNKNOWN_SPEED_M_S = 3.0
 MANY, MISFIT = 15.0, 0.6
 """Returns from which on their share says something, and how far below the usual one is too low."""
@@ -127,7 +129,7 @@ class Tracker:
     _STATE = (
         "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "standing_height",
         "travelled_m", "_times", "_states", "_imu", "_waiting", "_maps", "_inserted", "_still",
-        "_broad", "_near_ground_ns", "_standing_ns", "refused",
+        "_broad", "_near_ground_ns", "_standing_ns", "_is_high", "refused",
     )  # fmt: skip
 
     def __init__(
@@ -153,6 +155,8 @@ class Tracker:
         self._broad = np.zeros(6)
         self._near_ground_ns: int | None = None
         self._standing_ns = 0
+        self._is_high = False
+        """Whether the sonar says that it flies: a hover is as quiet as standing."""
         n = self.imu_noise
         self._noise = np.array(
             [n.gyro_rad_s_sqrt_hz, n.accel_m_s2_sqrt_hz, n.gyro_walk_rad_s2_sqrt_hz,
@@ -197,7 +201,8 @@ class Tracker:
 
     def add_range(self, time_ns: int, distance: float) -> None:
         """A reading of the sonar below, m; -inf: too near."""
-        if distance < 0.35:
+        self._is_high = distance >= _LOW_M
+        if distance < _LOW_M:
             self._near_ground_ns = time_ns
         elif math.isfinite(distance) and self.is_ready and self.has_flown:
             self._near_ground_ns = None
@@ -235,7 +240,7 @@ class Tracker:
         )
 
     def _try_to_begin(self, time_ns: int) -> None:
-        if time_ns % 5 or not self._is_quiet():
+        if self._is_high or not self._is_quiet():
             return
         up = np.mean([reading[1] for reading in self._still], axis=0)
         roll = math.atan2(up[1], up[2])
