@@ -1,9 +1,13 @@
 """UAVs that fly on what their own sensors tell them."""
 
+import copy
+
 import numpy as np
 import pytest
 
 from volery.core.errors import ScenarioError
+from volery.graph.messages import Odometry
+from volery.graph.zero import zero_message
 from volery.scenario.load import parse_scenario
 
 AIDS = [
@@ -129,3 +133,115 @@ def test_reset_with_another_seed_is_a_fresh_start(simulate, estimating_data):
         simulation.enable_digest()
         simulation.run(3.0)
     assert used.digest() == fresh.digest()
+
+
+SLIP_M = 3.0
+
+
+class Slam:
+    """In the place of a SLAM: the truth 25 times a second, 0.1 s late, and slipped aside."""
+
+    def __init__(self, simulation):
+        self._out = simulation.graph.advertise("/uav1/slam/odom", Odometry)
+        self._waiting = []
+        self.slip = 0.0
+        simulation.graph.subscribe("/uav1/ground_truth/odom", self._hear)
+
+    def _hear(self, published):
+        message = copy.deepcopy(published.message)
+        message.pose.pose.position.y += self.slip
+        self._waiting.append(message)
+        if len(self._waiting) > 5:
+            late = self._waiting.pop(0)
+            if late.header.stamp.nanosec % 40_000_000 == 0:
+                self._out.publish(late)
+
+
+@pytest.fixture
+def slam_data(estimating_data):
+    estimating_data["world"]["gnss_denied"] = True
+    estimating_data["types"]["f450"]["sensors"] = [
+        {"kind": "imu"},
+        {"kind": "estimate", "pose": {"topic": "slam/odom"}},
+        {"kind": "ground_truth"},
+    ]
+    return estimating_data
+
+
+def hovers_at_ten_metres(simulation):
+    uav = simulation.uavs["uav1"]
+    uav.take_off(3.0)
+    simulation.run(6.0)
+    uav.go_to([10.0, 0.0, 3.0])
+    simulation.run(10.0)
+    return uav
+
+
+def test_it_flies_where_a_slam_says_that_it_is(simulate, slam_data):
+    simulation = simulate(slam_data)
+    slam = Slam(simulation)
+    uav = hovers_at_ten_metres(simulation)
+    np.testing.assert_allclose(uav.position_map, [10.0, 0.0, 3.0], atol=0.35)
+    slam.slip = SLIP_M  # believed after a second
+    simulation.run(10.0)
+    np.testing.assert_allclose(uav.position_map, [10.0, -SLIP_M, 3.0], atol=0.5)
+
+
+def test_without_its_slam_it_strays(simulate, slam_data):
+    simulation = simulate(slam_data)
+    uav = hovers_at_ten_metres(simulation)
+    simulation.run(15.0)
+    assert np.linalg.norm(uav.position_map - [10.0, 0.0, 3.0]) > 1.0
+
+
+def odometry(**changed):
+    """One second old, somewhere else; `changed`: seconds, x, w."""
+    message = zero_message("nav_msgs/msg/Odometry")
+    message.header.stamp.sec = changed.get("seconds", 1)
+    message.pose.pose.position.x = changed.get("x", 50.0)
+    message.pose.pose.orientation.w = changed.get("w", 1.0)
+    return message
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize("changed", [{"x": NAN}, {"w": NAN}, {"w": 0.0}, {"seconds": 90}])
+def test_poses_that_cannot_be_are_left_out(simulate, slam_data, changed):
+    digests = []
+    for message in (None, odometry(**changed)):
+        simulation = simulate(slam_data)
+        publisher = simulation.graph.advertise("/uav1/slam/odom", Odometry)
+        simulation.run(1.02)
+        if message is not None:
+            publisher.publish(message)
+        simulation.run(0.5)
+        digests.append(simulation.uavs["uav1"].position_map.tobytes() + odometry_of(simulation))
+    assert digests[0] == digests[1]
+
+
+def test_what_it_took_from_its_slam_is_kept_in_a_snapshot(simulate, slam_data):
+    simulation = simulate(slam_data)
+    publisher = simulation.graph.advertise("/uav1/slam/odom", Odometry)
+    simulation.run(1.02)
+    publisher.publish(odometry(x=0.3))
+    simulation.run(0.05)
+    kept = simulation.snapshot()
+
+    def on():
+        simulation.run(0.02)
+        publisher.publish(odometry(x=0.3))  # is not newer
+        simulation.run(0.5)
+        return odometry_of(simulation)
+
+    first = on()
+    simulation.restore(kept)
+    assert on() == first
+
+
+def odometry_of(simulation):
+    heard = []
+    topic = simulation.graph.subscribe("/uav1/odom", lambda one: heard.append(one.cdr))
+    simulation.run(0.1)
+    topic.cancel()
+    return heard[-1]

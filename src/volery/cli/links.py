@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
 
 DEFAULT_VIA = "rosbridge://127.0.0.1:9090"
-WAYS = "rosbridge://HOST:PORT, ros-tcp://HOST:PORT, ros1, ros2 or ros2-zenoh"
+WAYS = "rosbridge://HOST:PORT, ros-tcp://HOST:PORT, ros1, ros2, ros2-zenoh or rclpy"
+ROS2_WAYS = ("ros2", "ros2-zenoh", "rclpy")
 _ROS_TCP_PORT = 10000
 
 
@@ -36,7 +37,7 @@ def open_link(via: str, name: str) -> Link:
         from volery.bridges.ros1.client import Ros1Client
 
         return Ros1Client(f"http://{rest}" if rest else None, _own_name(name))
-    if scheme in ("ros2", "ros2-zenoh"):
+    if scheme in ROS2_WAYS:
         from volery.bridges.ros2.client import Ros2Client
 
         return Ros2Client(_ros2_terms(via), f"/{_own_name(name)}")
@@ -44,22 +45,23 @@ def open_link(via: str, name: str) -> Link:
 
 
 def _ros2_terms(via: str) -> Ros2Terms:
-    """Of `ros2://DOMAIN?interface=NAME` or `ros2-zenoh://HOST:PORT?domain=DOMAIN`."""
+    """Of `ros2://DOMAIN?interface=NAME`, `ros2-zenoh://HOST:PORT?domain=DOMAIN`, `rclpy://DOMAIN`."""
     from volery.bridges.ros2.environment import Ros2Terms
 
     parts = urlsplit(via)
     asked = parse_qs(parts.query, keep_blank_values=True)
-    zenoh = via.startswith("ros2-zenoh")
+    kind = via.partition("://")[0]
+    zenoh = kind == "ros2-zenoh"
     domain = asked.pop("domain", [""])[-1] if zenoh else parts.netloc
-    interfaces = () if zenoh else tuple(asked.pop("interface", ()))
-    if asked or parts.path.strip("/") not in ("", "ros2", "ros2-zenoh") or parts.fragment:
+    interfaces = tuple(asked.pop("interface", ())) if kind == "ros2" else ()
+    if asked or parts.path.strip("/") not in ("", kind) or parts.fragment:
         raise _no_way(via)
     if domain and not domain.isdecimal():
         raise _no_way(via)
     domain_id = int(domain) if domain else None
     if zenoh:
         return Ros2Terms("zenoh", domain_id, router=parts.netloc)
-    return Ros2Terms("dds", domain_id, interfaces)
+    return Ros2Terms("rclpy" if kind == "rclpy" else "dds", domain_id, interfaces)
 
 
 def _address(via: str, port: int) -> tuple[str, int]:

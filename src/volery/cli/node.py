@@ -11,7 +11,7 @@ from typing import Any
 
 import typer
 
-from volery.cli.links import DEFAULT_VIA, open_link
+from volery.cli.links import DEFAULT_VIA, ROS2_WAYS, open_link
 from volery.cli.yaml_form import from_yaml
 from volery.core.errors import BridgeError
 
@@ -51,7 +51,7 @@ def run_node(options: NodeOptions) -> None:
         raise BridgeError(f"a node is named module:Class, not '{options.node}'") from None
     name = options.node.rpartition(":")[2]
     via = options.via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
-    if options.lock_step_s is not None and via.startswith("ros2"):
+    if options.lock_step_s is not None and via.partition("://")[0] in ROS2_WAYS:
         raise BridgeError(
             "--lock-step: ROS 2 keeps no order between topics; use rosbridge or ros-tcp"
         )

@@ -51,6 +51,19 @@ class EstimationSetup:
     """How near the truth estimates begin."""
 
 
+@dataclass(frozen=True)
+class Pose:
+    """Of a body in the map at `stamp_ns`, as some node tells it."""
+
+    stamp_ns: int
+    position_map: Array
+    """(3,) m."""
+    attitude: Array
+    """(4,) x y z w."""
+    sigma_m: float
+    sigma_rad: float
+
+
 class Estimation:
     """The estimators of all UAVs that have one."""
 
@@ -59,6 +72,7 @@ class Estimation:
         self.setup = setup
         self._fleet = fleet
         self._known: dict[int, tuple[tuple[SensorId, ...], Rows, Rows]] = {}
+        self._pose_ns = np.full(len(estimator), _NEVER_NS)
 
     @property
     def gyro_variance(self) -> Array:
@@ -104,6 +118,21 @@ class Estimation:
                 self.setup.ground_height_m,
             )
 
+    def take_pose(self, uav: int, pose: Pose, *, gap_ns: int) -> None:
+        """Feed a pose in the map, such as a SLAM's, to the estimator of a UAV, a row of the fleet.
+
+        A pose that is not at least `gap_ns` newer than the last one taken is left out, and so are
+        numbers that are not finite.
+        """
+        rows = self.rows_of(np.array([uav]))
+        if pose.stamp_ns - self._pose_ns[rows[0]] < gap_ns:
+            return
+        self._pose_ns[rows[0]] = pose.stamp_ns
+        variances = np.repeat([pose.sigma_m**2, pose.sigma_rad**2], 3)
+        self.estimator.fuse_pose(
+            rows, pose.stamp_ns, pose.position_map[None], pose.attitude[None], variances
+        )
+
     def restart(self, keys: Mapping[int, np.uint64]) -> None:
         """Begin anew for UAVs that have begun anew, with a random stream for each of their rows."""
         rows = np.array([e for e, uav in enumerate(self.setup.uavs) if int(uav) in keys], np.int64)
@@ -126,6 +155,7 @@ class Estimation:
             attitude=attitude,
             stamp_ns=before_the_first_reading,
         )
+        self._pose_ns[rows] = _NEVER_NS
         self._tell_fleet(rows)
 
     def continue_from(self, other: Estimation, kept: Sequence[tuple[int, int]]) -> None:
@@ -138,14 +168,17 @@ class Estimation:
             if was.get(int(uav)) in theirs
         ]
         self.estimator.continue_from(other.estimator, pairs)
+        for own, row in pairs:
+            self._pose_ns[own] = other._pose_ns[row]
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return self.estimator.get_state()
+        return {**self.estimator.get_state(), "pose_ns": self._pose_ns.copy()}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state; the fleet keeps the errors that belong to it."""
         self.estimator.set_state(state)
+        self._pose_ns[:] = state["pose_ns"]
 
     def _take_fixes(self, samples: GnssReadings, heard: Rows, rows: Rows) -> None:
         drift = self.setup.gnss_drift_variance[rows]
@@ -193,6 +226,8 @@ class Estimation:
         table = np.array(pairs, dtype=np.int64).reshape(-1, 2)
         return table[:, 0], table[:, 1]
 
+
+_NEVER_NS = -(10**18)
 
 _LEAST_VARIANCE = 1e-4
 """m^2 and (m/s)^2: no measurement is taken for better than a centimetre."""

@@ -23,11 +23,12 @@ from volery.runtime.graph_building import announce_sensors, start_nodes, start_s
 from volery.runtime.message_loading import learn_messages
 from volery.runtime.outlet import Outlet
 from volery.runtime.placement import Start
+from volery.runtime.pose_aids import open_pose_aids
 from volery.runtime.sensor_fitting import Fitted
 from volery.runtime.services.offering import Close
 from volery.runtime.services.uav_services import offer_uav_services
 from volery.runtime.uav import Uav
-from volery.scenario.schema import Scenario
+from volery.scenario.schema import Scenario, Sensor
 
 _ROOT = "/"
 """Namespace of the nodes of the whole system."""
@@ -153,9 +154,13 @@ class Crew:
             *open_commands(self.graph, uav, self._now_ns),
             *offer_uav_services(self.graph, uav),
             *self.flight_states.open(uav),
+            *open_pose_aids(self.graph, self.engine, start.name, self._sensors_of(start)),
         ]
         if self.radio is not None and self.scenario.types[start.type_name].radio:
             closes.append(self.radio.join(start.name))
+
+    def _sensors_of(self, start: Start) -> Sequence[Sensor]:
+        return self.scenario.types[start.type_name].sensors
 
     def _dismiss(self, name: str) -> None:
         own = [node for node in self.nodes if node.get_namespace() == f"/{name}"]

@@ -167,6 +167,21 @@ class OdometrySensor(SensorData):
     rate_hz: Rate = 50.0
 
 
+class PoseAid(Data):
+    """Odometry of a node, such as a SLAM's, that aids an estimator; taken for one in the map.
+
+    What such odometry states is how far it has drifted from the map. The UAV flies in the frame
+    of the odometry, where its errors are those of one pose beside the next: `sigma_m`, `sigma_deg`.
+    """
+
+    topic: Topic
+    """nav_msgs/Odometry, below the UAV's name."""
+    sigma_m: Annotated[float, Field(gt=0.0, le=100.0)] = 0.05
+    sigma_deg: Annotated[float, Field(gt=0.0, le=180.0)] = 1.0
+    rate_hz: Rate = 10.0
+    """The most poses a second that are taken: closer ones repeat each other's errors."""
+
+
 class EstimateSensor(SensorData):
     """What the UAV's estimator makes of its other sensors, as odometry; it needs an IMU."""
 
@@ -175,6 +190,7 @@ class EstimateSensor(SensorData):
     rate_hz: Rate = 50.0
     flies: bool = True
     """Whether the UAV's controllers fly on the estimate; false: on the truth."""
+    pose: PoseAid | None = None
 
 
 class GroundTruthSensor(SensorData):

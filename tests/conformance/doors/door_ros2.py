@@ -126,6 +126,8 @@ class PeerClient(Client):
     def reset(self):
         self._process.kill()
         self._end()
+        # Until its lease is over the door takes it for a listener, and who comes back for heard.
+        until(lambda: not any(map(self._bench.is_heard, self._kinds)))
 
     def close(self):
         if self._process.poll() is None:

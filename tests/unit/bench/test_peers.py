@@ -84,6 +84,7 @@ def measured_with(script: str, folder: Path) -> Measured:
 # ------------------------------------------------------------------------------- environments
 
 
+@pytest.mark.slow  # pip makes an environment
 def test_folder_that_does_not_exist_cannot_be_installed(tmp_path: Path) -> None:
     missing = tmp_path / "no_such_package"
     with pytest.raises(PeerError, match=r"cannot be installed: .*no_such_package"):
@@ -92,6 +93,7 @@ def test_folder_that_does_not_exist_cannot_be_installed(tmp_path: Path) -> None:
     assert left == []
 
 
+@pytest.mark.slow  # pip makes an environment
 def test_environment_is_made_once_and_used_again(tmp_path: Path) -> None:
     nothing = peer(requirements=("pip",))  # in every environment from the start
     python = environment(nothing, tmp_path)

@@ -185,6 +185,32 @@ def test_a_slam_pose_replaces_gnss():
     assert estimator.covariance(rows)[0, 2, 2] < 0.01
 
 
+def hover_by_poses(estimator, first, last, *, place=(0.0, 0.0, 0.0), yaw=0.0):
+    attitude = rotations.from_rpy([0.0], [0.0], [yaw])
+    variances = [2.5e-3] * 3 + [3e-4] * 3
+    for k in range(first, last + 1):
+        if k % 20 == 0:
+            estimator.fuse_pose([0], k * STEP, [place], attitude, variances)
+        estimator.predict([0], k * STEP, np.zeros((1, 3)), UP[None])
+
+
+def test_a_slam_that_found_itself_elsewhere_is_believed_when_it_insists():
+    estimator, place, yaw = still(1, velocity=[[0.5, 0.0, 0.0]]), (4.0, -3.0, 0.0), 0.6
+    hover_by_poses(estimator, 0, 1, place=(0.0, 0.0, 0.0))
+    hover_by_poses(estimator, 2, 200, place=place, yaw=yaw)  # not for a second yet
+    gate = estimator.gate(Aid.POSE_POSITION)
+    assert gate.rejected[0] == 8
+    assert np.linalg.norm(estimator.state.position_map[0]) < 0.6
+    hover_by_poses(estimator, 201, 275, place=place, yaw=yaw)
+    assert estimator.restarts[0] == 1
+    assert gate.rejected[0] == 12
+    np.testing.assert_allclose(estimator.state.position_map[0], place, atol=0.2)
+    assert rotations.yaw_of(estimator.state.attitude[0]) == pytest.approx(yaw, abs=0.02)
+    course = [0.5 * np.cos(yaw), 0.5 * np.sin(yaw), 0.0]
+    np.testing.assert_allclose(estimator.state.velocity_map[0], course, atol=0.15)
+    assert np.linalg.eigvalsh(estimator.covariance([0])[0]).min() > 0.0
+
+
 def test_standing_still_and_ranges_hold_a_uav_without_gnss():
     estimator = still(1, position=[[0.0, 0.0, 0.4]])
     for k in range(2000):

@@ -10,18 +10,26 @@ from typing import Literal, NamedTuple
 from volery.bridges.ros2.middleware import Participant
 from volery.core.errors import BridgeError
 
-Kind = Literal["dds", "zenoh"]
+Kind = Literal["dds", "zenoh", "rclpy"]
 
 MOST_DOMAIN = 232
 """Beyond, the ports of DDS do not fit into 16 bits (RTPS 2.5, 9.6.2.3)."""
 
-_PACKAGES = {"dds": "cyclonedds", "zenoh": "zenoh"}
+_PACKAGES = {"dds": "cyclonedds", "zenoh": "zenoh", "rclpy": "rclpy"}
+_INSTALL = 'use pip install "volery[ros2]"'
+_MISSING = {
+    "dds": f"ROS 2 over dds needs the package cyclonedds, which is not installed; {_INSTALL}",
+    "zenoh": f"ROS 2 over zenoh needs the package zenoh, which is not installed; {_INSTALL}",
+    "rclpy": "there is no rclpy: source a ROS 2 (. /opt/ros/jazzy/setup.sh) that is built for this "
+    "version of Python; without one use ros2 in place of rclpy",
+}
 
 
 class Ros2Terms(NamedTuple):
     """Where to find the ROS 2 graph."""
 
     middleware: Kind = "dds"
+    """`rclpy`: whatever the sourced ROS 2 uses; for nodes, not for the door."""
     domain_id: int | None = None
     """None: that of the variable ROS_DOMAIN_ID."""
     interfaces: tuple[str, ...] = ()
@@ -34,18 +42,27 @@ def join_ros2(terms: Ros2Terms) -> Participant:
     """Take part in a ROS 2 graph. `BridgeError` tells what is missing."""
     package = _PACKAGES[terms.middleware]
     if importlib.util.find_spec(package) is None:
-        raise BridgeError(
-            f"ROS 2 over {terms.middleware} needs the package {package}, which is not installed; "
-            'use pip install "volery[ros2]"'
-        )
+        raise BridgeError(_MISSING[terms.middleware])
     domain_id = domain_of(terms.domain_id)
     if terms.middleware == "dds":
         from volery.bridges.ros2.dds.participant import DdsParticipant
 
         return DdsParticipant(domain_id, _checked(terms.interfaces))
+    if terms.middleware == "rclpy":
+        return _sourced(domain_id)
     from volery.bridges.ros2.zenoh.participant import ZenohParticipant
 
     return ZenohParticipant(domain_id, terms.router)
+
+
+def _sourced(domain_id: int) -> Participant:
+    """Take part with the ROS 2 that is sourced. `BridgeError` where it does not work."""
+    try:
+        from volery.bridges.ros2.rcl.participant import RclParticipant
+
+        return RclParticipant(domain_id)
+    except (ImportError, RuntimeError) as error:  # of another Python, or an rmw that is not there
+        raise BridgeError(f"rclpy does not start: {error}") from None
 
 
 def domain_of(given: int | None) -> int:

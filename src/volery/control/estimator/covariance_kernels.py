@@ -223,6 +223,16 @@ def turn_errors(P: Array, x: float, y: float, z: float) -> None:
 
 
 @part_kernel
+def forget(P: Array, first: int, variance: Array) -> None:
+    """Covariance when three states from `first` on are taken anew, with variance (3,)."""
+    for k in range(first, first + 3):
+        for j in range(STATES):
+            P[k * STATES + j] = 0.0
+            P[j * STATES + k] = 0.0
+        P[k * (STATES + 1)] = variance[k - first]
+
+
+@part_kernel
 def forget_place(P: Array, variance: Array) -> None:
     """Covariance when position and velocity are taken anew from a GNSS fix; variance (6,).
 

@@ -270,7 +270,7 @@ class Estimator:
 
     @property
     def restarts(self) -> NDArray[np.int64]:
-        """(N,) how often position and velocity were restarted from a GNSS fix."""
+        """(N,) how often the place was taken anew, from a GNSS fix or a pose."""
         return np.asarray(self._filters["restarts"])
 
     @property

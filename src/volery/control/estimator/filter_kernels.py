@@ -20,6 +20,7 @@ from volery.control.estimator.covariance_kernels import (
     carry,
     correct,
     decay,
+    forget,
     forget_place,
     normalised_innovation,
     turn_errors,
@@ -33,8 +34,11 @@ from volery.control.estimator.records import (
     GYRO_BIAS,
     OFFSETS,
     PARTS,
+    POSE,
+    POSITION,
     PRESSURE_OFFSET,
     ROTATION,
+    STATES,
     VELOCITY,
 )
 from volery.core.rotation_kernels import rotate_vector
@@ -161,6 +165,7 @@ def _catch_up(state: Any, tuning: Any, work: Any) -> None:
 @part_kernel
 def fuse(state: Any, tuning: Any, measured: Any, work: Any) -> None:
     """Correct the state at the horizon by a measurement, each part if it passes its gate."""
+    missed = False
     for part in range(PARTS):
         count = linearise(state, tuning, measured, part, work)
         if count == 0:
@@ -177,19 +182,25 @@ def fuse(state: Any, tuning: Any, measured: Any, work: Any) -> None:
                 state.rejected_since_ns = -1
         else:
             state.rejected[aid] += 1
-            if is_fix and _is_lost(state, tuning, measured):
+            missed = True
+            if is_fix and _is_lost(state, tuning.restart_ns, measured):
                 _restart(state, measured, work.residual)
+    if measured.kind == POSE and not missed:
+        state.rejected_since_ns = -1
+    elif measured.kind == POSE and _is_lost(state, tuning.pose_restart_ns, measured):
+        _restart_from_pose(state, tuning, measured, work)
 
 
 @inner_kernel
-def _is_lost(state: Any, tuning: Any, measured: Any) -> bool:
+def _is_lost(state: Any, patience_ns: int, measured: Any) -> bool:
+    """Whether this place, rejected as those before it, tells enough to begin from it."""
     if state.rejected_since_ns < 0:
         state.rejected_since_ns = measured.stamp_ns
-    has_velocity = True
+    complete = True
     for k in range(6):
-        has_velocity = has_velocity and measured.variance[k] < np.inf
-    lost: bool = measured.stamp_ns - state.rejected_since_ns > tuning.restart_ns
-    return lost and has_velocity
+        complete = complete and (measured.kind == POSE or measured.variance[k] < np.inf)
+    lost: bool = measured.stamp_ns - state.rejected_since_ns > patience_ns
+    return lost and complete
 
 
 @inner_kernel
@@ -199,6 +210,31 @@ def _restart(state: Any, measured: Any, residual: Array) -> None:
         state.position[k] += residual[k]
         state.velocity[k] = measured.value[3 + k]
     forget_place(state.covariance, measured.variance)
+    state.rejected_since_ns = -1
+    state.restarts += 1
+
+
+@part_kernel
+def _restart_from_pose(state: Any, tuning: Any, measured: Any, work: Any) -> None:
+    """Take place and attitude anew; the velocity, as seen from the vehicle, goes on."""
+    if linearise(state, tuning, measured, 1, work) == 3:
+        for k in range(STATES):
+            work.error[k] = 0.0
+        for k in range(3):
+            work.error[ROTATION + k] = work.residual[k]
+        x, y, z, w = four(state.rotation)
+        vx, vy, vz = three(state.velocity)
+        vx, vy, vz = rotate_vector(-x, -y, -z, w, vx, vy, vz)
+        take_over(state, work.error)
+        x, y, z, w = four(state.rotation)
+        state.velocity[0], state.velocity[1], state.velocity[2] = rotate_vector(
+            x, y, z, w, vx, vy, vz
+        )
+        forget(state.covariance, ROTATION, work.variance)
+    if linearise(state, tuning, measured, 0, work) == 3:
+        for k in range(3):
+            state.position[k] += work.residual[k]
+        forget(state.covariance, POSITION, work.variance)
     state.rejected_since_ns = -1
     state.restarts += 1
 

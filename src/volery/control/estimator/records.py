@@ -92,7 +92,7 @@ FILTER = np.dtype(
         ("waiting_readings", "i8"),
         ("first_measurement", "i8"),
         ("waiting_measurements", "i8"),
-        ("rejected_since_ns", "i8"),  # GNSS positions; -1: the last one was accepted
+        ("rejected_since_ns", "i8"),  # fixes, poses; -1: the last one was accepted
         ("restarts", "i8"),
         ("dropped", "i8"),
         ("innovation", "f8", AIDS),  # normalised, squared, the latest
@@ -126,6 +126,7 @@ TUNING = np.dtype(
         ("horizon_ns", "i8"),
         ("lateness_ns", "i8"),
         ("restart_ns", "i8"),
+        ("pose_restart_ns", "i8"),
         ("gyro_noise", "f8"),  # spectral densities: rad^2/s, m^2/s^3
         ("accel_noise", "f8"),
         ("bias_rate", "f8", 2),  # 1/s, gyro and accelerometer
@@ -160,6 +161,7 @@ def tuning_of(settings: EstimatorSettings, mounting: Mounting) -> NDArray[np.voi
     row["horizon_ns"] = round(settings.horizon_s * 1e9)
     row["lateness_ns"] = round(settings.lateness_s * 1e9)
     row["restart_ns"] = round(settings.restart_after_s * 1e9)
+    row["pose_restart_ns"] = round(settings.pose_restart_after_s * 1e9)
     row["gyro_noise"] = settings.gyro_noise_density_rad_s_sqrt_hz**2
     row["accel_noise"] = settings.accel_noise_density_m_s2_sqrt_hz**2
     correlation = np.array([settings.gyro_bias_correlation_s, settings.accel_bias_correlation_s])

@@ -71,6 +71,9 @@ class EstimatorSettings(BaseModel):
     restart_after_s: PositiveFloat = 7.0
     """After rejecting all GNSS positions for this long the filter believes the receiver again and
     restarts position and velocity from a fix that tells both (PX4's EKF2 resets after 7 s)."""
+    pose_restart_after_s: PositiveFloat = 1.0
+    """The same of poses: a SLAM that has found itself elsewhere insists. It is soon, because what
+    would pass the gate later on, as uncertainty grows, would be taken for a drift in velocity."""
 
 
 @dataclass(frozen=True)
