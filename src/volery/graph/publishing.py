@@ -99,8 +99,13 @@ class GraphPublisher:
             BatteryReadings: self._batteries,
         }
 
-    def announce(self, sensor: SensorId, kind: type[Any], mount: Mount) -> None:
-        """Advertise a sensor's topic and place its frame."""
+    def announce(
+        self, sensor: SensorId, kind: type[Any], mount: Mount, *, in_map: bool = True
+    ) -> None:
+        """Advertise a sensor's topic and place its frame.
+
+        in_map: the frame of odometry is the map; else a node tells on `/tf` where it lies there.
+        """
         self._static_sent = False
         self._mounts[sensor.path] = mount
         base = f"{sensor.uav_name}/base_link"
@@ -108,7 +113,7 @@ class GraphPublisher:
             self._advertise(f"/{sensor.uav_name}/joint_states", JointState)
         elif kind is OdometryReadings:
             self._advertise(_odometry_topic(sensor), Odometry)
-            if sensor.name == "odom":
+            if sensor.name == "odom" and in_map:
                 self._static.append(_fixed_frame("map", f"{sensor.uav_name}/odom"))
         elif kind is BatteryReadings:
             self._advertise(f"/{sensor.uav_name}/{sensor.name}", BatteryState)

@@ -20,7 +20,7 @@ from volery.runtime.placement import Start
 from volery.runtime.sensor_fitting import RESULT_OF, Fitted
 from volery.runtime.uav import Uav
 from volery.scenario.camera import CameraSensor
-from volery.scenario.schema import NodeEntry, Scenario
+from volery.scenario.schema import EstimateSensor, NodeEntry, Scenario
 from volery.sensors.samples import JointAngles
 
 
@@ -33,7 +33,9 @@ def announce_sensors(publisher: GraphPublisher, fitted: Sequence[Fitted]) -> Non
             camera = Camera(sensor.id, sensor.spec, sensor.left)
             publisher.announce_camera(camera, sensor.mount)
         else:
-            publisher.announce(sensor.id, RESULT_OF[sensor.spec.kind], sensor.mount)
+            told_by_a_node = isinstance(sensor.spec, EstimateSensor) and sensor.spec.pose is not None
+            kind = RESULT_OF[sensor.spec.kind]
+            publisher.announce(sensor.id, kind, sensor.mount, in_map=not told_by_a_node)
         if sensor.mount.nods:
             publisher.announce(sensor.id, JointAngles, sensor.mount)
 
