@@ -2,14 +2,43 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from volery.autonomy.task_manager import TaskManager
 from volery.engine.events import EventKind
+from volery.graph.node import Node
 from volery.runtime import Simulation
 from volery.scenario import overrides
 from volery.scenario.load import load_scenario
+
+
+def test_no_node_hears_the_truth_nor_another_uav_but_by_radio(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """All that nodes of the whole scenario subscribe to or ask services of is their own UAV's."""
+    asked: list[tuple[str, str]] = []
+
+    def noting(method: Any) -> Any:
+        def note(self: Node, kind: Any, name: str, *rest: Any, **options: Any) -> Any:
+            asked.append((self.get_namespace(), self.resolve(name)))
+            return method(self, kind, name, *rest, **options)
+
+        return note
+
+    for method in ("create_subscription", "create_client"):
+        monkeypatch.setattr(Node, method, noting(getattr(Node, method)))
+    scenario = load_scenario("forest_search")
+    with Simulation(scenario) as simulation:
+        truths = [t for t in simulation.graph.topics() if "ground_truth" in t.name]
+        assert len(truths) >= len(simulation.uavs)
+        assert [t.name for t in truths if t.subscribers] == []
+        assert len(asked) > 20 * len(simulation.uavs)
+    for namespace, name in asked:
+        assert name == "/tf" or name.startswith(f"{namespace}/")
+        assert "ground_truth" not in name
 
 
 @pytest.mark.slow

@@ -162,7 +162,8 @@ def test_joining_needs_a_way_to_answer():
         from volery.graph.messages import message_type
         from volery.graph.reply import Reply
 
-        request = message_type("volery_interfaces/srv/JoinLockStep_Request")("mute", 0.001, 1.0)
+        kind = message_type("volery_interfaces/srv/JoinLockStep_Request")
+        request = kind("mute", 0.001, 1.0, False, False)
         answers = []
         session.call("/volery/join_lock_step", request, Reply(answers.append, answers.append))
         simulation.step()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from page_browsing import keep_picture
-from scene_reading import eye, on_screen, pixels, wait_for_frames, wait_for_picture, wait_until
+from scene_reading import on_screen, pixels, wait_for_frames, wait_for_picture, wait_until
 from truth import put
 
 pytestmark = pytest.mark.slow
@@ -45,19 +45,6 @@ def test_fog_takes_far_contrast_before_near_one(browsing, served):
     assert far < 0.25 * near  # ... and the horizon is not
 
 
-def test_night_is_dark(browsing, served):
-    page = browsing.open(served.url + LOW_OVER_GROUND, viewport={"width": 640, "height": 360})
-    wait_for_picture(page)
-    wait_for_frames(page)
-    set_weather(served, hour_of_day=12.0)
-    wait_for_frames(page, 12)
-    noon = pixels(page).mean()
-    set_weather(served, hour_of_day=24.0)
-    wait_until(page, lambda page: pixels(page).mean() < 0.6 * noon)
-    keep_picture(page, "night")
-    set_weather(served, hour_of_day=12.0)
-
-
 def test_a_moved_uav_moves_on_the_screen(browsing, served):
     page = browsing.open(
         served.url + "#view=fly&camera=-12_0_4_0_-0.1_0&uav=uav1",
@@ -75,27 +62,3 @@ def test_a_moved_uav_moves_on_the_screen(browsing, served):
 
 def placed(seen, y):
     return seen if abs(seen["position"][1] - y) < 0.6 else None
-
-
-def test_number_keys_and_the_menu_choose_views(browsing, served):
-    page = browsing.open(served.url, viewport={"width": 640, "height": 360})
-    wait_for_picture(page)
-    page.keyboard.press("4")
-    page.get_by_role("button", name="Chase", pressed=True).wait_for()
-    page.get_by_role("button", name="Walk", exact=True).click()
-    wait_until(
-        page,
-        lambda page: abs(eye(page)[2] - page.evaluate("window.volery.groundAt(0, 0)") - 1.7) < 0.05,
-    )
-    assert "view=walk" in page.url
-
-
-def test_a_link_shows_the_same_picture(browsing, served):
-    first = browsing.open(served.url + "#view=fly&camera=-9_4_6_-0.5_-0.3_0")
-    wait_for_picture(first)
-    wait_for_frames(first, 3)
-    second = browsing.open(first.url)
-    wait_for_picture(second)
-    wait_for_frames(second, 3)
-    np.testing.assert_allclose(eye(second), eye(first), atol=0.02)
-    np.testing.assert_allclose(eye(first), [-9.0, 4.0, 6.0], atol=0.02)

@@ -1,7 +1,5 @@
 """What the page steers: each control is worked, and its effect looked up on the graph."""
 
-import re
-
 import pytest
 import roslibpy
 from page_browsing import keep_picture
@@ -136,6 +134,34 @@ def test_flight_by_keyboard(page, served):
     assert ahead["position"]["x"] > flying["position"]["x"]
 
 
+SLOW_FRAMES = """
+() => {
+  const work = (ms) => { for (const from = performance.now(); performance.now() - from < ms; ); };
+  window.slow = setInterval(() => work(700), 710);
+  window.hang = (ms) => { setTimeout(() => work(ms), 0); };
+}
+"""
+
+
+def test_flight_goes_on_while_frames_are_slow_and_ends_when_the_page_hangs(page, served):
+    page.get_by_role("option", name="uav2").click()
+    vehicle(served, "uav2", lambda uav: uav["airborne"])
+    page.keyboard.press("c")
+    page.get_by_role("group", name="Flight by hand").wait_for()
+    page.evaluate(SLOW_FRAMES)
+    page.keyboard.down("KeyS")
+    vehicle(served, "uav2", lambda uav: uav["velocity"]["x"] < -2.0)
+    seen = [vehicle(served, "uav2") for _ in range(20)]
+    assert {uav["mode"] for uav in seen} == {"VELOCITY"}  # no hold in between
+    assert max(uav["velocity"]["x"] for uav in seen) < -2.0
+    page.evaluate("clearInterval(window.slow); window.hang(4000)")
+    vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["x"]) < 0.2, timeout_s=20.0)
+    vehicle(served, "uav2", lambda uav: uav["velocity"]["x"] < -1.0)  # the key is still down
+    page.keyboard.up("KeyS")
+    vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["x"]) < 0.2)
+    page.keyboard.press("Escape")
+
+
 def test_a_uav_is_chosen_and_flown_without_a_mouse(page, served):
     vehicle(served, "uav2", lambda uav: uav["mode"] in ("HOLD", "VELOCITY"))
     before = place(served, "uav2")
@@ -204,37 +230,3 @@ def test_weather_follows_its_sliders(page, served):
     assert told["rain"] == pytest.approx(8.0)
     page.get_by_role("button", name="Calm and clear").click()
     weather(served, lambda told: told["rain"] == told["fog_visibility"] == 0.0)
-
-
-def test_a_wrong_upload_is_answered_with_the_reason(page, shared):
-    shared.expected += ["422"]
-    page.get_by_role("button", name=re.compile("choose another one")).click()
-    page.locator("input[type=file]").set_input_files(
-        {"name": "field.csv", "mimeType": "text/csv", "buffer": b"0,1\n1,x\n"}
-    )
-    page.get_by_role("radio", name="Grid map").check()
-    page.get_by_role("button", name="Upload", exact=True).click()
-    refused = page.get_by_role("alert").filter(has_text="cannot be flown in")
-    refused.wait_for()
-    assert "field.csv" in refused.inner_text()
-
-
-def test_a_map_is_uploaded_and_flown_without_a_new_page(page, shared, served):
-    shared.expected += ["WebSocket connection", "Failed to load"]  # while the worlds change
-    page.evaluate("window.samePage = true")
-    page.get_by_role("button", name=re.compile("choose another one")).click()
-    rows = "\n".join(
-        ",".join("1" if (x, y) == (8, 8) else "0" for x in range(20)) for y in range(20)
-    )
-    page.locator("input[type=file]").set_input_files(
-        {"name": "field.csv", "mimeType": "text/csv", "buffer": rows.encode()}
-    )
-    page.get_by_role("button", name="Upload", exact=True).click()
-    page.get_by_role("textbox", name="UAVs", exact=True).fill("2")
-    page.get_by_role("button", name="Start", exact=True).click()
-    page.get_by_role("button", name=re.compile(r"Scenario field.*: choose")).wait_for(
-        timeout=120_000
-    )
-    page.get_by_label("Number of UAVs").get_by_text("2 UAVs").wait_for(timeout=120_000)
-    assert page.evaluate("window.samePage") is True
-    keep_picture(page, "uploaded")

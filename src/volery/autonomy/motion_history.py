@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.scan_points import Pose
+from volery.autonomy.stuck_sensors import is_stuck
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 
@@ -28,7 +29,7 @@ class Placement(NamedTuple):
 
 
 class MotionHistory:
-    """Poses by time. What is not finite, old or repeated is left out and counted in `refused`."""
+    """Poses by time. What is not finite, old, repeated or stuck is `refused`, and counted."""
 
     def __init__(self) -> None:
         self._times: list[int] = []
@@ -49,7 +50,7 @@ class MotionHistory:
             return False
         if self._times and pose.time_ns < self._times[-1] - _JUMP_BACK_NS:
             self._times, self._poses = [], []
-        if self._times and pose.time_ns <= self._times[-1]:
+        if self._times and (pose.time_ns <= self._times[-1] or is_stuck(pose, self._poses[-1])):
             self.refused += 1
             return False
         self._times.append(pose.time_ns)

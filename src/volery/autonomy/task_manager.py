@@ -28,7 +28,7 @@ from volery.graph.messages import PolygonStamped, PoseStamped, String, message_t
 
 _PERIOD_S = 0.2
 _REPEAT_S = 2.0
-"""A take-off or landing that has not begun is asked for again."""
+"""A take-off or landing that has not begun is asked for again, and the way home."""
 _RISE_S = 30.0
 """A take-off that takes longer has failed."""
 _RETURN_STUCK_S = 60.0
@@ -220,10 +220,16 @@ class TaskManager(TeamMember):
         self._nearest_m, self._news_ns = math.inf, now
         self._enter(Phase.RETURN)
         self._area.publish(polygon_of(None, float(self._home[2]), now))
+        self._send_home(now)
+
+    def _send_home(self, now: int) -> None:
+        self._asked_ns = now
         z = self._home[2] + self.settings.altitude_m
         self._goal.publish(goal_at(np.array([*self._home[:2], z]), now))
 
     def _return(self, pose: Pose, now: int) -> None:
+        if now - self._asked_ns >= _REPEAT_S * NS_PER_S:
+            self._send_home(now)  # a goal that the explorer chose before may have come since
         away = float(np.linalg.norm(pose.position[:2] - self._home[:2]))
         if away < self._nearest_m - _NEARER_M:
             self._nearest_m, self._news_ns = away, now

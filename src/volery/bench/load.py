@@ -14,8 +14,8 @@ from volery.runtime import Simulation
 
 _FLEETS, _SECONDS = (1, 2, 3, 6), 30.0
 _QUICK_FLEETS, _QUICK_SECONDS = (1, 3), 10.0
-_CLIMB_S = 10.0
-"""The take-off is left out."""
+_CLIMB_S = 15.0
+"""The take-off is left out, and the first map, for which kernels may still be compiled."""
 _ENGINE = ("take_commands", "advance_vehicles", "resolve_contacts", "raise_events", "meet_partners")
 _SENSORS, _GRAPH = "sample_sensors", "publish"
 

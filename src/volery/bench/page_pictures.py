@@ -121,7 +121,7 @@ def _kept(shot: Shot) -> str:
     lines = [{"topic": topic, "type": kind, "path": path} for topic, kind, path in shot.lines]
     kept = {"volery.layout": shot.layout}
     if lines:
-        kept["volery.plots"] = {"plots": [{"id": 1, "lines": lines}], "windowS": 30}
+        kept["volery.plots"] = {"plots": [{"id": 1, "lines": lines}], "windowS": 20}
     return "".join(
         f"localStorage.setItem({json.dumps(key)}, {json.dumps(json.dumps(value))});"
         for key, value in kept.items()
@@ -144,7 +144,9 @@ def _pause_at(server: PageProcess, time_s: float) -> None:
 
 def _settle(page: Page) -> None:
     seen = page.evaluate("window.volery.frames")
-    wait_until(page, f"window.volery.frames >= {seen + _FRAMES}", _PATIENCE_MS / 1000.0)
+    drawn = f"window.volery.frames >= {seen + _FRAMES}"
+    heard = "document.querySelector('.banner') === null"  # a slow frame may look like silence
+    wait_until(page, f"{drawn} && {heard}", _PATIENCE_MS / 1000.0)
 
 
 if __name__ == "__main__":

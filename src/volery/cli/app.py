@@ -13,11 +13,14 @@ from volery.cli.options import (
     BatchSizeOption,
     DomainOption,
     DoorsOption,
+    DropOption,
     InterfaceOption,
     MiddlewareOption,
     PageCommand,
+    Px4DirOption,
     RemoteOption,
     Ros2Option,
+    SilenceOption,
     ThreadsOption,
     TokenOption,
 )
@@ -103,11 +106,15 @@ def run(
             help="Show the flight on a page in the browser; at 127.0.0.1:8080 unless said.",
         ),
     ] = None,
+    px4_dir: Px4DirOption = None,
+    autopilot_timeout: SilenceOption = 10.0,
+    drop_silent: DropOption = False,
 ) -> None:
     """Fly a scenario.
 
     Doors: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, ros2, ros2-zenoh,
-    sensor-link, comms.
+    sensor-link, comms, mavlink, mavlink-tcp, mavlink-serial, px4,
+    px4-serial, ardupilot.
 
     At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
     + and - double and halve the speed, m frees it. Ctrl-C ends the flight and still writes log and
@@ -116,6 +123,8 @@ def run(
     from volery.cli.run import RunOptions, fly, parse_speed
 
     doors = (*(door or ()), *((("ros2" if middleware == "dds" else "ros2-zenoh"),) * ros2))
+    if px4_dir is not None and not any(text.partition("=")[0] == "px4" for text in doors):
+        doors = (*doors, "px4")
     options = RunOptions(
         scenario=scenario,
         uavs=uavs,
@@ -135,6 +144,9 @@ def run(
         overwrite=overwrite,
         page=page,
         replay_commands=replay_commands,
+        px4_dir=px4_dir,
+        autopilot_timeout_s=autopilot_timeout,
+        drop_silent=drop_silent,
     )
     code = fly(options)
     if code:
@@ -293,6 +305,32 @@ def list_scenarios() -> None:
 
 @app.command()
 @guarded
+def px4(
+    px4_dir: Annotated[
+        Path, typer.Option(help="Of PX4-Autopilot, in which `make px4_sitl_default` was run.")
+    ],
+    count: Annotated[int, typer.Option(min=1, help="Instances, one for each UAV.")] = 1,
+    first: Annotated[int, typer.Option(min=0, help="Number of the first one.")] = 0,
+    host: Annotated[str, typer.Option(help="Where the simulation runs.")] = "127.0.0.1",
+    folder: Annotated[
+        Path | None, typer.Option(help="For parameters and logs, which else are not kept.")
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(min=0.01, help="Factor of real time, for PX4's time-outs.")
+    ] = None,
+) -> None:
+    """Run PX4s for a simulation with `--door px4`, until Ctrl-C.
+
+    Instance i flies the i-th UAV, counted from 0. After a reset of the simulation, and when a run
+    has ended, they begin anew and wait for it.
+    """
+    from volery.cli.px4 import run_px4
+
+    run_px4(px4_dir, count, first=first, host=host, folder=folder, speed=speed)
+
+
+@app.command()
+@guarded
 def info(file: Annotated[Path, typer.Argument(help="A .mcap or .bag log.")]) -> None:
     """Show what is in a log."""
     from volery.cli.logs import show_log
@@ -313,6 +351,22 @@ def recover(
     from volery.cli.logs import recover_log
 
     recover_log(file, out)
+
+
+@app.command()
+@guarded
+def convert(
+    file: Annotated[Path, typer.Argument(help="A plain text log with one scan a line.")],
+    out: Annotated[Path, typer.Argument(help="The new log, .mcap or .bag.")],
+    layout: Annotated[
+        Path, typer.Option(help="A TOML file that says what stands in which column.")
+    ],
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the new log.")] = False,
+) -> None:
+    """Turn a scanner's text log into one that can be played, shown and mapped."""
+    from volery.cli.logs import convert_log
+
+    convert_log(file, out, layout, overwrite=overwrite)
 
 
 @app.command()

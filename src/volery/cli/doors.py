@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -9,24 +10,38 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from volery.cli.flight import RunOptions
+from volery.core.errors import BridgeError
 
 if TYPE_CHECKING:
     from volery.bridges.door_names import Address, Terms
     from volery.bridges.doors import Door
+    from volery.mavlink.meetings import Patience
     from volery.scenario.schema import Scenario
+
+_LONGEST_START_S = 60.0
+"""Wall time in which PX4s must have connected."""
+_LOOK_S = 0.05
 
 
 def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
     """The scenario with what the doors of `options` need: autopilots, or sensors for real ones."""
+    if options.px4_dir is not None:
+        from volery.mavlink.px4_processes import find_px4
+
+        find_px4(options.px4_dir)  # a wrong folder is told before anything is built
     names = {text.partition("=")[0] for text in options.doors}
     if any(name.startswith("mavlink") for name in names):
         from volery.mavlink.outfit import with_autopilots
 
         scenario = with_autopilots(scenario)
-    if "px4" in names:
+    if names & {"px4", "px4-serial"}:
         from volery.mavlink.outfit import with_px4
 
         scenario = with_px4(scenario)
+    if "ardupilot" in names:
+        from volery.mavlink.outfit import with_ardupilot
+
+        scenario = with_ardupilot(scenario)
     return scenario
 
 
@@ -39,11 +54,27 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
     from volery.bridges.door_names import DoorKind, Terms, make_door
     from volery.bridges.doors import Doors
 
+    patience = _patience_of(options)
     terms = Terms(options.allow_remote, options.token, options.domain_id, options.interfaces)
     more = {
         "comms": DoorKind(10200, _comms, "makes UAVs stations of a communication server"),
         "mavlink": DoorKind(14540, _mavlink, "MAVLink over UDP, ports as PX4's simulations"),
-        "px4": DoorKind(4560, _px4, "real PX4s fly the UAVs, in lock step"),
+        "px4": DoorKind(
+            4560,
+            lambda address, terms: _px4(address, terms, patience),
+            "real PX4s fly the UAVs, in lock step",
+        ),
+        "px4-serial": DoorKind(
+            921600,
+            lambda address, _terms: _px4_serial(address, patience),
+            "a PX4 on a serial line flies a UAV",
+            on_line=True,
+        ),
+        "ardupilot": DoorKind(
+            9002,
+            lambda address, terms: _ardupilot(address, terms, patience, simulation),
+            "real ArduCopters fly the UAVs, in lock step",
+        ),
         "mavlink-tcp": DoorKind(5760, _mavlink_tcp, "MAVLink over TCP, all UAVs on each link"),
         "mavlink-serial": DoorKind(
             57600, _mavlink_serial, "MAVLink on a serial line", on_line=True
@@ -55,7 +86,8 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
             doors.open(door)
             typer.echo(f"open    {door.name}", err=True)
         simulation.be_prompt()
-        yield
+        with _px4_instances(simulation, wanted, options):
+            yield
 
 
 def _comms(address: Address, terms: Terms) -> Door:
@@ -82,7 +114,54 @@ def _mavlink_serial(address: Address, _terms: Terms) -> Door:
     return MavlinkSerial(*address)
 
 
-def _px4(address: Address, terms: Terms) -> Door:
+def _px4(address: Address, terms: Terms, patience: Patience) -> Door:
     from volery.mavlink.px4_door import Px4Door
 
-    return Px4Door(*address, anywhere=terms.anywhere)
+    return Px4Door(*address, patience=patience, anywhere=terms.anywhere)
+
+
+def _px4_serial(address: Address, patience: Patience) -> Door:
+    from volery.mavlink.px4_serial_door import Px4Serial
+
+    return Px4Serial(*address, patience=patience)
+
+
+def _ardupilot(address: Address, terms: Terms, patience: Patience, simulation: Any) -> Door:
+    from volery.mavlink.ardupilot_door import ArdupilotDoor
+    from volery.mavlink.json_frames import Rotor
+
+    rotors = {
+        name: [
+            Rotor(place.position_m[0], place.position_m[1], place.direction)
+            for place in uav.airframe.rotors.places
+        ]
+        for name, uav in getattr(simulation, "uavs", {}).items()
+    }
+    return ArdupilotDoor(rotors, *address, patience=patience, anywhere=terms.anywhere)
+
+
+def _patience_of(options: RunOptions) -> Patience:
+    from volery.mavlink.meetings import Patience
+
+    return Patience(options.autopilot_timeout_s, options.drop_silent)
+
+
+@contextmanager
+def _px4_instances(simulation: Any, doors: list[Door], options: RunOptions) -> Iterator[None]:
+    """Run a PX4 for each UAV where that was asked for, and wait until all are connected."""
+    if options.px4_dir is None:
+        yield
+        return
+    from volery.mavlink.px4_door import Px4Door
+    from volery.mavlink.px4_processes import Px4Instances, find_px4
+
+    build, count = find_px4(options.px4_dir), len(simulation.uav_names)
+    door = next(door for door in doors if isinstance(door, Px4Door))
+    with Px4Instances(build, count, speed=options.speed) as instances:
+        typer.echo(f"started {build.binary}, instances 0 to {count - 1}", err=True)
+        end_s = time.monotonic() + _LONGEST_START_S
+        while len(door.connected) < count:
+            if instances.wait(_LOOK_S) or time.monotonic() > end_s:
+                missing = count - len(door.connected)
+                raise BridgeError(instances.failure or f"{missing} PX4s have not connected")
+        yield

@@ -52,6 +52,12 @@ class RunOptions:
     page: str | None = None
     """`HOST:PORT`, `PORT` or, for the usual place, nothing; None: no page."""
     replay_commands: Path | None = None
+    px4_dir: Path | None = None
+    """Of PX4's sources: instances are run beside the flight; None: by somebody else, or none."""
+    autopilot_timeout_s: float = 10.0
+    """Wall time that an autopilot in lock step may be silent ..."""
+    drop_silent: bool = False
+    """... and whether it is then waited for no more; else the run ends."""
 
 
 class _StoppedError(Exception):

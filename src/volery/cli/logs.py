@@ -1,4 +1,4 @@
-"""`volery info` and `volery recover`."""
+"""`volery info`, `volery recover` and `volery convert`."""
 
 from __future__ import annotations
 
@@ -53,3 +53,26 @@ def recover_log(path: Path, out: Path | None) -> None:
         f"{recovery.messages:,} messages up to {recovery.end_ns / NS_PER_S:.3f} s "
         f"written to {recovery.path}"
     )
+
+
+def convert_log(path: Path, out: Path, layout: Path, *, overwrite: bool) -> None:
+    """Write a plain text log of scans as a log of messages and say what was in it."""
+    from volery.bridges.logs.bag import check_target, open_log
+    from volery.bridges.logs.text_layout import TextLayout
+    from volery.bridges.logs.text_scans import TextScans
+    from volery.scenario.data_files import load_data_file
+
+    check_target(out, overwrite=overwrite)
+    scans = TextScans(path, load_data_file(layout, TextLayout))
+    made = out.with_name(f".{out.stem}.part{out.suffix}")
+    log = open_log(made, overwrite=True)
+    try:
+        scans.write_to(log)
+        log.close()
+        made.replace(out)
+    finally:
+        log.close()
+        made.unlink(missing_ok=True)
+    if scans.left_out:
+        complain(f"{path}: {scans.left_out:,} lines left out; {scans.trouble}")
+    typer.echo(f"{scans.scans:,} scans, {log.messages:,} messages written to {out}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
@@ -33,6 +34,18 @@ InterfaceOption = Annotated[
 ]
 ThreadsOption = Annotated[
     int | None, typer.Option(min=1, max=256, help="Threads; results do not depend on it.")
+]
+Px4DirOption = Annotated[
+    Path | None,
+    typer.Option(help="Run the PX4 of this folder for each UAV; opens the door px4."),
+]
+SilenceOption = Annotated[
+    float,
+    typer.Option(min=0.1, help="Wall seconds that an autopilot in lock step may be silent."),
+]
+DropOption = Annotated[
+    bool,
+    typer.Option("--drop-silent", help="Go on without a silent autopilot; else the run ends."),
 ]
 
 BatchSizeOption = Annotated[

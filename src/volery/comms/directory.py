@@ -46,6 +46,10 @@ class Directory:
         station = self._stations[address] = Known(address, Mailbox(rules), rate, left_ns=now_ns)
         return station
 
+    def remove(self, address: int) -> list[Frame]:
+        """Know a station no more; returns what waited for it."""
+        return self._stations.pop(address).mailbox.clear()
+
     def expects(self, now_ns: int) -> bool:
         """Whether stations that have not been here count as known."""
         return now_ns < self._grace_ends_ns
@@ -77,8 +81,7 @@ class Directory:
                 yield self._to_many.popleft(), None
         for station in self.stations():
             if self._is_forgotten(station, now_ns):
-                del self._stations[station.address]
-                for frame in station.mailbox.clear():
+                for frame in self.remove(station.address):
                     to_it = is_station(frame.destination)
                     never = Reason.UNKNOWN if to_it else None  # it does not count among the many
                     yield frame, Reason.EXPIRED if station.appeared else never

@@ -22,7 +22,6 @@ from volery.comms.station_core import StationCore
 from volery.comms.statistics import Statistics
 from volery.core.errors import CommsError
 
-_SESSION = 1
 _BOOT = 1
 
 
@@ -40,6 +39,8 @@ class Exchange:
         self._router = Router(self._settings, now_ns, _BOOT, self._decide)
         self._stations: dict[int, StationCore] = {}
         """By connection."""
+        self._joined = 0
+        """Stations so far: each is a session of its own, also where it follows another one."""
 
     @property
     def statistics(self) -> Statistics:
@@ -50,23 +51,24 @@ class Exchange:
         """A new station. `CommsError` where there is no room for it."""
         core = StationCore(
             identity,
-            _SESSION,
+            self._joined + 1,
             token=self._settings.token,
             planes_per_batch=self._settings.planes_per_batch,
         )
         connection = self._router.connect(now_ns)
         if connection is None:
             raise CommsError(f"{self._settings.most_connections} stations are the most")
+        self._joined += 1
         self._stations[connection] = core
         core.connected(now_ns)
         self._pass(now_ns)
         return core
 
     def leave(self, address: int, now_ns: int) -> None:
-        """End a station. `CommsError` where there is none with this address."""
+        """End a station for good. `CommsError` where there is none with this address."""
         connection = self._connection_of(address)
         del self._stations[connection]
-        self._router.disconnect(connection, now_ns)
+        self._router.forget(connection, now_ns)
 
     def station(self, address: int) -> StationCore:
         """The station with an address. `CommsError` where there is none."""
@@ -79,11 +81,11 @@ class Exchange:
 
     def get_state(self) -> Any:
         """Everything that changes, but for what the link keeps itself."""
-        return self._copied((self._router, self._stations))
+        return self._copied((self._router, self._stations, self._joined))
 
     def set_state(self, state: Any) -> None:
         """Go back to a kept state; stations are others than before: ask `station` for them."""
-        self._router, self._stations = self._copied(state)
+        self._router, self._stations, self._joined = self._copied(state)
 
     def _copied(self, parts: Any) -> Any:
         return copy.deepcopy(parts, {id(self): self})  # whom the router asks for the link

@@ -8,7 +8,15 @@ from typing import Any, NamedTuple
 
 from volery.comms.addresses import PLANES_PER_BATCH, Identity, is_station
 from volery.comms.bodies import Refusal
-from volery.comms.payloads import COMMANDS, REPLY, STATE, decode_named, encode_named
+from volery.comms.payloads import (
+    COMMANDS,
+    REPLY,
+    REPLY_TYPE,
+    STATE,
+    STATE_TYPE,
+    decode_named,
+    encode_named,
+)
 from volery.comms.protocol import Frame, Kind
 from volery.comms.targets import address_of
 from volery.core.clock import NS_PER_S
@@ -65,13 +73,13 @@ class Ground:
             named = decode_named(frame.payload)
         except CommsError as error:
             return f"{self._name(frame.source)}: {error}"
-        if named.name == STATE:
+        if named[:2] == (STATE, STATE_TYPE):
             before = self._states.get(frame.source)
             self._states[frame.source] = named.message, now_ns
             mode = named.message.mode
             changed = before is None or before[0].mode != mode
             return f"{self._name(frame.source)}: {mode}" if changed else None
-        if named.name == REPLY:
+        if named[:2] == (REPLY, REPLY_TYPE):
             return f"{self._name(frame.source)}: {named.message.data}"
         return f"{self._name(frame.source)}: {named.name} ({named.msgtype})"
 

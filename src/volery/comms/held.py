@@ -35,7 +35,7 @@ class Held:
         return len(self._messages)
 
     def put(self, sequence: int, kind: Kind, destination: int, data: bytes) -> None:
-        """Hold a message. `CommsError` for a command that finds no room."""
+        """Hold a message. `CommsError` where there is no room, nor a measurement to give way."""
         there = self._of.setdefault(destination, {})
         if len(there) >= MOST_A_DESTINATION or len(self._messages) >= MOST:
             oldest = next((s for s, held in there.items() if held is Kind.SENSING), None)

@@ -30,8 +30,8 @@ class Posted(NamedTuple):
     """What became of a new message."""
 
     kept: bool
-    dropped: Frame | None = None
-    """A measurement that had to go for it."""
+    dropped: tuple[Frame, ...] = ()
+    """Measurements that had to go for it."""
 
 
 class _Lane:
@@ -94,21 +94,20 @@ class Mailbox:
     def put(self, frame: Frame, now_ns: int, delay_ns: int = 0) -> tuple[Posted, int]:
         """Add a message; also when it may go. A full lane drops its oldest sensing, no command."""
         lane = self._lanes.setdefault(frame.source, _Lane())
-        queue, dropped = lane.of(frame.kind), None
-        size = len(frame.data)
-        full = len(queue) >= self._settings.lane_depth
-        if full or self._bytes + size > self._settings.mailbox_bytes:
+        queue, size = lane.of(frame.kind), len(frame.data)
+        dropped: list[Frame] = []
+        while self._is_full(queue, size):
             if frame.kind == Kind.COMMAND or not queue:
-                return Posted(False), 0
-            dropped = queue.popleft().frame
-            self._bytes -= len(dropped.data)
+                return Posted(False, tuple(dropped)), 0
+            dropped.append(queue.popleft().frame)
+            self._bytes -= len(dropped[-1].data)
         if frame.source not in self._turns:
             self._turns.append(frame.source)
         lane.last_due_ns = due_ns = max(lane.last_due_ns, now_ns + delay_ns)
         lane.count += 1
         queue.append(Waiting(frame, now_ns, due_ns, lane.count))
         self._bytes += size
-        return Posted(True, dropped), due_ns
+        return Posted(True, tuple(dropped)), due_ns
 
     def take(self, now_ns: int) -> Frame | None:
         """The next message, whose source then is the last to have its turn; None: nothing is due.
@@ -175,6 +174,10 @@ class Mailbox:
         self._turns.clear()
         self._bytes = 0
         return everything
+
+    def _is_full(self, queue: deque[Waiting], size: int) -> bool:
+        rules = self._settings
+        return len(queue) >= rules.lane_depth or self._bytes + size > rules.mailbox_bytes
 
     def _forget_empty(self, source: int, lane: _Lane) -> None:
         """Lanes of sources that are gone for good cost nothing."""

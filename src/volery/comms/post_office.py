@@ -113,6 +113,11 @@ class PostOffice:
             self._post(station, frame, now_ns)
         return station
 
+    def forget(self, address: int) -> None:
+        """A station that will not come again: what waits for it is done with."""
+        for frame in self.directory.remove(address):
+            self._settle(frame)
+
     def _post(self, station: Known, frame: Frame, now_ns: int) -> None:
         """Put one message into one mailbox."""
         delivery = self._link(now_ns, frame.source, station.address, frame)
@@ -121,11 +126,11 @@ class PostOffice:
             self._settle(frame)
             return
         posted, due_ns = station.mailbox.put(frame, now_ns, delivery.delay_ns)
+        for dropped in posted.dropped:
+            self._dispose(dropped, Reason.FULL, station.address)
         if not posted.kept:
             self._dispose(frame, Reason.FULL, station.address)
             return
-        if posted.dropped is not None:
-            self._dispose(posted.dropped, Reason.FULL, station.address)
         if station.connection is None:
             self.tally.counts["stored"] += 1
         elif due_ns <= now_ns:

@@ -101,6 +101,13 @@ class Router:
             station.left_ns = now_ns
             station.mailbox.rewind()
 
+    def forget(self, connection: int, now_ns: int) -> None:
+        """A connection has ended and its station will not come again: nothing is kept for it."""
+        known = self._connections.get(connection)
+        self.disconnect(connection, now_ns)
+        if known is not None and known.station is not None:
+            self._office.forget(known.station.address)
+
     def tick(self, now_ns: int) -> None:
         """What time brings: silence, age, delayed messages. Call it every 50 ms or so."""
         for number, connection in list(self._connections.items()):

@@ -135,7 +135,7 @@ class UavStations:
 
     def _tell_soon(self, tell: Any, text: str) -> None:
         """From whatever thread answers, into the loop; nobody is told once that has ended."""
-        if not self._loop.is_closed():
+        with contextlib.suppress(RuntimeError):
             self._loop.call_soon_threadsafe(tell, text)
 
     def _tell(self, uav: str, to: int, text: str) -> None:

@@ -3,7 +3,8 @@
 A partner meets the engine at each instant of its period: the engine stands still until the partner
 has answered, and applies what it answered before the next physics step. So a run with partners is
 as reproducible as they are. Who lets the engine wait longer than the agreed time ends the run with
-an error, or, where that was agreed, is left behind.
+an error, or, where that was agreed, is left behind. Nobody can take a partner back to an earlier
+state; one that begins anew by itself lets the simulation be reset.
 
     partner = simulation.add_partner("pilot", period_s=0.02, timeout_s=5.0)
 
@@ -40,6 +41,8 @@ class Partner:
         *,
         on_meeting: Callable[[int], None] | None = None,
         is_there: Callable[[], bool] | None = None,
+        restarts: bool = False,
+        period_s: float = 0.0,
     ) -> None:
         """Take the terms of `add_partner`.
 
@@ -48,6 +51,8 @@ class Partner:
         """
         self.name = name
         self.timeout_s = timeout_s
+        self.period_s = period_s
+        self.restarts = restarts
         self._on_timeout = on_timeout
         self._on_meeting = on_meeting
         self._is_there = is_there

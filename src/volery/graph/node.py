@@ -18,6 +18,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import Any, Protocol
 
 from volery.core.errors import GraphError, NodeError, VoleryError
@@ -88,8 +89,7 @@ class Node:
         self._held: list[Callable[[], None]] = []
         """What gives back a publisher, a subscription, a service."""
         self._destroyed = False
-        self.busy_s = 0.0
-        """CPU time that its callbacks have taken so far."""
+        self._busy_s = 0.0
         self._thinker = (
             Thinker(node_name, context.latency_ns, context.timers, context.now_ns)
             if context.latency_ns
@@ -148,12 +148,13 @@ class Node:
         """
         profile = profile_of(qos)
 
-        def receive(published: Published) -> None:
-            self._run(lambda: callback(published.message), f"message on {published.topic}")
+        name = self.resolve(topic)
+        occasion = f"message on {name}"
 
-        subscription = self._context.graph.subscribe(
-            self.resolve(topic), receive, msg_type, qos=profile
-        )
+        def receive(published: Published) -> None:
+            self._run(partial(callback, published.message), occasion)
+
+        subscription = self._context.graph.subscribe(name, receive, msg_type, qos=profile)
         self._held.append(subscription.cancel)
         return subscription
 
@@ -161,7 +162,9 @@ class Node:
         """Call `callback` each `period_s` of simulated time."""
         check_period(period_s)
         self._context.timers.every(
-            period_s, lambda: self._run(callback, "timer"), wanted=lambda: not self._destroyed
+            period_s,
+            lambda: self._run(callback, "timer", heavy=True),
+            wanted=lambda: not self._destroyed,
         )
 
     def create_service(
@@ -173,7 +176,7 @@ class Node:
         def handle(request: Any) -> Any:
             if self._thinker is None:
                 return callback(request, _blank(response_type))
-            return self._thinker.think(lambda: callback(request, _blank(response_type))).result()
+            return self._thinker.answer(lambda: callback(request, _blank(response_type)))
 
         name, graph = self.resolve(service), self._context.graph
         graph.offer(name, srv_type, handle)
@@ -226,17 +229,20 @@ class Node:
     def _now_ns(self) -> int:
         return self._context.now_ns() if self._thinker is None else self._thinker.now_ns()
 
-    def _run(self, callback: Callable[[], None], occasion: str) -> None:
+    def _run(self, callback: Callable[[], None], occasion: str, *, heavy: bool = False) -> None:
         if self._destroyed:
             return
         if self._thinker is None:
-            self._guarded(callback, occasion)
+            before = time.thread_time()
+            try:
+                self._guarded(callback, occasion)
+            finally:
+                self._busy_s += time.thread_time() - before
         else:
-            self._thinker.think(lambda: self._guarded(callback, occasion))
+            self._thinker.think(partial(self._guarded, callback, occasion), heavy=heavy)
 
     def _guarded(self, callback: Callable[[], None], occasion: str) -> None:
         """Call back; a failure becomes a `NodeError` that tells whose it was."""
-        before = time.thread_time()
         try:
             callback()
         except VoleryError:
@@ -247,8 +253,6 @@ class Node:
                 f"node {self.full_name} failed at {at} in its {occasion}: "
                 f"{type(error).__name__}: {error}"
             ) from error
-        finally:
-            self.busy_s += time.thread_time() - before
 
     def resolve(self, name: str) -> str:
         """Absolute name of a topic or service, as the launch profile wants it."""
@@ -257,6 +261,11 @@ class Node:
         elif not name.startswith("/"):
             name = f"{self._namespace}/{name}"
         return self._context.remap.get(name, name)
+
+    @property
+    def busy_s(self) -> float:
+        """CPU time that its callbacks have taken so far."""
+        return self._busy_s if self._thinker is None else self._thinker.busy_s
 
     @property
     def has_worker(self) -> bool:

@@ -10,11 +10,14 @@ inputs do not wait for earlier outputs.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
+from queue import SimpleQueue
 from typing import Any, Protocol
 
+from volery.core.errors import GraphError
 from volery.graph.graph import Publisher
 
 Action = Callable[[], Any]
@@ -29,14 +32,42 @@ class Deferring(Protocol):
 
 @dataclass
 class _Thought:
-    """One callback: when its input was taken, and what it wants done when its time is up."""
+    """The callbacks of one instant: when their input was taken, and what they want done later."""
 
     time_ns: int
+    work: list[Action] = field(default_factory=list)
     output: list[Action] = field(default_factory=list)
+    batch: _Batch | None = None
+    """With which it is worked on; None before."""
+    error: BaseException | None = None
+
+
+class _Batch:
+    """Thoughts that the worker takes up together."""
+
+    def __init__(self, thoughts: list[_Thought]) -> None:
+        self.thoughts = thoughts
+        self._busy = threading.Lock()
+        self._busy.acquire()
+        for thought in thoughts:
+            thought.batch = self
+
+    def finish(self) -> None:
+        """Let those go on who wait for it."""
+        self._busy.release()
+
+    def wait(self) -> None:
+        """Until it has been worked on."""
+        with self._busy:
+            return
 
 
 class Thinker:
-    """The worker of one node. All methods but `now_ns` and `hold_back` belong to the engine."""
+    """The worker of one node. All methods but `now_ns` and `hold_back` belong to the engine.
+
+    Waking a thread takes longer than most callbacks: they are handed over some at a time, when the
+    first of them is a third of the latency old, or with one that is said to be heavy.
+    """
 
     def __init__(
         self, name: str, latency_ns: int, deferring: Deferring, now_ns: Callable[[], int]
@@ -44,21 +75,42 @@ class Thinker:
         self._latency_ns = latency_ns
         self._deferring = deferring
         self._engine_now_ns = now_ns
-        self._pool = ThreadPoolExecutor(1, thread_name_prefix=f"volery-{name}")
-        self._here = threading.local()
+        self._waiting: list[_Thought] = []
+        """Not yet handed over, in the order of their time."""
+        self._inbox: SimpleQueue[_Batch | None] = SimpleQueue()
+        self._here: _Thought | None = None
+        """What the worker works on."""
+        self._last: _Batch | None = None
+        self._closed = False
+        self.busy_s = 0.0
+        """CPU time of the worker so far."""
+        self._thread = threading.Thread(target=self._run, name=f"volery-{name}", daemon=True)
+        self._thread.start()
 
-    def think(self, work: Action) -> Future[Any]:
-        """Begin `work()` now; its output is released after the latency."""
-        thought = _Thought(self._engine_now_ns())
-        future = self._pool.submit(self._work, thought, work)
+    def think(self, work: Action, *, heavy: bool = False) -> None:
+        """Do `work()` on the worker; its output is released after the latency."""
+        if self._closed:
+            return
+        now = self._engine_now_ns()
+        if not self._waiting or self._waiting[-1].time_ns != now:
+            thought = _Thought(now)
+            self._waiting.append(thought)
+            self._deferring.at(now + self._latency_ns, partial(self._release, thought))
+        self._waiting[-1].work.append(work)
+        if heavy or 3 * (now - self._waiting[0].time_ns) >= self._latency_ns:
+            self._hand_over()
 
-        def release() -> None:
-            future.result()
-            for action in thought.output:
-                action()
-
-        self._deferring.at(thought.time_ns + self._latency_ns, release)
-        return future
+    def answer(self, work: Action) -> Any:
+        """Do `work()` after all that came before it, and wait for what it returns."""
+        result: list[Any] = []
+        self.think(lambda: result.append(work()), heavy=True)
+        batch = self._last
+        if batch is None or self._closed:
+            raise GraphError("the node has ended")
+        batch.wait()
+        if not result:
+            raise batch.thoughts[-1].error or GraphError("the node has ended")
+        return result[0]
 
     def now_ns(self) -> int:
         """Time of the input that is being worked on; in the engine's thread, the engine's time."""
@@ -74,22 +126,59 @@ class Thinker:
         return True
 
     def join(self) -> None:
-        """Wait until everything begun has been worked on."""
-        self._pool.submit(_nothing).result()
+        """Have everything worked on, and wait for it."""
+        self._hand_over()
+        if self._last is not None:
+            self._last.wait()
 
     def close(self) -> None:
-        """End the worker."""
-        self._pool.shutdown(cancel_futures=True)
+        """End the worker; what has not been begun is dropped."""
+        self._closed = True
+        self._inbox.put(None)
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+
+    def _hand_over(self) -> None:
+        if self._waiting and not self._closed:
+            self._last = _Batch(self._waiting)
+            self._waiting = []
+            self._inbox.put(self._last)
+
+    def _release(self, thought: _Thought) -> None:
+        """The time of a thought is up: wait for it and do what it wants done."""
+        if self._closed:
+            return
+        if thought.batch is None:
+            self._hand_over()
+        assert thought.batch is not None
+        thought.batch.wait()
+        if thought.error is not None:
+            raise thought.error
+        for action in thought.output:
+            action()
 
     def _thought(self) -> _Thought | None:
-        return getattr(self._here, "thought", None)
+        return self._here if threading.get_ident() == self._thread.ident else None
 
-    def _work(self, thought: _Thought, work: Action) -> Any:
-        self._here.thought = thought
+    def _run(self) -> None:
+        while (batch := self._inbox.get()) is not None:
+            for thought in batch.thoughts:
+                self._here = thought
+                try:
+                    self._work(thought)
+                finally:
+                    self._here = None
+            batch.finish()
+
+    def _work(self, thought: _Thought) -> None:
+        before = time.thread_time()
         try:
-            return work()
+            while thought.work and not self._closed:
+                thought.work.pop(0)()
+        except BaseException as error:  # told by the engine when the time of the thought is up
+            thought.error = error
         finally:
-            self._here.thought = None
+            self.busy_s += time.thread_time() - before
 
 
 class DelayedPublisher(Publisher):
@@ -113,7 +202,3 @@ class DelayedPublisher(Publisher):
         """Publish `message` after the latency; outside of callbacks at once."""
         if not self._thinker.hold_back(lambda: self._publisher.publish(message)):
             self._publisher.publish(message)
-
-
-def _nothing() -> None:
-    """Do nothing."""

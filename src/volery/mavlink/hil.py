@@ -2,7 +2,8 @@
 
 The protocol is that of PX4's `simulator_mavlink`: HIL_SENSOR sets its clock, so that times must
 only grow; it answers each with HIL_ACTUATOR_CONTROLS once it has begun to fly the simulation. Until
-the first answer the simulation runs freely. A group of sensors (accelerometer, gyroscope,
+the first answer the simulation runs freely, and beside a PX4 with a clock of its own, such as
+hardware, always. A group of sensors (accelerometer, gyroscope,
 magnetometer, barometer) is told whole or not at all.
 """
 
@@ -24,6 +25,10 @@ SIMULATOR = 51
 ACCELEROMETER, GYROSCOPE, MAGNETOMETER, BAROMETER = 0x7, 0x38, 0x1C0, 0x1A00
 """Groups of HIL_SENSOR's `fields_updated`."""
 _ARMED = 128
+_GENERIC, _NO_AUTOPILOT = 0, 8
+"""MAV_TYPE and MAV_AUTOPILOT of the simulator."""
+_LOCK_STEP = 1
+"""Of HIL_ACTUATOR_CONTROLS: PX4 was built to take its time from the simulator."""
 _GAUSS_A_TESLA = 1e4
 
 
@@ -64,6 +69,8 @@ class Actuators(NamedTuple):
     controls: tuple[float, ...]
     """(16,) from -1 to 1."""
     armed: bool
+    time_ns: int = 0
+    """Of the reading that they follow from, where PX4 takes its time from the readings."""
 
 
 class HilLink:
@@ -74,7 +81,7 @@ class HilLink:
         self._framer, self._parser = Framer(), Parser()
         self._sequence = 0
         self.locked = False
-        """Whether PX4 has begun to answer, and is to be waited for from now on."""
+        """Whether PX4 has begun to answer in lock step, and is to be waited for from now on."""
 
     def tell(self, time_ns: int, sensed: Sensed) -> bytes:
         """Frames for a meeting at a simulated time."""
@@ -83,6 +90,10 @@ class HilLink:
             frames += self._gps(time_ns // 1000, sensed.fix)
         return frames
 
+    def heartbeat(self) -> bytes:
+        """A frame that says that a simulator is there, as nobody's ground station."""
+        return self._pack(dialect().MAVLink_heartbeat_message(_GENERIC, _NO_AUTOPILOT, 0, 0, 0, 3))
+
     def feed(self, data: bytes) -> list[Actuators]:
         """Answers in what PX4 sent; its other messages need none."""
         answers = []
@@ -90,12 +101,13 @@ class HilLink:
             message = self._parser.decode(frame.data)
             if message is None or message.get_type() != "HIL_ACTUATOR_CONTROLS":
                 continue
-            self.locked = True
+            self.locked = bool(message.flags & _LOCK_STEP)
             controls = tuple(
                 min(max(part, -1.0), 1.0) if math.isfinite(part) else 0.0
                 for part in message.controls
             )
-            answers.append(Actuators(controls, bool(message.mode & _ARMED)))
+            armed = bool(message.mode & _ARMED)
+            answers.append(Actuators(controls, armed, 1000 * message.time_usec))
         return answers
 
     def _pack(self, message: object) -> bytes:

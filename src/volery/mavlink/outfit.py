@@ -1,7 +1,8 @@
-"""Gives the UAVs of a scenario autopilots."""
+"""Gives the UAVs of a scenario autopilots, or what those outside need."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from volery.mavlink.codec import dialect
@@ -35,18 +36,31 @@ def with_px4(scenario: Scenario) -> Scenario:
     has none.
     """
     dialect()
+    return _with_sensors(scenario, {"imu": 250.0}, ("magnetometer", "barometer", "gnss"))
+
+
+def with_ardupilot(scenario: Scenario) -> Scenario:
+    """The scenario for real ArduPilots: IMU and true state at 500 Hz; none starts by itself.
+
+    ArduPilot makes all further sensors of its own from the true state.
+    """
+    return _with_sensors(scenario, {"imu": 500.0, "ground_truth": 500.0}, ("battery",))
+
+
+def _with_sensors(
+    scenario: Scenario, rates: Mapping[str, float], others: Sequence[str]
+) -> Scenario:
+    """Every type with these sensors, some of them at a rate; the UAVs wait on the ground."""
     data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
     for name, uav_type in scenario.types.items():
         sensors = [sensor.model_dump(exclude_unset=True) for sensor in uav_type.sensors]
         kinds = {sensor["kind"] for sensor in sensors}
-        sensors += [{"kind": kind} for kind in _NEEDED if kind not in kinds]
+        sensors += [{"kind": kind} for kind in (*rates, *others) if kind not in kinds]
         for sensor in sensors:
-            sensor.update({"rate_hz": 250.0} if sensor["kind"] == "imu" else {})
+            if sensor["kind"] in rates:
+                sensor["rate_hz"] = rates[sensor["kind"]]
         data["types"][name] = {**data["types"][name], "sensors": sensors}
     data["uavs"] = [{**group, "on_start": "wait"} for group in data["uavs"]]
     changed = parse_scenario(data, where=scenario.name)
     changed._folder = scenario.folder
     return changed
-
-
-_NEEDED = ("imu", "magnetometer", "barometer", "gnss")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from volery.control.flight_modes import FlightMode
+from volery.core import rotations
 from volery.core.clock import ns_from_s
 from volery.core.errors import CommandError, ScenarioError
 from volery.engine.engine import Engine
@@ -19,7 +20,7 @@ from volery.runtime.placement import Start
 from volery.runtime.sensor_fitting import RESULT_OF, Fitted
 from volery.runtime.uav import Uav
 from volery.scenario.camera import CameraSensor
-from volery.scenario.schema import Scenario
+from volery.scenario.schema import NodeEntry, Scenario
 from volery.sensors.samples import JointAngles
 
 
@@ -37,6 +38,10 @@ def announce_sensors(publisher: GraphPublisher, fitted: Sequence[Fitted]) -> Non
             publisher.announce(sensor.id, JointAngles, sensor.mount)
 
 
+START_POSE = "{start_pose}"
+"""A node's parameter with this value gets the place of take-off, as people measure it."""
+
+
 def start_nodes(
     scenario: Scenario,
     starts: Sequence[Start],
@@ -50,8 +55,18 @@ def start_nodes(
         for k, entry in enumerate(scenario.types[start.type_name].nodes):
             where = f"{scenario.name}: types.{start.type_name}.nodes[{k}]"
             context = Context(graph, engine, now_ns, ns_from_s(entry.latency_s))
-            nodes.append(start_node(entry, context, f"/{start.name}", where, scenario.folder))
+            own = _with_start(entry, start)
+            nodes.append(start_node(own, context, f"/{start.name}", where, scenario.folder))
     return nodes
+
+
+def _with_start(entry: NodeEntry, start: Start) -> NodeEntry:
+    """An entry whose parameters know where the UAV begins: x, y, z, m, and yaw, rad, in the map."""
+    if START_POSE not in entry.parameters.values():
+        return entry
+    pose = [*start.position_map.tolist(), float(rotations.yaw_of(start.attitude))]
+    known = {k: pose if v == START_POSE else v for k, v in entry.parameters.items()}
+    return entry.model_copy(update={"parameters": known})
 
 
 def start_system_nodes(

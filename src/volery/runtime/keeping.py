@@ -88,7 +88,7 @@ class Keeper:
 
     def reset(self, seed: int) -> None:
         """Go back to the start and the UAVs of the start, with other random streams."""
-        self._check("a reset", self.crew.nodes)
+        self._check("a reset", self.crew.nodes, to_start=True)
         if self.crew.starts != self._starts:
             self.crew.end_nodes()  # all of them, so that they are started in the same order
             self.crew.regroup(self._starts)
@@ -100,6 +100,9 @@ class Keeper:
         if self.radio is not None:
             self.radio.reseed(seed)
         self._restart_sensors(rows, refit(self.crew.fitted, seed))
+        for partner in self.partners:
+            if not partner.has_left:
+                self.engine.wait_for(partner, partner.period_s)
         self.crew.take_off(fleet.names)
 
     def reset_uav(self, row: int) -> None:
@@ -124,9 +127,9 @@ class Keeper:
     def _restart_sensors(self, rows: Any, fitted: Sequence[Fitted]) -> None:
         self.engine.restart_sensors(rows, {(f.id.uav, f.id.name): f.key for f in fitted})
 
-    def _check(self, what: str, nodes: Sequence[Node]) -> None:
+    def _check(self, what: str, nodes: Sequence[Node], *, to_start: bool = False) -> None:
         check_nodes(nodes, what)
-        check_partners(self.partners, what)
+        check_partners(self.partners, what, to_start=to_start)
         if not self.engine.stands:
             raise SnapshotError(f"{what} is not possible in the middle of a tick; use post()")
 

@@ -4,7 +4,7 @@ A client calls `/volery/join_lock_step`, subscribes `/volery/lock_step/NAME/go` 
 `/volery/lock_step/NAME/done`, both `rosgraph_msgs/Clock`. At each meeting the simulation sends the
 time on `go`, after everything that it has published until then, and stands still until the same
 time comes back on `done`; what the client published before is in force from the next physics step.
-Who unadvertises `done`, or loses the connection, has left.
+Who unadvertises `done`, or loses the connection, has left. After a reset the times begin anew.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def open_lock_step(simulation: Any) -> None:
 
     def join(request: Any) -> Any:
         try:
-            _Meetings(simulation, request.name, request.period_s, request.timeout_s)
+            _Meetings(simulation, request)
         except CommandError as error:
             return response(success=False, message=str(error), now=time_from_ns(0))
         return response(success=True, message="", now=time_from_ns(simulation.time_ns))
@@ -38,7 +38,8 @@ def open_lock_step(simulation: Any) -> None:
 class _Meetings:
     """The meetings with one client."""
 
-    def __init__(self, simulation: Any, name: str, period_s: float, timeout_s: float) -> None:
+    def __init__(self, simulation: Any, request: Any) -> None:
+        name = request.name
         if not name.isidentifier():
             raise CommandError(f"'{name}' is no name for a partner: letters, digits and _")
         graph: Graph = simulation.graph
@@ -48,11 +49,12 @@ class _Meetings:
             raise CommandError(f"advertise {self._done} before joining, and subscribe .../go")
         self._partner: Partner = simulation.add_partner(
             name,
-            period_s=period_s,
-            timeout_s=timeout_s,
-            on_timeout="leave",
+            period_s=request.period_s,
+            timeout_s=request.timeout_s,
+            on_timeout="stop" if request.stop_when_silent else "leave",
             on_meeting=self._begin,
             is_there=self._is_there,
+            restarts=request.restarts,
         )
         self._go = graph.advertise(f"/volery/lock_step/{name}/go", Clock)
         self._subscription = graph.subscribe(self._done, self._end, Clock)

@@ -366,18 +366,28 @@ class Simulation:
         on_timeout: Literal["stop", "leave"] = "stop",
         on_meeting: Callable[[int], None] | None = None,
         is_there: Callable[[], bool] | None = None,
+        restarts: bool = False,
     ) -> Partner:
         """Wait for an outside program each `period_s` of simulated time; see `engine.partners`.
 
         `timeout_s` is wall time; a partner that lets more pass ends the run with `PartnerError`, or
         is waited for no more. `on_meeting(time_ns)` is called when a meeting begins; a partner that
-        is not there any more, as `is_there()` says, is waited for no more.
+        is not there any more, as `is_there()` says, is waited for no more. `restarts`: it begins
+        anew where a meeting's time is earlier than the last one's, so that `reset` is possible.
         """
         self._check_open()
         check_terms(period_s, timeout_s, on_timeout, self._engine.fleet.dt_ns)
         if any(partner.name == name and not partner.has_left for partner in self._partners):
             raise CommandError(f"there is a lock-step partner '{name}' already")
-        partner = Partner(name, timeout_s, on_timeout, on_meeting=on_meeting, is_there=is_there)
+        partner = Partner(
+            name,
+            timeout_s,
+            on_timeout,
+            on_meeting=on_meeting,
+            is_there=is_there,
+            restarts=restarts,
+            period_s=period_s,
+        )
         self._partners.append(partner)
         self._engine.wait_for(partner, period_s)
         return partner

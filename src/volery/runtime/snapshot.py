@@ -81,10 +81,13 @@ def check_nodes(nodes: Sequence[Node], what: str) -> None:
             )
 
 
-def check_partners(partners: Sequence[Partner], what: str) -> None:
-    """Refuse `what` while an outside program takes part whose state nobody can keep."""
+def check_partners(partners: Sequence[Partner], what: str, *, to_start: bool = False) -> None:
+    """Refuse `what` while an outside program takes part whose state nobody can keep.
+
+    to_start: it goes back to the start, where those can come along that begin anew.
+    """
     for partner in partners:
-        if not partner.has_left:
+        if not (partner.has_left or (to_start and partner.restarts)):
             raise SnapshotError(
                 f"{what} is not possible: the state of lock-step partner '{partner.name}' is its "
                 "own; it must leave first"

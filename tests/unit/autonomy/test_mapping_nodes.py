@@ -1,5 +1,6 @@
 """The mapping nodes on sensor messages alone, good and bad ones."""
 
+import copy
 import json
 
 import numpy as np
@@ -39,7 +40,8 @@ def room_scan(time_ns, position=(0.0, 0.0), yaw=0.0, beams=720):
             (np.copysign(ROOM, f(angle)) - p) / f(angle)
             for f, p in zip((np.cos, np.sin), position, strict=True)
         ]
-    return scan(time_ns, np.minimum(*along))
+    noise = 1e-3 * np.sin(time_ns * 1e-9)  # no two scans are alike
+    return scan(time_ns, np.minimum(*along) + noise)
 
 
 def fly(bench, seconds, make=room_scan, begin_ns=0, height=3.0):
@@ -243,10 +245,13 @@ def test_a_snapshot_goes_on_alike():
     node = mapping(bench)
     fly(bench, 0.6)
     twin = mapping(other)
-    twin.set_state(node.get_state())
+    twin.set_state(copy.deepcopy(node.get_state()))
     other.run_to(bench.now_ns)
-    fly(bench, 0.6, begin_ns=S)
-    fly(other, 0.6, begin_ns=S)
+    before = node._octree.nodes
+    step_aside = lambda time_ns: room_scan(time_ns, (1.0, 0.5))  # noqa: E731
+    fly(bench, 0.6, step_aside, begin_ns=S)
+    fly(other, 0.6, step_aside, begin_ns=S)
+    assert node._octree.nodes > before
     np.testing.assert_array_equal(node._octree.binary(), twin._octree.binary())
     np.testing.assert_array_equal(node._grid.score, twin._grid.score)
 

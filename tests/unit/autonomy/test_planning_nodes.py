@@ -1,5 +1,6 @@
 """The planning nodes on messages alone: what they answer to good and to bad ones."""
 
+import copy
 import json
 import math
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from node_bench import NodeBench, nod, odometry, scan
 
+from volery.autonomy.map_frame import MapFrame
 from volery.autonomy.mapping.merging import PlacedMap, merged
 from volery.autonomy.mapping.octomap_stream import Voxels
 from volery.autonomy.mapping.reports import grid_values_message, octomap_message
@@ -14,6 +16,7 @@ from volery.autonomy.planning.exploring_node import POLYGON, Exploring
 from volery.autonomy.planning.follower import TrajectoryFollower
 from volery.autonomy.planning.global_planner import GlobalPlanner
 from volery.autonomy.planning.local_planner import LocalPlanner
+from volery.autonomy.planning.neighbours import Neighbours
 from volery.autonomy.planning.primitives import Path, State
 from volery.autonomy.planning.trajectory_form import samples_of, trajectory_message
 from volery.graph.messages import (
@@ -23,9 +26,11 @@ from volery.graph.messages import (
     PoseStamped,
     Quaternion,
     Range,
+    Vector3,
     header,
     message_type,
 )
+from volery.graph.zero import zero_message
 
 S = 1_000_000_000
 MS = 1_000_000
@@ -60,7 +65,7 @@ class Glade:
         self.now = 0
         self.ranges = np.full(720, 12.0)
 
-    def go_on(self, seconds, odom=True, level=True, blind=False, height=HEIGHT):
+    def go_on(self, seconds, odom=True, level=True, blind=False, stuck=False, height=HEIGHT):
         for _ in range(round(seconds / 0.02)):
             self.now += 20 * MS
             self.bench.run_to(self.now)
@@ -73,6 +78,8 @@ class Glade:
             r = Range(header(self.now, ""), 0, 0.4, 0.2, 7.0, np.float32(height), 0.0)
             self.bench.send("/uav1/range", r)
             ranges = np.full(720, np.inf) if blind else self.ranges
+            if not stuck:
+                ranges = ranges + 1e-3 * math.sin(self.now * 1e-9)  # no two scans are alike
             if level:
                 self.bench.send("/uav1/laser/horizontal/scan", scan(self.now, ranges))
             down = height / max(math.sin(tilt), 1e-9) if tilt > 0.0 else 12.0
@@ -108,6 +115,7 @@ def test_it_plans_towards_the_path_several_times_a_second():
         ({"odom": False}, "no odometry"),
         ({"level": False}, "the level LIDAR is silent"),
         ({"blind": True}, "no LIDAR sees anything"),
+        ({"stuck": True}, "the level LIDAR repeats itself"),
     ],
 )
 def test_without_its_senses_it_stops_and_says_why(fault, problem):
@@ -141,22 +149,44 @@ def test_a_path_that_is_none_is_refused(bad):
     assert glade.plans == []
 
 
-def test_it_gives_way_to_a_neighbour_that_comes_towards_it():
+def report(name, time_ns, place, velocity=(0.0, 0.0, 0.0)):
+    """What a teammate says over the radio."""
+    message = zero_message("volery_interfaces/msg/TeamReport")
+    message.header, message.name = header(time_ns, "map"), name
+    message.position, message.velocity = Point(*place), Vector3(*velocity)
+    return message
+
+
+def test_it_gives_way_to_a_teammate_that_comes_towards_it():
     ends = []
-    for neighbours in ([""], ["/uav2/odom"]):
-        glade = Glade(neighbours=neighbours)
+    for coming in (False, True):
+        glade = Glade()
         glade.go_on(1.0)
         glade.bench.send("/uav1/planning/path", path((0.0, 0.0), (9.0, 0.0)))
         for _ in range(5):
-            glade.bench.send(
-                "/uav2/odom", odometry(glade.now, (5.0, 0.2, HEIGHT), (-2.0, 0.0, 0.0), frame="map")
-            )
+            if coming:
+                said = report("uav2", glade.now, (5.0, 0.2, HEIGHT), (-2.0, 0.0, 0.0))
+                glade.bench.send("/uav1/radio/team", said)
             glade.go_on(0.2)
         ends.append(samples_of(glade.plans[-1]).position[-1])
     alone, beside = ends
     assert alone[0] > 2.0
     assert abs(alone[1]) < 1.0
     assert beside[0] < alone[0] - 0.5 or beside[1] < -1.0
+
+
+def test_reports_that_are_late_repeated_or_no_numbers_move_no_teammate():
+    near, frame = Neighbours(), MapFrame()
+    near.hear(report("uav2", 5 * S, (5.0, 0.0, HEIGHT), (1.0, 0.0, 0.0)), 6 * S)
+    near.hear(report("uav2", 4 * S, (9.0, 0.0, HEIGHT)), 7 * S)
+    near.hear(report("uav2", 5 * S, (9.0, 0.0, HEIGHT)), 7 * S)
+    near.hear(report("uav2", 7 * S, (math.nan, 0.0, HEIGHT)), 7 * S)
+    near.hear(report("uav3", 7 * S, (0.0, 0.0, HEIGHT), (math.inf, 0.0, 0.0)), 7 * S)
+    (other,) = near.in_odom(frame)
+    assert other.position.tolist() == [5.0, 0.0, HEIGHT]
+    assert other.time_ns == 6 * S  # by the hearer's clock
+    near.hear(report("uav2", S, (2.0, 0.0, HEIGHT)), 30 * S)  # its clock began anew
+    assert near.in_odom(frame)[0].position.tolist() == [2.0, 0.0, HEIGHT]
 
 
 # --------------------------------------------------------------------------------------- follower
@@ -366,13 +396,30 @@ def test_a_uav_that_gets_nowhere_is_blocked_in_the_end():
 
 @pytest.mark.parametrize("node_class", [LocalPlanner, GlobalPlanner, Exploring, TrajectoryFollower])
 def test_states_go_back(node_class):
+    """A twin that takes over a state says from then on what the first one says."""
+    said = []
     first, second = NodeBench(), NodeBench()
-    node = first.start(node_class, odometry="odom")
-    if node_class is Exploring:
-        first.send("/uav1/search_area", polygon((0, 0), (9, 0), (0, 9)))
-    first.send("/uav1/odom", odometry(5 * MS, (1.0, 2.0, 3.0)))
-    twin = second.start(node_class, odometry="odom")
-    twin.set_state(node.get_state())
-    assert repr(twin.get_state().keys()) == repr(node.get_state().keys())
-    first.run_to(S)
-    second.run_to(S)
+    node, twin = (bench.start(node_class, odometry="odom") for bench in (first, second))
+    grid = grid_values_message(np.zeros((50, 50), np.int8), 0.4, (-5.0, -5.0, 0.0), "map", 0)
+    for topic, message in (
+        ("odom", odometry(5 * MS, (1.0, 2.0, HEIGHT))),
+        ("search_area", polygon((0, 0), (9, 0), (0, 9))),
+        ("projected_map", grid),
+        ("planning/goal", pose(8.0, 0.0)),
+        ("planning/path", path((0.0, 0.0), (9.0, 0.0))),
+        ("planning/trajectory", plan_message(5 * MS)),
+        ("range", Range(header(0, ""), 0, 0.4, 0.2, 7.0, np.float32(HEIGHT), 0.0)),
+    ):
+        first.send(f"/uav1/{topic}", message)
+    twin.set_state(copy.deepcopy(node.get_state()))
+    for bench in (first, second):
+        heard = []
+        bench.graph.subscribe_all(lambda p, heard=heard: heard.append((p.topic, p.cdr)))
+        bench.graph.deliver()
+        heard.clear()  # what was latched before
+        for k in range(1, 80):
+            bench.run_to(k * 100 * MS)
+            bench.send("/uav1/odom", odometry(bench.now_ns, (1.0 + 0.01 * k, 2.0, HEIGHT)))
+        said.append([each for each in heard if each[0] != "/uav1/odom"])
+    assert said[0] == said[1]
+    assert len(said[0]) > 1

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 from team_bench import Clockwork, S
 
-from volery.autonomy.lane_flight import lanes
 from volery.autonomy.scan_points import Pose
 from volery.autonomy.search.ground_view import GroundView, Intrinsics
 from volery.autonomy.target_detection import TargetDetection
@@ -184,19 +182,3 @@ def test_nothing_is_placed_without_knowing_the_ground() -> None:
     for k in range(10):
         looks.look(np.array([4.0 + 0.5 * k, 4.0, 10.0 + math.nan]), 0.1, ball, (200, 20, 20))
     assert looks.told == []
-
-
-# ------------------------------------------------------------------------------------- the lanes
-
-
-def test_lanes_pass_near_every_place() -> None:
-    corners = np.array([[20.0, 0.0], [60.0, 0.0], [60.0, 30.0], [20.0, 30.0]])
-    way = np.array(lanes(corners, 10.0, np.array([70.0, 40.0])))
-    assert way[0].tolist() == [55.0, 25.0]  # the end that is nearest
-    legs = np.linalg.norm(np.diff(way, axis=0), axis=1)
-    assert legs.tolist() == [30.0, 10.0, 30.0, 10.0, 30.0]
-    places = np.stack(np.meshgrid(np.arange(20, 61, 2.0), np.arange(0, 31, 2.0)), -1).reshape(-1, 2)
-    fine = np.concatenate([np.linspace(a, b, 50) for a, b in pairwise(way)])
-    away = np.linalg.norm(places[:, None] - fine[None], axis=2).min(axis=1)
-    assert away.max() < 7.2
-    assert lanes(np.zeros((0, 2)), 10.0, np.zeros(2)) == []

@@ -15,6 +15,7 @@ from team_bench import AREA, TeamBench
 
 from volery.autonomy.search.places import Area
 from volery.autonomy.team.assignment import Claim, Worker, assign, must_yield
+from volery.autonomy.team.mission_messages import goal_at
 from volery.autonomy.team.sectors import Coverage, Sectors, from_bits, to_bits
 from volery.autonomy.team.target_list import Find, TargetList
 from volery.core.errors import GraphError
@@ -186,6 +187,19 @@ def test_low_battery_brings_one_home_and_the_others_do_its_part() -> None:
     bench.run(170.0)
     assert set(bench.phases().values()) == {"done"}
     assert bench.managers["uav1"].searched.all()
+
+
+def test_a_goal_of_the_explorer_that_comes_late_keeps_nobody_from_home() -> None:
+    bench = TeamBench({"uav1": HOMES["uav1"]})
+    bench.run(15.0)
+    bench.uavs["uav1"].charge = 0.2
+    bench.run(0.4)
+    assert bench.managers["uav1"].phase == "return"
+    late = goal_at(np.array([70.0, 50.0, 3.0]), bench.clock.now_ns)
+    bench.graph.advertise("/uav1/planning/goal", type(late)).publish(late)
+    bench.run(45.0)  # by far less than it takes to give up
+    assert bench.managers["uav1"].phase == "done"
+    np.testing.assert_allclose(bench.uavs["uav1"].place[:2], HOMES["uav1"], atol=2.0)
 
 
 def test_a_network_that_falls_apart_and_comes_together() -> None:

@@ -38,10 +38,17 @@ def test_help_is_quick_and_imports_nothing_heavy() -> None:
 
 
 def test_every_command_is_explained() -> None:
-    for name in ("run", "list", "info", "recover", "bench", "doctor", "identify"):
+    for name in ("run", "list", "info", "recover", "bench", "doctor", "identify", "px4"):
         result = runner.invoke(app, [name, "--help"])
         assert result.exit_code == 0
         assert name in result.stdout
+
+
+def test_a_folder_without_px4_is_told_before_anything_is_built(tmp_path: Path) -> None:
+    for words in (["run", "hover"], ["px4"]):
+        result = runner.invoke(app, [*words, "--px4-dir", str(tmp_path)])
+        assert result.exit_code == 2
+        assert "build it there with `make px4_sitl_default`" in result.stderr
 
 
 def test_version() -> None:

@@ -135,6 +135,15 @@ def test_states_replies_and_refusals_are_shown() -> None:
     assert "not a message" in desk.ground.take(broken, 0)
 
 
+@pytest.mark.parametrize("name", ["state", "reply"])
+def test_known_names_with_other_types_are_told_of(name: str) -> None:
+    """Programs may send any message under a name of their own."""
+    desk = Desk()
+    other = frame(name, "geometry_msgs/msg/Point", Point(1.0, 2.0, 3.0))
+    assert desk.ground.take(other, 0) == f"0.0: {name} (geometry_msgs/msg/Point)"
+    assert desk.ground.rows(0) == []
+
+
 def test_servers_as_people_write_them() -> None:
     assert parse_server("10.0.0.2:99") == ("10.0.0.2", 99)
     assert parse_server("[::1]:99") == ("::1", 99)

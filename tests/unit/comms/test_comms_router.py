@@ -237,6 +237,19 @@ def test_mailboxes_are_bounded_by_bytes() -> None:
     assert len(bench.got[1]) == 20_000 // 1032
 
 
+def test_large_messages_take_the_place_of_several_small_ones() -> None:
+    """One for one they would fill a mailbox far beyond its bytes."""
+    bench = Bench(RouterSettings(mailbox_bytes=20_000))
+    bench.station(0), bench.station(1)
+    bench.cut(1)
+    for size in (100, 1000):
+        for _ in range(200):
+            bench.send(0, 1, "x" * size)
+    bench.run()
+    bench.connect(1)
+    assert [len(payload) for payload in bench.got[1]] == [1000] * (20_000 // 1032)
+
+
 def test_floods_are_cut_off_by_rate() -> None:
     bench = Bench(RouterSettings(rate_messages_s=10.0, burst_messages=20))
     one, _ = bench.station(0), bench.station(1)

@@ -119,3 +119,16 @@ def test_states_are_not_kept_while_a_partner_takes_part(simulate, flat_data):
 def test_impossible_terms_are_refused(simulate, flat_data, values):
     with pytest.raises(CommandError, match="finite and positive"):
         airborne(simulate, flat_data).add_partner("guest", **values)
+
+
+def test_partners_that_begin_anew_come_along_in_a_reset(simulate, flat_data):
+    simulation = airborne(simulate, flat_data)
+    times = []
+    partner = simulation.add_partner("pilot", period_s=0.02, restarts=True)
+    pilot(partner, simulation.uavs["uav1"], times)
+    simulation.run(0.05)
+    with pytest.raises(SnapshotError, match="partner 'pilot' is its own"):
+        simulation.snapshot()
+    simulation.reset()
+    simulation.run(0.05)
+    assert times == [20 * MS, 40 * MS] * 2

@@ -98,7 +98,7 @@ def test_output_comes_after_the_latency(simulate, scenario):
         assert seen_at == stamp
         assert released_at == stamp + LATENCY_NS
     (node,) = simulation.nodes
-    assert node.threads == {"volery-thinker_0"}
+    assert node.threads == {"volery-thinker"}
 
 
 def test_node_without_latency_answers_at_once(simulate, scenario):

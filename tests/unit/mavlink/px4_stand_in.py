@@ -7,8 +7,11 @@ HIL_ACTUATOR_CONTROLS: a climb at a fixed throttle, in which a real PX4 would st
 from __future__ import annotations
 
 import math
+import os
+import select
 import socket
 import threading
+import tty
 
 from volery.mavlink.codec import Codec, dialect
 from volery.mavlink.framing import Framer
@@ -17,19 +20,62 @@ PERIOD_US = 4000
 WHOLE_GROUPS = (0x7, 0x38, 0x1C0, 0x1A00, 0x400)
 
 
+def connect(port):
+    """Over TCP, as PX4 does."""
+    link = socket.create_connection(("127.0.0.1", port), timeout=60.0)
+    link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return link
+
+
+class Terminal:
+    """The far end of a pseudo-terminal, as a connection; `path` is the near end."""
+
+    def __init__(self):
+        self._file, self._near = os.openpty()
+        self._closing = False
+        tty.setraw(self._near)
+        self.path = os.ttyname(self._near)
+
+    def sendall(self, data):
+        while data:
+            data = data[os.write(self._file, data) :]
+
+    def recv(self, size):
+        while not self._closing:
+            ready, _, _ = select.select([self._file], [], [], 0.1)
+            if ready:
+                return os.read(self._file, size)
+        for file in (self._file, self._near):
+            os.close(file)
+        return b""
+
+    def close(self):
+        """End the present or next `recv`, and the line with it."""
+        self._closing = True
+
+
 class StandIn(threading.Thread):
     """Connects at once; answers `answers` times with `throttle`, armed from the `arm_at`-th on."""
 
-    def __init__(self, port, answers, *, throttle=0.0, arm_at=0, falls_silent=False):
+    def __init__(
+        self,
+        port,
+        answers,
+        *,
+        throttle=0.0,
+        arm_at=0,
+        falls_silent=False,
+        in_lock_step=True,
+        link=None,
+    ):
         super().__init__(daemon=True)
         self.port, self.answers = port, answers
         self.throttle, self.arm_at = throttle, arm_at
-        self.falls_silent = falls_silent
+        self.falls_silent, self.in_lock_step = falls_silent, in_lock_step
         self.fault = None
         self.sensors, self.fixes, self.groups = [], [], 0
         self.done = threading.Event()
-        self._link = socket.create_connection(("127.0.0.1", port), timeout=60.0)
-        self._link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._link = connect(port) if link is None else link
         self._codec, self._framer = Codec(1, 1), Framer()
         self._mav = dialect().MAVLink(None, 0, 0)
         self._messages = []
@@ -47,6 +93,7 @@ class StandIn(threading.Thread):
                 self._link.close()
         except Exception as fault:
             self.fault = fault
+            self._link.close()
         finally:
             self.done.set()
 
@@ -64,11 +111,13 @@ class StandIn(threading.Thread):
             message = self._messages.pop(0)
             if message.get_type() == "HIL_SENSOR":
                 return message
+            if message.get_type() == "HEARTBEAT":
+                continue
             assert message.get_type() == "HIL_GPS", message
             self._check_fix(message)
 
     def _check(self, sensor):
-        if len(self.sensors) > 1:  # before the first answer it runs freely
+        if self.in_lock_step and len(self.sensors) > 1:  # before the first answer it runs freely
             assert sensor.time_usec - self.sensors[-1].time_usec == PERIOD_US, "a step is missing"
         fields = sensor.fields_updated
         for group in WHOLE_GROUPS:
@@ -97,6 +146,6 @@ class StandIn(threading.Thread):
         controls = [self.throttle if armed else 0.0] * 4 + [0.0] * 12
         time_us = self.sensors[-1].time_usec
         message = dialect().MAVLink_hil_actuator_controls_message(
-            time_us, controls, 128 if armed else 0, 1
+            time_us, controls, 128 if armed else 0, int(self.in_lock_step)
         )
         self._link.sendall(self._codec.pack(message, number % 256))

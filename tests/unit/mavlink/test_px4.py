@@ -5,12 +5,14 @@ import socket
 import time
 
 import pytest
-from px4_stand_in import StandIn
+from px4_stand_in import StandIn, Terminal
 
 from volery.bridges.doors import Doors
-from volery.core.errors import BridgeError
+from volery.core.errors import BridgeError, PartnerError
+from volery.mavlink.meetings import PATIENCE, Patience
 from volery.mavlink.outfit import with_px4
 from volery.mavlink.px4_door import Px4Door
+from volery.mavlink.px4_serial_door import Px4Serial
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
 
@@ -46,11 +48,11 @@ def opened():
     """A simulation of `count` UAVs, its door and the first port."""
     closing = []
 
-    def open_one(count=1, timeout_s=20.0):
+    def open_one(count=1, patience=PATIENCE):
         simulation = Simulation(scenario(count), threads=1)
         doors = Doors(simulation.gateway)
         closing.extend([doors, simulation])
-        door = Px4Door(port=free_port(), timeout_s=timeout_s)
+        door = Px4Door(port=free_port(), patience=patience)
         doors.open(door)
         simulation.take_in()
         return simulation, door
@@ -101,15 +103,29 @@ def test_several_vehicles_share_one_clock(opened):
     assert set(first) & set(second)
 
 
-def test_a_silent_one_is_given_up_with_a_warning_and_may_come_back(opened, caplog):
-    simulation, door = opened(timeout_s=0.5)
+def test_a_silent_one_ends_the_run_with_an_error(opened):
+    simulation, door = opened(patience=Patience(0.5))
+    pilot = StandIn(door._port, 50, falls_silent=True)
+    meet(simulation, door, 1)
+    pilot.start()
+    with pytest.raises(PartnerError) as told:
+        simulation.run(1.0)
+    told_s = round(pilot.sensors[-1].time_usec / 1e6 + 0.004, 3)
+    assert str(told.value) == (
+        f"partner 'px4_of_uav1' did not answer within 0.5 s of wall time at {told_s:.3f} s"
+    )
+    pilot.close()
+
+
+def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened, caplog):
+    simulation, door = opened(patience=Patience(0.5, drops=True))
     pilot = StandIn(door._port, 50, throttle=CLIMB, falls_silent=True)
     meet(simulation, door, 1)
     pilot.start()
-    with caplog.at_level(logging.WARNING, logger="volery.mavlink.px4_door"):
+    with caplog.at_level(logging.WARNING, logger="volery.mavlink"):
         simulation.run(1.0)
     assert simulation.time_s == pytest.approx(1.0)
-    told = "uav1: its PX4 has been silent for 0.5 s; it is not waited for"
+    told = "uav1: its autopilot has been silent for 0.5 s; it is not waited for"
     assert told in caplog.messages
     again = StandIn(door._port, 50)
     meet(simulation, door, 1)
@@ -118,6 +134,73 @@ def test_a_silent_one_is_given_up_with_a_warning_and_may_come_back(opened, caplo
     assert again.done.wait(20.0)
     assert again.fault is None
     pilot.close()
+
+
+def test_a_reset_sends_them_away_and_a_restarted_one_flies(opened, caplog):
+    simulation, door = opened()
+    before = StandIn(door._port, 10_000, throttle=CLIMB)
+    meet(simulation, door, 1)
+    before.start()
+    simulation.run(0.5)
+    simulation.reset()
+    with caplog.at_level(logging.WARNING, logger="volery.mavlink"):
+        simulation.run(0.1)
+    assert before.done.wait(20.0)
+    assert "the simulator closed the connection" in str(before.fault)
+    assert any("the simulation was reset" in message for message in caplog.messages)
+    assert door.connected == ()
+    again = StandIn(door._port, 100, throttle=CLIMB)
+    meet(simulation, door, 1)
+    again.start()
+    simulation.run(0.6)
+    assert again.done.wait(20.0)
+    assert again.fault is None
+    assert again.sensors[0].time_usec < 200_000
+
+
+def test_one_with_a_clock_of_its_own_is_not_waited_for(opened):
+    simulation, door = opened()
+    pilot = StandIn(door._port, 20, falls_silent=True, in_lock_step=False)
+    meet(simulation, door, 1)
+    pilot.start()
+    simulation.run(1.0)
+    assert pilot.done.wait(20.0)
+    assert pilot.fault is None
+    pilot.close()
+
+
+def test_one_on_a_serial_line_flies_the_uav_that_is_left():
+    terminals = [Terminal(), Terminal()]
+    simulation = Simulation(scenario(count=2), threads=1)
+    with simulation, Doors(simulation.gateway) as doors:
+        lines = [Px4Serial(terminal.path) for terminal in terminals]
+        pilots = []
+        for terminal, line in zip(terminals, lines, strict=True):
+            doors.open(line)
+            simulation.take_in()
+            pilots.append(StandIn(0, 10_000, throttle=CLIMB, arm_at=50, link=terminal))
+        assert [line.uav for line in lines] == ["uav1", "uav2"]
+        with pytest.raises(BridgeError, match="no UAV with an IMU is left"):
+            doors.open(Px4Serial(terminals[0].path))
+        for pilot in pilots:
+            pilot.start()
+        simulation.run(1.0)
+        assert simulation.uavs["uav1"].position_map[2] > 0.2
+        assert simulation.uavs["uav2"].position_map[2] > 0.2
+    for pilot in pilots:
+        pilot.close()
+        assert pilot.done.wait(20.0)
+        assert len(pilot.sensors) > 200
+        assert str(pilot.fault) == "the simulator closed the connection"
+
+
+def test_a_serial_line_that_is_too_slow_is_told():
+    simulation = Simulation(scenario(), threads=1)
+    with simulation, Doors(simulation.gateway) as doors:
+        with pytest.raises(BridgeError, match="57600 baud is too slow for HIL; 230400 or more"):
+            doors.open(Px4Serial("/dev/null", 57600))
+        with pytest.raises(BridgeError, match="/dev/null is no serial line"):
+            doors.open(Px4Serial("/dev/null"))
 
 
 def test_a_port_that_is_taken_is_told():

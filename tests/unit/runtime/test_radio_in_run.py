@@ -139,6 +139,21 @@ def test_a_uav_that_comes_later_is_heard() -> None:
         assert heard(simulation)[-1][0] > 1.3e9
 
 
+@pytest.mark.parametrize("links", ["ideal", "modelled"])
+def test_a_uav_in_the_place_of_another_has_a_radio_of_its_own(links: str) -> None:
+    with Simulation(scenario_of(links=links)) as simulation:
+        for _ in range(2):
+            row = len(simulation.nodes)
+            simulation.spawn_uav("uav9", "talker", [30.0, 20.0, 0.0])
+            simulation.run(0.5)
+            said = [name for _, name in heard(simulation)]
+            assert said.count("/uav9") >= 4
+            assert 8 <= len(heard(simulation, row)) <= 15  # of three, and nothing of before
+            simulation.delete_uav("uav9")
+            simulation.run(0.5)
+            heard(simulation).clear()
+
+
 def test_what_stands_between() -> None:
     """A block, an oak and a hill in three lines of sight, and nothing in a fourth."""
     scenario = parse_scenario(

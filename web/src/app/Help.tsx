@@ -1,4 +1,4 @@
-import { Group, Kbd, Modal, SimpleGrid, Stack, Text, Title } from "@mantine/core";
+import { Group, Kbd, Modal, Stack, Text, Title } from "@mantine/core";
 import { HOTKEYS } from "../state/hotkeys.ts";
 import { closeWindow } from "../state/windows.ts";
 
@@ -6,9 +6,9 @@ import { closeWindow } from "../state/windows.ts";
 export default function Help() {
   return (
     <Modal opened onClose={closeWindow} title="Keys" size="xl">
-      <SimpleGrid cols={{ base: 1, sm: 2 }} spacing="xl">
+      <div className="keys">
         {HOTKEYS.map(({ title, keys }) => (
-          <Stack key={title} gap={6}>
+          <Stack key={title} gap={6} mb="lg" className="keys-group">
             <Title order={5}>{title}</Title>
             {keys.map((key) => (
               <Group key={key.text} justify="space-between" wrap="nowrap" gap="sm">
@@ -22,7 +22,7 @@ export default function Help() {
             ))}
           </Stack>
         ))}
-      </SimpleGrid>
+      </div>
     </Modal>
   );
 }

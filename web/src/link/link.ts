@@ -136,6 +136,20 @@ export class Link {
     this.tell({ kind: "publish", topic, type, message });
   }
 
+  /** Publish now, and again until it is renewed, ended, or too old (`streams.ts`): then `rest`. */
+  stream<N extends keyof Messages>(
+    topic: string,
+    type: N,
+    message: DeepPartial<Messages[N]>,
+    rest: DeepPartial<Messages[N]>,
+  ): void {
+    this.tell({ kind: "stream", topic, type, message, rest });
+  }
+
+  endStream(topic: string): void {
+    this.tell({ kind: "endStream", topic });
+  }
+
   unadvertise(topic: string): void {
     this.tell({ kind: "unadvertise", topic });
   }

@@ -1,5 +1,7 @@
 // What the page and its worker tell each other. The worker owns the connection.
 
+import type { StreamOrder } from "./streams.ts";
+
 export type LinkState = "connecting" | "open" | "lost" | "refused";
 
 export interface Wish {
@@ -19,6 +21,8 @@ export type ToWorker =
   | { kind: "unsubscribe"; id: number }
   | { kind: "call"; id: number; service: string; type: string; request: unknown; timeoutS: number }
   | { kind: "publish"; topic: string; type: string; message: unknown }
+  | ({ kind: "stream" } & StreamOrder)
+  | { kind: "endStream"; topic: string }
   | { kind: "unadvertise"; topic: string }
   | { kind: "followFrames"; throttleMs: number; truth: boolean };
 

@@ -6,6 +6,7 @@ import type { geometry_msgs_TransformStamped } from "../messages/generated.ts";
 import { secondsOf } from "../lib/time.ts";
 import { FrameTree } from "./frameTree.ts";
 import type { FromWorker, ToWorker, Wish } from "./protocol.ts";
+import { Streams } from "./streams.ts";
 import { MeteredTransport } from "./transport.ts";
 
 const FIRST_RETRY_MS = 250;
@@ -27,6 +28,7 @@ const wishes = new Map<number, Wish>();
 const topics = new Map<number, Topic>();
 const outgoing = new Map<string, Topic>();
 const waiting = new Map<number, (reason: string) => void>();
+const streams = new Streams(publish, nowMs);
 
 self.onmessage = (event: MessageEvent<ToWorker>) => {
   const order = event.data;
@@ -49,6 +51,12 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
       break;
     case "publish":
       publish(order.topic, order.type, order.message);
+      break;
+    case "stream":
+      if (ros?.isConnected) streams.renew(order);
+      break;
+    case "endStream":
+      streams.end(order.topic);
       break;
     case "unadvertise":
       outgoing.get(order.topic)?.unadvertise();
@@ -104,6 +112,7 @@ function lose(event: CloseEvent): void {
   transport = null;
   topics.clear();
   outgoing.clear();
+  streams.drop();
   frameTopics.length = 0;
   for (const fail of waiting.values()) fail("the connection was lost");
   waiting.clear();

@@ -2240,6 +2240,8 @@ export interface volery_interfaces_JoinLockStep_Request {
   name: string;
   period_s: number;
   timeout_s: number;
+  stop_when_silent: boolean;
+  restarts: boolean;
 }
 
 export interface volery_interfaces_JoinLockStep_Response {

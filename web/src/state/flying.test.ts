@@ -4,6 +4,7 @@ const sent = vi.hoisted(() => [] as [string, number, number][]);
 vi.mock("../link/commands/flight.ts", () => ({
   fly: (uav: string, twist: { linear: { x: number }; angular: { z: number } }) =>
     sent.push([uav, twist.linear.x, twist.angular.z]),
+  stopFlying: (uav: string) => sent.push([uav, 0, 0]),
 }));
 vi.mock("../link/link.ts", () => ({ link: { subscribe: () => () => undefined } }));
 

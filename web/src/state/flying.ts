@@ -1,7 +1,7 @@
 // Flight by hand: who is flown, how fast, and the 20 Hz at which it is told.
 
 import { create } from "zustand";
-import { fly } from "../link/commands/flight.ts";
+import { fly, stopFlying } from "../link/commands/flight.ts";
 import { keep, readKept } from "../lib/kept.ts";
 import { AT_REST, isAtRest, sum, twistOf, type Speeds, type Wish } from "../lib/twist.ts";
 import { useVehicles } from "./vehicles.ts";
@@ -70,8 +70,8 @@ export function setSpeeds(speeds: Partial<Speeds>): void {
 
 /** Come to rest at once, as when the window loses its focus. */
 export function rest(): void {
-  const { uav, speeds } = useFlying.getState();
-  if (uav !== "" && moving) fly(uav, twistOf(AT_REST, speeds));
+  const { uav } = useFlying.getState();
+  if (uav !== "" && moving) stopFlying(uav);
   moving = false;
 }
 

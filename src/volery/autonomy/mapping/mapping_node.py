@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -110,9 +111,9 @@ class Mapping(Node):
             self.create_subscription(TFMessage, "/tf", self._frame.on_tf, 50)
         self.create_subscription(JointState, "joint_states", self._on_joint, 5)
         self.create_subscription(Range, "range", self._on_range, 5)
-        level, nodding = self._intakes["level"], self._intakes["nodding"]
-        self.create_subscription(LaserScan, "laser/horizontal/scan", level.add, 5)
-        self.create_subscription(LaserScan, "laser/nodding/scan", nodding.add, 5)
+        for name, lidar in (("level", "horizontal"), ("nodding", "nodding")):
+            scans = f"laser/{lidar}/scan"
+            self.create_subscription(LaserScan, scans, partial(self._on_scan, name), 5)
         self.create_service("octomap_msgs/srv/GetOctomap", "~/octomap", self._on_get)
         self.create_service("volery_interfaces/srv/ByName", "~/save", self._on_save)
         self.create_service("volery_interfaces/srv/ByName", "~/load", self._on_load)
@@ -140,6 +141,9 @@ class Mapping(Node):
         for name, intake in self._intakes.items():
             for rays in intake.ready(self._motion, self._nod if name == "nodding" else None):
                 self._insert(rays)
+
+    def _on_scan(self, name: str, scan: LaserScan) -> None:
+        self._intakes[name].add(scan)
 
     def _on_joint(self, message: JointState) -> None:
         if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
@@ -216,6 +220,8 @@ class Mapping(Node):
             heard, seen = intake.heard_ns, intake.seen_ns
             if heard is None or now - heard > _SILENT_S * NS_PER_S:
                 found.append(f"the {name} LIDAR is silent")
+            elif intake.stuck:
+                found.append(f"the {name} LIDAR repeats itself")
             elif seen is None or now - seen > _SILENT_S * NS_PER_S:
                 found.append(f"the {name} LIDAR sees nothing")
         return found

@@ -8,6 +8,7 @@ import numpy as np
 
 from volery.autonomy.motion_history import MotionHistory, NodHistory
 from volery.autonomy.scan_rays import RayMaker, Rays, is_usable, scan_times
+from volery.autonomy.stuck_sensors import ScanRepeats
 from volery.core.clock import NS_PER_S
 from volery.graph.messages import LaserScan, stamp_of
 
@@ -22,18 +23,21 @@ class ScanIntake:
     """Takes about `rate_hz` scans a second of one LIDAR, gives their rays.
 
     `counts` tells what happened to scans: taken, repeated, unusable, dropped (their motion never
-    became known).
+    became known), stuck (new ones with the ranges of the one before).
     """
 
     def __init__(self, maker: RayMaker, rate_hz: float) -> None:
         self._maker = maker
         self._period_ns = round(NS_PER_S / rate_hz)
         self._waiting: deque[LaserScan] = deque()
+        self._repeats = ScanRepeats()
         self._last_ns: int | None = None
         self._last_taken_ns: int | None = None
         self.counts: Counter[str] = Counter()
         self.seen_ns: int | None = None
         """When the newest scan with an echo was cast."""
+        self.stuck = False
+        """Whether the LIDAR repeats itself."""
         self.heard_ns: int | None = None
         """When the newest scan was cast."""
 
@@ -56,6 +60,10 @@ class ScanIntake:
         if np.isfinite(scan.ranges).any():
             self.seen_ns = stamp
         self._last_taken_ns = stamp
+        self.stuck = self._repeats.are_told_by(scan)
+        if self.stuck:
+            self.counts["stuck"] += 1
+            return
         self._waiting.append(scan)
         if len(self._waiting) > _WAITING:
             self._waiting.popleft()

@@ -173,10 +173,13 @@ class Exploring(Node):
 
     def _on_goal_status(self, message: String) -> None:
         """The planner cannot come to the goal: try another one."""
-        told = json.loads(message.data)
-        if self._goal is None or told.get("state") not in ("refused", "unreachable"):
+        try:
+            told = json.loads(message.data)
+            state, goal = told["state"], told["goal"]
+        except (ValueError, TypeError, KeyError):
             return
-        goal = told.get("goal")
+        if self._goal is None or state not in ("refused", "unreachable"):
+            return
         if goal is not None and np.hypot(*(self._goal.place - goal[:2])) < 0.1:
             self._give_up()
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.planning.trajectory_form import Samples, samples_of
 from volery.autonomy.scan_points import Pose
+from volery.autonomy.stuck_sensors import is_stuck
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.kept import keep, put_back
 from volery.graph.messages import MultiDOFJointTrajectory, Odometry, String, Twist, Vector3
@@ -21,6 +22,8 @@ Array = NDArray[np.float64]
 _PERIOD_S = 0.04
 _STALE_S = 0.5
 """Without a pose for so long it stops."""
+_CARRIED_S = 0.1
+"""A pose is carried on along its velocity for so long at most: stamps of another clock may err."""
 _TURN_GAIN, _TURN_RAD_S = 1.8, 1.2
 _OFF_M = 2.0
 """Farther from its plan it stops and waits for another one."""
@@ -71,7 +74,8 @@ class TrajectoryFollower(Node):
 
     def _on_odometry(self, message: Odometry) -> None:
         pose = Pose.from_odometry(message)
-        if np.isfinite(pose.position).all() and np.isfinite(pose.attitude).all():
+        values = (pose.position, pose.attitude, pose.velocity)
+        if all(np.isfinite(v).all() for v in values) and not is_stuck(pose, self._pose):
             self._pose, self._frame = pose, message.header.frame_id
             self._heard_ns = self.get_clock().now_ns()
 
@@ -98,7 +102,8 @@ class TrajectoryFollower(Node):
         self._fly(self._plan, self._pose, now)
 
     def _fly(self, plan: Samples, pose: Pose, now: int) -> None:
-        here = pose.position + pose.velocity * ((now - pose.time_ns) / NS_PER_S)
+        age_s = min(max((now - pose.time_ns) / NS_PER_S, 0.0), _CARRIED_S)
+        here = pose.position + pose.velocity * age_s
         place, _ = plan.at(now)
         _, velocity = plan.at(now + self._lead_ns)
         off = place - here

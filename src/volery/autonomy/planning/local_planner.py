@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from volery.autonomy.map_frame import MAP, MapFrame
 from volery.autonomy.planning.local_planning import Doing, LocalPlanning, Policy, Sight
+from volery.autonomy.planning.neighbours import Neighbours
 from volery.autonomy.planning.primitives import Limits, Path, State
-from volery.autonomy.planning.reciprocal_avoidance import Neighbour, Separation, half_planes
+from volery.autonomy.planning.reciprocal_avoidance import Separation, half_planes
 from volery.autonomy.planning.sight import Surroundings
 from volery.autonomy.planning.trajectory_form import trajectory_message
 from volery.autonomy.planning.way_ahead import WayAhead
@@ -28,7 +29,7 @@ from volery.graph.messages import (
     Range,
     String,
     TFMessage,
-    stamp_of,
+    message_type,
 )
 from volery.graph.node import Node
 
@@ -61,7 +62,7 @@ class LocalPlanner(Node):
         the node's latency.
     arrival_m: so near to its end the way is done.
     scan_rate_hz: scans taken of each LIDAR a second; cell_m: of the local grid.
-    neighbours: topics of the other UAVs' odometry; separation_m: to keep from them, in plan.
+    separation_m: to keep in plan from the UAVs that are heard on `radio/team`.
 
     """
 
@@ -89,7 +90,7 @@ class LocalPlanner(Node):
         self._way: WayAhead | None = None
         self._way_map: Array | None = None
         """The places of the way in the map, from which `_way` is made."""
-        self._neighbours: dict[str, Neighbour] = {}
+        self._neighbours = Neighbours()
         self._told = ""
         self._told_ns = 0
         self._plans = 0
@@ -109,9 +110,8 @@ class LocalPlanner(Node):
         self.create_subscription(JointState, "joint_states", self._sight.on_joint, 5)
         self.create_subscription(Range, "range", self._on_range, 5)
         self.create_subscription(PathMessage, "planning/path", self._on_path, 1)
-        for topic in self.declare_parameter("neighbours", [""]).value:
-            if topic:
-                self.create_subscription(Odometry, topic, self._neighbour_listener(topic), 5)
+        report = message_type("volery_interfaces/msg/TeamReport")
+        self.create_subscription(report, "radio/team", self._on_report, 20)
         self.create_timer(period, self._on_timer)
 
     def get_state(self) -> dict[str, Any]:
@@ -150,12 +150,8 @@ class LocalPlanner(Node):
         self._way_map = found if len(found) else None
         self._way = None
 
-    def _neighbour_listener(self, topic: str) -> Callable[[Odometry], None]:
-        def on_neighbour(message: Odometry) -> None:
-            pose = Pose.from_odometry(message)
-            self._neighbours[topic] = Neighbour(pose.position, pose.velocity, stamp_of(message))
-
-        return on_neighbour
+    def _on_report(self, report: Any) -> None:
+        self._neighbours.hear(report, self.get_clock().now_ns())
 
     # ------------------------------------------------------------------------------- what it does
 
@@ -191,10 +187,11 @@ class LocalPlanner(Node):
             self._publish(self._planning.hold(start, then), then)
             self._tell("arrived", [])
             return
+        others = self._neighbours.in_odom(self._frame)
         sight = Sight(
             self._sight.clearance(pose.position),
             self._sight.surface(float(self._height.value)),
-            half_planes(start.position, start.velocity, self._near(), self._separation, now),
+            half_planes(start.position, start.velocity, others, self._separation, now),
         )
         path = self._planning.plan(start, carrot, sight, then)
         self._plans += 1
@@ -211,16 +208,6 @@ class LocalPlanner(Node):
             self._way = WayAhead(self._frame.to_odom(self._way_map), passed)
             self._frame_was = at
         return self._way
-
-    def _near(self) -> list[Neighbour]:
-        """Neighbours in the odometry frame."""
-        moved = []
-        for topic in sorted(self._neighbours):
-            other = self._neighbours[topic]
-            place = self._frame.to_odom(other.position)
-            velocity = self._frame.to_odom(other.position + other.velocity) - place
-            moved.append(Neighbour(place, velocity, other.time_ns))
-        return moved
 
     def _policy(self) -> Policy:
         limits = Limits(float(self._speed.value), self._acceleration, 1.5, 1.5, 1.4)

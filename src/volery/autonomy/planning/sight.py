@@ -15,6 +15,7 @@ from volery.autonomy.planning.local_grid import LocalGrid
 from volery.autonomy.planning.surface import Surface
 from volery.autonomy.scan_points import Pose
 from volery.autonomy.scan_rays import Beams, RayMaker
+from volery.autonomy.stuck_sensors import ScanRepeats
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back
 from volery.graph.messages import JointState, LaserScan, Range, stamp_of
@@ -39,14 +40,28 @@ class Surroundings:
         self._grid = LocalGrid(cell_m, _SHAPE)
         self._makers = {name: RayMaker(mount, Beams()) for name, mount in mounts.items()}
         self._period_ns = round(NS_PER_S / scan_rate_hz)
+        self._repeats = {name: ScanRepeats() for name in mounts}
+        self._stuck: set[str] = set()
+        """LIDARs that repeat themselves."""
         self._heard_ns: dict[str, int] = {}
+        """When the newest scan came that was none before."""
         self._taken_ns: dict[str, int] = {}
         self._seen_ns: dict[str, int] = {}
         self._ground = GroundPlane()
         self._range: tuple[int, float] | None = None
         self._upright_cells = math.ceil(0.75 / cell_m)
 
-    _PLAIN = ("motion", "_nod", "_heard_ns", "_taken_ns", "_seen_ns", "_ground", "_range")
+    _PLAIN = (
+        "motion",
+        "_nod",
+        "_repeats",
+        "_stuck",
+        "_heard_ns",
+        "_taken_ns",
+        "_seen_ns",
+        "_ground",
+        "_range",
+    )
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
@@ -74,6 +89,10 @@ class Surroundings:
         heard = self._heard_ns.get(name)
         if heard is not None and heard - _JUMP_BACK_NS <= stamp <= heard:
             return  # it has come before
+        if self._repeats[name].are_told_by(scan):
+            self._stuck.add(name)
+            return
+        self._stuck.discard(name)
         self._heard_ns[name] = stamp
         taken = self._taken_ns.get(name)
         if taken is not None and taken <= stamp < taken + self._period_ns - NS_PER_S // 200:
@@ -99,7 +118,8 @@ class Surroundings:
             found.append("no odometry")
         for name in self._makers:
             if not self._is_fresh(self._heard_ns.get(name), now_ns):
-                found.append(f"the {name} LIDAR is silent")
+                what = "repeats itself" if name in self._stuck else "is silent"
+                found.append(f"the {name} LIDAR {what}")
         if not any(self._is_fresh(self._seen_ns.get(name), now_ns) for name in self._makers):
             found.append("no LIDAR sees anything")
         return found

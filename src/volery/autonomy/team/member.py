@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.map_frame import MapFrame
 from volery.autonomy.scan_points import Pose
+from volery.autonomy.stuck_sensors import is_stuck
 from volery.autonomy.team.assignment import Worker
 from volery.autonomy.team.reports import TYPE as REPORT_TYPE
 from volery.autonomy.team.reports import Phase, Team
@@ -131,7 +132,7 @@ class TeamMember(Node):
 
     def _on_odometry(self, message: Odometry) -> None:
         pose = self._frame.pose_in_map(message)
-        if not np.isfinite(pose.position).all():
+        if not np.isfinite([*pose.position, *pose.velocity]).all() or is_stuck(pose, self._pose):
             return
         self._pose, self._pose_ns = pose, self.now_ns
         coverage = self._coverage

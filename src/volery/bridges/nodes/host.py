@@ -145,7 +145,9 @@ class NodeHost:
         self.graph.subscribe(go, meet, Clock)
         self.graph.hold_back(go, lambda published: self._set_clock(published.message.clock))
         srvtype = "volery_interfaces/srv/JoinLockStep"
-        request = message_type(f"{srvtype}_Request")(name, period_s, timeout_s)
+        request = message_type(f"{srvtype}_Request")(
+            name, period_s, timeout_s, stop_when_silent=False, restarts=False
+        )
         answer = self.graph.call("/volery/join_lock_step", request)
         if not answer.success:
             raise GraphError(f"no lock step: {answer.message}")

@@ -12,13 +12,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from volery.comms.addresses import ALL, Identity
+from volery.comms.addresses import ALL, FIRST_GROUND, Identity
 from volery.comms.exchange import Exchange
 from volery.comms.link import Delivery, Link, ideal_link
 from volery.comms.naming import free_address
 from volery.comms.payloads import decode_named, encode_named
 from volery.comms.protocol import Frame, Kind
 from volery.comms.radio.link import RadioLink
+from volery.comms.settings import RouterSettings
 from volery.core.errors import CommandError, CommsError
 from volery.graph.graph import Graph, Publisher, Subscription
 from volery.graph.messages import Published
@@ -27,6 +28,8 @@ from volery.scenario.radio import RelayedTopic
 _TICK_S = 0.5
 """More often than stations have to tell that they are there, see `StationCore.tick`."""
 _LOST = Delivery(lost=True)
+_RULES = RouterSettings(grace_s=0.0, most_connections=FIRST_GROUND)
+"""Who comes later hears nothing of before: what is on the air is not kept for anybody."""
 
 
 class Timers(Protocol):
@@ -72,7 +75,7 @@ class RadioNet:
         self._topics = topics
         self._radio = link
         self._inner: Link = link or ideal_link
-        self._exchange = Exchange(link=self._decide, now_ns=graph.now_ns())
+        self._exchange = Exchange(_RULES, self._decide, graph.now_ns())
         self._members: dict[str, _Member] = {}
         self._silent: Counter[int] = Counter()
         """How many faults there are of each station."""

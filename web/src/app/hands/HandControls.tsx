@@ -25,6 +25,7 @@ function Controls({ uav }: { uav: string }) {
     <>
       <Paper
         className="hands"
+        data-touch={touch || undefined}
         shadow="md"
         withBorder
         p="xs"

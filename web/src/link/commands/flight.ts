@@ -45,7 +45,14 @@ export interface Twist {
   angular: Place;
 }
 
-/** A velocity in the level heading frame; holds for as long as the UAV's command timeout. */
+const STILL: Twist = { linear: { x: 0, y: 0, z: 0 }, angular: { x: 0, y: 0, z: 0 } };
+
+/** A velocity in the level heading frame, to be told again many times a second until `stopFlying`. */
 export function fly(uav: string, twist: Twist): void {
-  link.publish(`/${uav}/cmd_vel`, "geometry_msgs/msg/Twist", twist);
+  link.stream(`/${uav}/cmd_vel`, "geometry_msgs/msg/Twist", twist, STILL);
+}
+
+/** No velocity any more; said once, if there was one. */
+export function stopFlying(uav: string): void {
+  link.endStream(`/${uav}/cmd_vel`);
 }

@@ -18,7 +18,7 @@ export function Figures() {
       <Figure name="Position" unit="m">
         {[p.x, p.y, p.z].map(decimal).join("  ")}
       </Figure>
-      <Figure name="Height over ground" unit="m">
+      <Figure name="Above ground" unit="m">
         {decimal(p.z - heightAt(p.x, p.y))}
       </Figure>
       <Figure name="Speed" unit="m/s">
@@ -64,8 +64,8 @@ function Heading({ name }: { name: string }) {
   const pose = link.frames.pose(baseFrame(name));
   const yaw = pose === null ? NaN : eulerOf(pose[3], pose[4], pose[5], pose[6]).yaw;
   return (
-    <Figure name="Heading" unit="°, from east to the left">
-      {Number.isNaN(yaw) ? "–" : ((yaw * 180) / Math.PI).toFixed(0)}
+    <Figure name="Heading" unit="°, east 0, north 90">
+      {Number.isNaN(yaw) ? "–" : String(Math.round((yaw * 180) / Math.PI) + 0)}
     </Figure>
   );
 }

@@ -35,7 +35,14 @@ export function GoTo({ uav }: { uav: string }) {
             />
           ))}
           <Tooltip label={whyNot ?? "Fly there"}>
-            <Button type="submit" size="xs" px={8} disabled={whyNot !== null} aria-label="Go">
+            <Button
+              type="submit"
+              size="xs"
+              px={7}
+              miw={30}
+              disabled={whyNot !== null}
+              aria-label="Go"
+            >
               <Navigation size={15} />
             </Button>
           </Tooltip>

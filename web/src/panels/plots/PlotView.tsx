@@ -103,7 +103,14 @@ export function PlotView({ plot, paused }: { plot: Plot; paused: boolean }) {
           </ActionIcon>
         </Group>
       </Group>
-      <div ref={place} className={classes.canvas} />
+      <div className={classes.field}>
+        <div ref={place} className={classes.canvas} />
+        {plot.lines.length === 0 && (
+          <Text className={classes.hint} size="sm" c="dimmed">
+            Choose a topic below and one of its fields to draw a line.
+          </Text>
+        )}
+      </div>
       <AddLine plot={plot.id} />
     </section>
   );

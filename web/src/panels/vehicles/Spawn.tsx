@@ -66,6 +66,7 @@ export function Spawn({ close }: { close: () => void }) {
           <Button
             disabled={disabled}
             variant="default"
+            px="xs"
             leftSection={<MousePointerClick size={16} />}
             onClick={() => void byClick()}
           >

@@ -52,7 +52,7 @@ export class Sun implements Part {
     this.sun.color.setRGB(...sun);
     this.sky.color.setRGB(...above);
     this.sky.groundColor.setRGB(...below);
-    this.sky.intensity = 1.15;
+    this.sky.intensity = 1.35;
     this.fresh = true;
   }
 

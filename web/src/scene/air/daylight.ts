@@ -69,7 +69,7 @@ export function daylightOf(weather: Weather): Daylight {
   const warm: Rgb = [1, 1 - 0.38 * low, 1 - 0.72 * low];
   const clear = 1 - 0.9 * overcast;
   const dusk = smooth(-0.12, 0.25, height);
-  const sunStrength = 3.1 * smooth(-0.02, 0.22, height) * clear;
+  const sunStrength = 4.4 * smooth(-0.02, 0.22, height) * clear;
   const moonStrength = 0.1 * night * clear;
   const zenith = mix(
     scaled([0.1, 0.23, 0.58], 0.08 + 0.92 * dusk),
@@ -91,9 +91,9 @@ export function daylightOf(weather: Weather): Daylight {
     sun: night < 0.95 ? scaled(warm, sunStrength) : scaled([0.6, 0.75, 1], moonStrength),
     above: scaled(
       mix([0.62, 0.75, 1], [0.85, 0.9, 1], overcast),
-      0.09 + 1.25 * dusk * (1 - 0.25 * overcast),
+      0.09 + 2.2 * dusk * (1 - 0.25 * overcast),
     ),
-    below: scaled([0.36, 0.33, 0.26], 0.08 + 0.9 * dusk * (1 - 0.3 * overcast)),
+    below: scaled([0.36, 0.34, 0.28], 0.08 + 1.7 * dusk * (1 - 0.3 * overcast)),
     zenith: nightZenith,
     horizon: haze,
     haze,

@@ -44,6 +44,7 @@ export class Returns implements Part {
   private selected = "";
   private nowS = 0;
   private simulatedS = 0;
+  private played = false;
   private next = 0;
   private capacity = LEVELS[0]!.returns;
   private readonly room: number;
@@ -91,8 +92,12 @@ export class Returns implements Part {
     const stepped = Math.max(0, simulated - this.simulatedS);
     this.simulatedS = simulated;
     const { status } = useSimulation.getState();
-    if (status !== null && status.state !== PLAYING) return stepped;
-    return stepS; // bounded: where frames are slow returns are still seen in some
+    const played = this.played;
+    this.played = status === null || status.state === PLAYING;
+    // Bounded while it plays, the frame in which it is paused included: where frames are slow, returns
+    // are still seen in some.
+    if (this.played) return stepS;
+    return played ? Math.min(stepped, stepS) : stepped;
   }
 
   dispose(): void {

@@ -1,6 +1,7 @@
 import { Group } from "three";
 import { POSE } from "../../link/protocol.ts";
 import { useVehicles } from "../../state/vehicles.ts";
+import { useView } from "../../state/view.ts";
 import { SegmentLines } from "../lines/SegmentLines.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { shown } from "../stage/shown.ts";
@@ -25,10 +26,12 @@ export class Marks implements Part {
 
   update(moment: Moment): void {
     const { selected } = useVehicles.getState();
+    const onboard = useView.getState().name === "onboard";
     this.count = 0;
     let wrecks = 0;
     for (const uav of fleet.uavs) {
       const isSelected = uav.name === selected;
+      if (isSelected && onboard && !uav.crashed) continue; // nobody sees the ring he sits in
       if (!isSelected && !(uav.crashed && wrecks++ < MOST_WRECKS)) continue;
       this.mark(uav, uav.crashed ? CRASHED : SELECTED, isSelected);
     }

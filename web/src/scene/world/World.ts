@@ -1,10 +1,19 @@
-import { AxesHelper, GridHelper, Group, Mesh, type Object3D, type WebGLRenderer } from "three";
+import {
+  AxesHelper,
+  type Color,
+  GridHelper,
+  Group,
+  Mesh,
+  type Object3D,
+  type WebGLRenderer,
+} from "three";
 import { useSimulation } from "../../state/simulation.ts";
 import { planWorld } from "../../state/worldPlan.ts";
 import type { Air } from "../air/air.ts";
 import type { Moment, Part } from "../stage/part.ts";
+import { backdropOf } from "./beyond.ts";
 import { Forest } from "./Forest.ts";
-import { Ground } from "./ground.ts";
+import { cornersOf, Ground } from "./ground.ts";
 import { loadWorld } from "./loadWorld.ts";
 import { worldMaterial, worldUniforms } from "./materials.ts";
 import { obstaclesOf } from "./obstaclesOf.ts";
@@ -86,13 +95,18 @@ export class World implements Part {
     }
     const ground = content.solids.filter(({ material }) => isGround(material));
     this.grid.visible = content.solids.length === 0 && content.models.length === 0;
-    stand(
-      new Ground(ground.map(({ geometry, place }) => geometry.clone().applyMatrix4(place))),
-      obstaclesOf(content, isGround),
-    );
+    const surfaces = ground.map(({ geometry, place }) => geometry.clone().applyMatrix4(place));
+    stand(new Ground(surfaces), obstaclesOf(content, isGround));
+    const own = ground.findIndex(({ material }) => material === "ground");
+    if (own >= 0) this.surround(cornersOf([surfaces[own]!]), ground[own]!.colour);
     planWorld(content);
     this.ready = true;
     this.version++;
+  }
+
+  private surround(corners: Float64Array, colour: Color): void {
+    const backdrop = backdropOf(corners, colour);
+    if (backdrop !== null) this.object.add(backdrop);
   }
 
   private clear(): void {

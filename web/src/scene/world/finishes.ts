@@ -1,6 +1,6 @@
 // What surfaces look like close up, by the names of `volery.world.materials`. Each is a few lines of
 // shader that change what the glTF says: `colour` and `rough` may be set, `height` (m) makes relief,
-// `glow` is light of its own. At hand are `place` (map, m), `own` (m, in the thing's own axes),
+// `glow` is light of its own, `vanish` (0 to 1) how much of it is lost in the haze. At hand are `place` (map, m), `own` (m, in the thing's own axes),
 // `facing` (the surface's normal, map), `night` (0 to 1) and `noise(uv)`, see `noiseTexture.ts`.
 
 export interface Finish {
@@ -11,17 +11,27 @@ export interface Finish {
   sways?: boolean;
   /** Made of leaves: lit from both sides, cut out by a picture of leaves. */
   leafy?: boolean;
+  /** Fades into the haze by itself, by `vanish`. */
+  vanishes?: boolean;
 }
 
 const GROUND = /* glsl */ `
   vec4 wide = noise(place.xy / 61.0), middle = noise(place.xy / 9.0 + wide.r), close = noise(place.xy / 1.7);
-  float grass = smoothstep(0.36, 0.62, 0.5 * wide.r + 0.35 * middle.r + 0.15 * close.g);
+  float grass = smoothstep(0.3, 0.56, 0.5 * wide.r + 0.35 * middle.r + 0.15 * close.g);
   grass *= smoothstep(0.55, 0.8, facing.z);
   vec3 soil = colour * mix(vec3(0.75, 0.62, 0.6), vec3(1.5, 1.2, 1.1), close.g * 0.6 + middle.g * 0.4);
-  vec3 blades = mix(vec3(0.045, 0.085, 0.018), vec3(0.14, 0.2, 0.045), close.g * 0.7 + middle.g * 0.3);
-  blades = mix(blades, vec3(0.2, 0.19, 0.07), 0.5 * smoothstep(0.55, 0.9, middle.a));
+  vec3 blades = mix(vec3(0.055, 0.1, 0.024), vec3(0.16, 0.23, 0.06), close.g * 0.7 + middle.g * 0.3);
+  blades = mix(blades, vec3(0.22, 0.21, 0.085), 0.5 * smoothstep(0.55, 0.9, middle.a));
   colour = mix(soil, blades, grass);
   height = 0.05 * close.g + 0.02 * noise(place.xy / 0.41).g;
+`;
+
+/** As the ground, paler from the border on and gone into the haze where it ends. */
+const BEYOND = `${GROUND}
+  vec3 pale = mix(colour, vec3(dot(colour, vec3(0.33))), 0.35) * 1.15;
+  colour = mix(colour, pale, smoothstep(0.0, 0.004, vBase));
+  vanish = 1.0 - exp(-5.5 * vBase);
+  height *= 1.0 - vanish;
 `;
 
 const COVER = /* glsl */ `
@@ -105,6 +115,7 @@ const PLAIN_FINISH: Finish = { roughness: 0.85, shader: GRAIN };
 
 const FINISHES: Record<string, Finish> = {
   ground: { roughness: 0.95, shader: GROUND },
+  beyond: { roughness: 0.95, shader: BEYOND, vanishes: true },
   ground_cover: { roughness: 0.92, shader: COVER },
   wood: { roughness: 0.9, shader: WOOD, sways: true },
   leaf: { roughness: 0.7, shader: LEAF, sways: true, leafy: true },

@@ -68,6 +68,10 @@ function finishShader(shader: WebGLProgramParametersWithUniforms, finish: Finish
       "#include <emissivemap_fragment>",
       "#include <emissivemap_fragment>\ntotalEmissiveRadiance += glow;",
     )
+    .replace(
+      "#include <opaque_fragment>",
+      `#include <opaque_fragment>\n${finish.vanishes ? VANISH : ""}`,
+    )
     .replace("#include <roughnessmap_fragment>", plain ? "" : "float roughnessFactor = rough;")
     .replace(
       "#include <normal_fragment_maps>",
@@ -75,11 +79,17 @@ function finishShader(shader: WebGLProgramParametersWithUniforms, finish: Finish
     );
 }
 
+const VANISH = /* glsl */ `
+#ifdef USE_FOG
+  gl_FragColor.rgb = mix(gl_FragColor.rgb, hazeLight, vanish);
+#endif
+`;
+
 const BASE = "attribute float base;\n";
 
 const VERTEX_HEAD = /* glsl */ `
 varying vec3 vPlace, vOwn, vFacing;
-varying float vAbove, vHue;
+varying float vAbove, vBase, vHue;
 varying vec2 vLeaf;
 uniform float timeS;
 uniform vec2 windMap;
@@ -99,6 +109,7 @@ function vertexBody({ sways, leafy }: Finish): string {
   placed = modelMatrix * placed;
   vFacing = normalize(mat3(modelMatrix) * facing);
   vOwn = position;
+  vBase = base;
   vAbove = placed.z - base;
   vHue = fract(sin(dot(foot.xy, vec2(12.9898, 78.233))) * 43758.5453);
   ${sways ? SWAY : ""}
@@ -127,7 +138,7 @@ const FLUTTER = /* glsl */ `
 
 const FRAGMENT_HEAD = /* glsl */ `
 varying vec3 vPlace, vOwn, vFacing;
-varying float vAbove, vHue;
+varying float vAbove, vBase, vHue;
 varying vec2 vLeaf;
 uniform sampler2D noiseMap, leafMap;
 uniform float nightShare;
@@ -137,7 +148,7 @@ vec4 noise(vec2 uv) { return texture2D(noiseMap, uv); }
 function fragmentBody({ roughness, shader, leafy }: Finish): string {
   return /* glsl */ `
   vec3 place = vPlace, own = vOwn, facing = normalize(vFacing), colour = diffuseColor.rgb, glow = vec3(0.0);
-  float above = vAbove, night = nightShare, height = 0.0, treeHue = vHue, rough = ${roughness.toFixed(3)};
+  float above = vAbove, night = nightShare, height = 0.0, vanish = 0.0, treeHue = vHue, rough = ${roughness.toFixed(3)};
   ${leafy ? "vec4 leaves = texture2D(leafMap, vLeaf);\n  if (leaves.a < 0.4) discard;\n  colour *= leaves.rgb * 1.6;" : ""}
   { ${shader} }
   diffuseColor.rgb = colour;

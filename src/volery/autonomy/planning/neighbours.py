@@ -1,0 +1,45 @@
+"""The other UAVs near by, as their team reports tell over the radio."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from volery.autonomy.map_frame import MapFrame
+from volery.autonomy.planning.reciprocal_avoidance import Neighbour
+from volery.core.clock import NS_PER_S
+from volery.graph.messages import stamp_of
+
+_RESTART_NS = 10 * NS_PER_S
+"""After so long a silence an older stamp is that of a clock that began anew."""
+
+
+class Neighbours:
+    """What was last heard of each UAV, in the map; aged by the hearer's own clock."""
+
+    def __init__(self) -> None:
+        self._heard: dict[str, Neighbour] = {}
+        self._sent_ns: dict[str, int] = {}
+
+    def hear(self, report: Any, now_ns: int) -> None:
+        """Take in a `TeamReport`; what is not finite, repeated or overtaken is left out."""
+        p, v = report.position, report.velocity
+        if not np.isfinite([p.x, p.y, p.z, v.x, v.y, v.z]).all():
+            return
+        sent_ns, known = stamp_of(report), self._heard.get(report.name)
+        fresh = known is not None and now_ns - known.time_ns <= _RESTART_NS
+        if fresh and sent_ns <= self._sent_ns[report.name]:
+            return
+        place, velocity = np.array([p.x, p.y, p.z]), np.array([v.x, v.y, v.z])
+        self._heard[report.name] = Neighbour(place, velocity, now_ns)
+        self._sent_ns[report.name] = sent_ns
+
+    def in_odom(self, frame: MapFrame) -> list[Neighbour]:
+        """All of them, by name, in the odometry frame."""
+        moved = []
+        for _, other in sorted(self._heard.items()):
+            place = frame.to_odom(other.position)
+            velocity = frame.to_odom(other.position + other.velocity) - place
+            moved.append(Neighbour(place, velocity, other.time_ns))
+        return moved

@@ -1,0 +1,1 @@
+"""Simultaneous localisation and mapping: an inertial filter corrected by what LIDARs see again."""

@@ -1,0 +1,108 @@
+"""What is remembered of the way: every few metres where it was, and what stood around it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.matching_kernels import GROUND, UPRIGHT
+from volery.core import rotations
+
+Array = NDArray[np.float64]
+
+_MOST_POINTS = {UPRIGHT: 400, GROUND: 150}
+
+
+class Keyframe(NamedTuple):
+    """A place on the way; its axes are level, x along the vehicle's heading."""
+
+    time_ns: int
+    position: Array
+    """(3,) in the frame of the odometry."""
+    attitude: Array
+    """(4,) likewise."""
+    travelled_m: float
+    points: Array
+    """(K, 3) m, returns around it in its axes."""
+    kinds: NDArray[np.int8]
+    """(K,) what they are of."""
+    session: int
+    """Counts how often the motion was lost: within one the odometry is of one piece."""
+
+
+class Level(NamedTuple):
+    """How a keyframe's axes lie in the odometry's."""
+
+    attitude: Array
+    """(4,) level from odometry: gravity points along -z afterwards."""
+    yaw: float
+    """Of the vehicle about the true vertical, rad."""
+
+
+def levelling(gravity: Array) -> Array:
+    """The smallest turn (4,) after which `gravity` (3,) points straight down."""
+    up = -gravity / np.linalg.norm(gravity)
+    axis = np.cross(up, [0.0, 0.0, 1.0])
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-12:
+        return np.array([0.0, 0.0, 0.0, 1.0])
+    return rotations.exponential(axis / sine * math.atan2(sine, float(up[2])))
+
+
+def level_of(gravity: Array, attitude: Array) -> Level:
+    """Level axes of a vehicle with `attitude` (4,) where gravity is `gravity` (3,)."""
+    turn = levelling(gravity)
+    return Level(turn, float(rotations.yaw_of(rotations.multiply(turn, attitude))))
+
+
+def step_between(one: Keyframe, position: Array, attitude: Array, gravity: Array) -> Array:
+    """The step (4,) x, y, z, yaw from a keyframe to a pose of the odometry."""
+    here, there = level_of(gravity, one.attitude), level_of(gravity, attitude)
+    moved = rotations.rotate(here.attitude, position - one.position)
+    c, s = math.cos(here.yaw), math.sin(here.yaw)
+    turn = math.remainder(there.yaw - here.yaw, math.tau)
+    return np.array(
+        [c * moved[0] + s * moved[1], c * moved[1] - s * moved[0], float(moved[2]), turn]
+    )
+
+
+class Gathering:
+    """Returns since the last keyframe, in the odometry's frame."""
+
+    def __init__(self) -> None:
+        self._points: list[Array] = []
+        self._kinds: list[NDArray[np.int8]] = []
+
+    def add(self, points: Array, kinds: NDArray[np.int8]) -> None:
+        """Remember some returns (K, 3)."""
+        useful = (kinds == UPRIGHT) | (kinds == GROUND)
+        self._points.append(points[useful])
+        self._kinds.append(kinds[useful])
+
+    def keyframe(
+        self, time_ns: int, state: tuple[Array, Array, Array], travelled_m: float, session: int
+    ) -> Keyframe:
+        """End it at a pose: `state` is position (3,), attitude (4,) and gravity (3,)."""
+        position, attitude, gravity = state
+        level = level_of(gravity, attitude)
+        points = np.concatenate([*self._points, np.zeros((0, 3))])
+        kinds = np.concatenate([*self._kinds, np.zeros(0, np.int8)])
+        chosen = np.concatenate([_spread(kinds, kind) for kind in _MOST_POINTS])
+        turn = rotations.multiply(rotations.from_rpy(0.0, 0.0, -level.yaw), level.attitude)
+        own = rotations.rotate(turn, points[chosen] - position)
+        self._points, self._kinds = [], []
+        return Keyframe(
+            time_ns, position.copy(), attitude.copy(), travelled_m, own, kinds[chosen], session
+        )
+
+
+def _spread(kinds: NDArray[np.int8], kind: int) -> NDArray[np.int64]:
+    """Rows of a kind, thinned out evenly."""
+    rows = np.flatnonzero(kinds == kind)
+    most = _MOST_POINTS[kind]
+    if len(rows) <= most:
+        return rows
+    return rows[np.linspace(0, len(rows) - 1, most).round().astype(np.int64)]

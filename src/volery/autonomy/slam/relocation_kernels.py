@@ -1,0 +1,157 @@
+"""Finding where a set of uprights stands among others: by trying, then by least squares."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.ground_kernels import Keys, add_ground, plane_at
+from volery.autonomy.slam.inertial_kernels import STATE_NUMBERS, P, Q
+from volery.autonomy.slam.linear import eliminate
+from volery.autonomy.slam.matching_kernels import GROUND, UPRIGHT, gather
+from volery.autonomy.slam.upright_kernels import Cells, add_upright
+from volery.core.compiled import kernel
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+_FOUR = (0, 1, 2, 5)
+"""Of position and small turns, those that gravity does not tell."""
+
+
+@kernel
+def draw(points: Array, cell: float, picture: Picture) -> None:
+    """Mark cells at points (K, 2), and beside them, in `picture` (n, n) around the origin."""
+    n = picture.shape[0]
+    picture[:] = 0
+    for k in range(points.shape[0]):
+        i = math.floor(points[k, 0] / cell) + n // 2
+        j = math.floor(points[k, 1] / cell) + n // 2
+        if not (1 <= i < n - 1 and 1 <= j < n - 1):
+            continue
+        for di in range(-1, 2):
+            for dj in range(-1, 2):
+                worth = 4 if di == 0 and dj == 0 else (2 if di * dj == 0 else 1)
+                picture[i + di, j + dj] = max(picture[i + di, j + dj], worth)
+
+
+@kernel
+def search(
+    points: Array,
+    picture: Picture,
+    cell: float,
+    middle: Array,
+    reach: Array,
+    step_rad: float,
+    best: Array,
+) -> float:
+    """The pose (3,) x, y, yaw of points (K, 2) in `picture` that meets most; its share of all.
+
+    Tried are `middle` (3,) +- `reach` (3,), in steps of a cell and of `step_rad`.
+    """
+    n, count = picture.shape[0], points.shape[0]
+    wide, high = math.ceil(reach[0] / cell), math.ceil(reach[1] / cell)
+    turns = math.ceil(reach[2] / step_rad)
+    most = -1
+    for t in range(-turns, turns + 1):
+        yaw = middle[2] + t * step_rad
+        c, s = math.cos(yaw), math.sin(yaw)
+        for i in range(-wide, wide + 1):
+            x = middle[0] + i * cell
+            for j in range(-high, high + 1):
+                y = middle[1] + j * cell
+                total = 0
+                for k in range(count):
+                    a = math.floor((x + c * points[k, 0] - s * points[k, 1]) / cell) + n // 2
+                    b = math.floor((y + s * points[k, 0] + c * points[k, 1]) / cell) + n // 2
+                    if 0 <= a < n and 0 <= b < n:
+                        total += picture[a, b]
+                if total > most:
+                    most = total
+                    best[0], best[1], best[2] = x, y, yaw
+    return float(most / (4.0 * max(count, 1)))
+
+
+@kernel
+def draw_maps(
+    points: Array,
+    kinds: NDArray[np.int8],
+    upright_keys: Keys,
+    cells: Cells,
+    ground_keys: Keys,
+    sums: Array,
+) -> None:
+    """Begin maps anew with points (K, 3)."""
+    upright_keys[:] = -1
+    ground_keys[:] = -1
+    for k in range(points.shape[0]):
+        if kinds[k] == UPRIGHT:
+            add_upright(upright_keys, cells, points[k, 0], points[k, 1], points[k, 2])
+        elif kinds[k] == GROUND:
+            add_ground(ground_keys, sums, points[k, 0], points[k, 1], points[k, 2])
+
+
+@kernel
+def refine(
+    pose: Array,
+    points: Array,
+    kinds: NDArray[np.int8],
+    upright_keys: Keys,
+    cells: Cells,
+    ground_keys: Keys,
+    sums: Array,
+    upright_variance: float,
+    ground_variance: float,
+    rounds: int,
+    information: Array,
+    told: Array,
+) -> bool:
+    """Move the pose (4,) x, y, z, yaw of points (K, 3) to where they fit the maps best.
+
+    `information` (4, 4) and `told` (4,) are those of the end. False: they leave it open.
+    """
+    state, planes = np.zeros(STATE_NUMBERS), np.zeros((points.shape[0], 3))
+    now = kinds.copy()
+    all_six, gradient = np.empty((6, 6)), np.empty(6)
+    left, right = np.empty((4, 4)), np.empty((4, 1))
+    plane, flat = np.zeros(6), np.zeros(2)
+    for turn in range(rounds):
+        c, s = math.cos(pose[3]), math.sin(pose[3])
+        state[P], state[P + 1], state[P + 2] = pose[0], pose[1], pose[2]
+        state[Q + 2], state[Q + 3] = math.sin(0.5 * pose[3]), math.cos(0.5 * pose[3])
+        for k in range(points.shape[0]):
+            if kinds[k] != GROUND:
+                continue
+            x = pose[0] + c * points[k, 0] - s * points[k, 1]
+            y = pose[1] + s * points[k, 0] + c * points[k, 1]
+            known = plane_at(ground_keys, sums, x, y, 1, flat, plane)
+            now[k] = GROUND if known >= 4 else 0
+            planes[k, 0] = plane[0] - plane[1] * x - plane[2] * y
+            planes[k, 1], planes[k, 2] = plane[1], plane[2]
+        gather(
+            state,
+            points,
+            now,
+            planes,
+            upright_keys,
+            cells,
+            upright_variance,
+            ground_variance,
+            all_six,
+            gradient,
+            told,
+        )
+        for i in range(4):
+            right[i, 0] = -gradient[_FOUR[i]]
+            for k in range(4):
+                left[i, k] = information[i, k] = all_six[_FOUR[i], _FOUR[k]]
+            left[i, i] += 1e-6
+        if turn == rounds - 1:
+            return True
+        if not eliminate(left, right):
+            return False
+        for i in range(4):
+            pose[i] += right[i, 0]
+    return True

@@ -1,0 +1,238 @@
+"""Where the vehicle is and how it moves, from IMU, LIDARs and sonar alone."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.motion_history import NodHistory
+from volery.autonomy.scan_rays import is_usable, scan_times
+from volery.autonomy.slam import reports
+from volery.autonomy.slam.health import Health
+from volery.autonomy.slam.inertial_kernels import BG, Q, V
+from volery.autonomy.slam.settings import ImuNoise, Matching
+from volery.autonomy.slam.tracker import Sweep, Tracker
+from volery.autonomy.slam.way import Way
+from volery.core.clock import NS_PER_S
+from volery.core.errors import NodeError
+from volery.core.kept import keep, put_back
+from volery.graph.messages import (
+    Imu,
+    JointState,
+    LaserScan,
+    Odometry,
+    PathMessage,
+    Range,
+    String,
+    TFMessage,
+    stamp_of,
+)
+from volery.graph.node import Node
+
+Array = NDArray[np.float64]
+
+_JUMP_NS = NS_PER_S // 2
+"""A stamp so far before the newest one is a clock that was set back."""
+_LONGEST_GAP_NS = 2 * NS_PER_S
+"""Without readings of the IMU for longer it is not known where the vehicle has gone."""
+_MOST_RAD_S, _MOST_M_S2 = 60.0, 500.0
+"""Beyond what any IMU measures."""
+
+
+class Slam(Node):
+    """Publishes `slam/odom`, `slam/pose`, `slam/path` (latched), `slam/status`, and `/tf`.
+
+    Parameters
+    ----------
+    start: [x, y, z, yaw] of where it begins in the map, m and rad; empty: the map begins there.
+    level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
+    imu_noise: densities of gyroscope and accelerometer, of their biases' walks, and turn-on biases,
+        in SI units; empty: the ADIS16448's.
+    standing_height_m: of the body over the ground where it stands.
+    odom_rate_hz, pose_rate_hz: how often they are published.
+    scan_rate_hz: sweeps taken of each LIDAR a second.
+    reach_m: farther returns are left out.
+    loop_closures: whether places that are seen again correct the map (needs gtsam).
+
+    """
+
+    _PLAIN = ("_nod", "_omega", "_told", "_taken_ns", "_odom_ns", "_refused", "_resets")
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("slam", **options)
+        start = self.declare_parameter("start", []).value
+        noise = self.declare_parameter("imu_noise", []).value
+        if len(start) not in (0, 4) or len(noise) not in (0, 6):
+            raise NodeError("start is [x, y, z, yaw], imu_noise has 6 numbers, or they are empty")
+        self._start = np.array(start if len(start) else [0.0] * 4, np.float64)
+        self._mounts = {
+            name: np.array(self.declare_parameter(f"{name}_mount", [0.0] * 3).value, np.float64)
+            for name in ("level", "nodding")
+        }
+        self._imu_noise = ImuNoise(*map(float, noise)) if len(noise) else ImuNoise()
+        self._matching = Matching(reach_m=float(self.declare_parameter("reach_m", 30.0).value))
+        self._standing = float(self.declare_parameter("standing_height_m", 0.2).value)
+        self._has_loops = bool(self.declare_parameter("loop_closures", True).value)
+        period = NS_PER_S / float(self.declare_parameter("scan_rate_hz", 20.0).value)
+        self._sweep_ns = round(0.9 * period)  # a scan that comes a little early is not left out
+        self._odom_period_ns = round(NS_PER_S / self.declare_parameter("odom_rate_hz", 50.0).value)
+        self._uav = self.get_namespace().strip("/") or "uav"
+        self._begin()
+        self._open(1.0 / float(self.declare_parameter("pose_rate_hz", 10.0).value))
+
+    def _begin(self) -> None:
+        self._tracker = Tracker(self._start, self._imu_noise, self._matching)
+        self._tracker.standing_height = self._standing
+        self._way = Way(self._matching, self._start, self._has_loops)
+        self._health = Health(("IMU", "level LIDAR", "nodding LIDAR"), self.get_clock().now_ns())
+        self._nod = NodHistory()
+        self._omega = np.zeros(3)
+        self._taken_ns: dict[str, int] = {}
+        self._odom_ns = 0
+        self._refused = self._resets = 0
+        self._told = ""
+
+    def _open(self, pose_period_s: float) -> None:
+        self._odom = self.create_publisher(Odometry, "slam/odom", 5)
+        self._pose = self.create_publisher(reports.POSE, "slam/pose", 5)
+        self._path = self.create_publisher(PathMessage, "slam/path", 1, latched=True)
+        self._status = self.create_publisher(String, "slam/status", 1, latched=True)
+        self._tf = self.create_publisher(TFMessage, "/tf", 10)
+        self.create_subscription(Imu, "imu", self._on_imu, 50)
+        self.create_subscription(JointState, "joint_states", self._on_joint, 20)
+        self.create_subscription(Range, "range", self._on_range, 5)
+        self.create_subscription(
+            LaserScan, "laser/horizontal/scan", lambda m: self._on_scan("level", m), 5
+        )
+        self.create_subscription(
+            LaserScan, "laser/nodding/scan", lambda m: self._on_scan("nodding", m), 5
+        )
+        self.create_timer(pose_period_s, self._tell_pose)
+        self.create_timer(0.5, self._tell_status)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        parts = {n: getattr(self, n).get_state() for n in ("_tracker", "_way", "_health")}
+        return {"parts": parts, **keep(self, self._PLAIN)}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        for name, part in state["parts"].items():
+            getattr(self, name).set_state(part)
+        put_back(self, {name: state[name] for name in self._PLAIN})
+
+    # ------------------------------------------------------------------------------ what it hears
+
+    def _on_imu(self, message: Imu) -> None:
+        w, a = message.angular_velocity, message.linear_acceleration
+        time_ns, newest = stamp_of(message), self._tracker.time_ns
+        if not (abs(w.x) + abs(w.y) + abs(w.z) < _MOST_RAD_S and
+                abs(a.x) + abs(a.y) + abs(a.z) < _MOST_M_S2):  # fmt: skip  # leaves out nan
+            self._refused += 1
+            return
+        if newest and (time_ns < newest - _JUMP_NS or time_ns > newest + _LONGEST_GAP_NS):
+            self._set_clock(time_ns)
+        self._health.heard["IMU"] = self.get_clock().now_ns()
+        gyro = np.array([w.x, w.y, w.z])
+        seen = self._tracker.add_imu(time_ns, gyro, np.array([a.x, a.y, a.z]))
+        for returns in seen:
+            self._way.add(returns, self._tracker)
+        self._omega = gyro - self._tracker.state[BG : BG + 3]
+        if self._tracker.is_ready and time_ns - self._odom_ns >= self._odom_period_ns:
+            self._odom_ns = time_ns
+            self._tell_odometry(time_ns)
+
+    def _set_clock(self, time_ns: int) -> None:
+        """The clock was set, or the IMU silent: it goes on from where it was, but does not know."""
+        self._nod = NodHistory()
+        self._taken_ns = {}
+        self._odom_ns = 0
+        self._resets += 1
+        self._tracker.set_clock(time_ns)
+        if self._tracker.is_ready:
+            self._lose()
+
+    def _on_joint(self, message: JointState) -> None:
+        if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
+            angle, rate = float(message.position[0]), float(message.velocity[0])
+            self._nod.add(stamp_of(message), angle, rate)
+
+    def _on_range(self, message: Range) -> None:
+        self._tracker.add_range(stamp_of(message), float(message.range))
+
+    def _on_scan(self, name: str, scan: LaserScan) -> None:
+        first, last = scan_times(scan)
+        if not is_usable(scan) or first <= self._taken_ns.get(name, -1):
+            self._refused += 1
+            return
+        if np.isfinite(np.asarray(scan.ranges)).any():
+            self._health.heard[f"{name} LIDAR"] = self.get_clock().now_ns()
+        if first - self._taken_ns.get(name, -(1 << 60)) < self._sweep_ns:
+            return
+        nods = (0.0, 0.0) if name == "level" else (self._nod.at(first), self._nod.at(last))
+        if nods[0] is None or nods[1] is None:
+            self._refused += 1
+            return
+        self._taken_ns[name] = first
+        ranges = np.asarray(scan.ranges, np.float32)
+        self._tracker.add_sweep(
+            Sweep(
+                name, first, float(scan.time_increment) * NS_PER_S, float(scan.angle_min),
+                float(scan.angle_increment), ranges, self._mounts[name], nods[0], nods[1],
+            )
+        )  # fmt: skip
+
+    # ------------------------------------------------------------------------------ what it tells
+
+    def _tell_odometry(self, time_ns: int) -> None:
+        t = self._tracker
+        state = t.state
+        parts = (state[:3].copy(), state[Q : Q + 4].copy(), state[V : V + 3].copy(), self._omega)
+        self._odom.publish(reports.odometry(time_ns, self._uav, parts, t.covariance[:9, :9]))
+
+    def _tell_pose(self) -> None:
+        t = self._tracker
+        if not t.is_ready or not self._way.frames:
+            return
+        position, attitude = self._way.pose(t)
+        four, tilt = self._way.sigmas(t), np.sqrt(np.diag(t.covariance)[15:17])
+        own = np.sqrt(np.diag(t.covariance)[[0, 1, 2, 8]])
+        x, y, z, yaw = np.hypot(four, own)
+        sigmas = np.array([x, y, z, tilt[0], tilt[1], yaw])
+        self._pose.publish(reports.pose_in_map(t.time_ns, position, attitude, sigmas))
+        at = self._way.correction
+        self._tf.publish(reports.map_from_odom(t.time_ns, self._uav, at.position, at.attitude))
+
+    def _tell_status(self) -> None:
+        t, way, now = self._tracker, self._way, self.get_clock().now_ns()
+        if self._health.look(t, now, way.is_placed):
+            self._lose()
+        told = {
+            "state": self._health.state,
+            "problems": self._health.problems,
+            "uprights": {name: round(m.met, 1) for name, m in sorted(t.match.items())},
+            "sigma_m": round(math.sqrt(float(max(t.covariance[0, 0], t.covariance[1, 1]))), 3),
+            "keyframes": len(way.frames),
+            "closures": way.closures,
+            "sessions": way.session + 1,
+            "refused": self._refused + t.refused,
+            "clock_set": self._resets,
+        }
+        text = json.dumps(told)
+        if text != self._told:
+            self._told = text
+            self._status.publish(String(text))
+        if self._path.wanted and way.frames:
+            times = [frame.time_ns for frame in way.frames]
+            self._path.publish(reports.path(t.time_ns, times, way.poses))
+
+    def _lose(self) -> None:
+        """Begin new maps; where in the old one they lie must be found out."""
+        self._tracker.begin_anew()
+        self._health.begin_anew()
+        if self._way.frames:
+            self._way.begin_anew()

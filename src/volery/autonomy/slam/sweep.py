@@ -1,0 +1,74 @@
+"""From a sweep's ranges to points in the body as it is now, each beam from where it was cast."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.inertial_kernels import P, Q
+from volery.core.compiled import kernel
+from volery.core.rotation_kernels import rotate_vector
+
+Array = NDArray[np.float64]
+Times = NDArray[np.int64]
+
+
+@kernel
+def unskew(
+    ranges: NDArray[np.float32],
+    nearest: float,
+    reach: float,
+    angle_min: float,
+    angle_step: float,
+    first_ns: int,
+    beam_ns: float,
+    nod: float,
+    last_nod: float,
+    mount: Array,
+    times: Times,
+    states: Array,
+    points: Array,
+) -> int:
+    """Fill `points` (K, 3), m in the body at the newest of `states` (M, 19), return their number.
+
+    `times` (M,) rise; a beam's pose is interpolated between the two around its time. `nod` and
+    `last_nod` are the mount's angles (rad, positive down) at the first and last beam.
+    """
+    now = states[len(times) - 1]
+    last, count, row = max(len(ranges) - 1, 1), 0, 0
+    for beam in range(len(ranges)):
+        distance = ranges[beam]
+        if not nearest <= distance <= reach:  # leaves out nan
+            continue
+        moment = first_ns + beam * beam_ns
+        while row < len(times) - 2 and times[row + 1] < moment:
+            row += 1
+        span = float(times[row + 1] - times[row])
+        share = min(max((moment - times[row]) / span, 0.0), 1.0)
+        angle = angle_min + beam * angle_step
+        x, y = distance * math.cos(angle), distance * math.sin(angle)
+        tilt = nod + beam / last * (last_nod - nod)
+        bx, by, bz = math.cos(tilt) * x + mount[0], y + mount[1], -math.sin(tilt) * x + mount[2]
+        one, two = states[row], states[row + 1]
+        keep = 1.0 - share
+        if (
+            one[Q] * two[Q]
+            + one[Q + 1] * two[Q + 1]
+            + one[Q + 2] * two[Q + 2]
+            + (one[Q + 3] * two[Q + 3])
+            < 0.0
+        ):
+            share = -share
+        qx, qy = keep * one[Q] + share * two[Q], keep * one[Q + 1] + share * two[Q + 1]
+        qz, qw = keep * one[Q + 2] + share * two[Q + 2], keep * one[Q + 3] + share * two[Q + 3]
+        norm = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
+        wx, wy, wz = rotate_vector(qx * norm, qy * norm, qz * norm, qw * norm, bx, by, bz)
+        share = abs(share)
+        wx += keep * one[P] + share * two[P] - now[P]
+        wy += keep * one[P + 1] + share * two[P + 1] - now[P + 1]
+        wz += keep * one[P + 2] + share * two[P + 2] - now[P + 2]
+        points[count] = rotate_vector(-now[Q], -now[Q + 1], -now[Q + 2], now[Q + 3], wx, wy, wz)
+        count += 1
+    return count

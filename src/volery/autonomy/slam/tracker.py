@@ -1,0 +1,394 @@
+"""Following the motion of a vehicle: an inertial filter that LIDARs and sonar correct.
+
+Everything is in the frame of the odometry, which begins where the vehicle began and never jumps by
+what is learnt later on; the pose graph corrects it in the map.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.ground_kernels import GROUND_CELLS
+from volery.autonomy.slam.inertial_kernels import (
+    BG,
+    STATE_NUMBERS,
+    STATES,
+    G,
+    P,
+    Q,
+    V,
+    move,
+    observe,
+)
+from volery.autonomy.slam.matching_kernels import (
+    broad_plane,
+    carry_along,
+    classify,
+    insert,
+    seed_ground,
+    update,
+)
+from volery.autonomy.slam.settings import GRAVITY_M_S2, ImuNoise, Matching
+from volery.autonomy.slam.sweep import unskew
+from volery.autonomy.slam.upright_kernels import CELLS, LAYERS
+from volery.core import rotations
+from volery.core.clock import NS_PER_S
+from volery.core.kept import keep, put_back
+
+Array = NDArray[np.float64]
+
+_KEPT = 64
+"""IMU readings by whose states beams are placed: 0.3 s at 200 Hz."""
+_LONGEST_STEP_S = 0.1
+_STILL = 100
+"""Readings over which standing still is judged: 0.5 s at 200 Hz."""
+_STILL_GYRO, _STILL_ACCEL = 0.02, 0.25
+"""Most standard deviation of readings at rest, rad/s, m/s^2: four times the ADIS16448's."""
+_STANDING_M_S = 0.3
+_UNKNOWN_SPEED_M_S = 3.0
+MANY, MISFIT = 15.0, 0.6
+"""Returns from which on their share says something, and how far below the usual one is too low."""
+_USUAL_S = 10.0
+"""Time over which what is usual changes (modelling choices)."""
+
+
+class Sweep(NamedTuple):
+    """One scan of a planar LIDAR, and how its mount nods."""
+
+    name: str
+    first_ns: int
+    beam_ns: float
+    angle_min: float
+    angle_step: float
+    ranges: NDArray[np.float32]
+    mount: Array
+    nod: float = 0.0
+    last_nod: float = 0.0
+
+    @property
+    def last_ns(self) -> int:
+        """When the last beam was cast."""
+        return self.first_ns + round(self.beam_ns * (len(self.ranges) - 1))
+
+
+class Seen(NamedTuple):
+    """Returns of a sweep as the filter has taken them in."""
+
+    points: Array
+    """(K, 3) m in the frame of the odometry."""
+    kinds: NDArray[np.int8]
+    """(K,) what they are of; see `matching_kernels`."""
+    is_drawn: bool
+    """Whether it was from a new place, and what stood there entered the map."""
+
+
+@dataclass
+class Match:
+    """What the newest sweep of a LIDAR said."""
+
+    time_ns: int = 0
+    met: float = 0.0
+    """Uprights of the map that were met again, each by how well."""
+    seen: float = 0.0
+    """Returns that should have met one."""
+    ground: float = 0.0
+    usual: float = 0.0
+    """Share of the returns that lately met something again."""
+
+    @property
+    def fits(self) -> bool:
+        """Whether about as much is met again as is usual."""
+        return self.seen < MANY or self.met >= MISFIT * self.usual * self.seen
+
+
+class Maps:
+    """What has been seen around the vehicle: uprights, and the ground."""
+
+    def __init__(self) -> None:
+        self.upright_keys = np.full((CELLS, CELLS, LAYERS), -1, np.int64)
+        self.cells = np.zeros((CELLS, CELLS, LAYERS, 6), np.float32)
+        self.ground_keys = np.full((GROUND_CELLS, GROUND_CELLS), -1, np.int64)
+        self.sums = np.zeros((GROUND_CELLS, GROUND_CELLS, 9))
+
+
+class Tracker:
+    """The filter, its maps, and the sweeps that wait for the motion that they were made in.
+
+    `start` (4,): x, y, z in m and yaw in rad where it begins. It begins after standing still for
+    half a second, from gravity.
+    """
+
+    _STATE = (
+        "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "standing_height",
+        "travelled_m", "_times", "_states", "_imu", "_waiting", "_maps", "_inserted", "_still",
+        "_broad", "_near_ground_ns", "_standing_ns", "refused",
+    )  # fmt: skip
+
+    def __init__(
+        self, start: Array, imu: ImuNoise | None = None, matching: Matching | None = None
+    ) -> None:
+        self.imu_noise, self.matching = imu or ImuNoise(), matching or Matching()
+        self.start = np.asarray(start, np.float64)
+        self.state = np.zeros(STATE_NUMBERS)
+        self.state[Q + 3] = 1.0
+        self.covariance = np.zeros((STATES, STATES))
+        self.is_ready = self.is_standing = self.has_flown = False
+        self.match: dict[str, Match] = {}
+        self.standing_height = 0.2
+        self.travelled_m = 0.0
+        self.refused = 0
+        self._times = np.zeros(_KEPT, np.int64)
+        self._states = np.zeros((_KEPT, STATE_NUMBERS))
+        self._imu: tuple[int, Array, Array] | None = None
+        self._waiting: deque[Sweep] = deque()
+        self._maps = Maps()
+        self._inserted: dict[str, tuple[int, Array, float]] = {}
+        self._still: deque[tuple[Array, Array]] = deque(maxlen=_STILL)
+        self._broad = np.zeros(6)
+        self._near_ground_ns: int | None = None
+        self._standing_ns = 0
+        n = self.imu_noise
+        self._noise = np.array(
+            [n.gyro_rad_s_sqrt_hz, n.accel_m_s2_sqrt_hz, n.gyro_walk_rad_s2_sqrt_hz,
+             n.accel_walk_m_s3_sqrt_hz, self.matching.gravity_walk_rad_sqrt_s]
+        )  # fmt: skip
+
+    # ---------------------------------------------------------------------------------- readings
+
+    @property
+    def time_ns(self) -> int:
+        """Time of the state."""
+        return 0 if self._imu is None else self._imu[0]
+
+    def add_imu(self, time_ns: int, gyro: Array, accel: Array) -> list[Seen]:
+        """Carry the state on to a reading (rad/s, m/s^2, body axes); what sweeps were due then."""
+        if self._imu is not None and time_ns <= self._imu[0]:
+            self.refused += 1
+            return []
+        before, self._imu = self._imu, (time_ns, gyro, accel)
+        self._still.append((gyro, accel))
+        if not self.is_ready:
+            self._try_to_begin(time_ns)
+            return []
+        if before is not None:
+            self._move(before, time_ns, gyro, accel)
+        self._keep_still(time_ns)
+        done = []
+        while self._waiting and self._waiting[0].last_ns <= time_ns:
+            seen = self._take_in(self._waiting.popleft())
+            if seen is not None:
+                done.append(seen)
+        return done
+
+    def add_sweep(self, sweep: Sweep) -> None:
+        """Take in a sweep as soon as the motion until its end is known."""
+        if not self.is_ready:
+            return
+        self._waiting.append(sweep)
+        while len(self._waiting) > 8:
+            self._waiting.popleft()
+            self.refused += 1
+
+    def add_range(self, time_ns: int, distance: float) -> None:
+        """A reading of the sonar below, m; -inf: too near."""
+        if distance < 0.35:
+            self._near_ground_ns = time_ns
+        elif math.isfinite(distance) and self.is_ready and self.has_flown:
+            self._near_ground_ns = None
+            self._seed_below(distance)
+
+    def _move(
+        self, before: tuple[int, Array, Array], time_ns: int, gyro: Array, accel: Array
+    ) -> None:
+        dt = (time_ns - before[0]) / NS_PER_S
+        here = self.state[:3].copy()
+        mean_gyro, mean_accel = 0.5 * (before[1] + gyro), 0.5 * (before[2] + accel)
+        while dt > 0.0:
+            step = min(dt, _LONGEST_STEP_S)
+            move(self.state, self.covariance, mean_gyro, mean_accel, step, self._noise)
+            dt -= step
+        self.travelled_m += float(np.hypot(*(self.state[:2] - here[:2])))
+        self._remember(time_ns)
+
+    def _remember(self, time_ns: int) -> None:
+        self._times[:-1], self._states[:-1] = self._times[1:], self._states[1:]
+        self._times[-1], self._states[-1] = time_ns, self.state
+
+    # ---------------------------------------------------------------------------------- standing
+
+    def _is_quiet(self) -> bool:
+        if len(self._still) < _STILL:
+            return False
+        gyro = np.array([reading[0] for reading in self._still])
+        accel = np.array([reading[1] for reading in self._still])
+        return bool(
+            gyro.std(axis=0).max() < _STILL_GYRO
+            and accel.std(axis=0).max() < _STILL_ACCEL
+            and abs(np.linalg.norm(accel.mean(axis=0)) - GRAVITY_M_S2) < 1.0
+            and np.linalg.norm(gyro.mean(axis=0)) < 0.1
+        )
+
+    def _try_to_begin(self, time_ns: int) -> None:
+        if time_ns % 5 or not self._is_quiet():
+            return
+        up = np.mean([reading[1] for reading in self._still], axis=0)
+        roll = math.atan2(up[1], up[2])
+        pitch = math.atan2(-up[0], math.hypot(up[1], up[2]))
+        attitude = rotations.from_rpy(roll, pitch, float(self.start[3]))
+        self.state[:] = 0.0
+        self.state[:3], self.state[Q : Q + 4] = self.start[:3], attitude
+        self.state[G + 2] = -GRAVITY_M_S2
+        n = self.imu_noise
+        sigma = np.array(
+            [1e-3] * 3 + [0.01] * 3 + [1e-4] * 3
+            + [n.gyro_turn_on_rad_s] * 3 + [n.accel_turn_on_m_s2] * 3 + [2e-3] * 2
+        )  # fmt: skip
+        mixing, turn = np.eye(STATES), rotations.matrix(attitude)
+        mixing[15, 12:15] = turn[1] / GRAVITY_M_S2  # a bias looks like a tilt
+        mixing[16, 12:15] = -turn[0] / GRAVITY_M_S2
+        spread = mixing * sigma
+        self.covariance[:] = spread @ spread.T
+        self._times[:] = time_ns - np.arange(_KEPT)[::-1] * 1_000_000
+        self._states[:] = self.state
+        self.is_ready = self.is_standing = True
+        self._standing_ns = time_ns
+        normal = turn[:, 2]
+        x, y, z = self.start[:3] - self.standing_height * normal
+        self._broad[:] = (z, -normal[0] / normal[2], -normal[1] / normal[2], x, y, z)
+        seed_ground(self._maps.ground_keys, self._maps.sums, float(x), float(y), float(z))
+
+    def _keep_still(self, time_ns: int) -> None:
+        """While it stands its velocity is zero, and the gyroscope tells its bias."""
+        if time_ns - self._standing_ns < NS_PER_S // 10:
+            return
+        self._standing_ns = time_ns
+        low = not self.has_flown or (
+            self._near_ground_ns is not None
+            and float(np.linalg.norm(self.state[V : V + 3])) < _STANDING_M_S
+        )
+        self.is_standing = low and self._is_quiet()
+        if not self.is_standing:
+            self.has_flown = True
+            return
+        gyro = np.mean([reading[0] for reading in self._still], axis=0)
+        n = self.imu_noise
+        for i in range(3):
+            row = np.zeros(STATES)
+            row[3 + i] = 1.0
+            observe(self.state, self.covariance, row, -float(self.state[V + i]), 0.01**2)
+            row = np.zeros(STATES)
+            row[9 + i] = 1.0
+            innovation = float(gyro[i] - self.state[BG + i])
+            observe(self.state, self.covariance, row, innovation, 10.0 * n.gyro_rad_s_sqrt_hz**2)
+
+    # ------------------------------------------------------------------------------------ sweeps
+
+    def _take_in(self, sweep: Sweep) -> Seen | None:
+        m = self.matching
+        if sweep.first_ns < self._times[0]:
+            self.refused += 1
+            return None
+        points = np.empty((len(sweep.ranges), 3))
+        count = unskew(
+            sweep.ranges, m.nearest_m, m.reach_m, sweep.angle_min, sweep.angle_step,
+            sweep.first_ns, sweep.beam_ns, sweep.nod, sweep.last_nod, sweep.mount,
+            self._times, self._states, points,
+        )  # fmt: skip
+        points = points[:count]
+        maps, slope = self._maps, self._broad[1:3].copy()
+        known = broad_plane(self.state, maps.ground_keys, maps.sums, 6, slope, self._broad)
+        kinds, planes = np.empty(count, np.int8), np.zeros((count, 3))
+        self._classify(points, kinds, planes, known)
+        told, information = np.zeros(4), np.zeros((6, 6))
+        before = self.state.copy()
+        update(
+            self.state, self.covariance, points, kinds, planes, maps.upright_keys, maps.cells,
+            m.upright_sigma_m**2, m.ground_sigma_m**2, m.trust, m.rounds, information, told,
+        )  # fmt: skip
+        carry_along(self._states, before, self.state)
+        self.match[sweep.name] = self._judged(sweep.name, told)
+        is_drawn = self._draw(sweep, points, kinds)
+        turned = rotations.rotate(self.state[Q : Q + 4], points) + self.state[:3]
+        return Seen(turned, kinds, is_drawn)
+
+    def _classify(self, points: Array, kinds: NDArray[np.int8], planes: Array, known: int) -> None:
+        maps = self._maps
+        classify(points, self.state, maps.ground_keys, maps.sums, self._broad, known, kinds, planes)
+
+    def _judged(self, name: str, told: Array) -> Match:
+        """What a sweep said, beside what it usually says."""
+        before = self.match.get(name)
+        found = Match(self.time_ns, float(told[0]), float(told[1]), float(told[2]))
+        if before is not None:
+            found.usual = before.usual
+            if found.seen >= MANY and found.fits:
+                passed = (self.time_ns - before.time_ns) / NS_PER_S
+                share = found.met / found.seen
+                found.usual += min(passed / _USUAL_S, 1.0) * (share - found.usual)
+        return found
+
+    def _draw(self, sweep: Sweep, points: Array, kinds: NDArray[np.int8]) -> bool:
+        """Let returns enter the map; uprights only of sweeps from a new place, or after a while."""
+        m, maps, yaw = self.matching, self._maps, float(rotations.yaw_of(self.state[Q : Q + 4]))
+        last = self._inserted.get(sweep.name)
+        is_new = (
+            last is None
+            or float(np.linalg.norm(self.state[:3] - last[1])) > m.insert_m
+            or abs(math.remainder(yaw - last[2], math.tau)) > m.insert_rad
+            or self.time_ns - last[0] > m.insert_s * NS_PER_S
+        )
+        is_new = (
+            is_new and self.match[sweep.name].fits
+        )  # or a wrong place would become the right one
+        if is_new:
+            self._inserted[sweep.name] = (self.time_ns, self.state[:3].copy(), yaw)
+        insert(
+            points, kinds, self.state, is_new, maps.upright_keys, maps.cells, maps.ground_keys,
+            maps.sums,
+        )  # fmt: skip
+        return is_new
+
+    def _seed_below(self, distance: float) -> None:
+        """Where no LIDAR has seen ground below, the sonar tells of it."""
+        maps, plane = self._maps, np.zeros(6)
+        slope = self._broad[1:3].copy()
+        if broad_plane(self.state, maps.ground_keys, maps.sums, 2, slope, plane) > 0:
+            return
+        x, y, z = (float(v) for v in self.state[P : P + 3])
+        seed_ground(maps.ground_keys, maps.sums, x, y, z - distance)
+
+    def set_clock(self, time_ns: int) -> None:
+        """Go on from here at another time; what waits is given up."""
+        self._imu = None
+        self._waiting.clear()
+        self._still.clear()
+        self._near_ground_ns = None
+        self._standing_ns = time_ns
+        self._times[:] = time_ns - np.arange(_KEPT)[::-1] * 1_000_000
+        self._states[:] = self.state
+
+    def begin_anew(self) -> None:
+        """Forget the maps: from here on it follows the motion in new ones, at an unknown speed."""
+        self._maps = Maps()
+        self._inserted, self.match = {}, {}
+        keep_rows = self.covariance[6:, 6:].copy()
+        self.covariance[:] = 0.0
+        self.covariance[6:, 6:] = keep_rows
+        self.covariance[np.arange(3), np.arange(3)] = 1e-4
+        self.covariance[np.arange(3, 6), np.arange(3, 6)] = _UNKNOWN_SPEED_M_S**2
+
+    # ------------------------------------------------------------------------------------- state
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return keep(self, self._STATE)
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self, state)

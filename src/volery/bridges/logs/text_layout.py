@@ -1,0 +1,90 @@
+"""What stands where in a plain text log of a scanner: a small TOML file.
+
+    [ranges]
+    first_column = 24
+    beams = 682
+    angle_min_deg = -120.0
+    angle_max_deg = 120.0
+    range_max_m = 5.6
+
+Columns are numbered from 0. Everything else has a default.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from volery.scenario.base import Data, Name, NonNegative, Positive, Topic, Vector3
+
+Column = Annotated[int, Field(ge=0, le=100_000)]
+Turn = Annotated[float, Field(ge=-360.0, le=360.0)]
+
+
+class TimeColumn(Data):
+    """When a scan was taken."""
+
+    column: Column = 0
+    unit_s: Positive = 1e-6
+    """Microseconds, unless stated otherwise."""
+
+
+class RangeColumns(Data):
+    """The beams of one scan, from `angle_min_deg` to `angle_max_deg`, counter-clockwise from above.
+
+    Where the minimum is the greater angle, the scanner turns clockwise.
+    """
+
+    first_column: Column
+    beams: Annotated[int, Field(ge=2, le=100_000)]
+    angle_min_deg: Turn
+    angle_max_deg: Turn
+    range_max_m: Positive
+    range_min_m: NonNegative = 0.02
+    unit_m: Positive = 1e-3
+    no_echo: tuple[float, ...] = (0.0,)
+    """Numbers in the file that say: nothing was met."""
+    sweep_s: NonNegative = 0.0
+    """From the first beam to the last one; the scan's time is that of the first."""
+
+    @model_validator(mode="after")
+    def _sweeps_some_way(self) -> Self:
+        if self.angle_min_deg == self.angle_max_deg:
+            raise ValueError("angle_min_deg and angle_max_deg must differ")
+        if self.range_min_m >= self.range_max_m:
+            raise ValueError("range_min_m must be less than range_max_m")
+        return self
+
+
+class OdometryColumns(Data):
+    """A pose in the plane beside each scan: columns of x, y and yaw."""
+
+    columns: tuple[Column, Column, Column]
+    unit_m: Positive = 1e-3
+    unit_deg: Positive = 1.0
+
+
+class Place(Data):
+    """Of the scanner in the body, FLU."""
+
+    position_m: Vector3 = (0.0, 0.0, 0.0)
+    rpy_deg: Vector3 = (0.0, 0.0, 0.0)
+
+
+class TextLayout(Data):
+    """A log with one scan a line, its numbers parted by blanks, commas or semicolons."""
+
+    ranges: RangeColumns
+    time: TimeColumn = TimeColumn()
+    odometry: OdometryColumns | None = None
+    mount: Place = Place()
+    uav: Name = "uav1"
+    topic: Topic = "laser/horizontal/scan"
+    """Of the scans, below the UAV's name."""
+
+    @property
+    def columns(self) -> int:
+        """How many columns a line must have."""
+        last = [self.time.column, self.ranges.first_column + self.ranges.beams - 1]
+        return 1 + max(last + list(self.odometry.columns if self.odometry else ()))

@@ -1,0 +1,168 @@
+"""Plain text logs of scanners, one scan a line, as messages."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.bridges.logs.bag import Log
+from volery.bridges.logs.text_layout import Place, TextLayout
+from volery.core import rotations
+from volery.core.errors import RecordingError
+from volery.graph.messages import (
+    LaserScan,
+    Odometry,
+    Published,
+    Quaternion,
+    TFMessage,
+    Transform,
+    TransformStamped,
+    Vector3,
+    header,
+    single,
+)
+from volery.graph.zero import zero_message
+
+_APART = re.compile(r"[\s,;]+")
+_COMMENTS = ("#", "%", "//")
+_LONGEST_LINE = 10_000_000
+_LATEST_S = 4.0e9
+"""Stamps of messages end there: 32 bits of seconds."""
+
+
+@dataclass
+class TextScans:
+    """A plain text log, to be walked through once.
+
+    Iterating gives the `Published` messages of each line in turn: `/tf_static` with the mounting
+    first, odometry where the log has it, the scan. A line that cannot be read is left out and
+    counted in `left_out`, `trouble` tells of the first one. Raises `RecordingError` where the file
+    cannot be read, or holds no scan of this layout.
+    """
+
+    path: Path
+    layout: TextLayout
+    scans: int = 0
+    left_out: int = 0
+    trouble: str = ""
+    _newest_ns: int = field(default=-1, repr=False)
+
+    def __iter__(self) -> Iterator[Published]:
+        """Messages in the order of the lines."""
+        try:
+            with self.path.open(encoding="utf-8", errors="replace") as lines:
+                number = 0
+                while line := lines.readline(_LONGEST_LINE):
+                    number += 1
+                    if line.strip() and not line.lstrip().startswith(_COMMENTS):
+                        yield from self._messages(number, line)
+        except OSError as error:
+            raise RecordingError(f"{self.path}: cannot be read: {error.strerror}") from None
+        if not self.scans:
+            reason = self.trouble or "it is empty"
+            raise RecordingError(f"{self.path}: holds no scan of this layout ({reason})")
+
+    def write_to(self, log: Log) -> None:
+        """Put all messages into a log."""
+        for published in self:
+            log.write(published)
+
+    def _messages(self, number: int, line: str) -> Iterator[Published]:
+        try:
+            row = self._numbers(line)
+            time_ns = self._time_ns(row)
+        except ValueError as error:
+            self.left_out += 1
+            self.trouble = self.trouble or f"line {number}: {error}"
+            return
+        self._newest_ns = time_ns
+        uav = f"/{self.layout.uav}"
+        if not self.scans:
+            yield _published("/tf_static", time_ns, _mounting(self.layout, time_ns))
+        self.scans += 1
+        if self.layout.odometry is not None:
+            yield _published(f"{uav}/odom", time_ns, _odometry(self.layout, time_ns, row))
+        scan = _scan(self.layout, time_ns, row)
+        yield _published(f"{uav}/{self.layout.topic}", time_ns, scan)
+
+    def _numbers(self, line: str) -> NDArray[np.float64]:
+        words = _APART.split(line.strip(" \t\r\n,;"))
+        if len(words) < self.layout.columns:
+            raise ValueError(f"{len(words)} columns where the layout needs {self.layout.columns}")
+        try:
+            row = np.array(words[: self.layout.columns], dtype=np.float64)
+        except ValueError:
+            raise ValueError("a column holds no number") from None
+        return row
+
+    def _time_ns(self, row: NDArray[np.float64]) -> int:
+        time_s = float(row[self.layout.time.column]) * self.layout.time.unit_s
+        if not 0.0 <= time_s < _LATEST_S:  # which NaN is not
+            raise ValueError(f"{time_s:g} s is no time that a message can bear")
+        time_ns = round(time_s * 1e9)
+        if time_ns <= self._newest_ns:
+            raise ValueError(f"at {time_s:.6f} s, not after the line before it")
+        return time_ns
+
+
+def _published(topic: str, time_ns: int, message: Any) -> Published:
+    return Published(topic, message.__msgtype__, time_ns, message)
+
+
+def _scan(layout: TextLayout, time_ns: int, row: NDArray[np.float64]) -> LaserScan:
+    """REP 117: inf met nothing, -inf met something too near, NaN is no measurement."""
+    it = layout.ranges
+    told = row[it.first_column : it.first_column + it.beams]
+    ranges = told * it.unit_m
+    ranges[ranges < it.range_min_m] = -math.inf
+    ranges[(ranges > it.range_max_m) | np.isin(told, it.no_echo)] = math.inf
+    low, high = math.radians(it.angle_min_deg), math.radians(it.angle_max_deg)
+    values = ranges.astype(np.float32)
+    values.flags.writeable = False
+    return LaserScan(
+        header(time_ns, _frame(layout)),
+        single(low),
+        single(high),
+        single((high - low) / (it.beams - 1)),
+        single(it.sweep_s / (it.beams - 1)),
+        0.0,
+        single(it.range_min_m),
+        single(it.range_max_m),
+        values,
+        np.zeros(0, np.float32),
+    )
+
+
+def _odometry(layout: TextLayout, time_ns: int, row: NDArray[np.float64]) -> Odometry:
+    assert layout.odometry is not None
+    x, y, turn = row[list(layout.odometry.columns)]
+    yaw = math.radians(float(turn) * layout.odometry.unit_deg)
+    message: Odometry = zero_message("nav_msgs/msg/Odometry")
+    message.header = header(time_ns, f"{layout.uav}/odom")
+    message.child_frame_id = f"{layout.uav}/base_link"
+    place, attitude = message.pose.pose.position, message.pose.pose.orientation
+    place.x, place.y = float(x) * layout.odometry.unit_m, float(y) * layout.odometry.unit_m
+    attitude.z, attitude.w = math.sin(0.5 * yaw), math.cos(0.5 * yaw)
+    return message
+
+
+def _mounting(layout: TextLayout, time_ns: int) -> TFMessage:
+    stamped = header(time_ns, f"{layout.uav}/base_link")
+    return TFMessage([TransformStamped(stamped, _frame(layout), _transform(layout.mount))])
+
+
+def _transform(mount: Place) -> Transform:
+    q = rotations.from_rpy(*(math.radians(angle) for angle in mount.rpy_deg))
+    return Transform(Vector3(*mount.position_m), Quaternion(*(float(part) for part in q)))
+
+
+def _frame(layout: TextLayout) -> str:
+    """As the simulation names it: `uav1/laser_horizontal`."""
+    return f"{layout.uav}/{layout.topic.removesuffix('/scan').replace('/', '_')}"

@@ -1,0 +1,112 @@
+"""Where the PX4 of one UAV sits: what HIL messages carry, between meetings and some connection."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Protocol
+
+from volery.graph.session import Gateway
+from volery.mavlink.hil import PERIOD_NS, Actuators, HilLink
+from volery.mavlink.meetings import Meetings, News, Patience
+from volery.mavlink.sensed import TOPICS, Sensing
+
+_STILL = (0.0,) * 16
+_log = logging.getLogger(__name__)
+
+
+class Way(Protocol):
+    """What carries bytes to a PX4."""
+
+    def send(self, data: bytes) -> None:
+        """Send frames."""
+
+    def end(self) -> None:
+        """End the connection."""
+
+
+class HilSeat:
+    """One PX4's part in the lock step; `system` is the id that it has. Use `take` and `leave`.
+
+    An answer releases the meeting only if it was made after it, as its time says.
+    """
+
+    def __init__(
+        self, gateway: Gateway, uav: str, system: int, patience: Patience, *, kind: str = "px4"
+    ) -> None:
+        self.uav = uav
+        self._system = system
+        self._way: Way | None = None
+        self._link = HilLink(system)
+        self._sensing = Sensing()
+        self._meetings = Meetings(
+            gateway, uav, kind, self, period_ns=PERIOD_NS, topics=TOPICS, patience=patience
+        )
+
+    @property
+    def taken(self) -> bool:
+        """Whether a PX4 is there."""
+        return self._way is not None
+
+    def take(self, way: Way) -> Callable[[bytes], None]:
+        """Let a new PX4 sit down; what it sends is to be given to the result."""
+        self._way = way
+        self._link = HilLink(self._system)
+        return self._hear
+
+    def heartbeat(self) -> bytes:
+        """A frame that says who is there."""
+        return self._link.heartbeat()
+
+    def leave(self, why: str) -> None:
+        """The connection has ended; the rotors stop."""
+        if self._way is None:
+            return
+        self._way = None
+        self._meetings.turn_rotors(_STILL)
+        _log.warning("%s: %s", self.uav, why)
+        self._meetings.go_on()
+
+    def close(self) -> None:
+        """Give everything back; a second time nothing happens."""
+        way, self._way = self._way, None
+        if way is not None:
+            self._meetings.turn_rotors(_STILL)
+            way.end()
+        self._meetings.close()
+
+    # --------------------------------------------------------------------------------- of meetings
+
+    def tell(self, time_ns: int, news: News) -> bool:
+        """As of `Pilot`."""
+        sensed = self._sensing.read(news)
+        if self._way is None or sensed is None:
+            return False
+        self._way.send(self._link.tell(time_ns, sensed))
+        return self._link.locked and self.taken
+
+    def begin_anew(self) -> None:
+        """As of `Pilot`: a PX4 cannot go back in time."""
+        self._end("the simulation was reset, and its PX4 must begin anew")
+
+    def drop(self) -> None:
+        """As of `Pilot`."""
+        self._end("the connection to its PX4 was closed")
+
+    def _end(self, why: str) -> None:
+        way = self._way
+        if way is not None:
+            way.end()
+            self.leave(why)
+
+    def _hear(self, data: bytes) -> None:
+        for actuators in self._link.feed(data):
+            self._obey(actuators)
+            if actuators.time_ns >= self._meetings.time_ns:
+                self._meetings.go_on()
+
+    def _obey(self, actuators: Actuators) -> None:
+        armed = actuators.armed
+        self._meetings.turn_rotors(
+            [max(0.0, part) for part in actuators.controls] if armed else _STILL
+        )

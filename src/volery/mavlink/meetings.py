@@ -1,0 +1,188 @@
+"""One UAV's meetings with the autopilot outside that flies it, whatever carries them there.
+
+At each meeting the autopilot is told what is new of its UAV, and the simulation stands still until
+`go_on`. What it asks of the rotors before is in force from the next physics step. One that is
+waited for and stays silent ends the run with an error, or is given up with a warning.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from volery.core.clock import NS_PER_S
+from volery.core.errors import GraphError
+from volery.graph.mailbox import Mailbox
+from volery.graph.messages import message_type, time_from_ns
+from volery.graph.reply import Reply
+from volery.graph.session import Gateway, Session
+from volery.graph.zero import zero_message
+
+_JOIN = "volery_interfaces/srv/JoinLockStep"
+_SPEEDS = "std_msgs/msg/Float32MultiArray"
+_CLOCK = "rosgraph_msgs/msg/Clock"
+_MARGIN_S = 5.0
+"""By which the simulation is more patient than a seat that gives its autopilot up by itself."""
+_log = logging.getLogger(__name__)
+
+News = Mapping[str, Any]
+"""Newest messages that have come since the last meeting, by topic below the UAV's name."""
+
+
+class Patience(NamedTuple):
+    """How long an autopilot that has begun to answer may be silent, and what happens then."""
+
+    timeout_s: float = 10.0
+    """Of wall time."""
+    drops: bool = False
+    """Whether it is then waited for no more, its rotors still; else the run ends with an error."""
+
+
+PATIENCE = Patience()
+
+
+class Pilot(Protocol):
+    """The autopilot's side."""
+
+    def tell(self, time_ns: int, news: News) -> bool:
+        """Tell it of a meeting; whether its answer is waited for: it calls `go_on`."""
+
+    def begin_anew(self) -> None:
+        """The simulation was reset: times are earlier than those told before."""
+
+    def drop(self) -> None:
+        """It was silent for too long: let it go."""
+
+
+class Meetings:
+    """Joins the lock step for `uav` at once; `close` leaves it.
+
+    kind: `px4` or another word for names. topics: message types by topic below the UAV's name.
+    """
+
+    def __init__(
+        self,
+        gateway: Gateway,
+        uav: str,
+        kind: str,
+        pilot: Pilot,
+        *,
+        period_ns: int,
+        topics: Mapping[str, str],
+        patience: Patience,
+    ) -> None:
+        self._uav, self._pilot, self._patience = uav, pilot, patience
+        self._loop = asyncio.get_running_loop()
+        self._session: Session = gateway.open(f"{kind} of {uav}")
+        self._rotors = f"/{uav}/rotor_speeds"
+        meeting = f"/volery/lock_step/{kind}_of_{uav}"
+        self._done = f"{meeting}/done"
+        self._pending = False
+        self._alarm: asyncio.TimerHandle | None = None
+        self._time_ns = -1
+        self._boxes: dict[str, Mailbox] = {
+            name: self._session.subscribe(f"/{uav}/{name}", msgtype, depth=1, wake=_nothing)
+            for name, msgtype in topics.items()
+        }
+        self._speeds = message_type(_SPEEDS)
+        self._layout = zero_message(_SPEEDS).layout
+        self._clock = message_type(_CLOCK)
+        self._session.advertise(self._rotors, _SPEEDS)
+        self._session.advertise(self._done, _CLOCK)
+        self._go = self._session.subscribe(f"{meeting}/go", _CLOCK, depth=1, wake=self._wake)
+        self._join(f"{kind}_of_{uav}", period_ns)
+
+    @property
+    def time_ns(self) -> int:
+        """Of the present or last meeting."""
+        return self._time_ns
+
+    @property
+    def waits(self) -> bool:
+        """Whether the simulation stands still until `go_on`."""
+        return self._pending
+
+    def turn_rotors(self, shares: Sequence[float]) -> None:
+        """Ask for shares of the rotors' full speed, in the order of the airframe."""
+        data = np.array(shares, np.float32)
+        self._publish(self._rotors, self._speeds(layout=self._layout, data=data))
+
+    def go_on(self) -> None:
+        """End the meeting; without one nothing happens."""
+        if self._alarm is not None:
+            self._alarm.cancel()
+            self._alarm = None
+        if self._pending:
+            self._pending = False
+            self._publish(self._done, self._clock(clock=time_from_ns(self._time_ns)))
+
+    def close(self) -> None:
+        """Leave the lock step and the graph; a second time nothing happens."""
+        if self._alarm is not None:
+            self._alarm.cancel()
+        self._session.close()
+
+    def _join(self, name: str, period_ns: int) -> None:
+        request = zero_message(f"{_JOIN}_Request")
+        request.name = name
+        request.period_s = period_ns / NS_PER_S
+        drops = self._patience.drops
+        request.timeout_s = self._patience.timeout_s + (_MARGIN_S if drops else 0.0)
+        request.stop_when_silent = not drops
+        request.restarts = True
+        self._session.call("/volery/join_lock_step", request, Reply(_answered, _answered))
+
+    def _wake(self) -> None:
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self._meet)
+
+    def _meet(self) -> None:
+        for published in self._go.take():
+            clock = published.message.clock
+            time_ns = clock.sec * NS_PER_S + clock.nanosec
+            if time_ns <= self._time_ns:
+                self._pilot.begin_anew()
+            self._time_ns, self._pending = time_ns, True
+            if not self._pilot.tell(time_ns, self._news()):
+                self.go_on()
+            elif self._pending and self._patience.drops:
+                self._alarm = self._loop.call_later(self._patience.timeout_s, self._give_up)
+
+    def _news(self) -> News:
+        found = {name: box.take() for name, box in self._boxes.items()}
+        return {name: published[-1].message for name, published in found.items() if published}
+
+    def _give_up(self) -> None:
+        _log.warning(
+            "%s: its autopilot has been silent for %g s; it is not waited for",
+            self._uav,
+            self._patience.timeout_s,
+        )
+        self._pilot.drop()
+        self.go_on()
+
+    def _publish(self, topic: str, message: Any) -> None:
+        with contextlib.suppress(GraphError):  # the simulation is closing
+            self._session.publish(topic, message)
+
+
+def uavs_with(gateway: Gateway, topic: str) -> list[str]:
+    """UAVs that publish `topic` below their names, in the order of the names' numbers."""
+    ends = [info.name.split("/") for info in gateway.graph.topics() if info.publishers]
+    names = {parts[1] for parts in ends if "/".join(parts[2:]) == topic}
+    return sorted(names, key=lambda name: (len(name), name))
+
+
+def _nothing() -> None:
+    """Nobody waits for it."""
+
+
+def _answered(answer: Any) -> None:
+    """What the simulation says to somebody who joins."""
+    if not getattr(answer, "success", False):
+        _log.error("no lock step: %s", getattr(answer, "message", answer))

@@ -1,0 +1,251 @@
+"""Starts PX4's software-in-the-loop instances beside a running simulation, and stops them.
+
+    with Px4Instances(find_px4(folder), count=4):
+        ...                                           # they connect to TCP 4560 + i
+
+PX4 must have been built before, as by `make px4_sitl_default`. An instance whose connection to a
+simulation has ended is started anew, and waits for the next one: none can go back in time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from volery.core.errors import BridgeError
+
+AIRFRAME = "none_iris"
+"""PX4's airframe 10016: an iris whose simulator is a program of somebody else."""
+FIRST_PORT = 4560
+_PLACES = ("build/px4_sitl_default", "", "build/px4_sitl_nolockstep")
+"""Below the folder: PX4's sources, a build's folder or an installation."""
+_LOOK_S = 0.2
+_FAREWELL_S = 3.0
+"""Wall time in which an instance may end by itself."""
+_LINES_TOLD = 5
+_MOST = 254
+"""MAVLink's system ids: instance i has i + 1, of which 255 is a ground station's."""
+_ESTABLISHED = "01"
+_log = logging.getLogger(__name__)
+
+
+class Px4Build(NamedTuple):
+    """What is needed to run PX4."""
+
+    binary: Path
+    data: Path
+    """Its folder `etc` of start scripts."""
+
+
+def find_px4(folder: Path) -> Px4Build:
+    """PX4 in its folder of sources, of a build or of an installation. `BridgeError` if not there.
+
+    It must know the airframe `AIRFRAME`.
+    """
+    if not folder.is_dir():
+        raise BridgeError(f"{folder}: no such folder; --px4-dir takes that of PX4-Autopilot")
+    for place in _PLACES:
+        build = Px4Build(folder / place / "bin/px4", folder / place / "etc")
+        if build.binary.is_file():
+            _check(build)
+            return Px4Build(build.binary.resolve(), build.data.resolve())
+    raise BridgeError(
+        f"{folder} holds no PX4 for simulations: {folder / _PLACES[0] / 'bin/px4'} is missing; "
+        "build it there with `make px4_sitl_default`"
+    )
+
+
+def _check(build: Px4Build) -> None:
+    if not os.access(build.binary, os.X_OK):
+        raise BridgeError(f"{build.binary} is no program that may be run")
+    airframes = build.data / "init.d-posix/airframes"
+    if not any(airframes.glob(f"[0-9]*_{AIRFRAME}")):
+        raise BridgeError(f"{airframes} has no airframe {AIRFRAME}: is this PX4 1.14 or newer?")
+
+
+class Px4Instances:
+    """Instances `first` to `first + count - 1`; a context manager, or `start` and `stop`.
+
+    Instance i has the system id i + 1 and connects to `host` at port 4560 + i.
+    folder: where each has a folder of its own for parameters and logs, which stays; None: one that
+    is removed in the end. speed: factor of real time that its time-outs of radio links allow for.
+    """
+
+    def __init__(
+        self,
+        build: Px4Build,
+        count: int,
+        *,
+        first: int = 0,
+        host: str = "127.0.0.1",
+        folder: Path | None = None,
+        speed: float | None = None,
+    ) -> None:
+        if count < 1 or first < 0 or first + count > _MOST:
+            raise BridgeError(f"instances {first} to {first + count - 1}: 0 to {_MOST - 1} can be")
+        self._build = build
+        self._numbers = range(first, first + count)
+        self._environment = _environment(host, speed)
+        self._kept = folder
+        self._folder = Path()
+        self._instances: list[_Instance] = []
+        self._ended = threading.Event()
+        self._watcher = threading.Thread(target=self._watch, name="volery-px4", daemon=True)
+        self.failure: str | None = None
+        """Why an instance ended by itself; None while all is well."""
+
+    def start(self) -> None:
+        """Start all of them. `BridgeError` where that is not possible."""
+        self._folder = self._kept or Path(tempfile.mkdtemp(prefix="volery-px4-"))
+        try:
+            for number in self._numbers:
+                instance = _Instance(self._build, number, self._folder, self._environment)
+                self._instances.append(instance)
+                instance.start()
+        except OSError as error:
+            self.stop()
+            raise BridgeError(f"{self._build.binary}: {error.strerror or error}") from None
+        self._watcher.start()
+
+    def stop(self) -> None:
+        """End all of them; a second time nothing happens."""
+        self._ended.set()
+        if self._watcher.is_alive():
+            self._watcher.join()
+        for instance in self._instances:
+            instance.ask_to_end()
+        for instance in self._instances:
+            instance.end()
+        self._instances.clear()
+        if self._kept is None and self._folder.name:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait a while; whether one has failed, or they were stopped."""
+        return self._ended.wait(timeout_s)
+
+    def __enter__(self) -> Px4Instances:
+        self.start()
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self.stop()
+
+    def _watch(self) -> None:
+        while not self._ended.wait(_LOOK_S):
+            links = established_ports()
+            for instance in self._instances:
+                if instance.has_ended:
+                    self.failure = instance.last_words()
+                    _log.error("%s", self.failure)
+                    self._ended.set()
+                    return
+                if instance.was_left(links):
+                    _log.info("PX4 %d has lost its simulation and begins anew", instance.number)
+                    instance.end()
+                    instance.start()
+
+
+class _Instance:
+    """One PX4."""
+
+    def __init__(
+        self, build: Px4Build, number: int, folder: Path, environment: Mapping[str, str]
+    ) -> None:
+        self.number = number
+        self._build, self._environment = build, environment
+        self._folder = folder / f"instance_{number}"
+        self._output = self._folder / "output.txt"
+        self._process: subprocess.Popen[bytes] | None = None
+        self._was_linked = False
+
+    def start(self) -> None:
+        """Start it; `OSError` where that is not possible."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._was_linked = False
+        with self._output.open("wb") as output:
+            self._process = subprocess.Popen(
+                [self._build.binary, "-i", str(self.number), "-d", self._build.data],
+                cwd=self._folder,
+                env=self._environment,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether it ended by itself."""
+        return self._process is not None and self._process.poll() is not None
+
+    def was_left(self, links: frozenset[int] | None) -> bool:
+        """Whether it was connected to a simulation and is not any more."""
+        linked = links is not None and FIRST_PORT + self.number in links
+        left = links is not None and self._was_linked and not linked
+        self._was_linked = linked
+        return left
+
+    def last_words(self) -> str:
+        """How it ended and what it said last."""
+        code = None if self._process is None else self._process.returncode
+        with contextlib.suppress(OSError):
+            lines = self._output.read_text(errors="replace").splitlines()[-_LINES_TOLD:]
+            return "\n  ".join([f"PX4 {self.number} ended with code {code}; it said:", *lines])
+        return f"PX4 {self.number} ended with code {code}"
+
+    def ask_to_end(self) -> None:
+        """Tell it to end."""
+        self._signal(signal.SIGINT)
+
+    def end(self) -> None:
+        """End it, by force where it does not by itself."""
+        if self._process is None:
+            return
+        self._signal(signal.SIGINT)
+        try:
+            self._process.wait(_FAREWELL_S)
+        except subprocess.TimeoutExpired:
+            self._signal(signal.SIGKILL)
+            self._process.wait()
+        self._process = None
+
+    def _signal(self, number: signal.Signals) -> None:
+        if self._process is not None:
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(self._process.pid, number)
+
+
+def _environment(host: str, speed: float | None) -> dict[str, str]:
+    """What PX4's start scripts are told; of other PX4_ variables only parameters pass."""
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith("PX4_") or name.startswith("PX4_PARAM_")
+    }
+    kept |= {"PX4_SIM_MODEL": AIRFRAME, "PX4_SIM_HOSTNAME": host}
+    if speed not in (None, 1.0):  # PX4's script needs the program bc for it
+        kept["PX4_SIM_SPEED_FACTOR"] = f"{speed:g}"
+    return kept
+
+
+def established_ports() -> frozenset[int] | None:
+    """Ports to which somebody on this machine is connected by TCP; None where that is not told."""
+    ports: set[int] = set()
+    try:
+        for line in Path("/proc/net/tcp").read_text().splitlines()[1:]:
+            _, _, remote, state, *_ = line.split()
+            if state == _ESTABLISHED:
+                ports.add(int(remote.rpartition(":")[2], 16))
+    except OSError:
+        return None
+    return frozenset(ports)

@@ -1,0 +1,95 @@
+"""Hardware in the loop: one UAV is flown by a PX4 at the other end of a serial line.
+
+    doors.open(Px4Serial("/dev/ttyACM0"))        # hardware with SYS_HITL = 1
+
+The same messages as over TCP. Hardware has a clock of its own and is not waited for, so that the
+simulation must run in real time; a PX4 that takes its time from the simulator is waited for.
+"""
+
+from __future__ import annotations
+
+import asyncio
+
+from volery.core.errors import BridgeError
+from volery.graph.session import Gateway
+from volery.mavlink.codec import dialect
+from volery.mavlink.hil_seat import HilSeat
+from volery.mavlink.meetings import PATIENCE, Patience, uavs_with
+from volery.mavlink.serial_line import SerialLine
+
+BAUD = 921600
+"""HIL_SENSOR 250 times a second alone takes 190 kbit/s."""
+_BEAT_S = 1.0
+_LEAST_BAUD = 230400
+
+
+class Px4Serial:
+    """Serves the first UAV that no other autopilot door serves.
+
+    path: of the device. baud: its speed.
+    """
+
+    def __init__(self, path: str, baud: int = BAUD, *, patience: Patience = PATIENCE) -> None:
+        self._path, self._baud = path, baud
+        self._patience = patience
+        self._line: SerialLine | None = None
+        self._seat: HilSeat | None = None
+        self._beats: asyncio.Task[None] | None = None
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        return f"PX4 serial {self._path} at {self._baud} baud"
+
+    @property
+    def uav(self) -> str | None:
+        """The UAV that it serves; None while it is closed."""
+        return None if self._seat is None else self._seat.uav
+
+    async def start(self, gateway: Gateway) -> None:
+        """Open the line. `BridgeError` where that is not possible, or no UAV is left."""
+        dialect()
+        if self._baud < _LEAST_BAUD:
+            raise BridgeError(
+                f"{self._path}: {self._baud} baud is too slow for HIL; {_LEAST_BAUD} or more"
+            )
+        uavs = uavs_with(gateway, "imu")
+        flown = uavs_with(gateway, "rotor_speeds")
+        free = [uav for uav in uavs if uav not in flown]
+        if not free:
+            raise BridgeError(f"{self._path}: no UAV with an IMU is left for a PX4 there")
+        self._line = SerialLine(self._path, self._baud, self._take)
+        self._seat = HilSeat(gateway, free[0], uavs.index(free[0]) + 1, self._patience)
+        self._hear = self._seat.take(self)
+        self._beats = asyncio.create_task(self._beat())
+
+    async def stop(self) -> None:
+        """Close the line."""
+        if self._beats is not None:
+            self._beats.cancel()
+            await asyncio.gather(self._beats, return_exceptions=True)
+        if self._seat is not None:
+            self._seat.close()
+            self._seat = None
+        self.end()
+
+    def send(self, data: bytes) -> None:
+        """As of `Way`."""
+        if self._line is not None:
+            self._line.send(data)
+
+    def end(self) -> None:
+        """As of `Way`."""
+        if self._line is not None:
+            self._line.close()
+            self._line = None
+
+    def _take(self, data: bytes) -> None:
+        if self._seat is not None:
+            self._hear(data)
+
+    async def _beat(self) -> None:
+        """PX4 opens its side for the simulator that it hears."""
+        while self._seat is not None:
+            self.send(self._seat.heartbeat())
+            await asyncio.sleep(_BEAT_S)

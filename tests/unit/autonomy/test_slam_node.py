@@ -1,0 +1,246 @@
+"""The SLAM node on sensor messages alone, good and bad ones."""
+
+import copy
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from node_bench import NodeBench
+from slam_bench import LEVEL, MS, NODDING, Flight, S, messages, trunks, yaw_of
+
+from volery.autonomy.slam.slam_node import Slam
+from volery.core.errors import NodeError
+
+WOODS = trunks()
+MOUNTS = {"level_mount": LEVEL.tolist(), "nodding_mount": NODDING.tolist()}
+START = [100.0, -50.0, 7.0, 0.5]
+SECONDS = 9.0
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """Nine seconds with biases of 1.5 deg/s and 0.1 m/s^2."""
+    return messages(Flight(), WOODS, SECONDS, biases=(0.0087, 0.1))
+
+
+class Listening:
+    """A SLAM node, and what it says."""
+
+    def __init__(self, **parameters):
+        self.bench = NodeBench()
+        settings = {"start": START, **MOUNTS, **parameters}
+        self.node = self.bench.start(Slam, **settings)
+        self.odom, self.pose, self.tf, self.path, self.status = (
+            self.bench.listen(topic)
+            for topic in (
+                "/uav1/slam/odom",
+                "/uav1/slam/pose",
+                "/tf",
+                "/uav1/slam/path",
+                "/uav1/slam/status",
+            )
+        )
+
+    def hear(self, told):
+        for when, topic, message in told:
+            self.bench.run_to(max(when, self.bench.now_ns))
+            self.bench.send(f"/uav1/{topic}", message)
+        self.bench.run_to(self.bench.now_ns + 600 * MS)
+        return self
+
+    def last_status(self):
+        return json.loads(self.status[-1].data)
+
+    def state(self):
+        return self.last_status()["state"]
+
+
+def truth_in_map(time_ns):
+    position, yaw = Flight().pose(time_ns / S)
+    c, s = np.cos(START[3]), np.sin(START[3])
+    turned = np.array([c * position[0] - s * position[1], s * position[0] + c * position[1], 0.0])
+    return np.array(START[:3]) + turned + [0.0, 0.0, position[2] - 0.2], yaw + START[3]
+
+
+def errors(poses):
+    off, turned = [], []
+    for message in poses:
+        stamp = message.header.stamp
+        place, yaw = truth_in_map(stamp.sec * S + stamp.nanosec)
+        p = message.pose.pose.position
+        off.append(np.array([p.x, p.y, p.z]) - place)
+        turned.append(yaw_of(message.pose.pose.orientation) - yaw)
+    return np.array(off), np.remainder(np.array(turned) + np.pi, 2.0 * np.pi) - np.pi
+
+
+@pytest.fixture(scope="module")
+def heard(flown):
+    return Listening().hear(flown)
+
+
+def test_it_follows_a_flight_from_the_ground_on(heard):
+    off, turned = errors(heard.pose)
+    assert len(off) > 70
+    assert np.abs(off).max() < 0.2
+    assert np.abs(turned).max() < 0.02
+    assert heard.state() == "tracking"
+    assert heard.last_status()["refused"] == 0
+
+
+def test_odometry_is_smooth_and_frequent_and_says_how_fast_it_flies(heard):
+    stamps = np.array([m.header.stamp.sec * S + m.header.stamp.nanosec for m in heard.odom])
+    assert set(np.diff(stamps)) == {20 * MS}
+    places = np.array([[getattr(m.pose.pose.position, k) for k in "xyz"] for m in heard.odom])
+    assert np.abs(np.diff(places, axis=0)).max() < 0.06  # 2 m/s and a centimetre or two
+    last = heard.odom[-1]
+    assert last.header.frame_id == "uav1/odom"
+    assert last.child_frame_id == "uav1/base_link"
+    assert last.twist.twist.linear.x == pytest.approx(2.0, abs=0.1)
+    assert last.twist.twist.angular.z == pytest.approx(2.0 / 15.0, abs=0.05)
+    variances = last.pose.covariance.reshape(6, 6).diagonal()
+    assert (variances > 0.0).all()
+
+
+def test_frames_are_tied_together_and_the_path_is_told(heard):
+    moved = heard.tf[-1].transforms[0]
+    assert (moved.header.frame_id, moved.child_frame_id) == ("map", "uav1/odom")
+    assert heard.path[-1].header.frame_id == "map"
+    first = heard.path[-1].poses[0].pose.position
+    assert [first.x, first.y, first.z] == pytest.approx(START[:3], abs=0.05)
+    assert len(heard.path[-1].poses) >= 5
+
+
+def test_without_a_start_the_map_begins_where_it_begins(flown):
+    first = Listening(start=[]).hear(flown[: len(flown) // 4]).pose[0].pose.pose
+    place = [first.position.x, first.position.y, first.position.z]
+    assert place == pytest.approx([0.0] * 3, abs=0.05)
+
+
+def test_the_same_messages_give_the_same_bytes_and_a_kept_state_goes_on(flown):
+    whole = Listening().hear(flown)
+    half = len(flown) // 2
+    one = Listening()
+    for when, topic, message in flown[:half]:
+        one.bench.run_to(max(when, one.bench.now_ns))
+        one.bench.send(f"/uav1/{topic}", message)
+    kept = copy.deepcopy(one.node.get_state())
+    before = len(one.odom)
+    one.hear(flown[half:])
+    assert [repr(m) for m in one.odom] == [repr(m) for m in whole.odom]
+    again = one.odom[before:]
+    one.node.set_state(kept)
+    one.odom.clear()
+    for when, topic, message in flown[half:]:
+        one.bench.now_ns = when
+        one.bench.send(f"/uav1/{topic}", message)
+    assert [repr(m) for m in one.odom] == [repr(m) for m in again]
+
+
+def test_repeated_late_and_lost_messages_are_counted_and_change_little(flown):
+    spoilt = []
+    for k, row in enumerate(flown):
+        if k % 17 == 5 and row[1] != "imu":
+            continue
+        spoilt.append(row)
+        if k % 13 == 0:
+            spoilt.append(row)
+        if k % 29 == 0 and k > 50:
+            spoilt.append((row[0], *flown[k - 50][1:]))
+    told = Listening().hear(spoilt)
+    off, _ = errors(told.pose)
+    assert np.abs(off).max() < 0.25
+    assert told.last_status()["refused"] > 100
+    assert told.state() == "tracking"
+
+
+def test_readings_that_are_no_numbers_are_left_out(flown):
+    spoilt = []
+    for k, (when, topic, message) in enumerate(flown):
+        row = message
+        if topic == "imu" and k % 40 == 0:
+            row = copy.deepcopy(message)
+            row.angular_velocity.x = float("nan")
+        if topic.startswith("laser") and k % 3 == 0:
+            ranges = message.ranges.copy()
+            ranges[::2] = np.nan
+            row = dataclasses.replace(message, ranges=ranges)
+        spoilt.append((when, topic, row))
+    told = Listening().hear(spoilt)
+    off, _ = errors(told.pose)
+    assert np.isfinite(off).all()
+    assert np.abs(off).max() < 0.25
+    assert told.last_status()["refused"] > 10
+
+
+def without(flown, wanted, since_ns):
+    return [row for row in flown if row[0] < since_ns or wanted(row[1])]
+
+
+def test_blinded_lidars_are_told_of(flown):
+    blind = []
+    for when, topic, message in flown:
+        row = message
+        if topic.startswith("laser") and when > 6 * S:
+            row = dataclasses.replace(message, ranges=np.full(1081, np.inf, np.float32))
+        blind.append((when, topic, row))
+    told = Listening().hear(blind)
+    assert told.state() in ("degraded", "lost")
+    assert "the level LIDAR is silent" in told.last_status()["problems"]
+    sigma = told.odom[-1].pose.covariance[0] ** 0.5
+    off, _ = errors(told.pose)
+    assert np.abs(off[-1][:2]).max() < 4.0 * sigma + 0.2
+
+
+def test_a_silent_imu_is_told_of(flown):
+    told = Listening().hear(without(flown, lambda topic: topic != "imu", 6 * S))
+    assert "the IMU is silent" in told.last_status()["problems"]
+    assert told.state() != "tracking"
+
+
+def test_featureless_space_is_told_of():
+    flat = messages(Flight(), np.zeros((0, 3)), 7.0)
+    told = Listening().hear(flat)
+    assert "too few things in reach" in told.last_status()["problems"]
+    assert told.state() == "degraded"
+    off, _ = errors(told.pose)
+    assert np.abs(off[:, 2]).max() < 0.1  # the ground still tells its height
+
+
+def test_a_clock_that_is_set_makes_it_lost_until_it_knows_the_place_again(flown):
+    later = [(when, topic, shifted(message, 100 * S)) for when, topic, message in flown
+             if when > 7 * S]  # fmt: skip
+    before = [row for row in flown if row[0] <= 7 * S]
+    told = Listening().hear([*before, *later])
+    assert told.last_status()["clock_set"] == 1
+    assert told.last_status()["sessions"] == 2
+    assert np.isfinite([told.odom[-1].pose.pose.position.x]).all()
+
+
+def shifted(message, by_ns):
+    moved = copy.deepcopy(message)
+    stamp = moved.header.stamp
+    total = stamp.sec * S + stamp.nanosec + by_ns
+    stamp.sec, stamp.nanosec = divmod(total, S)
+    return moved
+
+
+def test_a_kidnapped_uav_finds_itself_or_says_lost(flown):
+    """After nine seconds it is suddenly where it had been five before, and flies on from there."""
+    again = [(when + 5 * S, topic, shifted(message, 5 * S)) for when, topic, message in flown
+             if when > 4 * S + 20 * MS]  # fmt: skip
+    told = Listening().hear([*flown, *again])
+    states = [json.loads(m.data)["state"] for m in told.status]
+    assert "lost" in states
+    last = told.last_status()
+    p = told.pose[-1].pose.pose.position
+    place, _ = truth_in_map(told.pose[-1].header.stamp.sec * S
+                            + told.pose[-1].header.stamp.nanosec - 5 * S)  # fmt: skip
+    found = np.abs(np.array([p.x, p.y, p.z]) - place).max() < 0.3
+    assert found or last["state"] == "lost"
+    assert last["closures"] >= 1
+
+
+def test_wrong_parameters_are_refused():
+    with pytest.raises(NodeError, match="start is"):
+        NodeBench().start(Slam, start=[1.0, 2.0])

@@ -1,0 +1,247 @@
+"""The door for real ArduPilots against a strict stand-in, and its frames by themselves."""
+
+import logging
+import math
+import socket
+import struct
+import threading
+import time
+
+import pytest
+from ardupilot_stand_in import ArdupilotStandIn
+
+from volery.bridges.doors import Doors
+from volery.core.errors import BridgeError, PartnerError
+from volery.mavlink.ardupilot_door import ArdupilotDoor
+from volery.mavlink.json_frames import Rotor, State, motors_of, parse_servos, shares, state_line
+from volery.mavlink.meetings import PATIENCE, Patience
+from volery.mavlink.outfit import with_ardupilot
+from volery.runtime import Simulation
+from volery.scenario.load import parse_scenario
+
+X = (
+    Rotor(0.1, -0.2, "ccw"),
+    Rotor(-0.1, 0.2, "ccw"),
+    Rotor(0.1, 0.2, "cw"),
+    Rotor(-0.1, -0.2, "cw"),
+)
+CLIMB = 1780
+"""microseconds: 0.78 of full speed; 0.73 carries an iris."""
+STILL = State(
+    (0.0, 0.0, 9.8), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0), (4.0, 5.0, 6)
+)
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def scenario(count):
+    data = {
+        "name": "flat",
+        "duration_s": 1000.0,
+        "types": {"iris": {"airframe": "iris"}},
+        "uavs": [
+            {
+                "type": "iris",
+                "count": count,
+                "position_m": [0.0, 0.0],
+                "last_position_m": [5.0, 0.0],
+            }
+        ],
+    }
+    return with_ardupilot(parse_scenario(data, where="flat"))
+
+
+@pytest.fixture
+def opened():
+    """A simulation of `count` UAVs and its door."""
+    closing = []
+
+    def open_one(count=1, patience=PATIENCE):
+        simulation = Simulation(scenario(count), threads=1)
+        doors = Doors(simulation.gateway)
+        closing.extend([doors, simulation])
+        rotors = dict.fromkeys(simulation.uavs, X)
+        door = ArdupilotDoor(rotors, port=free_port(), patience=patience)
+        doors.open(door)
+        simulation.take_in()
+        return simulation, door
+
+    yield open_one
+    for one in closing:
+        one.close()
+
+
+def meet(simulation, door, count):
+    """Run until that many have spoken."""
+    end = time.monotonic() + 20.0
+    while len(door.connected) < count and time.monotonic() < end:
+        time.sleep(0.01)
+        simulation.take_in()
+    assert len(door.connected) == count
+
+
+def finish(*pilots):
+    for pilot in pilots:
+        assert pilot.done.wait(20.0)
+        if pilot.fault:
+            raise pilot.fault
+
+
+@pytest.mark.parametrize("magic", [18458, 29569])
+def test_a_vehicle_flies_in_lock_step(opened, magic):
+    simulation, door = opened()
+    pilot = ArdupilotStandIn(door._port, 600, pwm=CLIMB, arm_at=50, magic=magic)
+    pilot.start()
+    meet(simulation, door, 1)
+    simulation.run(1.2)
+    finish(pilot)
+    resting, climbing = pilot.states[20], pilot.states[-1]
+    assert resting["imu", "accel_body"][2] == pytest.approx(-9.81, abs=0.4)
+    assert climbing["", "velocity"][2] < -0.3
+    assert climbing["", "position"][2] < resting["", "position"][2] - 0.1
+    assert simulation.uavs["uav1"].position_map[2] > 0.3
+
+
+def test_several_have_ports_of_their_own(opened):
+    simulation, door = opened(count=2)
+    pilots = [ArdupilotStandIn(door._port + 10 * k, 100, pwm=1000 + k) for k in range(2)]
+    for pilot in pilots:
+        pilot.start()
+    meet(simulation, door, 2)
+    simulation.run(0.2)
+    finish(*pilots)
+    places = [pilot.states[0]["", "position"] for pilot in pilots]
+    assert places[1][1] - places[0][1] == pytest.approx(5.0, abs=0.1)
+
+
+def test_one_that_was_restarted_is_met_anew(opened):
+    simulation, door = opened()
+    for first in (5, 0):
+        pilot = ArdupilotStandIn(door._port, 50, first=first)
+        pilot.start()
+        end = time.monotonic() + 20.0
+        while door._seats[0]._number != first and time.monotonic() < end:
+            time.sleep(0.01)
+        simulation.run(0.1)
+        finish(pilot)
+        assert pilot.states[0]["", "timestamp"] == [0.002]
+
+
+def test_it_flies_on_after_a_reset(opened):
+    simulation, door = opened()
+    pilot = ArdupilotStandIn(door._port, 100, pwm=CLIMB, may_jump=True)
+    pilot.start()
+    meet(simulation, door, 1)
+    simulation.run(0.1)
+    simulation.reset()
+    simulation.run(0.1)
+    finish(pilot)
+    assert pilot.jumps == 1
+
+
+def test_who_is_silent_ends_the_run_or_is_given_up(opened, caplog):
+    simulation, door = opened(patience=Patience(0.3))
+    pilot = ArdupilotStandIn(door._port, 5)
+    pilot.start()
+    meet(simulation, door, 1)
+    with pytest.raises(PartnerError, match=r"'ardupilot_of_uav1' did not answer within 0\.3 s"):
+        simulation.run(1.0)
+    simulation, door = opened(patience=Patience(0.3, drops=True))
+    pilot = ArdupilotStandIn(door._port, 5, pwm=CLIMB)
+    pilot.start()
+    meet(simulation, door, 1)
+    with caplog.at_level(logging.WARNING, logger="volery.mavlink"):
+        simulation.run(0.5)
+    assert "uav1: its autopilot has been silent for 0.3 s; it is not waited for" in caplog.messages
+    assert door.connected == ()
+
+
+def test_what_was_lost_is_said_again(opened):
+    simulation, door = opened()
+    pilot = ArdupilotStandIn(door._port, 1)
+    pilot.send(0)
+    meet(simulation, door, 1)
+    run = threading.Thread(target=simulation.run, args=(0.0035,))
+    run.start()
+    first = pilot.link.recv(65000)
+    pilot.send(0)  # as one that has not heard it
+    assert pilot.link.recv(65000) == first
+    pilot.send(1)
+    run.join(20.0)
+    assert not run.is_alive()
+    pilot.link.close()
+
+
+def test_noise_and_a_second_one_are_passed_over(opened):
+    simulation, door = opened()
+    pilot = ArdupilotStandIn(door._port, 100, pwm=CLIMB)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        for data in (
+            b"",
+            b"\x1a",
+            b"\x1a\x48" * 21,
+            struct.pack("<HHI16H", 18459, 1, 0, *[0] * 16),
+        ):
+            other.sendto(data, ("127.0.0.1", door._port))
+        pilot.start()
+        meet(simulation, door, 1)
+        frame = struct.pack("<HHI16H", 18458, 400, 10_000, *[1000] * 16)
+        other.sendto(frame, ("127.0.0.1", door._port))
+        simulation.run(0.2)
+    finish(pilot)
+
+
+def test_frames_that_are_none():
+    good = struct.pack("<HHI16H", 18458, 400, 7, *range(1000, 1016))
+    assert parse_servos(good) == (400, 7, tuple(range(1000, 1016)))
+    for bad in (b"", b"\x1a", good[:-1], good + b"\0", b"\0" + good[1:]):
+        assert parse_servos(bad) is None
+
+
+def test_the_line_is_as_its_reader_wants_it():
+    line = state_line(1.5, STILL._replace(range_m=2.0, battery=(12.0, 3.0)))
+    assert line == (
+        b'\n{"timestamp":1.5,"imu":{"gyro":[0.1,-0.2,-0.3],"accel_body":[0.0,-0.0,-9.8]},'
+        b'"position":[2.0,1.0,-3.0],"quaternion":[0.7071067811865476,0.0,0.0,0.7071067811865476],'
+        b'"velocity":[5.0,4.0,-6],"rng_1":2.0,"battery":{"voltage":12.0,"current":3.0}}\n'
+    )
+
+
+def test_motors_follow_the_arms():
+    assert motors_of(X) == (0, 1, 2, 3)
+    assert motors_of(tuple(reversed(X))) == (3, 2, 1, 0)
+    plus = [
+        Rotor(0.2, 0.0, "cw"),
+        Rotor(0.0, 0.2, "ccw"),
+        Rotor(-0.2, 0.0, "cw"),
+        Rotor(0, -1, "ccw"),
+    ]
+    assert motors_of(plus) == (2, 1, 3, 0)
+    assert shares([1000, 1500, 2100, 900], (1, 0, 3, 2)) == [0.5, 0.0, 0.0, 1.0]
+
+
+def test_arms_that_arducopter_does_not_fly():
+    with pytest.raises(BridgeError, match="the other way"):
+        motors_of(
+            [rotor._replace(direction={"cw": "ccw", "ccw": "cw"}[rotor.direction]) for rotor in X]
+        )
+    six = [Rotor(math.cos(k * math.pi / 3), math.sin(k * math.pi / 3), "cw") for k in range(6)]
+    with pytest.raises(BridgeError, match="quadrotors"):
+        motors_of(six)
+
+
+def test_a_port_that_is_taken_is_told():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        port = other.getsockname()[1]
+        simulation = Simulation(scenario(1), threads=1)
+        with simulation, Doors(simulation.gateway) as doors:
+            with pytest.raises(BridgeError) as told:
+                doors.open(ArdupilotDoor({"uav1": X}, port=port))
+            assert str(told.value) == (
+                f"uav1: cannot listen on UDP 127.0.0.1:{port}: the port is taken"
+            )

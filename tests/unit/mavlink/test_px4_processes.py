@@ -1,0 +1,108 @@
+"""Starting, watching and ending PX4 instances, with a program in PX4's place."""
+
+import socket
+import sys
+import time
+
+import pytest
+
+from volery.core.errors import BridgeError
+from volery.mavlink.px4_processes import FIRST_PORT, Px4Instances, established_ports, find_px4
+
+NUMBER = 187
+"""Of instances, so that their ports are nobody's."""
+
+CONNECTS = """
+import os, signal, socket, sys, time
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+number = int(sys.argv[sys.argv.index("-i") + 1])
+print(os.environ["PX4_SIM_MODEL"], os.environ["PX4_SIM_HOSTNAME"], sys.argv[3:], flush=True)
+while True:
+    try:
+        link = socket.create_connection(("127.0.0.1", 4560 + number))
+    except OSError:
+        time.sleep(0.01)
+        continue
+    time.sleep(1000)
+"""
+FAILS = """
+import sys
+print("PX4 server already running for instance 187")
+sys.exit(3)
+"""
+
+
+def make_px4(folder, program):
+    """A build's folder with a program in PX4's place."""
+    build = folder / "build/px4_sitl_default"
+    airframes = build / "etc/init.d-posix/airframes"
+    airframes.mkdir(parents=True)
+    (airframes / "10016_none_iris").touch()
+    binary = build / "bin/px4"
+    binary.parent.mkdir()
+    binary.write_text(f"#!{sys.executable}{program}")
+    binary.chmod(0o755)
+    return build
+
+
+@pytest.fixture
+def simulator():
+    """Listens where instance NUMBER connects."""
+    with socket.create_server(("127.0.0.1", FIRST_PORT + NUMBER)) as server:
+        server.settimeout(20.0)
+        yield server
+
+
+def test_an_instance_connects_and_ends(tmp_path, simulator):
+    build = make_px4(tmp_path, CONNECTS)
+    with Px4Instances(find_px4(tmp_path), 1, first=NUMBER, folder=tmp_path / "kept"):
+        link, _ = simulator.accept()
+    with link:
+        link.settimeout(20.0)
+        assert link.recv(1) == b""
+    said = (tmp_path / f"kept/instance_{NUMBER}/output.txt").read_text()
+    assert said == f"none_iris 127.0.0.1 ['-d', '{build / 'etc'}']\n"
+
+
+@pytest.mark.skipif(established_ports() is None, reason="this system does not tell connections")
+def test_one_that_lost_its_simulation_begins_anew(tmp_path, simulator):
+    make_px4(tmp_path, CONNECTS)
+    with Px4Instances(find_px4(tmp_path), 1, first=NUMBER) as instances:
+        first, _ = simulator.accept()
+        time.sleep(0.6)  # so that the connection is seen
+        first.close()
+        second, _ = simulator.accept()
+        second.close()
+        assert instances.failure is None
+
+
+def test_one_that_ends_by_itself_is_told(tmp_path):
+    make_px4(tmp_path, FAILS)
+    with Px4Instances(find_px4(tmp_path), 1, first=NUMBER) as instances:
+        assert instances.wait(20.0)
+    assert instances.failure == (
+        "PX4 187 ended with code 3; it said:\n  PX4 server already running for instance 187"
+    )
+
+
+def test_what_is_no_px4_is_told(tmp_path):
+    with pytest.raises(BridgeError, match="no such folder; --px4-dir takes that of PX4-Autopilot"):
+        find_px4(tmp_path / "nowhere")
+    with pytest.raises(BridgeError, match="px4 is missing; build it there with `make"):
+        find_px4(tmp_path)
+    build = make_px4(tmp_path, FAILS)
+    assert find_px4(build).binary == build / "bin/px4"
+    (build / "bin/px4").chmod(0o644)
+    with pytest.raises(BridgeError, match="is no program that may be run"):
+        find_px4(tmp_path)
+    (build / "bin/px4").chmod(0o755)
+    (build / "etc/init.d-posix/airframes/10016_none_iris").unlink()
+    with pytest.raises(BridgeError, match="has no airframe none_iris"):
+        find_px4(tmp_path)
+
+
+@pytest.mark.parametrize(("first", "count"), [(0, 0), (-1, 1), (250, 10)])
+def test_numbers_beyond_mavlinks_ids_are_refused(tmp_path, first, count):
+    make_px4(tmp_path, FAILS)
+    with pytest.raises(BridgeError, match="0 to 253 can be"):
+        Px4Instances(find_px4(tmp_path), count, first=first)
