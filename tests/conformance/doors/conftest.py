@@ -10,16 +10,16 @@ from door_rosbridge import ClientBench, ServerBench
 from door_sensor_link import SensorLinkBench
 
 BENCHES = {
-    "ros_tcp": lambda: EndpointBench("ros1"),
-    "ros_tcp_2": lambda: EndpointBench("ros2"),
-    "ros_tcp_connector": ConnectorBench,
-    "rosbridge_json": lambda: ServerBench("none"),
-    "rosbridge_cbor": lambda: ServerBench("cbor"),
-    "rosbridge_raw": lambda: ServerBench("cbor-raw"),
-    "rosbridge_client": ClientBench,
-    "ros1": Ros1Bench,
-    "ros2": Ros2Bench,
-    "sensor_link": SensorLinkBench,
+    "ros_tcp": (EndpointBench, "ros1"),
+    "ros_tcp_2": (EndpointBench, "ros2"),
+    "ros_tcp_connector": (ConnectorBench,),
+    "rosbridge_json": (ServerBench, "none"),
+    "rosbridge_cbor": (ServerBench, "cbor"),
+    "rosbridge_raw": (ServerBench, "cbor-raw"),
+    "rosbridge_client": (ClientBench,),
+    "ros1": (Ros1Bench,),
+    "ros2": (Ros2Bench,),
+    "sensor_link": (SensorLinkBench,),
 }
 
 
@@ -33,7 +33,10 @@ ROSPY = [  # it uses what is deprecated and forgets to close sockets
     params=[pytest.param(name, marks=ROSPY if name == "ros1" else []) for name in BENCHES]
 )
 def bench(request):
-    made = BENCHES[request.param]()
+    kind, *options = BENCHES[request.param]
+    for marker in request.node.iter_markers("needs"):
+        kind.needs(*marker.args)
+    made = kind(*options)
     yield made
     made.close()
 

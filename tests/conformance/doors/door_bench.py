@@ -228,11 +228,12 @@ class Bench:
         """What a client meant with a message that came on `topic_in`."""
         return message.data
 
-    def needs(self, *abilities):
-        """Skip a case that this protocol cannot do."""
+    @classmethod
+    def needs(cls, *abilities):
+        """Skip a case that this protocol cannot do, before anything is started."""
         for ability in abilities:
-            if ability in self.cannot:
-                pytest.skip(f"{ability}: {self.cannot[ability]}")
+            if ability in cls.cannot:
+                pytest.skip(f"{ability}: {cls.cannot[ability]}")
 
     def close(self):
         for client in self.clients:

@@ -12,6 +12,7 @@ import struct
 import subprocess
 import sys
 import threading
+from collections import Counter
 from pathlib import Path
 from types import MappingProxyType
 
@@ -20,6 +21,7 @@ from door_ros_tcp import Form
 from ros2_bench import DOMAIN
 from ros_tcp_client import until
 
+from volery.bridges.ros2.dds import library
 from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
 
@@ -91,6 +93,7 @@ class PeerClient(Client):
         self._kinds[topic] = msgtype
         latched = topic in LATCHED
         assert self._do("subscribe", topic=topic, type=msgtype, reliable=True, latched=latched)
+        self._bench.readers[topic] += 1
         until(lambda: self._bench.is_heard(topic))
         if not self._reading:
             os.kill(self._process.pid, signal.SIGSTOP)
@@ -140,6 +143,8 @@ class PeerClient(Client):
         self._end()
 
     def _end(self):
+        while self._kinds:
+            self._bench.readers[self._kinds.popitem()[0]] -= 1
         self._process.wait()
         self._reader.join()
         self._process.stdin.close()
@@ -163,6 +168,7 @@ class Ros2Bench(Bench):
 
     def __init__(self):
         super().__init__()
+        self.readers = Counter()
         self.door = Ros2Door(
             Ros2Terms(domain_id=DOMAIN),
             remote_services={self.remote_service: TRIGGER},
@@ -175,8 +181,12 @@ class Ros2Bench(Bench):
         return 1
 
     def is_heard(self, topic):
-        """Whether a subscription has reached the graph."""
-        return any(t.name == topic and t.subscribers for t in self.ours.live.graph.topics())
+        """Whether a subscription has reached the graph, and the door's writer each reader."""
+        outlet = self.door._shared.topics._outlets.get(topic)
+        known = any(t.name == topic and t.subscribers for t in self.ours.live.graph.topics())
+        if outlet is None or not known:
+            return False
+        return library.subscriptions(outlet._writer._writer) >= self.readers[topic]
 
     def _connect(self, reading):
         return PeerClient(self, reading)

@@ -106,7 +106,7 @@ for kind in (*TYPES.values(), Request_, Response_):
     stay_bytes(kind)
 
 
-def qos(*, reliable=True, latched=False):
+def qos(*, reliable=True, latched=False, user_data=b""):
     kept = Policy.History.KeepLast(1 if latched else 1000)
     return Qos(
         Policy.Reliability.Reliable(duration(infinite=True))
@@ -116,6 +116,7 @@ def qos(*, reliable=True, latched=False):
         Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile,
         Policy.DurabilityService(0, kept, -1, -1, -1),
         Policy.WriterDataLifecycle(autodispose=False),
+        Policy.Userdata(data=user_data),
     )
 
 
@@ -191,8 +192,9 @@ class Peer:
                 come.set()
 
         header = struct.pack("<Qq", 77, time.monotonic_ns())
-        writer = self.speak(f"rq{service}Request", Request_, qos())
-        reader = self.hear(f"rr{service}Reply", Response_, take, qos())
+        quality = qos(user_data=b"clientid=1.2.3;")
+        writer = self.speak(f"rq{service}Request", Request_, quality)
+        reader = self.hear(f"rr{service}Reply", Response_, take, quality)
         both = self.matched(
             lambda: writer.get_matched_subscriptions() and reader.get_matched_publications()
         )
@@ -203,14 +205,15 @@ class Peer:
         return base64.b64encode(found[0]).decode() if found else None
 
     def offer(self, service, answer):
-        writer = self.speak(f"rr{service}Reply", Response_, qos())
+        quality = qos(user_data=b"serviceid=1.2.3;")
+        writer = self.speak(f"rr{service}Reply", Response_, quality)
 
         def take(raw):
             if answer is not None:
                 body = base64.b64decode(answer)
                 self.write(writer, Response_, body[:4] + raw[4:20] + body[4:])
 
-        self.hear(f"rq{service}Request", Request_, take, qos())
+        self.hear(f"rq{service}Request", Request_, take, quality)
         self.writers[f"service {service}"] = writer, Response_
         return self.matched(writer.get_matched_subscriptions)
 

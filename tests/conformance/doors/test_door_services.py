@@ -10,15 +10,15 @@ from door_bench import Refused
 from volery.core.errors import GraphError
 
 
+@pytest.mark.needs("services")
 def test_a_service_of_ours(bench, client):
-    bench.needs("services")
     bench.ours.offer("/ours", "here, größer")
     assert client.call("/ours") == "here, größer"
     assert client.call("/ours") == "here, größer"
 
 
+@pytest.mark.needs("services", "advertising")
 def test_a_service_that_nobody_offers_is_told(bench, client):
-    bench.needs("services", "advertising")
     bench.ours.offer("/ours", "x")
     client.call("/ours")
     bench.ours.live.graph.withdraw("/ours")
@@ -26,8 +26,8 @@ def test_a_service_that_nobody_offers_is_told(bench, client):
         client.call("/ours")
 
 
+@pytest.mark.needs("services of clients")
 def test_a_service_of_the_client(bench, client):
-    bench.needs("services of clients")
     client.offer(bench.remote_service)
     bench.ours.wait_for_service(bench.remote_service)
     for _ in range(2):
@@ -35,9 +35,9 @@ def test_a_service_of_the_client(bench, client):
         assert answer.message == client.their_answer
 
 
+@pytest.mark.needs("services of clients")
 @pytest.mark.parametrize("how", ["reset", "close"])
 def test_a_service_whose_client_left_fails_at_once(bench, client, how):
-    bench.needs("services of clients")
     client.their_answer = None
     client.offer(bench.remote_service)
     bench.ours.wait_for_service(bench.remote_service)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from door_bench import IMAGE, STRING
 from ros_tcp_client import until
 
@@ -39,8 +40,8 @@ def test_what_our_side_publishes_arrives_at_every_client(bench, client):
         assert [one.next() for one in clients] == [f"{k}"] * len(clients)
 
 
+@pytest.mark.needs("texts")
 def test_texts_of_any_letters_go_both_ways(bench, client):
-    bench.needs("texts")
     seen = bench.ours.collect(bench.topic_in)
     publish = bench.ours.publisher(bench.topic_out)
     client.advertise(bench.topic_in)
@@ -62,8 +63,8 @@ def test_large_messages_go_out(bench, client):
     assert client.next() == LARGE
 
 
+@pytest.mark.needs("large messages in")
 def test_large_messages_come_in(bench, client):
-    bench.needs("large messages in")
     seen = bench.ours.collect(bench.image_in, IMAGE)
     client.advertise(bench.image_in, IMAGE)
     client.publish_image(bench.image_in, LARGE)
@@ -71,8 +72,8 @@ def test_large_messages_come_in(bench, client):
     assert seen[0].data.size == LARGE
 
 
+@pytest.mark.needs("late joiners")
 def test_who_joins_late_finds_what_was_latched(bench, client):
-    bench.needs("late joiners")
     publish = bench.ours.publisher("/map", latched=True)
     publish(m.String("old"))
     publish(m.String("kept"))
@@ -80,8 +81,8 @@ def test_who_joins_late_finds_what_was_latched(bench, client):
     assert client.next() == "kept"
 
 
+@pytest.mark.needs("late joiners", "advertising")
 def test_what_a_client_latches_awaits_our_side(bench, client):
-    bench.needs("late joiners", "advertising")
     early = bench.ours.collect("/plan")
     client.advertise("/plan", latched=True)
     client.publish("/plan", "kept")
@@ -91,8 +92,8 @@ def test_what_a_client_latches_awaits_our_side(bench, client):
     assert late[0].data == "kept"
 
 
+@pytest.mark.needs("reliability")
 def test_reliable_subscribers_miss_nothing_of_a_burst(bench, client):
-    bench.needs("reliability")
     publish = bench.ours.burst(bench.topic_out)
     client.subscribe_reliably(bench.topic_out)
     client.settle()
@@ -100,8 +101,8 @@ def test_reliable_subscribers_miss_nothing_of_a_burst(bench, client):
     assert [client.next() for _ in range(BURST)] == [f"{k}" for k in range(BURST)]
 
 
+@pytest.mark.needs("topics")
 def test_thousands_of_topics(bench, client):
-    bench.needs("topics")
     names = range(bench.topics)
     publish = {k: bench.ours.publisher(f"/out{k}") for k in names}
     seen = {k: bench.ours.collect(f"/in{k}") for k in names}

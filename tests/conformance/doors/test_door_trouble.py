@@ -60,8 +60,8 @@ def others(bench, client):
     return Served(bench, bench.another(client))
 
 
+@pytest.mark.needs("leaving")
 def test_who_leaves_takes_everything_back(bench):
-    bench.needs("leaving")
     bench.ours.collect(bench.topic_in, bench.type_in)
     before = bench.ours.counts()
     client = bench.connect()
@@ -86,9 +86,9 @@ def test_a_client_comes_back_after_its_sudden_death(bench, client):
     served.check()
 
 
+@pytest.mark.needs("leaving", "others")
 def test_who_speaks_no_more_counts_as_gone(bench, others):
     """A client that closes its half of the connection has left, whatever it would still read."""
-    bench.needs("leaving", "others")
     others.check()
     before = bench.ours.counts()
     client = bench.connect()
@@ -101,10 +101,10 @@ def test_who_speaks_no_more_counts_as_gone(bench, others):
     others.check()
 
 
+@pytest.mark.needs("leaving", "others")
 @pytest.mark.parametrize("talking", [True, False])
 def test_who_vanished_without_a_word_is_missed(bench, others, monkeypatch, talking):
     """Neither FIN nor RST came: found out by what is sent to it, or by asking whether it lives."""
-    bench.needs("leaving", "others")
     monkeypatch.setattr("volery.core.listening.PROBES", QUICK_PROBES)
     others.check()
     before = bench.ours.counts()
@@ -121,8 +121,8 @@ def test_who_vanished_without_a_word_is_missed(bench, others, monkeypatch, talki
     others.check()
 
 
+@pytest.mark.needs("others")
 def test_half_a_frame_and_silence_harm_nobody(bench, client, others):
-    bench.needs("others")
     bench.ours.collect("/in")
     if "topics" not in bench.cannot:
         client.advertise("/in")
@@ -132,8 +132,8 @@ def test_half_a_frame_and_silence_harm_nobody(bench, client, others):
     others.check()
 
 
+@pytest.mark.needs("others")
 def test_who_does_not_read_costs_bounded_memory(bench, others):
-    bench.needs("others")
     publish = bench.ours.publisher(bench.image_out, IMAGE)
     sleeper = bench.connect(reading=False)
     for one in (sleeper, others.client):
@@ -168,8 +168,8 @@ def resident_bytes():
     return pages * resource.getpagesize()
 
 
+@pytest.mark.needs("own types")
 def test_unknown_types_are_told(bench, client, others):
-    bench.needs("own types")
     if hasattr(client, "send_unknown_type"):
         client.send_unknown_type()
         assert "type 99" in client.error()
@@ -193,8 +193,8 @@ def test_text_that_is_not_utf8_is_told(bench, client, others):
     assert not any("\ufffd" in str(vars(one)) for one in others._seen)
 
 
+@pytest.mark.needs("limits", "others")
 def test_a_frame_over_the_limit_is_told_with_the_limit(bench, client, others):
-    bench.needs("limits", "others")
     client.send_too_much()
     if "errors" in bench.cannot:
         until(lambda: any(bench.over_limit in note for note in bench.error_of(client)))
@@ -203,8 +203,8 @@ def test_a_frame_over_the_limit_is_told_with_the_limit(bench, client, others):
     others.check()
 
 
+@pytest.mark.needs("others")
 def test_a_flood_of_one_client_delays_no_other(bench, client, others):
-    bench.needs("others")
     flooded = bench.ours.collect(bench.topic_in, bench.type_in)
     client.advertise(bench.topic_in)
     stop = threading.Event()
@@ -242,15 +242,15 @@ def test_wrong_sums_are_told(bench, client, others):
     assert not seen
 
 
+@pytest.mark.needs("listening")
 def test_a_port_in_use_is_named(bench):
-    bench.needs("listening")
     listener, port = taken_port()
     with listener, pytest.raises(VoleryError, match=f"{port}"):
         bench.open_where_taken(port)
 
 
+@pytest.mark.needs("listening")
 def test_strangers_who_speak_another_protocol_harm_nobody(bench, others):
-    bench.needs("listening")
     strangers = []
     for words in (
         b"GET / HTTP/1.1\r\nHost: x\r\n\r\n",

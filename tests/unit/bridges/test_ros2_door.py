@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from live_graph import NOW_NS, LiveGraph
@@ -16,7 +17,9 @@ from ros2_bench import DOMAIN, Other
 from ros_tcp_client import until
 
 from volery.bridges.doors import Doors
-from volery.bridges.ros2.dds.idl_types import message_struct
+from volery.bridges.ros2.client import Ros2Client
+from volery.bridges.ros2.dds import library
+from volery.bridges.ros2.dds.idl_types import message_struct, request_struct
 from volery.bridges.ros2.dds.qos import qos_of
 from volery.bridges.ros2.dds.records import TYPE as RECORD
 from volery.bridges.ros2.dds.records import record_message
@@ -28,6 +31,7 @@ from volery.bridges.ros2.parameter_values import parameter_message, plain_of
 from volery.bridges.rosbridge.beside import WithRosApi
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.cdr import decode_cdr, encode_cdr
+from volery.graph.link import call_and_wait
 from volery.graph.messages import (
     Clock,
     LaserScan,
@@ -413,3 +417,27 @@ def test_everything_is_given_back():
     assert made.gateway.sessions() == []
     watcher.close()
     made.close()
+
+
+def test_clients_and_servers_of_another_kind_are_told_and_not_misread(world, other, caplog):
+    """rmw_fastrtps calls the topics the same, but begins neither requests nor responses alike."""
+    inner = other.participant._participant
+    asked = []
+    world.graph.offer("/strange", TRIGGER, asked.append)
+    request, response = (request_struct(f"{TRIGGER}_{part}") for part in ("Request", "Response"))
+    quality = qos_of(Profile())  # without the user data of rmw_cyclonedds
+    writer = DataWriter(inner, Topic(inner, "rq/strangeRequest", request), qos=quality)
+    until(lambda: library.subscriptions(writer))
+    until(lambda: library.write(writer, b"\0\1\0\0" + bytes(20)) and caplog.text)
+    assert "/strange: a client is not answered: it speaks as rmw_fastrtps" in caplog.text
+    assert asked == []
+    library.delete(writer)
+
+    server = DataReader(inner, Topic(inner, "rq/foreignRequest", request), qos=quality)
+    answers = DataWriter(inner, Topic(inner, "rr/foreignReply", response), qos=quality)
+    link = Ros2Client(Ros2Terms(domain_id=DOMAIN), "/asker")
+    with pytest.raises(GraphError, match="its server speaks as rmw_fastrtps"):
+        call_and_wait(link, "/foreign", None, 15.0)
+    link.close()
+    library.delete(server)
+    library.delete(answers)

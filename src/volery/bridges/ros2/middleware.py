@@ -84,6 +84,10 @@ class Caller(Handle, Protocol):
     def ready(self) -> bool:
         """Whether a server is there."""
 
+    @property
+    def trouble(self) -> str:
+        """Why nobody answers though a server is there; empty where that is not known."""
+
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
         """Send a request; one of the two is called once, the second if the server has left."""
 

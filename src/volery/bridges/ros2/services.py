@@ -147,8 +147,13 @@ def ask_server(caller: Caller, spec: ServiceSpec, request: Any, reply: Reply) ->
         reply.fail(GraphError(f"service '{spec.service}': its ROS 2 node has left"))
 
     try:
-        if not wait_for(lambda: caller.ready, _LONGEST_WAIT_S):
-            raise GraphError(f"nobody offers ROS 2 service '{spec.service}'")
+        wait_for(lambda: caller.ready or bool(caller.trouble), _LONGEST_WAIT_S)
+        if not caller.ready:
+            raise GraphError(
+                f"service '{spec.service}': {caller.trouble}"
+                if caller.trouble
+                else f"nobody offers ROS 2 service '{spec.service}'"
+            )
         caller.call(encode_cdr(request, f"{spec.srvtype}_Request"), respond, lose)
     except GraphError as error:
         reply.fail(error)

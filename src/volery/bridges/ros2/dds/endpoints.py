@@ -16,7 +16,9 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
+from volery.bridges.ros2.complaints import Complaints
 from volery.bridges.ros2.dds import library
+from volery.bridges.ros2.dds.counterparts import CLIENT, FOREIGN, SERVER, Counterparts
 from volery.bridges.ros2.dds.idl_types import message_struct, request_struct
 from volery.bridges.ros2.dds.listening import Ear
 from volery.bridges.ros2.dds.qos import qos_of
@@ -79,7 +81,7 @@ class DdsReader:
         user_data = f"typehash={message_hash(spec.msgtype)};".encode()
         topic = Topic(place.participant, dds_topic(spec.topic), message_struct(spec.msgtype))
         self._half = _Half(place, spec.node)
-        self._half.reader(topic, qos_of(spec.profile, user_data), take)
+        self._half.reader(topic, qos_of(spec.profile, user_data), lambda data, _writer: take(data))
 
     def close(self) -> None:
         """Subscribe no more."""
@@ -92,17 +94,23 @@ class DdsServer:
     def __init__(self, place: Place, spec: ServiceSpec, take: TakeRequest) -> None:
         requests, replies = _topics(place, spec)
         self._half = _Half(place, spec.node)
-        qos = qos_of(SERVICES, _identity("serviceid"))
+        qos = qos_of(SERVICES, _identity(SERVER))
         self._writer = self._half.writer(replies, qos)
+        self._name = spec.service
         self._take = take
         self._missed = (0, 0)
+        self._complaints = Complaints()
         self._reader = self._half.reader(requests, qos, self._on_request)
+        self._clients = Counterparts(CLIENT, self._reader.get_matched_publication_data)
 
     def close(self) -> None:
         """Offer it no more."""
         self._half.close()
 
-    def _on_request(self, data: bytes) -> None:
+    def _on_request(self, data: bytes, client: int) -> None:
+        if not self._clients.understands(client):
+            self._complaints.tell(self._name, f"a client is not answered: it {FOREIGN}")
+            return
         header = data[_CDR_HEADER : _CDR_HEADER + _HEADER.size]
 
         def answer(cdr: bytes) -> None:
@@ -133,19 +141,28 @@ class DdsCaller:
     def __init__(self, place: Place, spec: ServiceSpec) -> None:
         requests, replies = _topics(place, spec)
         self._half = _Half(place, spec.node)
-        qos = qos_of(SERVICES, _identity("clientid"))
+        qos = qos_of(SERVICES, _identity(CLIENT))
         self._writer = self._half.writer(requests, qos)
         self._guid = random.SystemRandom().getrandbits(64)
         self._numbers = itertools.count(1)
         self._waiting: dict[int, tuple[TakeMessage, Callable[[], None]]] = {}
         self._lock = threading.Lock()
         self._reader = self._half.reader(replies, qos, self._on_reply)
+        self._servers = Counterparts(SERVER, self._writer.get_matched_subscription_data)
 
     @property
     def ready(self) -> bool:
         """Whether a server is there, both halves of it."""
-        halves = library.subscriptions(self._writer), library.publications(self._reader)
-        return min(halves) > 0
+        return library.publications(self._reader) > 0 and any(self._understood())
+
+    @property
+    def trouble(self) -> str:
+        """Why nobody answers though a server is there."""
+        found = self._understood()
+        return f"its server {FOREIGN}" if found and not any(found) else ""
+
+    def _understood(self) -> list[bool]:
+        return [self._servers.understands(h) for h in self._writer.get_matched_subscriptions()]
 
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
         """Send a request."""
@@ -174,7 +191,7 @@ class DdsCaller:
         for _, on_loss in waiting:
             on_loss()
 
-    def _on_reply(self, data: bytes) -> None:
+    def _on_reply(self, data: bytes, _server: int) -> None:
         guid, number = _HEADER.unpack_from(data, _CDR_HEADER)
         if guid != self._guid:
             return  # somebody else's
@@ -198,14 +215,14 @@ class _Half:
         """A writer of the node's."""
         return self._add(topic, DataWriter(self._place.participant, topic, qos=qos), writes=True)
 
-    def reader(self, topic: Topic, qos: Any, take: TakeMessage) -> Any:
-        """A reader of the node's; `take` gets the bytes of each sample."""
+    def reader(self, topic: Topic, qos: Any, take: Callable[[bytes, int], None]) -> Any:
+        """A reader of the node's; `take` gets the bytes of each sample and its writer's handle."""
         reader = DataReader(self._place.participant, topic, qos=qos)
 
         def take_all(samples: list[Any]) -> None:
             for sample in samples:
                 if sample.sample_info.valid_data:  # else it only tells that a writer has left
-                    take(sample.cdr)
+                    take(sample.cdr, sample.sample_info.publication_handle)
 
         self._numbers.append(self._place.ear.listen(reader, take_all))
         return self._add(topic, reader, writes=False)

@@ -99,6 +99,11 @@ class RclCaller:
         """Whether a server is there."""
         return bool(self._client.service_is_ready())
 
+    @property
+    def trouble(self) -> str:
+        """All servers are understood."""
+        return ""
+
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
         """Send a request."""
         with self._lock:

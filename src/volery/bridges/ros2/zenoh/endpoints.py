@@ -167,6 +167,11 @@ class ZenohCaller:
         """Whether a server is there."""
         return self._is_there(self._spec)
 
+    @property
+    def trouble(self) -> str:
+        """All servers are understood."""
+        return ""
+
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
         """Send a request."""
         question = _Question(on_response, on_loss)
