@@ -113,13 +113,7 @@ class ClientState:
             for name, topic_ in self._topics.items():
                 self._order(self._subscription(name, topic_))
             for service, offer in self._offers.items():
-                self._order(
-                    {
-                        "op": "advertise_service",
-                        "service": service,
-                        "type": self._spelled(offer.srvtype),
-                    }
-                )
+                self._order(self._offering(service, offer.srvtype))
 
     def lose(self, why: str) -> None:
         """The connection is gone: open calls fail, publications are dropped."""
@@ -281,9 +275,7 @@ class ClientState:
             if service in self._offers:
                 raise GraphError(f"service '{service}' is offered already")
             self._offers[service] = _Offer(srvtype, handler)
-            self._order(
-                {"op": "advertise_service", "service": service, "type": self._spelled(srvtype)}
-            )
+            self._order(self._offering(service, srvtype))
 
     def withdraw(self, service: str, who: str) -> None:
         """Offer a service no more; its open requests fail."""
