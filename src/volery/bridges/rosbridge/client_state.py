@@ -376,11 +376,19 @@ class ClientState:
         if offer is None:
             respond(f"service '{service}' is not offered here", False)
             return
-        answer = f"{offer.srvtype}_Response"
-        reply = Reply(
-            lambda message: respond(self._plain.encode(message, answer), True),
-            lambda error: respond(str(error), False),
-        )
+
+        def answer(message: Any) -> None:
+            try:
+                values = self._plain.encode(message, f"{offer.srvtype}_Response")
+            except GraphError as error:
+                fail(error)
+            else:
+                respond(values, True)
+
+        def fail(error: GraphError) -> None:
+            respond(str(error), False)
+
+        reply = Reply(answer, fail)
         try:
             request = decode_plain(operation.get("args") or {}, f"{offer.srvtype}_Request")
             offer.pending.add(reply)
