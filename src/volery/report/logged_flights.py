@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -52,10 +53,12 @@ class _Rows:
         """Keep a pose, twenty a second."""
         if time_ns < self.next_ns:
             return
-        self.next_ns = time_ns + _POSE_NS
         pose = message.pose.pose if hasattr(message.pose, "pose") else message.pose
         p, q = pose.position, pose.orientation
-        self.poses.append((time_ns * 1e-9, p.x, p.y, p.z, q.x, q.y, q.z, q.w))
+        numbers = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+        if all(map(math.isfinite, numbers)):  # filters that are lost tell NaN
+            self.next_ns = time_ns + _POSE_NS
+            self.poses.append((time_ns * 1e-9, *numbers))
 
     def way(self) -> Way:
         """All of them."""

@@ -9,7 +9,9 @@ import pytest
 from rosbridge_bench import TRIGGER
 
 from volery.bridges.rosbridge.client_state import ClientState
+from volery.bridges.rosbridge.wire import decode_frame, encode_json
 from volery.core.errors import GraphError
+from volery.graph.messages import String
 from volery.graph.reply import Reply
 
 
@@ -65,3 +67,17 @@ def test_whatever_breaks_calls_end_with_the_connection(state):
         state.call(service, None, Reply(failures.append, failures.append))
     state.lose("it has left")
     assert [str(failure) for failure in failures] == ["it has left"] * 2
+
+
+def test_a_response_of_another_type_is_the_callers_error() -> None:
+    state = ClientState(None, lambda: None)
+    state.begin(cbor=False)
+    asked: list[Reply] = []
+    state.offer("/a", "std_srvs/srv/Trigger", lambda _request, reply: asked.append(reply))
+    list(state.frames())
+    call = {"op": "call_service", "service": "/a", "id": "1", "args": {}}
+    state.receive(encode_json(call), 0.0)
+    asked[0].answer(String("x"))
+    (said,) = map(decode_frame, state.frames())
+    assert said["result"] is False
+    assert "std_srvs/srv/Trigger_Response" in said["values"]

@@ -119,3 +119,18 @@ def test_a_log_without_uavs(tmp_path: Path) -> None:
         read_uavs(path)
     with pytest.raises(VoleryError, match="Poses stand on: nothing"):
         read_way(path)
+
+
+def test_poses_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
+    """As filters tell that have lost their way."""
+    path = tmp_path / "lost.mcap"
+    with closing(open_log(path)) as log:
+        for k in range(20):
+            pose = zero_message("geometry_msgs/msg/PoseStamped")
+            pose.header = m.header((k + 1) * 100_000_000, "map")
+            pose.pose.position.x = float("nan") if k % 4 == 3 else float(k)
+            time_ns = (k + 1) * 100_000_000
+            log.write(m.Published("/pose", "geometry_msgs/msg/PoseStamped", time_ns, pose))
+    way = read_way(path)
+    assert len(way.time_s) == 15
+    assert np.isfinite(way.position).all()

@@ -257,7 +257,7 @@ class RosTcpClient:
             before = self._connections
             try:
                 await self._serve(await dial(*self._address))
-            except (OSError, TimeoutError) as error:
+            except (OSError, TimeoutError, UnicodeError) as error:  # or no such name can be
                 self._why = str(error) or "no answer"
             self._lose(f"the connection to {self._where} is broken")
             if self._closed:

@@ -20,7 +20,7 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import Any
 
 from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import InvalidHandshake, InvalidURI, WebSocketException
+from websockets.exceptions import WebSocketException
 
 from volery.bridges.rosbridge.client_state import ClientState
 from volery.bridges.rosbridge.forms import Generation
@@ -241,7 +241,7 @@ class RosbridgeClient:
             try:
                 await self._connect_once()
                 self._trouble = "the server has closed the connection"
-            except (InvalidURI, InvalidHandshake, WebSocketException, OSError) as error:
+            except (WebSocketException, OSError, ValueError) as error:  # or no such address can be
                 self._trouble = str(error) or type(error).__name__
             finally:
                 self._connected.clear()

@@ -113,13 +113,7 @@ class ClientState:
             for name, topic_ in self._topics.items():
                 self._order(self._subscription(name, topic_))
             for service, offer in self._offers.items():
-                self._order(
-                    {
-                        "op": "advertise_service",
-                        "service": service,
-                        "type": self._spelled(offer.srvtype),
-                    }
-                )
+                self._order(self._offering(service, offer.srvtype))
 
     def lose(self, why: str) -> None:
         """The connection is gone: open calls fail, publications are dropped."""
@@ -281,9 +275,7 @@ class ClientState:
             if service in self._offers:
                 raise GraphError(f"service '{service}' is offered already")
             self._offers[service] = _Offer(srvtype, handler)
-            self._order(
-                {"op": "advertise_service", "service": service, "type": self._spelled(srvtype)}
-            )
+            self._order(self._offering(service, srvtype))
 
     def withdraw(self, service: str, who: str) -> None:
         """Offer a service no more; its open requests fail."""
@@ -384,11 +376,19 @@ class ClientState:
         if offer is None:
             respond(f"service '{service}' is not offered here", False)
             return
-        answer = f"{offer.srvtype}_Response"
-        reply = Reply(
-            lambda message: respond(self._plain.encode(message, answer), True),
-            lambda error: respond(str(error), False),
-        )
+
+        def answer(message: Any) -> None:
+            try:
+                values = self._plain.encode(message, f"{offer.srvtype}_Response")
+            except GraphError as error:
+                fail(error)
+            else:
+                respond(values, True)
+
+        def fail(error: GraphError) -> None:
+            respond(str(error), False)
+
+        reply = Reply(answer, fail)
         try:
             request = decode_plain(operation.get("args") or {}, f"{offer.srvtype}_Request")
             offer.pending.add(reply)
