@@ -33,9 +33,9 @@ def announce_sensors(publisher: GraphPublisher, fitted: Sequence[Fitted]) -> Non
             camera = Camera(sensor.id, sensor.spec, sensor.left)
             publisher.announce_camera(camera, sensor.mount)
         else:
-            told_by_a_node = isinstance(sensor.spec, EstimateSensor) and sensor.spec.pose is not None
-            kind = RESULT_OF[sensor.spec.kind]
-            publisher.announce(sensor.id, kind, sensor.mount, in_map=not told_by_a_node)
+            kind, spec = RESULT_OF[sensor.spec.kind], sensor.spec
+            by_a_node = isinstance(spec, EstimateSensor) and spec.pose is not None
+            publisher.announce(sensor.id, kind, sensor.mount, in_map=not by_a_node)
         if sensor.mount.nods:
             publisher.announce(sensor.id, JointAngles, sensor.mount)
 
