@@ -162,7 +162,9 @@ def test_rays_visit_the_cells_of_fine_sampling(end, start, dx, dy):
     cells = np.unique(np.floor((start + share * (end - start)) / CELL).astype(int), axis=0)
     free = np.argwhere(scores != UNKNOWN) + low
     assert {tuple(c) for c in cells} <= {tuple(c) for c in free}
-    assert len(free) <= len(cells) + 2  # corners that sampling steps over
+    assert len(free) <= 2 * len(cells) + 2  # corners that sampling steps over
+    aside = np.linalg.norm(np.cross((free + 0.5) * CELL - start, end - start), axis=1)
+    assert (aside <= 0.87 * CELL * np.linalg.norm(end - start) + 1e-9).all()  # half a diagonal
 
 
 # --------------------------------------------------------------------------------------- guidance

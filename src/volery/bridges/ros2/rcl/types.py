@@ -55,10 +55,14 @@ def _word(described_type: Any) -> str:
 
 def _found(name: str) -> Any:
     package, kind, short = name.split("/")
+    missing = f"the sourced ROS 2 has no type '{name}'"
     try:
-        return getattr(import_module(f"{package}.{kind}"), short)
+        found = getattr(import_module(f"{package}.{kind}"), short)
     except (ImportError, AttributeError):
-        raise GraphError(f"the sourced ROS 2 has no type '{name}'") from None
+        raise GraphError(missing) from None
+    if not hasattr(getattr(found, "Request", found), "get_fields_and_field_types"):
+        raise GraphError(f"{missing}: the package '{package}' found is of ROS 1")
+    return found
 
 
 def _compare(msgtype: str, found: Any) -> None:
