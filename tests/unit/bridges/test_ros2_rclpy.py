@@ -44,6 +44,7 @@ def test_fields_are_described_in_the_words_of_rosidl():
     assert types.described("tf2_msgs/msg/TFMessage") == {
         "transforms": "sequence<geometry_msgs/TransformStamped>"
     }
+    assert types.described("std_srvs/srv/Trigger_Request") == {}
     descriptor = types.described("rcl_interfaces/msg/ParameterDescriptor")
     assert descriptor["read_only"] == "boolean"
     assert descriptor["integer_range"] == "sequence<rcl_interfaces/IntegerRange, 1>"

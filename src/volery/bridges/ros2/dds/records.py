@@ -18,6 +18,7 @@ from volery.bridges.ros2.dds.idl_types import message_struct
 from volery.bridges.ros2.dds.qos import qos_of
 from volery.bridges.ros2.middleware import Profile
 from volery.bridges.ros2.names import NodeName
+from volery.bridges.ros2.type_hashes import message_hash
 from volery.graph.cdr import encode_cdr
 from volery.graph.messages import message_type
 
@@ -37,7 +38,8 @@ class Record:
         self._lock = threading.Lock()
         self._stale = True
         topic = Topic(participant, TOPIC, message_struct(TYPE))
-        self._writer = DataWriter(participant, topic, qos=qos_of(PROFILE))
+        user_data = f"typehash={message_hash(TYPE)};".encode()
+        self._writer = DataWriter(participant, topic, qos=qos_of(PROFILE, user_data))
 
     def add_node(self, node: NodeName) -> None:
         """Have a node in it."""

@@ -15,6 +15,8 @@ _WORDS = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float
 _WORDS |= {"float64": "double"}
 """What `rosidl_generator_py` calls base types; others are called the same."""
 _NESTED_IN = "/msg/"
+_FILLER = "structure_needs_at_least_one_member"
+"""What messages without fields have on the wire; classes of ROS 2 do not tell of it."""
 
 
 @cache
@@ -36,7 +38,8 @@ def service_class(srvtype: str) -> Any:
 
 def described(msgtype: str) -> dict[str, str]:
     """Fields and their types, in the words of `get_fields_and_field_types` of ROS 2's classes."""
-    return {name: _word(kind) for name, kind in typestore().fielddefs[msgtype][1]}
+    fields = typestore().fielddefs[msgtype][1]
+    return {name: _word(kind) for name, kind in fields if name != _FILLER}
 
 
 def _word(described_type: Any) -> str:
