@@ -9,6 +9,7 @@ import time
 
 import pytest
 from ardupilot_stand_in import ArdupilotStandIn
+from autopilot_bench import free_port, irises
 
 from volery.bridges.doors import Doors
 from volery.core.errors import BridgeError, PartnerError
@@ -17,7 +18,6 @@ from volery.mavlink.json_frames import Rotor, State, motors_of, parse_servos, sh
 from volery.mavlink.meetings import PATIENCE, Patience
 from volery.mavlink.outfit import with_ardupilot
 from volery.runtime import Simulation
-from volery.scenario.load import parse_scenario
 
 X = (
     Rotor(0.1, -0.2, "ccw"),
@@ -32,27 +32,8 @@ STILL = State(
 )
 
 
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 def scenario(count):
-    data = {
-        "name": "flat",
-        "duration_s": 1000.0,
-        "types": {"iris": {"airframe": "iris"}},
-        "uavs": [
-            {
-                "type": "iris",
-                "count": count,
-                "position_m": [0.0, 0.0],
-                "last_position_m": [5.0, 0.0],
-            }
-        ],
-    }
-    return with_ardupilot(parse_scenario(data, where="flat"))
+    return with_ardupilot(irises(count))
 
 
 @pytest.fixture
@@ -65,7 +46,7 @@ def opened():
         doors = Doors(simulation.gateway)
         closing.extend([doors, simulation])
         rotors = dict.fromkeys(simulation.uavs, X)
-        door = ArdupilotDoor(rotors, port=free_port(), patience=patience)
+        door = ArdupilotDoor(rotors, port=free_port(socket.SOCK_DGRAM), patience=patience)
         doors.open(door)
         simulation.take_in()
         return simulation, door

@@ -5,6 +5,7 @@ import socket
 import time
 
 import pytest
+from autopilot_bench import free_port, irises
 from px4_stand_in import StandIn, Terminal
 
 from volery.bridges.doors import Doors
@@ -14,33 +15,13 @@ from volery.mavlink.outfit import with_px4
 from volery.mavlink.px4_door import Px4Door
 from volery.mavlink.px4_serial_door import Px4Serial
 from volery.runtime import Simulation
-from volery.scenario.load import parse_scenario
 
 CLIMB = 0.78
 """Share of full speed; 0.73 carries an iris: the root of its share of thrust."""
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 def scenario(count=1):
-    data = {
-        "name": "flat",
-        "duration_s": 1000.0,
-        "types": {"iris": {"airframe": "iris"}},
-        "uavs": [
-            {
-                "type": "iris",
-                "count": count,
-                "position_m": [0.0, 0.0],
-                "last_position_m": [5.0, 0.0],
-            }
-        ],
-    }
-    return with_px4(parse_scenario(data, where="flat"))
+    return with_px4(irises(count))
 
 
 @pytest.fixture
