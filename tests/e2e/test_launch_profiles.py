@@ -20,7 +20,7 @@ from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.cli.launching import start_profile
 from volery.runtime.node_loading import start_node
-from volery.scenario.load import parse_scenario
+from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import NodeEntry
 
 PROFILES = Path(__file__).parents[2] / "examples/profiles"
@@ -172,9 +172,9 @@ def messages(said: Said) -> dict[str, list[bytes]]:
 def test_shipped_profiles_start_the_nodes_of_the_scenario(name: str) -> None:
     """The same classes with parameters that they know; only names and drivers differ."""
     profile = load_profile(PROFILES / f"{name}.toml")
-    shipped = load_profile(PROFILES / "simulation.toml")
+    flown = load_scenario("forest_search").types["searcher"].nodes
     autonomy = [e for e in profile.launch if e.node.startswith("volery.autonomy.")]
-    assert [e.node for e in autonomy] == [e.node for e in shipped.launch]
+    assert [e.node for e in autonomy] == [e.node for e in flown]
     assert profile.name == name
     with Simulation(scenario_of([], blind=True)) as simulation:
         from volery.graph.node import Context

@@ -1,7 +1,7 @@
 """Where a UAV's odometry frame lies in the map, as `/tf` tells.
 
 `map -> uavN/odom` is identity until a SLAM, or whoever corrects the drift, says otherwise
-(REP-105).
+(REP-105). A SLAM that has lost its place says nothing more.
 """
 
 from __future__ import annotations
@@ -14,11 +14,15 @@ from numpy.typing import NDArray
 from volery.autonomy.motion_history import Placement
 from volery.autonomy.scan_points import Pose
 from volery.core import rotations
-from volery.graph.messages import Odometry, TFMessage
+from volery.core.clock import NS_PER_S
+from volery.graph.messages import Odometry, TFMessage, stamp_of
 
 Array = NDArray[np.float64]
 
 MAP = "map"
+UNKNOWN_PLACE = "where in the map is not known"
+_SILENT_NS = NS_PER_S
+"""What `/tf` has told once it must tell again within this time of the odometry's clock."""
 
 
 class MapFrame:
@@ -27,7 +31,13 @@ class MapFrame:
     def __init__(self) -> None:
         self.odom_frame = ""
         """Name of the odometry frame; empty before it is known."""
+        self._odom_ns = 0
         self._known: dict[str, Placement] = {}
+        self._told_ns: dict[str, int] = {}
+
+    def hear(self, message: Odometry) -> None:
+        """The frame of this odometry is the one looked up from now on."""
+        self.odom_frame, self._odom_ns = message.header.frame_id, stamp_of(message)
 
     def on_tf(self, message: TFMessage) -> None:
         """Take in what `/tf` says; transforms that are not finite are left out."""
@@ -39,11 +49,18 @@ class MapFrame:
             length = float(np.linalg.norm(attitude))
             if np.isfinite(position).all() and 0.9 < length < 1.1:
                 self._known[stamped.child_frame_id] = Placement(position, attitude / length)
+                self._told_ns[stamped.child_frame_id] = stamp_of(stamped)
 
     @property
     def map_from_odom(self) -> Placement | None:
         """`T_map_odom`; None where it is identity."""
         return self._known.get(self.odom_frame)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether `/tf` has fallen silent about a frame whose odometry goes on."""
+        told = self._told_ns.get(self.odom_frame)
+        return told is not None and self._odom_ns - told > _SILENT_NS
 
     def to_map(self, points_odom: Array) -> Array:
         """Points (..., 3) of the odometry frame in the map."""
@@ -61,7 +78,7 @@ class MapFrame:
 
     def pose_in_map(self, message: Odometry) -> Pose:
         """The pose that odometry tells, in the map; its frame is the one looked up from now on."""
-        self.odom_frame = message.header.frame_id
+        self.hear(message)
         pose, at = Pose.from_odometry(message), self.map_from_odom
         if at is None:
             return pose
@@ -75,8 +92,10 @@ class MapFrame:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return {"odom_frame": self.odom_frame, "known": dict(self._known)}
+        times = {"odom_ns": self._odom_ns, "told_ns": dict(self._told_ns)}
+        return {"odom_frame": self.odom_frame, "known": dict(self._known), **times}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
         self.odom_frame, self._known = state["odom_frame"], dict(state["known"])
+        self._odom_ns, self._told_ns = state["odom_ns"], dict(state["told_ns"])

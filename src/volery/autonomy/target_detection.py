@@ -109,7 +109,8 @@ class TargetDetection(Node):
         self._frame.on_tf(message)
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._pose = self._frame.pose_in_map(message)
+        pose = self._frame.pose_in_map(message)
+        self._pose = None if self._frame.is_lost else pose
 
     def _on_range(self, message: Range) -> None:
         if math.isfinite(message.range):

@@ -33,6 +33,8 @@ _RISE_S = 30.0
 """A take-off that takes longer has failed."""
 _RETURN_STUCK_S = 60.0
 """Without coming nearer to home for so long it lands where it is."""
+_LOST_S = 30.0
+"""After so long without knowing where it is it lands."""
 _HOME_M, _NEARER_M = 1.5, 1.0
 _LANDED_M, _SUNK_M, _STILL_M_S = 0.3, 0.25, 0.2
 """All modelling choices."""
@@ -125,8 +127,9 @@ class TaskManager(TeamMember):
             self._home = pose.position.copy()
             self._enter(Phase.WAIT)
         self.trouble = self.what_is_wrong(now)
-        if now - self._pose_ns > POSE_S * NS_PER_S and self.phase in ALOFT:
-            self._ask_now_and_then(self._hold)
+        lost_s = (now - self._pose_ns) / NS_PER_S
+        if lost_s > POSE_S and self.phase in ALOFT:
+            self._wait_or_land(lost_s)
         else:
             self._act(pose, now)
         self.tell_team()
@@ -148,6 +151,15 @@ class TaskManager(TeamMember):
             self._return(pose, now)
         elif self.phase is Phase.LAND:
             self._sink(pose)
+
+    def _wait_or_land(self, lost_s: float) -> None:
+        """Stay until it knows where it is again; land where that takes too long."""
+        if lost_s < _LOST_S:
+            self._ask_now_and_then(self._hold)
+            return
+        if self.phase is not Phase.LAND:
+            self._enter(Phase.LAND)
+        self._ask_now_and_then(self._land)
 
     def _rise(self, pose: Pose, now: int) -> None:
         climbed = pose.position[2] - self._home[2]

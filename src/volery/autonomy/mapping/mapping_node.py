@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.ground_plane import GroundPlane
-from volery.autonomy.map_frame import MAP, MapFrame
+from volery.autonomy.map_frame import MAP, UNKNOWN_PLACE, MapFrame
 from volery.autonomy.mapping import reports
 from volery.autonomy.mapping.level_grid import LevelGrid, Slab
 from volery.autonomy.mapping.map_files import MapLimits, read_map, write_map
@@ -135,7 +135,7 @@ class Mapping(Node):
     # ------------------------------------------------------------------------------ what it hears
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._frame.odom_frame = message.header.frame_id
+        self._frame.hear(message)
         if not self._motion.add(Pose.from_odometry(message)):
             return
         for name, intake in self._intakes.items():
@@ -155,7 +155,7 @@ class Mapping(Node):
             self._range = (self.get_clock().now_ns(), float(message.range))
 
     def _insert(self, rays: Rays) -> None:
-        if len(rays.hits) == 0:
+        if len(rays.hits) == 0 or self._frame.is_lost:
             return
         rays = rays._replace(
             starts=self._frame.to_map(rays.starts), ends=self._frame.to_map(rays.ends)
@@ -216,6 +216,8 @@ class Mapping(Node):
         newest = self._motion.newest
         if newest is None or now - newest.time_ns > _SILENT_S * NS_PER_S:
             found.append("no odometry")
+        if self._frame.is_lost:
+            found.append(UNKNOWN_PLACE)
         for name, intake in self._intakes.items():
             heard, seen = intake.heard_ns, intake.seen_ns
             if heard is None or now - heard > _SILENT_S * NS_PER_S:

@@ -137,7 +137,7 @@ class Exploring(Node):
     # ------------------------------------------------------------------------------ what it hears
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._frame.odom_frame = message.header.frame_id
+        self._frame.hear(message)
         motion = Motion.from_odometry(message)
         if np.isfinite(motion.position).all() and np.isfinite(motion.velocity).all():
             self._motion = motion
@@ -188,6 +188,9 @@ class Exploring(Node):
     def _on_timer(self) -> None:
         if self._area is None or self._motion is None or self._grid is None:
             self._tell()
+            return
+        if self._frame.is_lost:
+            self._since_ns = self.get_clock().now_ns()  # no goal is blocked by that
             return
         place = self._frame.to_map(self._motion.position)
         self._area.look(place, *self._grid, self._view)

@@ -109,7 +109,7 @@ class GlobalPlanner(Node):
     # ------------------------------------------------------------------------------ what it hears
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._frame.odom_frame = message.header.frame_id
+        self._frame.hear(message)
         place = Motion.from_odometry(message).position
         if np.isfinite(place).all():
             self._place = self._frame.to_map(place)

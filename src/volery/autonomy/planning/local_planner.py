@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.map_frame import MAP, MapFrame
+from volery.autonomy.map_frame import MAP, UNKNOWN_PLACE, MapFrame
 from volery.autonomy.planning.local_planning import Doing, LocalPlanning, Policy, Sight
 from volery.autonomy.planning.neighbours import Neighbours
 from volery.autonomy.planning.primitives import Limits, Path, State
@@ -130,7 +130,7 @@ class LocalPlanner(Node):
     # ------------------------------------------------------------------------------ what it hears
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._frame.odom_frame = message.header.frame_id
+        self._frame.hear(message)
         self._sight.motion.add(Pose.from_odometry(message))
 
     def _scan_listener(self, name: str) -> Callable[[LaserScan], None]:
@@ -158,6 +158,8 @@ class LocalPlanner(Node):
     def _on_timer(self) -> None:
         now = self.get_clock().now_ns()
         pose, problems = self._sight.motion.newest, self._sight.problems(now)
+        if self._frame.is_lost:
+            problems.append(UNKNOWN_PLACE)
         if pose is None:
             self._tell("waiting", problems)
             return

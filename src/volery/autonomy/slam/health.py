@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from volery.autonomy.slam.tracker import MANY, MISFIT, Tracker
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back
@@ -64,9 +62,8 @@ class Health:
         seen, usual = sum(m.seen for m in fresh), sum(m.usual * m.seen for m in fresh)
         unfit = seen >= MANY and met < MISFIT * usual
         self._misfit_ns = (self._misfit_ns or now) if unfit and tracker.has_flown else None
-        sigma = float(np.sqrt(max(tracker.covariance[0, 0], tracker.covariance[1, 1])))
         long = self._misfit_ns is not None and now - self._misfit_ns > _LOST_NS
-        return long or sigma > _UNSURE_M
+        return long or tracker.sigma_m > _UNSURE_M
 
     def begin_anew(self) -> None:
         """The tracker has begun a new map."""

@@ -29,6 +29,8 @@ _OVER_GROUND_M = 0.5
 """Nothing lower than this counts as upright: grass, feet of trees, errors of the ground's map."""
 _PER_M = 0.12
 """How much farther ground that nobody has seen may be off, per metre (modelling choice)."""
+_LEVEL_M = 0.3
+"""Where nothing is known of the ground, what lies so much lower than the vehicle may be it."""
 _YOUNG = 25
 """Cells of known ground around the vehicle below which it may begin away from them."""
 _GATE_M = 0.6
@@ -69,6 +71,8 @@ def classify(
         x, y, z = _placed(state, turn, points[n])
         kinds[n] = UPRIGHT
         if known_broad == 0:
+            if z < state[P + 2] - _LEVEL_M:
+                kinds[n] = LEFT_OUT
             continue
         away = math.hypot(x - broad[3], y - broad[4])
         over = z - broad[5] - broad[1] * (x - broad[3]) - broad[2] * (y - broad[4])

@@ -39,6 +39,8 @@ _JUMP_NS = NS_PER_S // 2
 """A stamp so far before the newest one is a clock that was set back."""
 _LONGEST_GAP_NS = 2 * NS_PER_S
 """Without readings of the IMU for longer it is not known where the vehicle has gone."""
+_UNKNOWN_SPEED_M_S, _DOUBTED_SPEED_M_S = 3.0, 0.5
+"""How far the velocity may be off after such a gap, and after what is seen did not fit the map."""
 _MOST_RAD_S, _MOST_M_S2 = 60.0, 500.0
 """Beyond what any IMU measures."""
 
@@ -154,7 +156,7 @@ class Slam(Node):
         self._resets += 1
         self._tracker.set_clock(time_ns)
         if self._tracker.is_ready:
-            self._lose()
+            self._lose(_UNKNOWN_SPEED_M_S)
 
     def _on_joint(self, message: JointState) -> None:
         if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
@@ -196,7 +198,7 @@ class Slam(Node):
 
     def _tell_pose(self) -> None:
         t = self._tracker
-        if not t.is_ready or not self._way.frames:
+        if not t.is_ready or not self._way.frames or not self._way.is_placed:
             return
         position, attitude = self._way.pose(t)
         four, tilt = self._way.sigmas(t), np.sqrt(np.diag(t.covariance)[15:17])
@@ -210,12 +212,12 @@ class Slam(Node):
     def _tell_status(self) -> None:
         t, way, now = self._tracker, self._way, self.get_clock().now_ns()
         if self._health.look(t, now, way.is_placed):
-            self._lose()
+            self._lose(_DOUBTED_SPEED_M_S)
         told = {
             "state": self._health.state,
             "problems": self._health.problems,
             "uprights": {name: round(m.met, 1) for name, m in sorted(t.match.items())},
-            "sigma_m": round(math.sqrt(float(max(t.covariance[0, 0], t.covariance[1, 1]))), 3),
+            "sigma_m": round(t.sigma_m, 3),
             "keyframes": len(way.frames),
             "closures": way.closures,
             "sessions": way.session + 1,
@@ -230,9 +232,9 @@ class Slam(Node):
             times = [frame.time_ns for frame in way.frames]
             self._path.publish(reports.path(t.time_ns, times, way.poses))
 
-    def _lose(self) -> None:
+    def _lose(self, speed_sigma: float) -> None:
         """Begin new maps; where in the old one they lie must be found out."""
-        self._tracker.begin_anew()
+        self._tracker.begin_anew(speed_sigma)
         self._health.begin_anew()
         if self._way.frames:
             self._way.begin_anew()

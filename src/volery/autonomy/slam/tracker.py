@@ -53,9 +53,16 @@ _STILL_GYRO, _STILL_ACCEL = 0.02, 0.25
 _STANDING_M_S = 0.3
 _LOW_M = 0.35
 """What the sonar says at most where the vehicle stands."""
-_UNKNOWN_SPEED_M_S = 3.0
-MANY, MISFIT = 15.0, 0.6
-"""Returns from which on their share says something, and how far below the usual one is too low."""
+_DRAWN_M = 0.1
+"""What stands is drawn from places that are known so well."""
+_RECENT_NS = NS_PER_S
+"""A reading of the sonar that is younger tells where the ground is."""
+MANY, MISFIT = 15.0, 0.25
+"""Returns from which on their share says something, and how far below the usual one is too low.
+
+Where much comes into sight for the first time the share falls to 0.3 of the usual one, where nothing
+is as it was to 0.05 (recorded flights).
+"""
 _USUAL_S = 10.0
 """Time over which what is usual changes (modelling choices)."""
 
@@ -129,7 +136,7 @@ class Tracker:
     _STATE = (
         "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "standing_height",
         "travelled_m", "_times", "_states", "_imu", "_waiting", "_maps", "_inserted", "_still",
-        "_broad", "_near_ground_ns", "_standing_ns", "_is_high", "refused",
+        "_broad", "_near_ground_ns", "_range", "_standing_ns", "_is_high", "refused",
     )  # fmt: skip
 
     def __init__(
@@ -154,6 +161,7 @@ class Tracker:
         self._still: deque[tuple[Array, Array]] = deque(maxlen=_STILL)
         self._broad = np.zeros(6)
         self._near_ground_ns: int | None = None
+        self._range: tuple[int, float] | None = None
         self._standing_ns = 0
         self._is_high = False
         """Whether the sonar says that it flies: a hover is as quiet as standing."""
@@ -169,6 +177,11 @@ class Tracker:
     def time_ns(self) -> int:
         """Time of the state."""
         return 0 if self._imu is None else self._imu[0]
+
+    @property
+    def sigma_m(self) -> float:
+        """Standard deviation of the place in the plane, in its worse direction of x and y."""
+        return math.sqrt(float(max(self.covariance[0, 0], self.covariance[1, 1])))
 
     def add_imu(self, time_ns: int, gyro: Array, accel: Array) -> list[Seen]:
         """Carry the state on to a reading (rad/s, m/s^2, body axes); what sweeps were due then."""
@@ -206,6 +219,7 @@ class Tracker:
             self._near_ground_ns = time_ns
         elif math.isfinite(distance) and self.is_ready and self.has_flown:
             self._near_ground_ns = None
+            self._range = time_ns, distance
             self._seed_below(distance)
 
     def _move(
@@ -348,9 +362,8 @@ class Tracker:
             or abs(math.remainder(yaw - last[2], math.tau)) > m.insert_rad
             or self.time_ns - last[0] > m.insert_s * NS_PER_S
         )
-        is_new = (
-            is_new and self.match[sweep.name].fits
-        )  # or a wrong place would become the right one
+        # Or a wrong place would become the right one.
+        is_new = is_new and self.match[sweep.name].fits and self.sigma_m < _DRAWN_M
         if is_new:
             self._inserted[sweep.name] = (self.time_ns, self.state[:3].copy(), yaw)
         insert(
@@ -373,20 +386,23 @@ class Tracker:
         self._imu = None
         self._waiting.clear()
         self._still.clear()
-        self._near_ground_ns = None
+        self._near_ground_ns = self._range = None
         self._standing_ns = time_ns
         self._times[:] = time_ns - np.arange(_KEPT)[::-1] * 1_000_000
         self._states[:] = self.state
 
-    def begin_anew(self) -> None:
-        """Forget the maps: from here on it follows the motion in new ones, at an unknown speed."""
+    def begin_anew(self, speed_sigma: float) -> None:
+        """Forget the maps, and follow the motion in new ones.
+
+        `speed_sigma`, m/s, is how far the velocity may be off by now.
+        """
         self._maps = Maps()
         self._inserted, self.match = {}, {}
-        keep_rows = self.covariance[6:, 6:].copy()
-        self.covariance[:] = 0.0
-        self.covariance[6:, 6:] = keep_rows
+        self.covariance[:3] = self.covariance[:, :3] = 0.0
         self.covariance[np.arange(3), np.arange(3)] = 1e-4
-        self.covariance[np.arange(3, 6), np.arange(3, 6)] = _UNKNOWN_SPEED_M_S**2
+        self.covariance[np.arange(3, 6), np.arange(3, 6)] += speed_sigma**2
+        if self._range is not None and self.time_ns - self._range[0] < _RECENT_NS:
+            self._seed_below(self._range[1])
 
     # ------------------------------------------------------------------------------------- state
 

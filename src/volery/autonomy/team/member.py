@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.map_frame import MapFrame
+from volery.autonomy.map_frame import UNKNOWN_PLACE, MapFrame
 from volery.autonomy.scan_points import Pose
 from volery.autonomy.stuck_sensors import is_stuck
 from volery.autonomy.team.assignment import Worker
@@ -134,6 +134,8 @@ class TeamMember(Node):
         pose = self._frame.pose_in_map(message)
         if not np.isfinite([*pose.position, *pose.velocity]).all() or is_stuck(pose, self._pose):
             return
+        if self._frame.is_lost:
+            return
         self._pose, self._pose_ns = pose, self.now_ns
         coverage = self._coverage
         if coverage is not None and coverage.look(pose.position[:2], self.settings.sight_m):
@@ -165,7 +167,7 @@ class TeamMember(Node):
         """What people should know, in words; empty: nothing."""
         wrong = []
         if now - self._pose_ns > POSE_S * NS_PER_S:
-            wrong.append("no odometry")
+            wrong.append(UNKNOWN_PLACE if self._frame.is_lost else "no odometry")
         silent = sorted(
             name
             for name, mate in self.team.mates.items()
