@@ -241,6 +241,29 @@ def test_a_kidnapped_uav_finds_itself_or_says_lost(flown):
     assert last["closures"] >= 1
 
 
+def test_new_maps_in_flight_leave_the_velocity_right(flown):
+    told = Listening().hear([row for row in flown if row[0] <= 7 * S])
+    told.node._lose(0.5)
+    since = told.bench.now_ns
+    told.hear([row for row in flown if row[0] > 7 * S])
+    speeds = [np.hypot(m.twist.twist.linear.x, m.twist.twist.linear.y) for m in told.odom
+              if m.header.stamp.sec * S + m.header.stamp.nanosec > since]  # fmt: skip
+    assert len(speeds) > 50
+    assert np.abs(np.array(speeds) - 2.0).max() < 0.3
+    assert told.last_status()["sessions"] == 2
+
+
+def test_what_comes_into_sight_for_the_first_time_makes_nobody_lost():
+    """Out of a clearing into dense woods: most of what is seen was never seen before."""
+    dense = trunks(160, 14.0, seed=5, clear_m=0.0)
+    dense[:, 0] += 34.0
+    woods = np.concatenate([trunks(12, 10.0), dense])
+    told = Listening().hear(messages(Flight(5.0, 1e6), woods, 12.0))
+    states = [json.loads(m.data)["state"] for m in told.status]
+    assert "lost" not in states
+    assert json.loads(told.status[-1].data)["sessions"] == 1
+
+
 def test_wrong_parameters_are_refused():
     with pytest.raises(NodeError, match="start is"):
         NodeBench().start(Slam, start=[1.0, 2.0])

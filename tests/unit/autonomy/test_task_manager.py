@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from team_bench import AREA, TeamBench
 
+from volery.autonomy.map_frame import UNKNOWN_PLACE
 from volery.autonomy.search.places import Area
 from volery.autonomy.team.assignment import Claim, Worker, assign, must_yield
 from volery.autonomy.team.mission_messages import goal_at
@@ -249,6 +250,35 @@ def test_it_holds_while_it_does_not_know_where_it_is() -> None:
     bench.uavs["uav1"].silent = False
     bench.run(1.0)
     assert bench.managers["uav1"].trouble == ""
+
+
+def test_it_waits_and_in_the_end_lands_where_its_place_in_the_map_is_lost() -> None:
+    bench = TeamBench({})
+    bench.add("uav1", (10.0, 0.0), corrected=True)
+    tf, told = (
+        zero_message("geometry_msgs/msg/TransformStamped"),
+        bench.graph.advertise("/tf", TFMessage),
+    )
+    tf.header.frame_id, tf.child_frame_id, tf.transform.rotation.w = "map", "map", 1.0
+    uav, manager = bench.uavs["uav1"], bench.managers["uav1"]
+    uav.frame = tf.child_frame_id = "uav1/odom"
+
+    def run(seconds: float, placed: bool) -> None:
+        for _ in range(round(2.0 * seconds)):
+            if placed:
+                tf.header = header(bench.clock.now_ns, "map")
+                told.publish(TFMessage([tf]))
+            bench.run(0.5)
+
+    run(10.0, True)
+    assert manager.trouble == ""
+    run(4.0, False)
+    assert manager.trouble == UNKNOWN_PLACE
+    assert uav.flies
+    run(2.0, True)
+    assert manager.trouble == ""
+    run(40.0, False)
+    assert not uav.flies
 
 
 def test_a_kept_state_is_all_that_a_manager_knows() -> None:

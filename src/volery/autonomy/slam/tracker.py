@@ -60,8 +60,8 @@ _RECENT_NS = NS_PER_S
 MANY, MISFIT = 15.0, 0.25
 """Returns from which on their share says something, and how far below the usual one is too low.
 
-Where much comes into sight for the first time the share falls to 0.3 of the usual one, where nothing
-is as it was to 0.05 (recorded flights).
+Where much comes into sight for the first time the share falls to half of the usual one, where
+nothing is as it was to a twentieth (recorded flights).
 """
 _USUAL_S = 10.0
 """Time over which what is usual changes (modelling choices)."""
