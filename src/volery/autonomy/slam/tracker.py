@@ -48,6 +48,8 @@ _KEPT = 64
 _LONGEST_STEP_S = 0.1
 _STILL = 100
 """Readings over which standing still is judged: 0.5 s at 200 Hz."""
+_SETTLING = 2_000
+"""Readings over which a turn before it stands still is followed: 10 s at 200 Hz."""
 _STILL_GYRO, _STILL_ACCEL = 0.02, 0.25
 """Most standard deviation of readings at rest, rad/s, m/s^2: four times the ADIS16448's."""
 _STANDING_M_S = 0.3
@@ -136,6 +138,7 @@ class Tracker:
     _STATE = (
         "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "standing_height",
         "travelled_m", "_times", "_states", "_imu", "_waiting", "_maps", "_inserted", "_still",
+        "_turns",
         "_broad", "_near_ground_ns", "_range", "_standing_ns", "_is_high", "refused",
     )  # fmt: skip
 
@@ -159,6 +162,8 @@ class Tracker:
         self._maps = Maps()
         self._inserted: dict[str, tuple[int, Array, float]] = {}
         self._still: deque[tuple[Array, Array]] = deque(maxlen=_STILL)
+        self._turns: deque[tuple[int, Array]] = deque(maxlen=_SETTLING)
+        """Times and rates of turn before it has begun."""
         self._broad = np.zeros(6)
         self._near_ground_ns: int | None = None
         self._range: tuple[int, float] | None = None
@@ -191,6 +196,7 @@ class Tracker:
         before, self._imu = self._imu, (time_ns, gyro, accel)
         self._still.append((gyro, accel))
         if not self.is_ready:
+            self._turns.append((time_ns, gyro))
             self._try_to_begin(time_ns)
             return []
         if before is not None:
@@ -259,7 +265,8 @@ class Tracker:
         up = np.mean([reading[1] for reading in self._still], axis=0)
         roll = math.atan2(up[1], up[2])
         pitch = math.atan2(-up[0], math.hypot(up[1], up[2]))
-        attitude = rotations.from_rpy(roll, pitch, float(self.start[3]))
+        heading = float(self.start[3]) + self._turned_before(rotations.from_rpy(roll, pitch, 0.0))
+        attitude = rotations.from_rpy(roll, pitch, heading)
         self.state[:] = 0.0
         self.state[:3], self.state[Q : Q + 4] = self.start[:3], attitude
         self.state[G + 2] = -GRAVITY_M_S2
@@ -281,6 +288,21 @@ class Tracker:
         x, y, z = self.start[:3] - self.standing_height * normal
         self._broad[:] = (z, -normal[0] / normal[2], -normal[1] / normal[2], x, y, z)
         seed_ground(self._maps.ground_keys, self._maps.sums, float(x), float(y), float(z))
+
+    def _turned_before(self, level: Array) -> float:
+        """Turn of the heading, rad, since the first reading; it ends at `level` (4,).
+
+        On its feet a vehicle turns by some tenths of a degree as it settles.
+        """
+        if len(self._turns) == _SETTLING:
+            return 0.0
+        bias = np.mean([reading[0] for reading in list(self._still)[_STILL // 2 :]], axis=0)
+        turns, attitude = list(self._turns), level
+        for (before, first), (after, last) in zip(turns[-2::-1], turns[:0:-1], strict=True):
+            turn = (0.5 * (first + last) - bias) * ((before - after) / NS_PER_S)
+            attitude = rotations.multiply(attitude, rotations.exponential(turn))
+        self._turns.clear()
+        return -float(rotations.yaw_of(attitude))
 
     def _keep_still(self, time_ns: int) -> None:
         """While it stands its velocity is zero, and the gyroscope tells its bias."""
