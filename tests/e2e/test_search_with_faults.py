@@ -169,6 +169,22 @@ def test_it_stops_while_its_odometry_is_wrong(flight: Flight, spoil: str) -> Non
     flight.goes_on()
 
 
+def test_without_its_sonar_it_says_so_and_keeps_its_height(flight: Flight) -> None:
+    now = flight.simulation.time_s
+    fault = {"kind": "sensor", "uav": "uav1", "sensor": "range", "effect": "stuck"}
+    flight.simulation.inject({**fault, "at_s": now, "until_s": now + 12.0})
+    heights = []
+    for _ in range(10):
+        assert flight.way_m(1.0) > 0.1
+        x, y, z = flight.simulation.uavs["uav1"].position_map
+        heights.append(z - float(flight.simulation.terrain.height(x, y)))
+    assert flight.status[-1]["problems"] == ["the sonar repeats itself"]
+    assert min(heights) > 1.5
+    assert max(heights) < 4.5
+    flight.simulation.run(3.0)
+    flight.goes_on()
+
+
 @pytest.mark.parametrize("spoil", [pytest.param("twice", marks=pytest.mark.slow), "some lost"])
 def test_messages_twice_or_lost_do_not_matter(flight: Flight, spoil: str) -> None:
     flight.relay.spoil = spoil

@@ -15,6 +15,8 @@ _CELL_M = 2.0
 _CELLS = 16
 _RADIUS_M = 13.0
 _NOISE_M = 0.05
+_ENOUGH = 8
+"""Cells with returns from which on these tell the height, where no sonar does."""
 _RIDGE = 8.0
 """Weight that pulls the slope to zero where few returns reach the ground."""
 
@@ -39,13 +41,16 @@ class GroundPlane:
         _keep_lowest(points, time_ns, self._keep_ns, self._low, self._seen_ns)
 
     def fit(self, position: Array, height_below: float | None, time_ns: int) -> None:
-        """Refit around `position` (3,); `height_below` is the ground's height there if known."""
+        """Refit around `position` (3,); `height_below` is the ground's height there if known.
+
+        Where it is not, the returns tell that, too.
+        """
         fresh = self._low[time_ns - self._seen_ns <= self._keep_ns]
         offset = fresh[:, :2] - position[:2]
         near = np.hypot(offset[:, 0], offset[:, 1]) < _RADIUS_M
         offset, z = offset[near], fresh[near, 2]
         base = height_below if height_below is not None else float(self.height_at(position[:2]))
-        weight = np.ones(len(z))
+        is_told = height_below is not None or len(z) < _ENOUGH
         slope = self.slope
         for _ in range(3):
             residual = z - base - offset @ slope
@@ -53,6 +58,8 @@ class GroundPlane:
             weight = 1.0 / (1.0 + (np.maximum(residual, 0.0) / 0.4) ** 2 + (residual / 2.0) ** 2)
             normal = (offset * weight[:, None]).T @ offset + _RIDGE * np.eye(2)
             slope = np.linalg.solve(normal, (offset * weight[:, None]).T @ (z - base))
+            if not is_told:
+                base += float(weight @ (z - base - offset @ slope) / weight.sum())
         steepness = float(np.hypot(*slope))
         self.slope = slope if steepness < 1.0 else slope / steepness
         self.anchor = position[:2].copy()

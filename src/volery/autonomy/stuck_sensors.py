@@ -1,6 +1,7 @@
 """Sensors that repeat themselves: new stamps, old measurements.
 
-Two measurements of a real sensor are never alike to the last bit: all have noise.
+Two measurements of a real sensor are never alike to the last bit: all have noise. Those of a sonar
+are whole centimetres, so that many in a row must be alike.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from volery.autonomy.scan_points import Pose
 from volery.graph.messages import LaserScan
 
 _MOVES_M_S = 0.1
+_ALIKE = 15
+"""Ranges in a row: with noise of 1 cm it takes some hundred hours until that comes by chance."""
 
 
 class ScanRepeats:
@@ -29,6 +32,20 @@ class ScanRepeats:
             and bool(np.isfinite(ranges).any())
             and np.array_equal(ranges, before, equal_nan=True)
         )
+
+
+class RangeRepeats:
+    """Whether a sonar goes on telling the same range."""
+
+    def __init__(self) -> None:
+        self._last = -1.0
+        self._count = 0
+
+    def are_told_by(self, distance: float) -> bool:
+        """Whether a range (m, finite) is the last of many that are alike."""
+        self._count = self._count + 1 if distance == self._last else 1
+        self._last = distance
+        return self._count >= _ALIKE
 
 
 def is_stuck(pose: Pose, before: Pose | None) -> bool:

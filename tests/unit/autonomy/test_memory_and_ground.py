@@ -40,6 +40,19 @@ def test_slope_is_found_below_trunks_and_leaves():
     assert plane.height_at(np.array([5.0, 0.0])) == pytest.approx(101.0, abs=0.3)
 
 
+def test_without_a_sonar_the_returns_tell_where_the_ground_is():
+    rng = np.random.default_rng(4)
+    at = rng.uniform(-10.0, 10.0, (2000, 2))
+    ground = np.column_stack([at, 0.2 * at[:, 0] + 1.0])
+    stuff = np.column_stack([at[:300], 0.2 * at[:300, 0] + rng.uniform(1.5, 5.0, 300)])
+    plane = GroundPlane()
+    plane.add(np.concatenate([ground, stuff]), 0)
+    for _ in range(3):
+        plane.fit(np.array([1.0, 0.0, 4.0]), None, 0)
+    assert plane.height == pytest.approx(1.2, abs=0.25)
+    assert plane.slope == pytest.approx([0.2, 0.0], abs=0.05)
+
+
 def test_without_returns_the_ground_is_taken_as_level():
     plane = GroundPlane()
     plane.fit(np.array([1.0, 2.0, 5.0]), 2.0, S)

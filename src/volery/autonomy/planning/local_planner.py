@@ -198,7 +198,7 @@ class LocalPlanner(Node):
         path = self._planning.plan(start, carrot, sight, then)
         self._plans += 1
         self._publish(path, self._planning.began_ns)
-        self._tell(str(self._planning.doing), [])
+        self._tell(str(self._planning.doing), self._sight.warnings())
 
     def _way_here(self) -> WayAhead | None:
         """The way in the odometry frame, made anew where that has been moved in the map."""

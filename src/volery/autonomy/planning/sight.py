@@ -15,7 +15,7 @@ from volery.autonomy.planning.local_grid import LocalGrid
 from volery.autonomy.planning.surface import Surface
 from volery.autonomy.scan_points import Pose
 from volery.autonomy.scan_rays import Beams, RayMaker
-from volery.autonomy.stuck_sensors import ScanRepeats
+from volery.autonomy.stuck_sensors import RangeRepeats, ScanRepeats
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back
 from volery.graph.messages import JointState, LaserScan, Range, stamp_of
@@ -49,6 +49,8 @@ class Surroundings:
         self._seen_ns: dict[str, int] = {}
         self._ground = GroundPlane()
         self._range: tuple[int, float] | None = None
+        self._range_repeats = RangeRepeats()
+        self._is_sonar_stuck = False
         self._upright_cells = math.ceil(0.75 / cell_m)
 
     _PLAIN = (
@@ -61,6 +63,8 @@ class Surroundings:
         "_seen_ns",
         "_ground",
         "_range",
+        "_range_repeats",
+        "_is_sonar_stuck",
     )
 
     def get_state(self) -> dict[str, Any]:
@@ -80,8 +84,10 @@ class Surroundings:
 
     def on_range(self, message: Range, now_ns: int) -> None:
         """Range to the ground below."""
-        if math.isfinite(message.range):
-            self._range = (now_ns, float(message.range))
+        if not math.isfinite(message.range):
+            return
+        self._is_sonar_stuck = self._range_repeats.are_told_by(float(message.range))
+        self._range = None if self._is_sonar_stuck else (now_ns, float(message.range))
 
     def on_scan(self, name: str, scan: LaserScan, now_ns: int) -> None:
         """A scan of LIDAR `name`."""
@@ -123,6 +129,10 @@ class Surroundings:
         if not any(self._is_fresh(self._seen_ns.get(name), now_ns) for name in self._makers):
             found.append("no LIDAR sees anything")
         return found
+
+    def warnings(self) -> list[str]:
+        """What is wrong but hinders nothing: without a sonar the LIDARs tell where ground is."""
+        return ["the sonar repeats itself"] if self._is_sonar_stuck else []
 
     def height_above_ground(self, pose: Pose, now_ns: int) -> float:
         """m, by the sonar and by what the LIDARs see of the ground."""
