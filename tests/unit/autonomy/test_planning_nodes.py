@@ -75,7 +75,8 @@ class Glade:
             self.bench.send("/uav1/joint_states", nod(self.now, tilt))
             if (self.now // (20 * MS)) % 5:
                 continue
-            r = Range(header(self.now, ""), 0, 0.4, 0.2, 7.0, np.float32(height), 0.0)
+            distance = np.float32(height + 0.01 * (self.now // (100 * MS) % 2))
+            r = Range(header(self.now, ""), 0, 0.4, 0.2, 7.0, distance, 0.0)
             self.bench.send("/uav1/range", r)
             ranges = np.full(720, np.inf) if blind else self.ranges
             if not stuck:
