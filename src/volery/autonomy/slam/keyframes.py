@@ -58,6 +58,16 @@ def level_of(gravity: Array, attitude: Array) -> Level:
     return Level(turn, float(rotations.yaw_of(rotations.multiply(turn, attitude))))
 
 
+def turn_of_heading(level: Level, attitude: Array, settling: Array) -> float:
+    """Turn of the heading, rad, while a vehicle turned by `settling` (4,), in its own axes.
+
+    It ended at `attitude` (4,), whose level axes are `level`.
+    """
+    ahead = rotations.multiply(rotations.from_rpy(0.0, 0.0, -level.yaw), level.attitude)
+    before = rotations.multiply(rotations.multiply(ahead, attitude), rotations.conjugate(settling))
+    return -float(rotations.yaw_of(before))
+
+
 def step_between(one: Keyframe, position: Array, attitude: Array, gravity: Array) -> Array:
     """The step (4,) x, y, z, yaw from a keyframe to a pose of the odometry."""
     here, there = level_of(gravity, one.attitude), level_of(gravity, attitude)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ from volery.autonomy.slam.inertial_kernels import (
     move,
     observe,
 )
+from volery.autonomy.slam.keyframes import Level, turn_of_heading
 from volery.autonomy.slam.matching_kernels import (
     broad_plane,
     carry_along,
@@ -48,6 +50,7 @@ _KEPT = 64
 _LONGEST_STEP_S = 0.1
 _STILL = 100
 """Readings over which standing still is judged: 0.5 s at 200 Hz."""
+IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 _SETTLING = 2_000
 """Readings over which a turn before it stands still is followed: 10 s at 200 Hz."""
 _STILL_GYRO, _STILL_ACCEL = 0.02, 0.25
@@ -138,8 +141,7 @@ class Tracker:
     _STATE = (
         "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "standing_height",
         "travelled_m", "_times", "_states", "_imu", "_waiting", "_maps", "_inserted", "_still",
-        "_turns",
-        "_broad", "_near_ground_ns", "_range", "_standing_ns", "_is_high", "refused",
+        "settling", "_turns", "_broad", "_near_ground_ns", "_range", "_standing_ns", "_is_high", "refused",
     )  # fmt: skip
 
     def __init__(
@@ -164,6 +166,8 @@ class Tracker:
         self._still: deque[tuple[Array, Array]] = deque(maxlen=_STILL)
         self._turns: deque[tuple[int, Array]] = deque(maxlen=_SETTLING)
         """Times and rates of turn before it has begun."""
+        self.settling = IDENTITY.copy()
+        """How it turned on its feet from the first reading on, (4,) in its own axes."""
         self._broad = np.zeros(6)
         self._near_ground_ns: int | None = None
         self._range: tuple[int, float] | None = None
@@ -265,8 +269,10 @@ class Tracker:
         up = np.mean([reading[1] for reading in self._still], axis=0)
         roll = math.atan2(up[1], up[2])
         pitch = math.atan2(-up[0], math.hypot(up[1], up[2]))
-        heading = float(self.start[3]) + self._turned_before(rotations.from_rpy(roll, pitch, 0.0))
-        attitude = rotations.from_rpy(roll, pitch, heading)
+        attitude = rotations.from_rpy(roll, pitch, 0.0)
+        self.settling = self._turned_before()
+        turn = turn_of_heading(Level(IDENTITY, 0.0), attitude, self.settling)
+        attitude = rotations.from_rpy(roll, pitch, float(self.start[3]) + turn)
         self.state[:] = 0.0
         self.state[:3], self.state[Q : Q + 4] = self.start[:3], attitude
         self.state[G + 2] = -GRAVITY_M_S2
@@ -289,20 +295,17 @@ class Tracker:
         self._broad[:] = (z, -normal[0] / normal[2], -normal[1] / normal[2], x, y, z)
         seed_ground(self._maps.ground_keys, self._maps.sums, float(x), float(y), float(z))
 
-    def _turned_before(self, level: Array) -> float:
-        """Turn of the heading, rad, since the first reading; it ends at `level` (4,).
-
-        On its feet a vehicle turns by some tenths of a degree as it settles.
-        """
+    def _turned_before(self) -> Array:
+        """How it has turned since the first reading, (4,) in its own axes."""
         if len(self._turns) == _SETTLING:
-            return 0.0
+            return IDENTITY.copy()
         bias = np.mean([reading[0] for reading in list(self._still)[_STILL // 2 :]], axis=0)
-        turns, attitude = list(self._turns), level
-        for (before, first), (after, last) in zip(turns[-2::-1], turns[:0:-1], strict=True):
-            turn = (0.5 * (first + last) - bias) * ((before - after) / NS_PER_S)
-            attitude = rotations.multiply(attitude, rotations.exponential(turn))
+        turned = IDENTITY.copy()
+        for (before, first), (after, last) in pairwise(self._turns):
+            turn = (0.5 * (first + last) - bias) * ((after - before) / NS_PER_S)
+            turned = rotations.multiply(turned, rotations.exponential(turn))
         self._turns.clear()
-        return -float(rotations.yaw_of(attitude))
+        return turned
 
     def _keep_still(self, time_ns: int) -> None:
         """While it stands its velocity is zero, and the gyroscope tells its bias."""

@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import G, Q
-from volery.autonomy.slam.keyframes import Gathering, Keyframe, level_of, step_between
+from volery.autonomy.slam.keyframes import (
+    Gathering,
+    Keyframe,
+    level_of,
+    step_between,
+    turn_of_heading,
+)
 from volery.autonomy.slam.loop_closing import LoopCloser
 from volery.autonomy.slam.pose_graph import Edge, compose, load_gtsam, optimised
 from volery.autonomy.slam.settings import Matching
@@ -47,7 +53,7 @@ class Way:
 
     _STATE = (
         "frames", "poses", "edges", "closures", "refused", "session", "is_placed", "correction",
-        "_gathering", "_tried", "_cursor",
+        "_gathering", "_tried", "_cursor", "_settling",
     )  # fmt: skip
 
     def __init__(self, matching: Matching, start: Array, has_loops: bool = True) -> None:
@@ -55,6 +61,8 @@ class Way:
             load_gtsam()
         self._closer = LoopCloser(matching) if has_loops else None
         self._start = np.asarray(start, np.float64)
+        self._settling = np.array([0.0, 0.0, 0.0, 1.0])
+        """How the vehicle turned on its feet since it was at the start."""
         self.frames: list[Keyframe] = []
         self.poses: list[Array] = []
         """Of the keyframes in the map, (4,) x, y, z, yaw."""
@@ -77,6 +85,8 @@ class Way:
         state = tracker.state
         place = state[:3].copy(), state[Q : Q + 4].copy(), state[G : G + 3].copy()
         frame = self._gathering.keyframe(tracker.time_ns, place, tracker.travelled_m, self.session)
+        if not self.frames:
+            self._settling = tracker.settling.copy()
         self._append(frame, place[2])
         self._look_for_known_places()
         self._correct(place[2])
@@ -124,7 +134,7 @@ class Way:
     def _append(self, frame: Keyframe, gravity: Array) -> None:
         if not self.frames:
             self.frames.append(frame)
-            self.poses.append(self._start.copy())
+            self.poses.append(self._begin_pose(gravity))
             return
         is_new = frame.session != self.frames[-1].session
         self.frames.append(frame)
@@ -139,6 +149,12 @@ class Way:
         self.poses.append(compose(self.poses[row - 1], step))
         self._level_again(gravity)
 
+    def _begin_pose(self, gravity: Array) -> Array:
+        """Of the first keyframe in the map, (4,): where it stood, by what is known of gravity."""
+        attitude = self.frames[0].attitude
+        turn = turn_of_heading(level_of(gravity, attitude), attitude, self._settling)
+        return self._start + np.array([0.0, 0.0, 0.0, turn])
+
     def _level_again(self, gravity: Array) -> None:
         """Take what is now known of gravity for the last keyframes, too."""
         first = len(self.frames) - 1
@@ -149,6 +165,8 @@ class Way:
             and newest.time_ns - self.frames[first - 1].time_ns < _RELEVEL_NS
         ):
             first -= 1
+        if first == 0:
+            self.poses[0] = self._begin_pose(gravity)
         for n, edge in enumerate(self.edges):
             if edge.is_closure or edge.origin < first:
                 continue
