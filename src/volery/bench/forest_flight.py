@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from volery.engine.events import EventKind
 from volery.graph.messages import Published, stamp_of
-from volery.report.alignment import at_times, ate_rmse_m, common_times
+from volery.report.alignment import Alignment, at_times, ate_rmse_m, common_times, umeyama
 from volery.report.logged_flights import ESTIMATES, SCAN, TRUTH
 from volery.report.trunks import in_map, trunks_of_scan
 from volery.report.ways import Way
 from volery.runtime import Simulation
 from volery.scenario import overrides
-from volery.scenario.load import load_scenario
+from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import Scenario
 
 Array = NDArray[np.float64]
@@ -55,6 +55,17 @@ class Flown:
         """Where it thought it was."""
         return Way.of_rows(self.estimate)
 
+    def way_and_own(self) -> tuple[Array, Array]:
+        """Places (N, 3) where it truly was, and where it thought it was at these times."""
+        own, way = self.own_way, self.way
+        known = common_times(own.time_s, way.time_s)
+        return at_times(way.time_s, way.position, own.time_s[known]), own.position[known]
+
+    def alignment(self) -> Alignment | None:
+        """What brings its own way as near to the true one as may be."""
+        true, own = self.way_and_own()
+        return umeyama(own, true) if len(own) > 3 else None
+
 
 @dataclass(frozen=True)
 class Search:
@@ -79,14 +90,8 @@ class Search:
 
     def ate_rmse_m(self) -> dict[str, float]:
         """Error of each UAV's own idea of its way, after alignment."""
-        found = {}
-        for name, uav in self.uavs.items():
-            own, way = uav.own_way, uav.way
-            known = common_times(own.time_s, way.time_s)
-            if known.sum() > 3:
-                true = at_times(way.time_s, way.position, own.time_s[known])
-                found[name] = ate_rmse_m(own.position[known], true)
-        return found
+        pairs = {name: uav.way_and_own() for name, uav in self.uavs.items()}
+        return {name: ate_rmse_m(own, true) for name, (true, own) in pairs.items() if len(own) > 3}
 
     def searched_m2(self, until_s: float = np.inf) -> float:
         """Size of the part of the area that somebody came within sight of."""
@@ -99,15 +104,17 @@ class Search:
                 seen |= np.hypot(x[None, :] - place[0], y[:, None] - place[1]) <= SIGHT_M
         return float(seen.sum()) * _CELL_M**2
 
-    def trunk_errors_m(self) -> Array:
+    def trunk_errors_m(self, *, aligned: bool = False) -> Array:
         """Distances of mapped trunks from their trees, of those seen three times or more.
 
         A sighting is of the tree at which it lies by the true pose; a tree's place in the map is
-        the mean of its sightings by the estimated poses.
+        the mean of its sightings by the estimated poses. `aligned`: each UAV's map is laid onto the
+        world as its way is for the trajectory error, else by the place of take-off alone.
         """
         sums, counts = np.zeros_like(self.trees), np.zeros(len(self.trees), np.int64)
         for uav in self.uavs.values():
             way, own_way = uav.way, uav.own_way
+            alignment = uav.alignment() if aligned else None
             for seconds, trunks in uav.scans:
                 true, own = way.pose_at(seconds), own_way.pose_at(seconds)
                 if true is None or own is None or not len(trunks):
@@ -116,7 +123,11 @@ class Search:
                 away = np.linalg.norm(self.trees[None] - there[:, None], axis=2)
                 tree = away.argmin(axis=1)
                 sure = away.min(axis=1) <= _SAME_TREE_M
-                np.add.at(sums, tree[sure], in_map(trunks, *own)[sure])
+                found = in_map(trunks, *own)
+                if alignment is not None:
+                    height = np.full((len(found), 1), own[0][2])
+                    found = alignment.apply(np.concatenate([found, height], axis=1))[:, :2]
+                np.add.at(sums, tree[sure], found[sure])
                 np.add.at(counts, tree[sure], 1)
         often = counts >= _SEEN_OFTEN
         mean = sums[often] / counts[often, None]
@@ -153,6 +164,19 @@ class Search:
 def search_scenario(uavs: int, seed: int, seconds: float) -> Scenario:
     """The scenario with so many UAVs, a seed and a duration."""
     return overrides.apply(load_scenario("forest_search"), uavs=uavs, seed=seed, seconds=seconds)
+
+
+def sparse_scenario(seed: int, seconds: float) -> Scenario:
+    """One UAV where on a third of the area less than three trunks are in a LIDAR's reach."""
+    scenario = search_scenario(1, seed, seconds)
+    data = scenario.model_dump(exclude_unset=True)
+    data["uavs"][0].update(position_m=[186.0, 162.0], last_position_m=[186.0, 162.0])
+    for node in data["types"]["searcher"]["nodes"]:
+        if "area_m" in node.get("parameters", {}):
+            node["parameters"]["area_m"] = [180.0, 160.0, 260.0, 240.0]
+    changed = parse_scenario(data)
+    changed._folder = scenario.folder
+    return changed
 
 
 def area_of(scenario: Scenario) -> tuple[float, float, float, float]:

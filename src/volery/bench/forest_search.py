@@ -1,18 +1,19 @@
 """The bench `forest_search`: three UAVs search the Barro Colorado forest, ten times.
 
 Each flight takes five minutes; a tenth of the seeds are flown again by one UAV alone, to tell what
-a team is worth. `quick` flies one minute with one seed.
+a team is worth, and once more where trunks are rare. `quick` flies one minute with one seed.
 """
 
 from __future__ import annotations
 
 import logging
+import math
 import statistics
 from collections.abc import Sequence
 
 import numpy as np
 
-from volery.bench.forest_flight import Search, fly, search_scenario
+from volery.bench.forest_flight import Search, fly, search_scenario, sparse_scenario
 from volery.bench.registry import Measured
 
 _LOG = logging.getLogger(__name__)
@@ -30,7 +31,19 @@ def measure(*, quick: bool = False) -> Measured:
         team.append(fly(search_scenario(_UAVS, seed, seconds)))
         _LOG.info("seed %d: %.2f of real time", seed, team[-1].real_time_factor)
     alone = [fly(search_scenario(1, seed, seconds)) for seed in list(seeds)[:1]]
-    return figures_of(team, alone)
+    measured = figures_of(team, alone)
+    if not quick:
+        measured.figures.update(figures_of_sparse(fly(sparse_scenario(seeds[0], seconds))))
+    return measured
+
+
+def figures_of_sparse(search: Search) -> dict[str, float]:
+    """What a flight among few trunks comes to."""
+    return {
+        "sparse_ate_rmse_m": max(search.ate_rmse_m().values(), default=math.nan),
+        "sparse_distance_m": min(search.distances_m().values()),
+        "sparse_collisions": float(search.collisions),
+    }
 
 
 def figures_of(team: Sequence[Search], alone: Sequence[Search]) -> Measured:
@@ -39,7 +52,8 @@ def figures_of(team: Sequence[Search], alone: Sequence[Search]) -> Measured:
     distances = [way for search in team for way in search.distances_m().values()]
     delays = [delay for search in team for delay in search.target_delays_s()]
     places = [error for search in team for error in search.target_errors_m()]
-    trunks = np.concatenate([search.trunk_errors_m() for search in team])
+    trunks = np.concatenate([search.trunk_errors_m(aligned=True) for search in team])
+    as_told = np.concatenate([search.trunk_errors_m() for search in team])
     figures = {
         "realtime_factor": statistics.median(search.real_time_factor for search in team),
         "realtime_factor_worst": min(search.real_time_factor for search in team),
@@ -59,6 +73,7 @@ def figures_of(team: Sequence[Search], alone: Sequence[Search]) -> Measured:
     if len(trunks):
         figures["trunks"] = float(len(trunks))
         figures["trunks_within_half_m"] = float((trunks <= _TRUNK_M).mean())
+        figures["trunks_within_half_m_unaligned"] = float((as_told <= _TRUNK_M).mean())
     else:
         failures["trunks_within_half_m"] = "no trunk was seen three times"
     if delays:

@@ -54,6 +54,7 @@ def test_errors_of_poses_and_of_trunks() -> None:
     search = search_of({"uav1": flown(24.0, 254.0, off=0.7)})
     assert search.ate_rmse_m()["uav1"] == pytest.approx(0.0, abs=1e-6)  # moved as a whole
     np.testing.assert_allclose(search.trunk_errors_m(), [0.7, 0.7], atol=1e-6)
+    np.testing.assert_allclose(search.trunk_errors_m(aligned=True), [0.0, 0.0], atol=1e-6)
     assert search.distances_m()["uav1"] == pytest.approx(120.0)
 
 

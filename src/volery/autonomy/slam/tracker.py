@@ -141,7 +141,8 @@ class Tracker:
     _STATE = (
         "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "standing_height",
         "travelled_m", "_times", "_states", "_imu", "_waiting", "_maps", "_inserted", "_still",
-        "settling", "_turns", "_broad", "_near_ground_ns", "_range", "_standing_ns", "_is_high", "refused",
+        "settling", "_turns", "_broad", "_near_ground_ns", "_range", "_standing_ns",
+        "_is_high", "refused",
     )  # fmt: skip
 
     def __init__(
