@@ -10,6 +10,7 @@ import logging
 import math
 import statistics
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,9 +33,10 @@ def measure(*, quick: bool = False) -> Measured:
         _LOG.info("seed %d: %.2f of real time", seed, team[-1].real_time_factor)
     alone = [fly(search_scenario(1, seed, seconds)) for seed in list(seeds)[:1]]
     measured = figures_of(team, alone)
-    if not quick:
-        measured.figures.update(figures_of_sparse(fly(sparse_scenario(seeds[0], seconds))))
-    return measured
+    if quick:
+        return measured
+    sparse = figures_of_sparse(fly(sparse_scenario(seeds[0], seconds)))
+    return replace(measured, figures={**measured.figures, **sparse})
 
 
 def figures_of_sparse(search: Search) -> dict[str, float]:
