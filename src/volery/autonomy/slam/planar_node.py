@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.autonomy.fixed_joints import LEVEL, FixedJoints, Mount
 from volery.autonomy.scan_rays import is_usable
 from volery.autonomy.slam import reports
 from volery.autonomy.slam.planar.follower import Follower
 from volery.autonomy.slam.planar.health import Watched, judged
 from volery.autonomy.slam.planar.odometry import WheelOdometry, step_between
-from volery.autonomy.slam.planar.scans import LEVEL, Mount, returns
+from volery.autonomy.slam.planar.scans import returns
 from volery.autonomy.slam.planar.settings import PlanarSettings, Returns
 from volery.autonomy.slam.planar.way import PlanarWay
 from volery.core import rotations
@@ -37,8 +38,8 @@ _JUMP_NS = NS_PER_S // 2
 """A stamp so far before the newest one is a clock that was set back."""
 _WAITING = 4
 """Scans that wait for the odometry of their time."""
-_JOINTS = 16
-"""Between body and scanner at most."""
+_PATH_NS = 2_000_000
+"""Between two paths for each keyframe in them."""
 
 
 class PlanarSlam(Node):
@@ -56,7 +57,16 @@ class PlanarSlam(Node):
 
     """
 
-    _PLAIN = ("_taken_ns", "_before", "_refused", "_resets", "_told", "_static", "_heard")
+    _PLAIN = (
+        "_taken_ns",
+        "_before",
+        "_refused",
+        "_resets",
+        "_told",
+        "_heard",
+        "_path_ns",
+        "_path_of",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)
@@ -93,8 +103,8 @@ class PlanarSlam(Node):
         self._heard = self.get_clock().now_ns()
         self._refused = self._resets = 0
         self._told = ""
-        self._static: dict[str, tuple[str, Mount]] = {}
-        """Fixed joints, by the frame beyond them: frame before, and where it sits there."""
+        self._path_ns = self._path_of = 0
+        self._joints = FixedJoints()
 
     def _open(self) -> None:
         self._odom = self.create_publisher(Odometry, "slam/odom", 5)
@@ -105,42 +115,28 @@ class PlanarSlam(Node):
         if self._hears_odometry:
             self.create_subscription(Odometry, "odom", self._on_odometry, 50)
         if not self._is_mount_told:
-            self.create_subscription(TFMessage, "/tf_static", self._on_mount, 10)
+            self.create_subscription(TFMessage, "/tf_static", self._on_joints, 10)
         self.create_subscription(LaserScan, "laser/horizontal/scan", self._on_scan, 10)
         self.create_timer(0.5, self._tell_status)
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
         parts = {n: getattr(self, n).get_state() for n in ("_follower", "_way", "_odometry")}
-        return {"parts": parts, "waiting": list(self._waiting), **keep(self, self._PLAIN)}
+        more = {"waiting": list(self._waiting), "joints": dict(self._joints.joints)}
+        return {"parts": parts, **more, **keep(self, self._PLAIN)}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
         for name, part in state["parts"].items():
             getattr(self, name).set_state(part)
         self._waiting = list(state["waiting"])
+        self._joints.joints = dict(state["joints"])
         put_back(self, {name: state[name] for name in self._PLAIN})
 
     # ------------------------------------------------------------------------------ what it hears
 
-    def _on_mount(self, message: TFMessage) -> None:
-        for found in message.transforms:
-            p, q = found.transform.translation, found.transform.rotation
-            turn = np.array([q.x, q.y, q.z, q.w])
-            if np.isfinite([p.x, p.y, p.z, *turn]).all() and np.linalg.norm(turn) > 0.5:
-                mount = Mount(np.array([p.x, p.y, p.z]), rotations.normalize(turn))
-                self._static[found.child_frame_id] = found.header.frame_id, mount
-
-    def _mount_of(self, frame: str) -> Mount:
-        """Where the scanner sits in the body: by all fixed joints between them."""
-        mount = self._mount
-        for _ in range(_JOINTS):
-            if frame not in self._static:
-                break
-            frame, joint = self._static[frame]
-            place = rotations.rotate(joint.attitude, mount.position) + joint.position
-            mount = Mount(place, rotations.multiply(joint.attitude, mount.attitude))
-        return mount
+    def _on_joints(self, message: TFMessage) -> None:
+        self._joints.add(message)
 
     def _on_odometry(self, message: Odometry) -> None:
         self._odometry.add(message)
@@ -183,8 +179,8 @@ class PlanarSlam(Node):
         dt = 0.0 if self._taken_ns is None else (time_ns - self._taken_ns) / NS_PER_S
         step = step_between(self._before, here, dt)
         self._before, self._taken_ns = here, time_ns
-        velocity = follower.motion.velocity
-        seen = returns(scan, self._mount_of(scan.header.frame_id), velocity, self._settings.returns)
+        mount = self._joints.mount_of(scan.header.frame_id, self._mount)
+        seen = returns(scan, mount, follower.motion.velocity, self._settings.returns)
         frame = follower.follow(time_ns, seen, step)
         if frame is not None:
             self._way.add(frame)
@@ -247,12 +243,20 @@ class PlanarSlam(Node):
         if text != self._told:
             self._told = text
             self._status.publish(String(text))
-        if self._path.wanted and way.frames:
-            z = float(self._start[2])
-            poses = [np.array([x, y, z, yaw]) for x, y, yaw in way.poses]
-            times = [frame.time_ns for frame in way.frames]
-            newest = self._taken_ns or times[-1]
-            self._path.publish(reports.path(newest, times, poses))
+        self._tell_path()
+
+    def _tell_path(self) -> None:
+        """Where keyframes have come or moved; the longer it is the more rarely."""
+        way, now = self._way, self.get_clock().now_ns()
+        is_due = now < self._path_ns or now - self._path_ns >= len(way.frames) * _PATH_NS
+        if way.changes == self._path_of or not is_due:
+            return
+        way.finish()
+        self._path_ns, self._path_of = now, way.changes
+        z = float(self._start[2])
+        poses = [np.array([x, y, z, yaw]) for x, y, yaw in way.poses]
+        times = [frame.time_ns for frame in way.frames]
+        self._path.publish(reports.path(self._taken_ns or times[-1], times, poses))
 
     def _odometry_heard_ns(self) -> int | None:
         """When the odometry was last told, by the node's clock as far as stamps follow it."""

@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.autonomy.fixed_joints import Mount
 from volery.autonomy.slam.planar.settings import Returns
 from volery.core import rotations
 from volery.core.compiled import kernel
 from volery.graph.messages import LaserScan
 
 Array = NDArray[np.float64]
-
-
-class Mount(NamedTuple):
-    """Where a scanner sits in the body: position (3,) m, attitude (4,) x y z w."""
-
-    position: Array
-    attitude: Array
-
-
-LEVEL = Mount(np.zeros(3), rotations.IDENTITY)
 
 
 def returns(scan: LaserScan, mount: Mount, velocity: Array, kept: Returns) -> Array:

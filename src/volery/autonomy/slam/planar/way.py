@@ -38,7 +38,8 @@ class PlanarWay:
     """Keyframes and their graph; `start` (3,) is the first one's pose in the map."""
 
     _STATE = (
-        "frames", "poses", "edges", "session", "is_placed", "closures", "tried", "covariance",
+        "frames", "poses", "edges", "session", "is_placed", "closures", "tried", "changes",
+        "covariance",
         "_spread", "_pending", "_tried_at", "_cursor", "_waiting",
     )  # fmt: skip
 
@@ -55,7 +56,8 @@ class PlanarWay:
         self.session = 0
         self.is_placed = True
         """Whether it is known where in the map the present session is."""
-        self.closures = self.tried = 0
+        self.closures = self.tried = self.changes = 0
+        """`changes` counts keyframes and corrections."""
         self.covariance = np.zeros((3, 3))
         """Of the newest keyframe in the map."""
         self._spread: list[Array] = []
@@ -114,6 +116,7 @@ class PlanarWay:
         self._put(frame, compose(before, step), spread)
 
     def _put(self, frame: Kept, pose: Array, spread: Array) -> None:
+        self.changes += 1
         self.frames.append(frame)
         self.poses.append(pose)
         self._spread.append(spread)
@@ -217,6 +220,7 @@ class PlanarWay:
         self.poses, self.edges = optimised(self.poses, self.edges)
         self.closures -= before - len(self.edges)
         self._waiting = 0
+        self.changes += 1
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
