@@ -103,7 +103,7 @@ class PlanarSlam(Node):
         self._heard = self.get_clock().now_ns()
         self._refused = self._resets = 0
         self._told = ""
-        self._path_ns = self._path_of = 0
+        self._path_ns = self._path_of = self._period_ns = 0
         self._joints = FixedJoints()
 
     def _open(self) -> None:
@@ -176,7 +176,9 @@ class PlanarSlam(Node):
     def _take(self, scan: LaserScan) -> None:
         time_ns, follower = stamp_of(scan), self._follower
         here = self._odometry.at(time_ns)
-        dt = 0.0 if self._taken_ns is None else (time_ns - self._taken_ns) / NS_PER_S
+        passed = 0 if self._taken_ns is None else time_ns - self._taken_ns
+        self._period_ns += (min(passed, 10 * NS_PER_S) - self._period_ns) // 8
+        dt = passed / NS_PER_S
         step = step_between(self._before, here, dt)
         self._before, self._taken_ns = here, time_ns
         mount = self._joints.mount_of(scan.header.frame_id, self._mount)
@@ -222,7 +224,7 @@ class PlanarSlam(Node):
         follower, way = self._follower, self._way
         state, problems = judged(
             Watched(
-                self.get_clock().now_ns(), self._heard, self._odometry_heard_ns(),
+                self.get_clock().now_ns(), self._heard, self._period_ns, self._odometry_heard_ns(),
                 bool(way.frames), follower.misfits, follower.is_blind, follower.is_open,
                 way.is_placed,
             )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from volery.autonomy.slam.linear import eliminate
 from volery.autonomy.slam.planar.map_kernels import (
     CELL_M,
+    FEW,
     KIND,
     LINE,
     MX,
@@ -99,6 +100,8 @@ def _gather(
             error = nx * dx + ny * dy
             fits = 1.0 / (1.0 + (error / scale) ** 2) ** 2
             _add(nx, ny, ny * lx - nx * ly, error, fits / spread, h, g)
+        elif shape[KIND] == FEW:
+            fits = 0.5
         else:
             fits = 1.0 / (1.0 + (dx * dx + dy * dy) / (scale * scale)) ** 2
             _add(1.0, 0.0, -ly, dx, fits / spread, h, g)
@@ -148,14 +151,16 @@ def fit(
     gate: float,
     sigma: float,
     trust: float,
+    pull: float,
     unclear: float,
     rounds: int,
     information: Array,
 ) -> float:
     """Move `pose` (3,) of points (K, 2) to where they fit the map best; how many meet something.
 
-    expected, certainty: pose (3,) and information (3, 3) of the prior. information: (3, 3), filled
-    with what the points alone say of the pose, as far as it is believed.
+    expected, certainty: pose (3,) and information (3, 3) of the prior. pull: share of the points'
+    information against it. information: (3, 3), filled with what the points alone say of the pose,
+    as far as it is believed, by `trust`.
     """
     h, g = np.zeros((3, 3)), np.zeros(3)
     left, right = np.empty((3, 3)), np.empty((3, 1))
@@ -164,10 +169,10 @@ def fit(
         met = _gather(pose, points, grid, sums, shapes, corner, wide, sigma * sigma, h, g)
         _doubt(h, g, unclear)
         for i in range(3):
-            g[i] *= trust
+            g[i] *= pull
             for j in range(3):
-                h[i, j] *= trust
-                information[i, j] = h[i, j]
+                information[i, j] = trust * h[i, j]
+                h[i, j] *= pull
         if turn == rounds - 1:
             break
         for i in range(3):

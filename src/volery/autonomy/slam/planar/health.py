@@ -20,6 +20,8 @@ class Watched(NamedTuple):
     now_ns: int
     heard_ns: int
     """When the LIDAR was last heard of."""
+    period_ns: int
+    """Usual time between two scans."""
     odometry_ns: int | None
     """When the odometry was; None: it never was."""
     has_begun: bool
@@ -33,9 +35,10 @@ class Watched(NamedTuple):
 def judged(it: Watched) -> tuple[str, list[str]]:
     """State (starting, tracking, degraded, lost) and what is wrong."""
     problems = []
-    if it.now_ns - it.heard_ns > _SILENT_NS:
+    long = max(_SILENT_NS, 4 * it.period_ns)
+    if it.now_ns - it.heard_ns > long:
         problems.append("the LIDAR is silent")
-    if it.odometry_ns is not None and it.now_ns - it.odometry_ns > _SILENT_NS:
+    if it.odometry_ns is not None and it.now_ns - it.odometry_ns > long:
         problems.append("the odometry is silent")
     if it.is_blind:
         problems.append("too few things in reach")

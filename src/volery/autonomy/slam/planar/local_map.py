@@ -72,7 +72,7 @@ class LocalMap:
         met = float(
             fit(
                 pose, start, held, points, self._grid, self._sums, self._shapes, self._corner,
-                f.gate_m, f.sigma_m, f.trust, f.unclear, f.rounds, information,
+                f.gate_m, f.sigma_m, f.trust, f.pull, f.unclear, f.rounds, information,
             )
         )  # fmt: skip
         pose[2] = math.remainder(pose[2], math.tau)

@@ -22,11 +22,15 @@ COUNT, MX, MY, CXX, CXY, CYY = range(6)
 """What sums hold: number, mean and sums of squares about it."""
 RX, RY, NX, NY, THICK, KIND = range(6)
 """What shapes hold: a point of the line, its normal, its variance across; or of a heap."""
-LINE, HEAP = 1.0, 0.0
+LINE, HEAP, FEW = 1.0, 0.0, -1.0
+"""Of few returns nobody knows what they are of. Far along a wall single beams end always at the
+same places about the scanner: taken for things they would hold it where it is."""
 FULL = 100
 """Of the field: on a wall."""
-_LEAST, _STRAIGHT = 5.0, 0.12
-"""Returns that a line needs, and its spread across over that along."""
+_LEAST = 5.0
+"""Returns that a line needs."""
+_STRAIGHT, _VERY_STRAIGHT = 0.12, 0.04
+"""Variance across over that along, of a line in a window of three cells, and of five."""
 _ALONG_M = 0.05
 _BLUR_M = 0.1
 
@@ -66,14 +70,14 @@ def _window(grid: Grid, sums: Array, i: int, j: int, reach: int, total: Array) -
 
 
 @inner_kernel
-def _shape(total: Array, shape: Array) -> bool:
+def _shape(total: Array, shape: Array, straight: float) -> bool:
     """Describe the returns of a window; whether they lie along a line."""
     n = total[COUNT]
     a, b, d = total[CXX] / n, total[CXY] / n, total[CYY] / n
     middle, half = 0.5 * (a + d), math.hypot(0.5 * (a - d), b)
     low, high = max(middle - half, 0.0), middle + half
     shape[RX], shape[RY] = total[MX], total[MY]
-    if n < _LEAST or high < _ALONG_M * _ALONG_M or low > _STRAIGHT * high:
+    if n < _LEAST or high < _ALONG_M * _ALONG_M or low > straight * high:
         return False
     angle = 0.5 * math.atan2(2.0 * b, a - d) + 0.5 * math.pi
     shape[NX], shape[NY] = math.cos(angle), math.sin(angle)
@@ -102,17 +106,18 @@ def build(points: Array, corner: Array, grid: Grid, cells: Grid, sums: Array, sh
     total = np.zeros(6)
     for k in range(count):
         i, j = cells[k, 0], cells[k, 1]
+        _window(grid, sums, i, j, 2, total)
+        sparse = total[COUNT] < 3.0 * _LEAST
+        if _shape(total, shapes[k], _STRAIGHT if sparse else _VERY_STRAIGHT):
+            continue
+        is_known = total[COUNT] >= _LEAST
         _window(grid, sums, i, j, 1, total)
-        if not _shape(total, shapes[k]):
-            if total[COUNT] < _LEAST:
-                _window(grid, sums, i, j, 2, total)
-                if _shape(total, shapes[k]):
-                    continue
+        if not _shape(total, shapes[k], _STRAIGHT):
             own = sums[k]
             shapes[k, RX], shapes[k, RY] = own[MX], own[MY]
             shapes[k, NX], shapes[k, NY] = 1.0, 0.0
             shapes[k, THICK] = 0.25 * CELL_M * CELL_M
-            shapes[k, KIND] = HEAP
+            shapes[k, KIND] = HEAP if is_known else FEW
     return count
 
 

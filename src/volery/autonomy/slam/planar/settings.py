@@ -30,6 +30,9 @@ class Fitting:
     rounds: int = 12
     trust: float = 0.05
     """Share of the returns' information that is believed: their errors have the map's in common."""
+    pull: float = 0.3
+    """The same against the motion, while a scan is laid onto the map: a few returns of a corner
+    must be able to hold it against a guess."""
     unclear: float = 0.01
     """Information along the weaker axis, as a share of that along the stronger one, that rough
     walls alone pretend: so much of it is not believed."""
@@ -39,7 +42,7 @@ class Fitting:
 class Moving:
     """How it may move."""
 
-    accel_m2_s3: float = 0.2
+    accel_m2_s3: float = 0.4
     """Density of white acceleration of who has no odometry."""
     turn_rad2_s3: float = 1.0
     odometry_m: float = 0.002
