@@ -20,8 +20,8 @@ _HIT, _MISS, _LEAST, _MOST = 0.85, 0.4, -4.0, 6.0
 """ln of the odds of a scan's hit (0.70) and miss (0.60), and bounds (modelling choices)."""
 OCCUPIED, FREE, UNKNOWN = 100, 0, -1
 """As in nav_msgs/OccupancyGrid."""
-_SURE = 0.6
-"""Odds' logarithm from which on a cell counts as occupied, or below minus which as free."""
+_OCCUPIED, _FREE = 0.6, -0.3
+"""Odds' logarithms beyond which a cell counts as such: after one scan, unless others gainsay."""
 
 
 class LogOddsGrid:
@@ -48,8 +48,8 @@ class LogOddsGrid:
     def occupancy(self) -> NDArray[np.int8]:
         """(rows, columns) `OCCUPIED`, `FREE` or `UNKNOWN`."""
         values = np.full(self.odds.shape, UNKNOWN, np.int8)
-        values[self.odds > _SURE] = OCCUPIED
-        values[self.odds < -_SURE] = FREE
+        values[self.odds > _OCCUPIED] = OCCUPIED
+        values[self.odds < _FREE] = FREE
         return values
 
 

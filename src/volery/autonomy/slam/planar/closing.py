@@ -24,6 +24,8 @@ _THIN, _FINE = 160, 600
 """Returns that are searched with, and that are fitted."""
 _ALIKE, _OTHER_M = 0.93, 0.7
 """A second place this far off that scores so nearly as well makes both doubtful."""
+_ANY_RAD = 3.0
+"""A window so wide is that of who is lost: it lies about the older keyframe."""
 _LEAST_INFORMATION = 400.0
 """1/m^2 of the place in the weaker direction: less tells only the stronger one."""
 _MARGIN = np.array([0.3, 0.3, 0.1])
@@ -68,7 +70,8 @@ class Closer:
         at = poses[older]
         drawn = np.concatenate([placed(frames[k].points, between(at, poses[k])) for k in known])
         self._map.draw(drawn, np.zeros(3))
-        guess = between(at, poses[newest])
+        lost = reach[2] >= _ANY_RAD
+        guess = np.zeros(3) if lost else between(at, poses[newest])
         is_narrow = reach[0] < 0.35 and reach[2] < 0.1
         start = guess if is_narrow else self._found(query, guess, reach)
         if start is None:
@@ -85,8 +88,7 @@ class Closer:
     def _found(self, query: Array, guess: Array, reach: Array) -> Array | None:
         """Where it lies best in the window; None where nothing fits, or two places do."""
         thin = np.ascontiguousarray(query[:: max(len(query) // _THIN, 1)])
-        lost = reach[2] >= 1.0
-        slope = np.zeros(3) if lost else 0.04 / reach**2
+        slope = np.zeros(3) if reach[2] >= _ANY_RAD else 0.04 / reach**2
         least = 0.45
         pose, score = self._map.search(thin, guess, reach, slope=slope, least=least)
         if score <= 0.0:

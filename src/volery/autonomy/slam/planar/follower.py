@@ -144,6 +144,8 @@ class Follower:
         if len(points) >= _FEW and self._local:
             found = self._match(points)
             self._judge(time_ns, dt, found)
+            if self.misfits == 1 and step is None:
+                self.motion.forget_velocity()  # it would only lead farther away
             if self.misfits == 0:
                 self.is_open = is_open(found.information)
                 self.motion.correct(found.pose, found.information)

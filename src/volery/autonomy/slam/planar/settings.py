@@ -42,7 +42,7 @@ class Fitting:
 class Moving:
     """How it may move."""
 
-    accel_m2_s3: float = 0.4
+    accel_m2_s3: float = 0.3
     """Density of white acceleration of who has no odometry."""
     turn_rad2_s3: float = 1.0
     odometry_m: float = 0.002
