@@ -44,7 +44,8 @@ def grid_of(folder):
     """Shades (rows, columns), the lowest row first, origin and width of cells."""
     told = dict(line.split(": ", 1) for line in (folder / "map.yaml").read_text().splitlines())
     assert told["mode"] == "trinary"
-    shades = np.asarray(Image.open(folder / told["image"]))[::-1]
+    with Image.open(folder / told["image"]) as picture:
+        shades = np.asarray(picture)[::-1]
     return shades, np.array(json.loads(told["origin"]))[:2], float(told["resolution"])
 
 
@@ -86,8 +87,8 @@ def test_the_map_is_that_of_the_walls(mapped, carried):
     free = shades == 254
     i, j = ((carried.poses[:, :2] - origin) / cell).astype(int).T
     assert free[j, i].mean() > 0.9
-    picture = Image.open(mapped[0] / "map.png")
-    assert min(picture.size) > 100
+    with Image.open(mapped[0] / "map.png") as picture:
+        assert min(picture.size) > 100
 
 
 def test_files_are_replaced_only_if_asked(mapped, text):
