@@ -94,7 +94,7 @@ def short(lap):
     return short
 
 
-@pytest.mark.parametrize("with_odometry", [False, True])
+@pytest.mark.parametrize("with_odometry", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_loop_of_a_hundred_metres_is_closed(lap, with_odometry):
     heard = Listening().carry(lap, with_odometry=with_odometry)
     assert ate(heard.keyframes(), lap) < 0.08
@@ -106,6 +106,7 @@ def test_a_loop_of_a_hundred_metres_is_closed(lap, with_odometry):
     assert np.hypot(*(last[1:3] - true[:2])) < 0.25
 
 
+@pytest.mark.slow
 def test_without_closures_it_drifts_and_says_how_far_it_may_be_off(lap):
     heard = Listening(loop_closures=False).carry(lap)
     sigma = heard.last()["sigma_m"]
