@@ -371,6 +371,62 @@ def convert(
 
 @app.command()
 @guarded
+def slam(
+    log: Annotated[
+        Path,
+        typer.Argument(help="A .mcap or .bag log, a ROS 2 bag, or a scanner's text log."),
+    ],
+    out: Annotated[Path, typer.Option(help="The folder to write map and path into.")] = Path(
+        "slam"
+    ),
+    layout: Annotated[
+        Path | None,
+        typer.Option(help="For a text log: a TOML file that says what stands in which column."),
+    ] = None,
+    uav: Annotated[str | None, typer.Option(help="Name, where the log has several.")] = None,
+    scan: Annotated[str | None, typer.Option(help="Topic of the level LIDAR.")] = None,
+    odom: Annotated[str | None, typer.Option(help="Topic of the wheels' odometry.")] = None,
+    imu_topic: Annotated[str | None, typer.Option(help="Topic of the IMU.")] = None,
+    no_odometry: Annotated[
+        bool, typer.Option("--no-odometry", help="Leave odometry out that the log has.")
+    ] = False,
+    imu: Annotated[
+        bool | None,
+        typer.Option(
+            "--imu/--no-imu", help="In space, or in the plane; by what the log has unless said."
+        ),
+    ] = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z,YAW_DEG", help="Where in the map it begins.")
+    ] = None,
+    level_mount: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z", help="Of the level LIDAR, not /tf_static's.")
+    ] = None,
+    nodding_mount: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z", help="Of the nodding one.")
+    ] = None,
+    resolution: Annotated[
+        float, typer.Option(min=0.01, max=1.0, help="Width of the map's cells, m.")
+    ] = 0.05,
+    reach: Annotated[float, typer.Option(min=1.0, max=60.0, help="Farther is left out, m.")] = 30.0,
+    loops: Annotated[
+        bool, typer.Option("--loops/--no-loops", help="Correct by places seen again (gtsam).")
+    ] = True,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace older files.")] = False,
+) -> None:
+    """Map a recorded log: map.png, map.pgm and .yaml (map_server), path.tum, summary.json."""
+    from volery.cli.slam import SlamAsked, map_log
+
+    map_log(
+        SlamAsked(
+            log, out, layout, uav, scan, odom, imu_topic, not no_odometry, imu, start, level_mount,
+            nodding_mount, resolution, reach, loops, overwrite,
+        )
+    )  # fmt: skip
+
+
+@app.command()
+@guarded
 def bench(
     name: Annotated[
         str, typer.Argument(help="lidar, fleet, dynamics, start, all of them, or peers.")

@@ -155,3 +155,39 @@ def test_what_was_begun_and_failed_leaves_an_old_log_alone(tmp_path):
     before = out.read_bytes()
     assert convert(source, out, "--layout", layout, "--overwrite").exit_code == 2
     assert out.read_bytes() == before
+
+
+def test_wheels_make_a_pose(tmp_path):
+    wheels = {"columns": [1, 2], "unit_m": 0.001, "apart_m": 0.5}
+    layout = {key: value for key, value in LAYOUT.items() if key != "odometry"}
+    quarter = 0.25 * math.pi * 1000.0  # about a point between the wheels, then a metre on
+    rows = [(500.0, 200.0), (500.0 - 0.5 * quarter, 200.0 + 0.5 * quarter)]
+    rows.append((rows[1][0] + 1000.0, rows[1][1] + 1000.0))
+    text = "".join(f"{k + 1}00000 {a} {b} 0 1 2 3\n" for k, (a, b) in enumerate(rows))
+    told = [p.message for p in walk(tmp_path, text, {**layout, "wheels": wheels})]
+    places = [m.pose.pose for m in told if type(m).__name__.endswith("Odometry")]
+    assert len(places) == 3
+    found = [(p.position.x, p.position.y, 2 * math.atan2(p.orientation.z, p.orientation.w))
+             for p in places]  # fmt: skip
+    assert found[0] == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    assert found[1] == pytest.approx((0.0, 0.0, 0.5 * math.pi), abs=1e-9)
+    assert found[2] == pytest.approx((0.0, 1.0, 0.5 * math.pi), abs=1e-9)
+
+
+def test_either_wheels_or_odometry_are_given():
+    wheels = {"columns": [1, 2], "unit_m": 0.001, "apart_m": 0.5}
+    with pytest.raises(ValueError, match="either odometry or wheels"):
+        TextLayout.model_validate({**LAYOUT, "wheels": wheels})
+
+
+def test_a_clock_set_back_is_followed_and_disorder_is_not(tmp_path):
+    times = (9_000_000, 9_100_000, 9_050_000, 1_000_000, 1_100_000)
+    scans = walk(tmp_path, "".join(f"{time} 0 0 0 1 2 3\n" for time in times))
+    heard = [one.time_ns for one in scans if one.topic.endswith("scan")]
+    assert heard == [time * 1000 for time in times if time != 9_050_000]
+    assert (scans.left_out, scans.clock_set) == (1, 1)
+
+
+def test_odometry_that_is_no_number_is_not_told(tmp_path):
+    scans = walk(tmp_path, "1000000 nan 0 0 1 2 3\n")
+    assert [one.topic for one in scans] == ["/tf_static", "/uav1/laser/horizontal/scan"]

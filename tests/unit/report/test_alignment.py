@@ -92,3 +92,19 @@ def test_a_map_from_several_poses() -> None:
         trunks.add(in_map(found, place, turn))
     assert trunks.sightings.tolist() == [3]
     np.testing.assert_allclose(trunks.places[0], tree, atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("poses", "golden"), [(50, 0.1568051246012699), (400, 0.17494651464471914)]
+)
+def test_the_error_is_that_of_evo(poses: int, golden: float) -> None:
+    """Golden figures: `APE(translation_part)` of evo 1.38.1 after `align` without scale."""
+    random, found = np.random.default_rng(11), 0.0
+    for count in (50, 400):
+        t = 0.1 * np.arange(count)
+        truth = np.stack([5.0 * np.sin(0.2 * t), 0.5 * t, np.cos(0.1 * t)], axis=1)
+        noisy = truth + random.normal(0.0, 0.1, (count, 3))
+        turn = rotations.matrix(rotations.from_rpy(0.0, 0.0, 0.7))
+        if count == poses:
+            found = ate_rmse_m(noisy @ turn.T + [3.0, -2.0, 1.0], truth)
+    assert found == pytest.approx(golden, abs=1e-12)

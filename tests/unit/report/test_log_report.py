@@ -134,3 +134,21 @@ def test_poses_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
     way = read_way(path)
     assert len(way.time_s) == 15
     assert np.isfinite(way.position).all()
+
+
+def test_what_slam_tells_is_the_estimate(tmp_path: Path) -> None:
+    """Where it is recorded, in the place of the odometry."""
+    path = tmp_path / "flight.mcap"
+    with closing(open_log(path)) as log:
+        for k in range(100):
+            time_ns, place = (k + 1) * S // 10, place_at(k / 10.0)
+            write(log, "/uav1/ground_truth/odom", time_ns, odometry(time_ns, place))
+            write(log, "/uav1/odom", time_ns, odometry(time_ns, place + np.array([5.0, 0.0, 0.0])))
+            pose = zero_message("geometry_msgs/msg/PoseWithCovarianceStamped")
+            pose.header = m.header(time_ns, "map")
+            pose.pose.pose = odometry(time_ns, place + OFF).pose.pose
+            write(log, "/uav1/slam/pose", time_ns, pose)
+    (uav,) = read_uavs(path)
+    assert uav.estimate is not None
+    assert uav.truth is not None
+    np.testing.assert_allclose(uav.estimate.position - uav.truth.position, np.tile(OFF, (100, 1)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -82,6 +83,7 @@ def path(time_ns: int, times_ns: Sequence[int], poses: Sequence[Array]) -> PathM
     """Keyframes' poses (4,) x, y, z, yaw in the map."""
     stamped = []
     for when, (x, y, z, yaw) in zip(times_ns, poses, strict=True):
-        attitude = rotations.from_rpy(0.0, 0.0, float(yaw))
-        stamped.append(PoseStamped(header(when, "map"), _pose(np.array([x, y, z]), attitude)))
+        turn = Quaternion(0.0, 0.0, math.sin(0.5 * float(yaw)), math.cos(0.5 * float(yaw)))
+        place = Point(float(x), float(y), float(z))
+        stamped.append(PoseStamped(header(when, "map"), Pose(place, turn)))
     return PathMessage(header(time_ns, "map"), stamped)

@@ -65,6 +65,17 @@ class OdometryColumns(Data):
     unit_deg: Positive = 1.0
 
 
+class WheelColumns(Data):
+    """Two wheels' counters beside each scan, which make a pose in the plane."""
+
+    columns: tuple[Column, Column]
+    """Left, right."""
+    unit_m: Positive
+    """Way of a wheel's rim in one unit of its counter."""
+    apart_m: Positive
+    """Between the wheels."""
+
+
 class Place(Data):
     """Of the scanner in the body, FLU."""
 
@@ -78,13 +89,22 @@ class TextLayout(Data):
     ranges: RangeColumns
     time: TimeColumn = TimeColumn()
     odometry: OdometryColumns | None = None
+    wheels: WheelColumns | None = None
+    """In the place of `odometry`."""
     mount: Place = Place()
     uav: Name = "uav1"
     topic: Topic = "laser/horizontal/scan"
     """Of the scans, below the UAV's name."""
 
+    @model_validator(mode="after")
+    def _has_one_odometry(self) -> Self:
+        if self.odometry is not None and self.wheels is not None:
+            raise ValueError("either odometry or wheels can be given")
+        return self
+
     @property
     def columns(self) -> int:
         """How many columns a line must have."""
         last = [self.time.column, self.ranges.first_column + self.ranges.beams - 1]
-        return 1 + max(last + list(self.odometry.columns if self.odometry else ()))
+        moving = self.odometry or self.wheels
+        return 1 + max(last + list(moving.columns if moving else ()))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from volery.bridges.logs.bag import Log
 from volery.bridges.logs.text_layout import Place, TextLayout
 from volery.core import rotations
+from volery.core.clock import NS_PER_S
 from volery.core.errors import RecordingError
 from volery.graph.messages import (
     LaserScan,
@@ -35,6 +36,8 @@ _COMMENTS = ("#", "%", "//")
 _LONGEST_LINE = 10_000_000
 _LATEST_S = 4.0e9
 """Stamps of messages end there: 32 bits of seconds."""
+_JUMP_NS = NS_PER_S // 2
+"""A time so far before that of the line before is a clock that was set; less is disorder."""
 
 
 @dataclass
@@ -43,16 +46,21 @@ class TextScans:
 
     Iterating gives the `Published` messages of each line in turn: `/tf_static` with the mounting
     first, odometry where the log has it, the scan. A line that cannot be read is left out and
-    counted in `left_out`, `trouble` tells of the first one. Raises `RecordingError` where the file
-    cannot be read, or holds no scan of this layout.
+    counted in `left_out`, `trouble` tells of the first one. Where the clock was set back the times
+    go back, too; `clock_set` counts that. Raises `RecordingError` where the file cannot be read, or
+    holds no scan of this layout.
     """
 
     path: Path
     layout: TextLayout
     scans: int = 0
     left_out: int = 0
+    clock_set: int = 0
     trouble: str = ""
     _newest_ns: int = field(default=-1, repr=False)
+    _counters: tuple[float, float] | None = field(default=None, repr=False)
+    _pose: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0), repr=False)
+    """By the wheels: x, y in m, yaw in rad."""
 
     def __iter__(self) -> Iterator[Published]:
         """Messages in the order of the lines."""
@@ -82,13 +90,15 @@ class TextScans:
             self.left_out += 1
             self.trouble = self.trouble or f"line {number}: {error}"
             return
+        self.clock_set += time_ns < self._newest_ns
         self._newest_ns = time_ns
         uav = f"/{self.layout.uav}"
         if not self.scans:
             yield _published("/tf_static", time_ns, _mounting(self.layout, time_ns))
         self.scans += 1
-        if self.layout.odometry is not None:
-            yield _published(f"{uav}/odom", time_ns, _odometry(self.layout, time_ns, row))
+        pose = self._pose_of(row)
+        if pose is not None:
+            yield _published(f"{uav}/odom", time_ns, _odometry(self.layout, time_ns, *pose))
         scan = _scan(self.layout, time_ns, row)
         yield _published(f"{uav}/{self.layout.topic}", time_ns, scan)
 
@@ -107,9 +117,36 @@ class TextScans:
         if not 0.0 <= time_s < _LATEST_S:  # which NaN is not
             raise ValueError(f"{time_s:g} s is no time that a message can bear")
         time_ns = round(time_s * 1e9)
-        if time_ns <= self._newest_ns:
+        if self._newest_ns - _JUMP_NS <= time_ns <= self._newest_ns:
             raise ValueError(f"at {time_s:.6f} s, not after the line before it")
         return time_ns
+
+    def _pose_of(self, row: NDArray[np.float64]) -> tuple[float, float, float] | None:
+        """Of the body, by the odometry's columns or the wheels; None: the line tells of neither."""
+        odometry, wheels = self.layout.odometry, self.layout.wheels
+        if odometry is not None:
+            x, y, turn = (float(number) for number in row[list(odometry.columns)])
+            unit = odometry.unit_m
+            pose = (x * unit, y * unit, math.radians(turn * odometry.unit_deg))
+            return pose if all(map(math.isfinite, pose)) else None
+        if wheels is None:
+            return None
+        left, right = (float(number) * wheels.unit_m for number in row[list(wheels.columns)])
+        if not math.isfinite(left + right):
+            return None
+        before, self._counters = self._counters or (left, right), (left, right)
+        self._pose = _rolled(self._pose, left - before[0], right - before[1], wheels.apart_m)
+        return self._pose
+
+
+def _rolled(
+    pose: tuple[float, float, float], left: float, right: float, apart: float
+) -> tuple[float, float, float]:
+    """The pose after its wheels have rolled so far, m, along an arc."""
+    x, y, yaw = pose
+    way, turn = 0.5 * (left + right), (right - left) / apart
+    along = yaw + 0.5 * turn
+    return x + way * math.cos(along), y + way * math.sin(along), yaw + turn
 
 
 def _published(topic: str, time_ns: int, message: Any) -> Published:
@@ -140,15 +177,12 @@ def _scan(layout: TextLayout, time_ns: int, row: NDArray[np.float64]) -> LaserSc
     )
 
 
-def _odometry(layout: TextLayout, time_ns: int, row: NDArray[np.float64]) -> Odometry:
-    assert layout.odometry is not None
-    x, y, turn = row[list(layout.odometry.columns)]
-    yaw = math.radians(float(turn) * layout.odometry.unit_deg)
+def _odometry(layout: TextLayout, time_ns: int, x: float, y: float, yaw: float) -> Odometry:
     message: Odometry = zero_message("nav_msgs/msg/Odometry")
     message.header = header(time_ns, f"{layout.uav}/odom")
     message.child_frame_id = f"{layout.uav}/base_link"
     place, attitude = message.pose.pose.position, message.pose.pose.orientation
-    place.x, place.y = float(x) * layout.odometry.unit_m, float(y) * layout.odometry.unit_m
+    place.x, place.y = x, y
     attitude.z, attitude.w = math.sin(0.5 * yaw), math.cos(0.5 * yaw)
     return message
 

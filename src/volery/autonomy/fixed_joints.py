@@ -1,0 +1,52 @@
+"""Where sensors sit in the body, as `/tf_static` tells it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core import rotations
+from volery.graph.messages import TFMessage
+
+Array = NDArray[np.float64]
+
+_JOINTS = 16
+"""Between body and sensor at most."""
+
+
+class Mount(NamedTuple):
+    """Where a sensor sits: position (3,) m, attitude (4,) x y z w."""
+
+    position: Array
+    attitude: Array
+
+
+LEVEL = Mount(np.zeros(3), rotations.IDENTITY)
+
+
+class FixedJoints:
+    """Joints by the frame beyond them: the frame before, and where it sits there."""
+
+    def __init__(self) -> None:
+        self.joints: dict[str, tuple[str, Mount]] = {}
+
+    def add(self, message: TFMessage) -> None:
+        """Remember joints; what is not finite is left out."""
+        for found in message.transforms:
+            p, q = found.transform.translation, found.transform.rotation
+            turn = np.array([q.x, q.y, q.z, q.w])
+            if np.isfinite([p.x, p.y, p.z, *turn]).all() and np.linalg.norm(turn) > 0.5:
+                mount = Mount(np.array([p.x, p.y, p.z]), rotations.normalize(turn))
+                self.joints[found.child_frame_id] = found.header.frame_id, mount
+
+    def mount_of(self, frame: str, own: Mount = LEVEL) -> Mount:
+        """Where a frame sits in the body, the first frame of its chain; `own` is beyond it."""
+        for _ in range(_JOINTS):
+            if frame not in self.joints:
+                break
+            frame, joint = self.joints[frame]
+            place = rotations.rotate(joint.attitude, own.position) + joint.position
+            own = Mount(place, rotations.multiply(joint.attitude, own.attitude))
+        return own

@@ -1,0 +1,48 @@
+"""Occupancy grids as ROS' map_server reads them: a picture `.pgm` and a `.yaml` beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.errors import DataFileError
+
+Array = NDArray[np.float64]
+
+_FREE, _UNKNOWN, _OCCUPIED = 254, 205, 0
+"""Shades that map_saver writes and map_server reads back in mode trinary."""
+
+
+def shades(values: NDArray[np.int8]) -> NDArray[np.uint8]:
+    """(rows, columns) grey, the first row at the top, of values of nav_msgs/OccupancyGrid."""
+    picture = np.full(values.shape, _UNKNOWN, np.uint8)
+    picture[values == 0] = _FREE
+    picture[values > 50] = _OCCUPIED
+    return picture[::-1]
+
+
+def write_grid(stem: Path, values: NDArray[np.int8], origin: Array, cell_m: float) -> list[Path]:
+    """Write `stem`.pgm and `stem`.yaml; `origin` (2,) m is the lower left corner in the map.
+
+    Raises
+    ------
+    DataFileError
+        They cannot be written.
+
+    """
+    picture, told = stem.with_suffix(".pgm"), stem.with_suffix(".yaml")
+    rows, columns = values.shape
+    text = (
+        f"image: {picture.name}\nmode: trinary\nresolution: {cell_m:g}\n"
+        f"origin: [{origin[0]:.6g}, {origin[1]:.6g}, 0.0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    )
+    try:
+        head = f"P5\n# written by Volery\n{columns} {rows}\n255\n".encode()
+        picture.write_bytes(head + shades(values).tobytes())
+        told.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise DataFileError(f"{stem}: the grid cannot be written: {error.strerror}") from None
+    return [picture, told]

@@ -1,0 +1,254 @@
+"""Following a level scanner: each scan is laid onto a map of the last keyframes.
+
+Everything is in the frame of the odometry, which begins where the log begins and never jumps by
+what is learnt later on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.planar.health import is_open
+from volery.autonomy.slam.planar.local_map import Fit, LocalMap
+from volery.autonomy.slam.planar.motion import Motion
+from volery.autonomy.slam.planar.poses import between, placed
+from volery.autonomy.slam.planar.scans import thinned
+from volery.autonomy.slam.planar.settings import PlanarSettings
+from volery.core.clock import NS_PER_S
+from volery.core.kept import keep, put_back
+
+Array = NDArray[np.float64]
+
+_LEVELS = 4
+_TURN_M = 0.3
+"""What a turn by 1 rad counts as way."""
+_FEW = 12
+"""Returns below which a scan says nothing."""
+_POOR, _LOST_SHARE = 0.9, 0.5
+"""Share of the usual share of returns below which a fit is doubted, or not believed."""
+_USUAL_S = 5.0
+_LOST_SCANS, _LOST_NS = 4, NS_PER_S
+_ROUGHLY = np.diag([0.7**2, 0.7**2, 0.3**2])
+"""Covariance of a way over which scans did not fit, but odometry went on."""
+_WIDEST = np.array([1.6, 1.6, 0.9])
+_FLOOR = np.diag([0.008**2, 0.008**2, 0.0015**2])
+"""Least covariance of a step between keyframes: what map and scanner have in common."""
+
+
+class Kept(NamedTuple):
+    """A keyframe as the follower leaves it."""
+
+    time_ns: int
+    pose: Array
+    """(3,) in the odometry's frame."""
+    points: Array
+    """(K, 2) m in its own axes."""
+    step: Array
+    """(3,) from the keyframe before."""
+    covariance: Array
+    """(3, 3) of the step, in the axes of the keyframe before."""
+    travelled: float
+    """Way until here; turns count, see `_TURN_M`."""
+    usual: float
+    """Share of the returns that lately met something again."""
+    session: int
+    """Counts how often the motion was lost."""
+
+
+class Follower:
+    """Motion, local map and the newest keyframe."""
+
+    def __init__(self, settings: PlanarSettings) -> None:
+        self.settings = settings
+        self.motion = Motion(settings.moving)
+        self.time_ns: int | None = None
+        self.travelled = self.travelled_m = 0.0
+        self.share = self.usual = 0.0
+        self.session = 0
+        self.misfits = 0
+        """Scans that have not fitted, one after the other."""
+        self.is_blind = self.is_open = False
+        """Whether too few things are in reach, or what is seen leaves a direction open."""
+        self._misfit_ns = 0
+        self._has_odometry = False
+        self._map = LocalMap(settings.returns.reach_m + 4.0, _LEVELS, settings.fitting)
+        self._local: deque[Kept] = deque()
+        self._last: Kept | None = None
+        self._since = np.zeros((3, 3))
+        """Covariance of the pose as seen from the newest keyframe, in that one's axes."""
+        self._fresh_share = 0.0
+
+    _STATE = (
+        "time_ns", "travelled", "travelled_m", "share", "usual", "session", "misfits", "is_blind",
+        "is_open", "_misfit_ns", "_has_odometry", "_last", "_since", "_fresh_share",
+    )  # fmt: skip
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        motion = keep(self.motion, ("pose", "velocity", "covariance"))
+        return {"motion": motion, "local": tuple(self._local), **keep(self, self._STATE)}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self.motion, state["motion"])
+        self._local = deque(state["local"])
+        put_back(self, {name: state[name] for name in self._STATE})
+        self._redraw()
+
+    def set_clock(self, time_ns: int) -> None:
+        """Go on from here at another time, at any speed."""
+        self.time_ns = time_ns
+        self.motion.forget_velocity()
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether scans have not fitted for so long that nothing is known of the motion."""
+        if self.misfits < _LOST_SCANS or self.time_ns is None:
+            return False
+        return self.time_ns - self._misfit_ns >= _LOST_NS
+
+    def begin_anew(self) -> bool:
+        """What is seen is not what was there: begin a new map with the next scan.
+
+        Whether the way so far goes on, by odometry, if only roughly.
+        """
+        self._local.clear()
+        self.misfits, self.usual = 0, 0.0
+        if self._has_odometry:
+            self._since = self._since + _ROUGHLY
+            return True
+        self.session += 1
+        self._last = None
+        self.motion.forget_velocity()
+        return False
+
+    def follow(self, time_ns: int, returns: Array, step: Array | None) -> Kept | None:
+        """Take in the returns (K, 2) of a scan; the keyframe that it has become, if it has.
+
+        step: (3,) since the scan before, by the odometry.
+        """
+        r = self.settings.returns
+        dt = 0.0 if self.time_ns is None else (time_ns - self.time_ns) / NS_PER_S
+        self.time_ns = time_ns
+        before = self.motion.pose.copy()
+        added = self.motion.move(dt, step)
+        self._has_odometry = step is not None
+        points = thinned(returns, r.apart_m, r.most)
+        found = None
+        self.is_blind = len(points) < _FEW
+        if len(points) >= _FEW and self._local:
+            found = self._match(points)
+            self._judge(time_ns, dt, found)
+            if self.misfits == 1 and step is None:
+                self.motion.forget_velocity()  # it would only lead farther away
+            if self.misfits == 0:
+                self.is_open = is_open(found.information)
+                self.motion.correct(found.pose, found.information)
+        self._count_way(before, added, found)
+        is_first = len(points) >= _FEW and not self._local
+        return self._keep(time_ns, returns) if is_first or self._is_due(found) else None
+
+    # ---------------------------------------------------------------------------------- matching
+
+    def _match(self, points: Array) -> Fit:
+        """By least squares from where it should be; where that fits poorly, by search."""
+        motion = self.motion
+        found = self._map.fit(points, motion.pose, motion.certainty)
+        if found.share >= _POOR * self.usual and not self._is_surprising(found):
+            return found
+        sigma = np.sqrt(np.diag(motion.covariance)[:3])
+        reach = np.minimum(3.0 * sigma + [0.1, 0.1, 0.05], _WIDEST)
+        if self.misfits:
+            reach = _WIDEST
+        slope = 0.02 / np.maximum(reach, 0.05) ** 2
+        thin = np.ascontiguousarray(points[:: max(len(points) // 120, 1)])
+        start, score = self._map.search(thin, motion.pose, reach, slope=slope)
+        if score <= 0.0:
+            return found
+        other = self._map.fit(points, start)
+        return other if other.share > found.share + 0.03 else found
+
+    def _is_surprising(self, found: Fit) -> bool:
+        """Whether the scan lies farther from where it should be than three sigma."""
+        away = found.pose - self.motion.pose
+        away[2] = math.remainder(float(away[2]), math.tau)
+        return float(away @ self.motion.certainty @ away) > 16.0
+
+    def _judge(self, time_ns: int, dt: float, found: Fit) -> None:
+        self.share = found.share
+        if self.share >= _LOST_SHARE * self.usual:
+            self.misfits = 0
+            passed = min(max(dt, 0.05) / _USUAL_S, 0.2)
+            self.usual += (passed if self.usual else 1.0) * (self.share - self.usual)
+            return
+        self.misfits += 1
+        if self.misfits == 1:
+            self._misfit_ns = time_ns
+
+    def _count_way(self, before: Array, added: Array, found: Fit | None) -> None:
+        moved = between(before, self.motion.pose)
+        self.travelled_m += math.hypot(moved[0], moved[1])
+        self.travelled += math.hypot(moved[0], moved[1]) + _TURN_M * abs(float(moved[2]))
+        if self._last is None:
+            return
+        turn = between(self._last.pose, before)[2]
+        c, s = math.cos(turn), math.sin(turn)
+        axes = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        lever = np.eye(3)
+        lever[:2, 2] = axes[:2, :2] @ np.array([-moved[1], moved[0]])
+        self._since = lever @ self._since @ lever.T + axes @ added @ axes.T
+        if found is not None and self.misfits == 0:
+            yaw = float(self._last.pose[2])
+            c, s = math.cos(yaw), math.sin(yaw)
+            axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+            told = axes @ found.information @ axes.T
+            self._since = np.linalg.inv(np.linalg.inv(self._since + 1e-12 * np.eye(3)) + told)
+
+    # --------------------------------------------------------------------------------- keyframes
+
+    def _is_due(self, found: Fit | None) -> bool:
+        if found is None or self.misfits or self._last is None:
+            return False
+        k = self.settings.keeping
+        if self._fresh_share == 0.0:
+            self._fresh_share = self.share
+        moved = between(self._last.pose, self.motion.pose)
+        way, turn = math.hypot(moved[0], moved[1]), abs(float(moved[2]))
+        stale = self.share < k.step_share * self._fresh_share
+        return (
+            way > k.step_m
+            or turn > k.step_rad
+            or (stale and (way > k.least_m or turn > k.least_rad))
+        )
+
+    def _keep(self, time_ns: int, returns: Array) -> Kept:
+        r, pose = self.settings.returns, self.motion.pose.copy()
+        step, covariance = np.zeros(3), np.zeros((3, 3))
+        if self._last is not None:
+            step = between(self._last.pose, pose)
+            covariance = self._since + _FLOOR
+        points = thinned(returns, r.apart_m, r.most_kept)
+        kept = Kept(
+            time_ns, pose, points, step, covariance, self.travelled, self.usual, self.session
+        )
+        self._last = kept
+        self._local.append(kept)
+        k = self.settings.keeping
+        while len(self._local) > k.local_most or (
+            self.travelled - self._local[0].travelled > k.local_way and len(self._local) > 3
+        ):
+            self._local.popleft()
+        self._since = np.zeros((3, 3))
+        self._fresh_share = 0.0
+        self._redraw()
+        return kept
+
+    def _redraw(self) -> None:
+        if self._local:
+            points = np.concatenate([placed(kept.points, kept.pose) for kept in self._local])
+            self._map.draw(points, self._local[-1].pose)

@@ -1,0 +1,106 @@
+"""A map around a place, and the two ways to lay a scan onto it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.planar.fit_kernels import fit
+from volery.autonomy.slam.planar.map_kernels import CELL_M, blur, build, pool
+from volery.autonomy.slam.planar.search_kernels import search
+from volery.autonomy.slam.planar.settings import Fitting
+
+Array = NDArray[np.float64]
+
+_MOST_CELLS = 30_000
+_NOWHERE = np.array([0.0, 0.0, -1.0])
+
+
+class Fit(NamedTuple):
+    """How a scan lies on a map."""
+
+    pose: Array
+    """(3,)"""
+    information: Array
+    """(3, 3) that the scan alone gives about it."""
+    met: float
+    """Returns that meet something, each by how well."""
+    share: float
+    """Of all returns."""
+
+
+class LocalMap:
+    """Walls within `reach_m` of a middle.
+
+    levels: of the search, whose widest squares are 2^(levels - 1) cells.
+    """
+
+    def __init__(self, reach_m: float, levels: int, fitting: Fitting) -> None:
+        n = 2 * math.ceil(reach_m / CELL_M)
+        self._grid = np.full((n, n), -1, np.int32)
+        self._cells = np.zeros((_MOST_CELLS, 2), np.int32)
+        self._sums = np.zeros((_MOST_CELLS, 6))
+        self._shapes = np.zeros((_MOST_CELLS, 6))
+        self._fields = np.zeros((levels, n, n), np.uint8)
+        self._corner = np.zeros(2)
+        self._fitting = fitting
+        self.count = 0
+        """Cells that hold something."""
+
+    def draw(self, points: Array, middle: Array, least: float = 1.0) -> None:
+        """Begin anew with points (K, 2) around a pose.
+
+        least: returns of a cell from which on it counts in searches.
+        """
+        n = len(self._grid)
+        self._corner = (np.floor(middle[:2] / CELL_M) - n // 2) * CELL_M
+        points = np.ascontiguousarray(points)
+        self.count = int(
+            build(points, self._corner, self._grid, self._cells, self._sums, self._shapes)
+        )
+        blur(self._cells, self._sums, self.count, self._corner, least, self._fields[0])
+        pool(self._fields)
+
+    def fit(self, points: Array, start: Array, certainty: Array | None = None) -> Fit:
+        """Lay points (K, 2) on it from a pose (3,), held to that by `certainty` (3, 3)."""
+        f = self._fitting
+        pose, information = start.copy(), np.zeros((3, 3))
+        held = 1e-3 * np.eye(3) if certainty is None else certainty
+        met = float(
+            fit(
+                pose, start, held, points, self._grid, self._sums, self._shapes, self._corner,
+                f.gate_m, f.sigma_m, f.trust, f.pull, f.unclear, f.rounds, information,
+            )
+        )  # fmt: skip
+        pose[2] = math.remainder(pose[2], math.tau)
+        return Fit(pose, information, met, met / max(len(points), 1))
+
+    def search(
+        self,
+        points: Array,
+        middle: Array,
+        reach: Array,
+        *,
+        slope: Array | None = None,
+        least: float = 0.0,
+        shut: Array | None = None,
+    ) -> tuple[Array, float]:
+        """The pose of points (K, 2) within `middle` (3,) +- `reach` (3,) that scores best.
+
+        slope: (3,) of the score, lost for each unit squared away from the middle. shut: a place
+        and a radius where nothing is looked for. The score is the share of returns that meet
+        something, 0 where none is above `least`.
+        """
+        best = middle.copy()
+        far = float(np.sqrt((points * points).sum(axis=1)).max()) if len(points) else 1.0
+        step = CELL_M / max(min(far, 8.0), 1.0)
+        none = np.zeros(3)
+        score = search(
+            points, self._fields, self._corner, middle, reach, step,
+            none if slope is None else slope, least, _NOWHERE if shut is None else shut, best,
+        )  # fmt: skip
+        best[2] = math.remainder(best[2], math.tau)
+        return best, float(score)

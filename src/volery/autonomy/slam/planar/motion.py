@@ -1,0 +1,127 @@
+"""How the vehicle moves between two scans: by its odometry, or going on as it went.
+
+A Kalman filter of pose and velocity. Without odometry the velocity along the body's axes changes
+by white accelerations; what no scan tells, such as the way along a plain corridor, goes on with
+the last velocity, and its covariance grows with the third power of the time.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.planar.poses import compose, turned
+from volery.autonomy.slam.planar.settings import Moving
+
+Array = NDArray[np.float64]
+
+_LEAST_M, _LEAST_RAD = 1e-3, 3e-4
+"""So well at most the next pose is foretold."""
+_FIRST_M_S, _FIRST_RAD_S = 1.0, 1.0
+_LONGEST_S = 3.0
+"""Nobody goes on as he went for longer: then the velocity is not known."""
+
+
+class Motion:
+    """Pose (3,), velocity (3,) in the body's axes, and their covariance (6, 6)."""
+
+    def __init__(self, settings: Moving) -> None:
+        self._settings = settings
+        self.pose = np.zeros(3)
+        self.velocity = np.zeros(3)
+        self.covariance = np.diag([0.0] * 3 + [_FIRST_M_S**2] * 2 + [_FIRST_RAD_S**2])
+
+    def forget_velocity(self) -> None:
+        """Nothing is known of how fast it moves."""
+        self.velocity = np.zeros(3)
+        self.covariance[:3, 3:] = self.covariance[3:, :3] = 0.0
+        self.covariance[3:, 3:] = np.diag([_FIRST_M_S**2] * 2 + [_FIRST_RAD_S**2])
+
+    def move(self, dt: float, step: Array | None) -> Array:
+        """Foretell the pose after `dt` s; `step` (3,) is the odometry's, None: there is none.
+
+        Returns the covariance (3, 3) that the step adds, in the axes of the body before it.
+        """
+        if step is not None:
+            return self._by_odometry(dt, step)
+        if dt > _LONGEST_S:
+            self.forget_velocity()
+        return self._going_on(min(dt, _LONGEST_S))
+
+    def _by_odometry(self, dt: float, step: Array) -> Array:
+        s = self._settings
+        way, turn = math.hypot(step[0], step[1]), abs(float(step[2]))
+        along = s.odometry_m + s.odometry_per_m * way
+        yaw = s.odometry_rad + s.odometry_rad_per_m * way + s.odometry_rad_per_rad * turn
+        added = np.diag([along**2, along**2, yaw**2])
+        before = float(self.pose[2])
+        lever = self._lever(step)
+        self.pose = compose(self.pose, step)
+        own = lever @ self.covariance[:3, :3] @ lever.T + turned(added, before)
+        self.velocity = step / dt if dt > 0.0 else np.zeros(3)
+        of_velocity = added / max(dt, 0.02) ** 2
+        self.covariance = np.zeros((6, 6))
+        self.covariance[:3, :3], self.covariance[3:, 3:] = own, of_velocity
+        return added
+
+    def _going_on(self, dt: float) -> Array:
+        s = self._settings
+        yaw = float(self.pose[2])
+        step = self.velocity * dt
+        middle = yaw + 0.5 * step[2]
+        f = np.eye(6)
+        f[:3, :3] = self._lever(step)
+        c, d = math.cos(middle), math.sin(middle)
+        f[:3, 3:] = dt * np.array([[c, -d, 0.0], [d, c, 0.0], [0.0, 0.0, 1.0]])
+        density = np.diag([s.accel_m2_s3, s.accel_m2_s3, s.turn_rad2_s3])
+        noise = np.zeros((6, 6))
+        noise[:3, :3] = density * dt**3 / 3.0
+        noise[:3, 3:] = noise[3:, :3] = density * dt**2 / 2.0
+        noise[:3, 3:] = turned(density, middle) @ f[:3, 3:] * dt / 2.0
+        noise[3:, :3] = noise[:3, 3:].T
+        noise[3:, 3:] = density * dt
+        of_velocity = self.covariance[3:, 3:]
+        self.pose = np.array(
+            [
+                self.pose[0] + c * step[0] - d * step[1],
+                self.pose[1] + d * step[0] + c * step[1],
+                math.remainder(yaw + step[2], math.tau),
+            ]
+        )
+        added = density * dt**3 / 3.0 + of_velocity * dt**2
+        self.covariance = f @ self.covariance @ f.T + noise
+        return np.asarray(added)
+
+    def _lever(self, step: Array) -> Array:
+        """How an error of the yaw moves the place."""
+        c, s = math.cos(self.pose[2]), math.sin(self.pose[2])
+        lever = np.eye(3)
+        lever[0, 2] = -(s * step[0] + c * step[1])
+        lever[1, 2] = c * step[0] - s * step[1]
+        return lever
+
+    @property
+    def certainty(self) -> Array:
+        """Information (3, 3) about the pose."""
+        least = np.diag([_LEAST_M**2, _LEAST_M**2, _LEAST_RAD**2])
+        return np.asarray(np.linalg.inv(self.covariance[:3, :3] + least))
+
+    def correct(self, pose: Array, information: Array) -> None:
+        """Take the pose (3,) that scan and motion together make likeliest.
+
+        information: (3, 3) of the scan alone.
+        """
+        own = self.covariance[:3, :3] + np.diag([_LEAST_M**2, _LEAST_M**2, _LEAST_RAD**2])
+        after = np.linalg.inv(np.linalg.inv(own) + information)
+        away = pose - self.pose
+        away[2] = math.remainder(float(away[2]), math.tau)
+        gain = self.covariance[3:, :3] @ np.linalg.inv(own)
+        self.velocity = self.velocity + gain @ away
+        rest = self.covariance[3:, 3:] - gain @ (own - after) @ gain.T
+        self.covariance[3:, 3:] = 0.5 * (rest + rest.T)
+        self.covariance[3:, :3] = gain @ after
+        self.covariance[:3, 3:] = self.covariance[3:, :3].T
+        self.covariance[:3, :3] = 0.5 * (after + after.T)
+        self.pose = np.array([pose[0], pose[1], math.remainder(float(pose[2]), math.tau)])

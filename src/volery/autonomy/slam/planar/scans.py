@@ -1,0 +1,66 @@
+"""From a laser scan to returns in the plane of the body."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.fixed_joints import Mount
+from volery.autonomy.slam.planar.settings import Returns
+from volery.core import rotations
+from volery.core.compiled import kernel
+from volery.graph.messages import LaserScan
+
+Array = NDArray[np.float64]
+
+
+def returns(scan: LaserScan, mount: Mount, velocity: Array, kept: Returns) -> Array:
+    """Returns (K, 2) m in the body as it is at the first beam.
+
+    velocity: (3,) of the body in its own axes, m/s and rad/s, by which each beam is placed.
+    """
+    ranges = np.asarray(scan.ranges, np.float64)
+    nearest = max(kept.nearest_m, float(scan.range_min))
+    farthest = min(kept.reach_m, 0.99 * float(scan.range_max) or math.inf)
+    rows = np.flatnonzero((ranges >= nearest) & (ranges <= farthest))
+    if len(rows) == 0:
+        return np.zeros((0, 2))
+    angle = float(scan.angle_min) + rows * float(scan.angle_increment)
+    flat = np.zeros((len(rows), 3))
+    flat[:, 0], flat[:, 1] = ranges[rows] * np.cos(angle), ranges[rows] * np.sin(angle)
+    points: Array = (rotations.rotate(mount.attitude, flat) + mount.position)[:, :2]
+    after = rows * float(scan.time_increment)
+    if after[-1] > 0.0:
+        c, s = np.cos(velocity[2] * after), np.sin(velocity[2] * after)
+        points = np.stack(
+            [
+                c * points[:, 0] - s * points[:, 1] + velocity[0] * after,
+                s * points[:, 0] + c * points[:, 1] + velocity[1] * after,
+            ],
+            axis=1,
+        )
+    return points
+
+
+def thinned(points: Array, apart: float, most: int) -> Array:
+    """At most so many of points (K, 2) in the order of the beams, no two neighbours too near."""
+    kept = np.zeros(len(points), np.bool_)
+    _thin(points, apart, kept)
+    chosen = points[kept]
+    if len(chosen) > most:
+        chosen = chosen[np.linspace(0, len(chosen) - 1, most).round().astype(np.int64)]
+    return np.ascontiguousarray(chosen)
+
+
+@kernel
+def _thin(points: Array, apart: float, kept: NDArray[np.bool_]) -> None:
+    last = -1
+    for k in range(points.shape[0]):
+        if last >= 0:
+            dx, dy = points[k, 0] - points[last, 0], points[k, 1] - points[last, 1]
+            if dx * dx + dy * dy < apart * apart:
+                continue
+        kept[k] = True
+        last = k

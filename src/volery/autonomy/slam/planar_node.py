@@ -1,0 +1,268 @@
+"""Where a ground vehicle, or a scanner in the hand, is: from one level LIDAR, without an IMU."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.fixed_joints import LEVEL, FixedJoints, Mount
+from volery.autonomy.scan_rays import is_usable
+from volery.autonomy.slam import reports
+from volery.autonomy.slam.planar.follower import Follower
+from volery.autonomy.slam.planar.health import Watched, judged
+from volery.autonomy.slam.planar.odometry import WheelOdometry, step_between
+from volery.autonomy.slam.planar.scans import returns
+from volery.autonomy.slam.planar.settings import PlanarSettings, Returns
+from volery.autonomy.slam.planar.way import PlanarWay
+from volery.core import rotations
+from volery.core.clock import NS_PER_S
+from volery.core.errors import NodeError
+from volery.core.kept import keep, put_back
+from volery.graph.messages import (
+    LaserScan,
+    Odometry,
+    PathMessage,
+    String,
+    TFMessage,
+    stamp_of,
+)
+from volery.graph.node import Node
+
+Array = NDArray[np.float64]
+
+_JUMP_NS = NS_PER_S // 2
+"""A stamp so far before the newest one is a clock that was set back."""
+_WAITING = 4
+"""Scans that wait for the odometry of their time."""
+_PATH_NS = 2_000_000
+"""Between two paths for each keyframe in them."""
+
+
+class PlanarSlam(Node):
+    """Publishes `slam/odom`, `slam/pose`, `slam/path` (latched), `slam/status`, and `/tf`.
+
+    Parameters
+    ----------
+    start: [x, y, z, yaw] of where it begins in the map, m and rad; empty: the map begins there.
+    mount: [x, y, z, roll, pitch, yaw] of the LIDAR in the body, m and rad; empty: as `/tf_static`
+        has it, else at the body's origin.
+    odometry: whether `odom` is heard where there is one.
+    reach_m: farther returns are left out.
+    nearest_m: nearer ones are.
+    loop_closures: whether places that are seen again correct the map (needs gtsam).
+
+    """
+
+    _PLAIN = (
+        "_taken_ns",
+        "_before",
+        "_refused",
+        "_resets",
+        "_told",
+        "_heard",
+        "_path_ns",
+        "_path_of",
+    )
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("slam", **options)
+        start = self.declare_parameter("start", []).value
+        mount = self.declare_parameter("mount", []).value
+        if len(start) not in (0, 4) or len(mount) not in (0, 6):
+            raise NodeError("start is [x, y, z, yaw], mount has 6 numbers, or they are empty")
+        self._start = np.array(start if len(start) else [0.0] * 4, np.float64)
+        self._mount = LEVEL
+        self._is_mount_told = len(mount) == 6
+        if self._is_mount_told:
+            turn = rotations.from_rpy(*map(float, mount[3:]))
+            self._mount = Mount(np.array(mount[:3], np.float64), turn)
+        kept = Returns(
+            nearest_m=float(self.declare_parameter("nearest_m", 0.05).value),
+            reach_m=float(self.declare_parameter("reach_m", 30.0).value),
+        )
+        self._settings = PlanarSettings(returns=kept)
+        self._hears_odometry = bool(self.declare_parameter("odometry", True).value)
+        self._has_loops = bool(self.declare_parameter("loop_closures", True).value)
+        self._uav = self.get_namespace().strip("/") or "uav"
+        self._begin()
+        self._open()
+
+    def _begin(self) -> None:
+        self._follower = Follower(self._settings)
+        first = self._start[[0, 1, 3]]
+        self._way = PlanarWay(self._settings, first, has_loops=self._has_loops)
+        self._odometry = WheelOdometry()
+        self._before: Array | None = None
+        """Pose of the odometry at the newest scan."""
+        self._waiting: list[LaserScan] = []
+        self._taken_ns: int | None = None
+        self._heard = self.get_clock().now_ns()
+        self._refused = self._resets = 0
+        self._told = ""
+        self._path_ns = self._path_of = self._period_ns = 0
+        self._joints = FixedJoints()
+
+    def _open(self) -> None:
+        self._odom = self.create_publisher(Odometry, "slam/odom", 5)
+        self._pose = self.create_publisher(reports.POSE, "slam/pose", 5)
+        self._path = self.create_publisher(PathMessage, "slam/path", 1, latched=True)
+        self._status = self.create_publisher(String, "slam/status", 1, latched=True)
+        self._tf = self.create_publisher(TFMessage, "/tf", 10)
+        if self._hears_odometry:
+            self.create_subscription(Odometry, "odom", self._on_odometry, 50)
+        if not self._is_mount_told:
+            self.create_subscription(TFMessage, "/tf_static", self._on_joints, 10)
+        self.create_subscription(LaserScan, "laser/horizontal/scan", self._on_scan, 10)
+        self.create_timer(0.5, self._tell_status)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        parts = {n: getattr(self, n).get_state() for n in ("_follower", "_way", "_odometry")}
+        more = {"waiting": list(self._waiting), "joints": dict(self._joints.joints)}
+        return {"parts": parts, **more, **keep(self, self._PLAIN)}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        for name, part in state["parts"].items():
+            getattr(self, name).set_state(part)
+        self._waiting = list(state["waiting"])
+        self._joints.joints = dict(state["joints"])
+        put_back(self, {name: state[name] for name in self._PLAIN})
+
+    # ------------------------------------------------------------------------------ what it hears
+
+    def _on_joints(self, message: TFMessage) -> None:
+        self._joints.add(message)
+
+    def _on_odometry(self, message: Odometry) -> None:
+        self._odometry.add(message)
+        self._take_waiting()
+
+    def _on_scan(self, scan: LaserScan) -> None:
+        self._heard = self.get_clock().now_ns()
+        time_ns, newest = stamp_of(scan), self._taken_ns
+        if self._waiting:
+            newest = stamp_of(self._waiting[-1])
+        if newest is not None and time_ns < newest - _JUMP_NS:
+            self._set_clock(time_ns)
+            newest = None
+        if not is_usable(scan) or (newest is not None and time_ns <= newest):
+            self._refused += 1
+            return
+        self._waiting.append(scan)
+        self._take_waiting()
+
+    def _set_clock(self, time_ns: int) -> None:
+        while self._waiting:
+            self._take(self._waiting.pop(0))
+        self._resets += 1
+        self._taken_ns = None
+        self._before = None
+        self._follower.set_clock(time_ns)
+
+    def _take_waiting(self) -> None:
+        """Take scans in as soon as the odometry of their time is known, or late."""
+        while self._waiting:
+            newest, time_ns = self._odometry.newest_ns, stamp_of(self._waiting[0])
+            awaited = newest is not None and time_ns - NS_PER_S <= newest < time_ns
+            if awaited and len(self._waiting) < _WAITING:
+                return
+            self._take(self._waiting.pop(0))
+
+    def _take(self, scan: LaserScan) -> None:
+        time_ns, follower = stamp_of(scan), self._follower
+        here = self._odometry.at(time_ns)
+        passed = 0 if self._taken_ns is None else time_ns - self._taken_ns
+        self._period_ns += (min(passed, 10 * NS_PER_S) - self._period_ns) // 8
+        dt = passed / NS_PER_S
+        step = step_between(self._before, here, dt)
+        self._before, self._taken_ns = here, time_ns
+        mount = self._joints.mount_of(scan.header.frame_id, self._mount)
+        seen = returns(scan, mount, follower.motion.velocity, self._settings.returns)
+        frame = follower.follow(time_ns, seen, step)
+        if frame is not None:
+            self._way.add(frame)
+        if follower.is_lost:
+            follower.begin_anew()
+        if self._way.frames:
+            self._tell_place(time_ns)
+
+    # ------------------------------------------------------------------------------ what it tells
+
+    def _tell_place(self, time_ns: int) -> None:
+        motion = self._follower.motion
+        pose, velocity = motion.pose, motion.velocity
+        state = (
+            np.array([pose[0], pose[1], 0.0]),
+            rotations.from_rpy(0.0, 0.0, float(pose[2])),
+            rotations.rotate(
+                rotations.from_rpy(0.0, 0.0, float(pose[2])), [velocity[0], velocity[1], 0.0]
+            ),
+            np.array([0.0, 0.0, velocity[2]]),
+        )
+        covariance = np.zeros((9, 9))
+        rows = [0, 1, 8, 3, 4]
+        covariance[np.ix_(rows, rows)] = motion.covariance[:5, :5]
+        self._odom.publish(reports.odometry(time_ns, self._uav, state, covariance))
+        x, y, yaw = self._way.pose(pose)
+        z = float(self._start[2])
+        spread = self._way.covariance + motion.covariance[:3, :3]
+        known = np.sqrt(np.maximum(np.diag(spread), 0.0))
+        sigmas = np.array([known[0], known[1], 0.0, 0.0, 0.0, known[2]])
+        turn = rotations.from_rpy(0.0, 0.0, float(yaw))
+        self._pose.publish(reports.pose_in_map(time_ns, np.array([x, y, z]), turn, sigmas))
+        at = self._way.correction
+        turn = rotations.from_rpy(0.0, 0.0, float(at[2]))
+        place = np.array([at[0], at[1], z])
+        self._tf.publish(reports.map_from_odom(time_ns, self._uav, place, turn))
+
+    def _tell_status(self) -> None:
+        follower, way = self._follower, self._way
+        state, problems = judged(
+            Watched(
+                self.get_clock().now_ns(), self._heard, self._period_ns, self._odometry_heard_ns(),
+                bool(way.frames), follower.misfits, follower.is_blind, follower.is_open,
+                way.is_placed,
+            )
+        )  # fmt: skip
+        sigma = math.sqrt(max(float(way.covariance[0, 0]), float(way.covariance[1, 1])))
+        told = {
+            "state": state,
+            "problems": problems,
+            "share": round(follower.share, 2),
+            "sigma_m": round(sigma, 3),
+            "keyframes": len(way.frames),
+            "closures": way.closures,
+            "sessions": way.session + 1,
+            "refused": self._refused + self._odometry.refused,
+            "clock_set": self._resets,
+        }
+        text = json.dumps(told)
+        if text != self._told:
+            self._told = text
+            self._status.publish(String(text))
+        self._tell_path()
+
+    def _tell_path(self) -> None:
+        """Where keyframes have come or moved; the longer it is the more rarely."""
+        way, now = self._way, self.get_clock().now_ns()
+        is_due = now < self._path_ns or now - self._path_ns >= len(way.frames) * _PATH_NS
+        if way.changes == self._path_of or not is_due:
+            return
+        way.finish()
+        self._path_ns, self._path_of = now, way.changes
+        z = float(self._start[2])
+        poses = [np.array([x, y, z, yaw]) for x, y, yaw in way.poses]
+        times = [frame.time_ns for frame in way.frames]
+        self._path.publish(reports.path(self._taken_ns or times[-1], times, poses))
+
+    def _odometry_heard_ns(self) -> int | None:
+        """When the odometry was last told, by the node's clock as far as stamps follow it."""
+        newest = self._odometry.newest_ns
+        if newest is None or self._taken_ns is None:
+            return None
+        return self.get_clock().now_ns() - max(self._taken_ns - newest, 0)

@@ -1,0 +1,162 @@
+"""`volery slam`: the SLAM over a log, its map and path as files."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from volery.cli.guard import complain
+from volery.core.errors import RecordingError, VoleryError
+
+if TYPE_CHECKING:
+    from volery.runtime.slam_run.run import Outcome
+
+_NAMES = ("map.png", "map.pgm", "map.yaml", "path.tum", "summary.json")
+
+
+@dataclass(frozen=True)
+class SlamAsked:
+    """The options as they were typed."""
+
+    log: Path
+    out: Path
+    layout: Path | None
+    uav: str | None
+    scan: str | None
+    odometry: str | None
+    imu_topic: str | None
+    has_odometry: bool
+    has_imu: bool | None
+    start: str | None
+    level_mount: str | None
+    nodding_mount: str | None
+    resolution: float
+    reach: float
+    loops: bool
+    overwrite: bool
+
+
+def map_log(asked: SlamAsked) -> None:
+    """Run the SLAM over a log, write what came of it and say so."""
+    from volery.bridges.logs.text_layout import TextLayout
+    from volery.runtime.slam_run.channels import Asked
+    from volery.runtime.slam_run.run import SlamOptions, SlamRun
+    from volery.runtime.slam_run.sources import open_source
+    from volery.scenario.data_files import load_data_file
+
+    _check_folder(asked.out, overwrite=asked.overwrite)
+    layout = None if asked.layout is None else load_data_file(asked.layout, TextLayout)
+    source = open_source(asked.log, layout)
+    topics = Asked(
+        asked.uav, asked.scan, asked.odometry, asked.imu_topic, asked.has_odometry, asked.has_imu
+    )
+    start = _numbers(asked.start, 4, "--start")
+    options = SlamOptions(
+        topics,
+        None if start is None else (*start[:3], math.radians(start[3])),
+        _numbers(asked.level_mount, 3, "--level-mount"),
+        _numbers(asked.nodding_mount, 3, "--nodding-mount"),
+        asked.reach,
+        asked.loops,
+    )
+    outcome = SlamRun(source, options).run(_progress if sys.stderr.isatty() else None)
+    if source.trouble:
+        complain(f"{asked.log}: {source.trouble}")
+    _write(asked, outcome)
+    _tell(asked.out, _summary(asked, outcome, source.refused))
+
+
+def _progress(scans: int, seconds: float) -> None:
+    typer.echo(f"{scans:,} scans, {seconds:.0f} s of the log", err=True)
+
+
+def _check_folder(out: Path, *, overwrite: bool) -> None:
+    there = [name for name in _NAMES if (out / name).exists()]
+    if there and not overwrite:
+        raise RecordingError(f"{out / there[0]} exists; --overwrite replaces it")
+    if out.exists() and not out.is_dir():
+        raise RecordingError(f"{out} is no folder")
+
+
+def _numbers(text: str | None, count: int, option: str) -> Any:
+    """Numbers of an option, parted by commas or blanks."""
+    if text is None:
+        return None
+    try:
+        found = tuple(float(word) for word in text.replace(",", " ").split())
+    except ValueError:
+        found = ()
+    if len(found) != count or not all(map(math.isfinite, found)):
+        raise VoleryError(f"{option}: {count} numbers, such as '{','.join(['0'] * count)}'")
+    return found
+
+
+def _write(asked: SlamAsked, outcome: Outcome) -> None:
+    from volery.autonomy.mapping.grid_files import write_grid
+    from volery.runtime.slam_run.drawing import draw_map
+    from volery.runtime.slam_run.picture import write_picture
+    from volery.runtime.slam_run.trajectory import write_tum
+
+    out = asked.out
+    out.mkdir(parents=True, exist_ok=True)
+    grid = draw_map(outcome, asked.resolution, asked.reach)
+    values = grid.occupancy()
+    write_grid(out / "map", values, grid.origin, grid.cell_m)
+    way = outcome.trajectory.position[:, :2]
+    write_picture(out / "map.png", values, grid.origin, grid.cell_m, way)
+    write_tum(out / "path.tum", outcome.trajectory)
+
+
+def _summary(asked: SlamAsked, outcome: Outcome, refused: int) -> dict[str, Any]:
+    status = outcome.status
+    told = {
+        "log": asked.log.name,
+        "mode": "imu" if outcome.channels.has_imu else "planar",
+        "topics": outcome.channels.names,
+        "scans": outcome.heard,
+        "lasted_s": round(outcome.lasted_s, 3),
+        "way_m": round(outcome.trajectory.length_m, 2),
+        "keyframes": status.get("keyframes", 0),
+        "closures": status.get("closures", 0),
+        "sessions": status.get("sessions", 1),
+        "refused": status.get("refused", 0) + refused,
+        "clock_set": status.get("clock_set", 0),
+        "sigma_m": status.get("sigma_m"),
+        "states_s": {k: round(v, 1) for k, v in outcome.states.items()},
+        "problems_s": {k: round(v, 1) for k, v in outcome.problems.items()},
+        "cpu_s": round(outcome.cpu_s, 2),
+        "cpu_share": round(outcome.cpu_s / outcome.lasted_s, 4) if outcome.lasted_s else None,
+    }
+    try:
+        text = json.dumps(told, indent=2) + "\n"
+        (asked.out / "summary.json").write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"{asked.out}: {error.strerror}") from None
+    return told
+
+
+def _tell(out: Path, told: dict[str, Any]) -> None:
+    share = told["cpu_share"]
+    typer.echo(
+        f"{told['scans']:,} scans over {told['lasted_s']:.1f} s, {told['way_m']:.1f} m "
+        f"({'with' if told['mode'] == 'imu' else 'without'} IMU)"
+    )
+    typer.echo(
+        f"{told['keyframes']:,} keyframes, {told['closures']} closures, "
+        f"{told['sessions']} session{'s' if told['sessions'] != 1 else ''}, "
+        f"{told['refused']:,} messages refused"
+    )
+    states = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in told["states_s"].items())
+    typer.echo(f"state     {states or 'none told'}")
+    for problem, seconds in told["problems_s"].items():
+        typer.echo(f"problem   {problem}: {seconds:.0f} s")
+    if share is not None:
+        typer.echo(f"CPU       {told['cpu_s']:.1f} s, {share:.1%} of the log's time")
+    for name in _NAMES:
+        typer.echo(f"written   {out / name}")

@@ -1,0 +1,93 @@
+"""Which topics of a log the SLAM hears as what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from volery.core.errors import RecordingError
+
+SCAN, ODOMETRY, IMU = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "sensor_msgs/msg/Imu"
+LEVEL, NODDING = "laser/horizontal/scan", "laser/nodding/scan"
+_NOT_SENSED = ("ground_truth/odom", "slam/odom")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the user says of a log's topics; None: as they are called here, or the only ones."""
+
+    uav: str | None = None
+    scan: str | None = None
+    odometry: str | None = None
+    imu: str | None = None
+    has_odometry: bool = True
+    has_imu: bool | None = None
+    """None: where the log has an IMU and a nodding LIDAR."""
+
+
+@dataclass(frozen=True)
+class Channels:
+    """Topics by what they are for; `names` are those of the log by those that the node hears."""
+
+    uav: str
+    names: dict[str, str]
+    has_imu: bool
+
+    @property
+    def scan(self) -> str:
+        """The level LIDAR's in the log."""
+        return self.names[f"/{self.uav}/{LEVEL}"]
+
+
+def choose(path: Path, topics: dict[str, str], asked: Asked) -> Channels:
+    """The topics of a log, types by topic. `RecordingError` where it cannot be said which."""
+    scan = _one(path, topics, SCAN, asked.scan, asked.uav, LEVEL)
+    assert scan is not None
+    uav = asked.uav or (scan.split("/")[1] if scan.endswith(f"/{LEVEL}") else "") or "uav1"
+    names = {f"/{uav}/{LEVEL}": scan, "/tf_static": "/tf_static"}
+    imu = _one(path, topics, IMU, asked.imu, uav, "imu", needed=bool(asked.has_imu))
+    nodding = f"/{uav}/{NODDING}"
+    wanted = asked.has_imu
+    if wanted is None:
+        wanted = imu is not None and nodding in topics
+    if wanted and imu is not None:
+        own = {f"/{uav}/{t}": f"/{uav}/{t}" for t in (NODDING, "joint_states", "range")}
+        names |= {f"/{uav}/imu": imu, **{k: v for k, v in own.items() if v in topics}}
+    elif asked.has_odometry:
+        needed = asked.odometry is not None
+        odometry = _one(path, topics, ODOMETRY, asked.odometry, uav, "odom", needed=needed)
+        if odometry is not None:
+            names[f"/{uav}/odom"] = odometry
+    return Channels(uav, names, bool(wanted))
+
+
+def _one(
+    path: Path,
+    topics: dict[str, str],
+    kind: str,
+    name: str | None,
+    uav: str | None,
+    usual: str,
+    *,
+    needed: bool = True,
+) -> str | None:
+    """The topic of a type that is meant."""
+    known = sorted(t for t, what in topics.items() if what == kind and not t.endswith(_NOT_SENSED))
+    if name is not None:
+        if name in known:
+            return name
+        raise RecordingError(f"{path}: there is no {kind} on {name}; there is {_list(known)}")
+    fitting = [t for t in known if t == f"/{uav}/{usual}"] or [
+        t for t in known if uav is None and t.endswith(f"/{usual}")
+    ]
+    if not fitting and (uav is None or kind != SCAN):
+        fitting = known
+    if len(fitting) == 1 or (fitting and fitting[0].endswith(usual)):
+        return fitting[0]
+    if needed:
+        raise RecordingError(f"{path}: which {kind} is meant? There is {_list(known)}")
+    return None
+
+
+def _list(names: list[str]) -> str:
+    return ", ".join(names) or "none"

@@ -1,0 +1,88 @@
+"""The map that scans at their final poses make."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.fixed_joints import Mount
+from volery.autonomy.mapping.log_odds import LogOddsGrid
+from volery.core import rotations
+from volery.core.errors import RecordingError
+from volery.graph.messages import LaserScan, stamp_of
+from volery.runtime.slam_run.run import Outcome
+from volery.runtime.slam_run.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+_NEAREST_M = 0.05
+_MARGIN_M = 1.0
+_MOST_CELLS = 100_000_000
+_SLAB_M = 0.5
+"""Returns so far above or below the scanner, along a leaning scan, are of other things: ground,
+branches."""
+
+
+def draw_map(outcome: Outcome, cell_m: float, reach_m: float) -> LogOddsGrid:
+    """The grid of a run, cells of `cell_m`; returns beyond `reach_m` are free space up to there.
+
+    `RecordingError` where it would need too much memory.
+    """
+    rays = [
+        _rays(outcome.trajectory, row, scan, outcome.mount(scan.header.frame_id), reach_m)
+        for row, scan in outcome.scans
+    ]
+    ends = [np.concatenate([starts[:1], ends]) for starts, ends, _ in rays if len(starts)]
+    spread = np.concatenate(ends) if ends else outcome.trajectory.position[:, :2]
+    low, high = spread.min(axis=0) - _MARGIN_M, spread.max(axis=0) + _MARGIN_M
+    cells = float(np.prod((high - low) / cell_m))
+    if cells > _MOST_CELLS:
+        raise RecordingError(
+            f"a map of {high[0] - low[0]:.0f} m x {high[1] - low[1]:.0f} m in cells of "
+            f"{cell_m:g} m is too large; try a coarser --resolution"
+        )
+    grid = LogOddsGrid(low, high, cell_m)
+    for starts, ends_, hits in rays:
+        grid.add(starts, ends_, hits)
+    return grid
+
+
+def _rays(
+    trajectory: Trajectory, row: int, scan: LaserScan, mount: Mount, reach_m: float
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Starts and ends (K, 2) of a scan in the map, and which end in something."""
+    ranges = np.asarray(scan.ranges, np.float64)
+    nearest = max(_NEAREST_M, float(scan.range_min))
+    most = float(scan.range_max)
+    rows = np.flatnonzero((ranges >= nearest) & (ranges <= (most if most > 0.0 else math.inf)))
+    length = np.minimum(ranges[rows], reach_m)
+    hits = ranges[rows] <= reach_m
+    angle = float(scan.angle_min) + rows * float(scan.angle_increment)
+    flat = np.stack([length * np.cos(angle), length * np.sin(angle), np.zeros(len(rows))], axis=1)
+    place, turn = _poses(trajectory, row, scan, rows)
+    starts = rotations.rotate(turn, mount.position) + place
+    ends = rotations.rotate(rotations.multiply(turn, mount.attitude), flat) + starts
+    rise = np.abs(ends[:, 2] - starts[:, 2])
+    short = np.minimum(_SLAB_M / np.maximum(rise, 1e-9), 1.0)[:, None]
+    ends = starts + short * (ends - starts)
+    return starts[:, :2], ends[:, :2], hits & (short[:, 0] >= 1.0)
+
+
+def _poses(
+    trajectory: Trajectory, row: int, scan: LaserScan, beams: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Where the body was at each beam: positions (K, 3), attitudes (K, 4)."""
+    first = stamp_of(scan) - int(trajectory.time_ns[row]) + int(trajectory.clock_ns[row])
+    when = first + beams * (float(scan.time_increment) * 1e9)
+    clock = trajectory.clock_ns
+    after = np.clip(np.searchsorted(clock, when, side="right"), 1, max(len(clock) - 1, 1))
+    before = after - 1
+    after = np.minimum(after, len(clock) - 1)
+    span = np.maximum(clock[after] - clock[before], 1)
+    share = np.clip((when - clock[before]) / span, 0.0, 1.0)[:, None]
+    place = trajectory.position[before] * (1.0 - share) + trajectory.position[after] * share
+    one, other = trajectory.attitude[before], trajectory.attitude[after]
+    sign = np.where((one * other).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+    return place, rotations.normalize((1.0 - share) * one + share * sign * other)

@@ -1,0 +1,98 @@
+"""A graph for nodes whose clock is that of a log's messages."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+from volery.core.clock import ns_from_s
+from volery.core.errors import NodeError
+from volery.graph.graph import Graph
+from volery.graph.messages import Published
+from volery.graph.node import Context
+
+_LEAP_NS = 60_000_000_000
+"""After a longer gap timers ring once, not for all of it."""
+
+
+class LogHost:
+    """Nodes hear messages at the times of a log, and their timers ring between them."""
+
+    def __init__(self) -> None:
+        self._now_ns: int | None = None
+        self.graph = Graph(self.now_ns)
+        self._alarms: list[tuple[int, int, int, Callable[[], None]]] = []
+        self._numbers = itertools.count()
+        self._publishers: dict[str, Any] = {}
+
+    def now_ns(self) -> int:
+        """Time of the newest message."""
+        return self._now_ns or 0
+
+    def context(self) -> Context:
+        """What a node stands on."""
+        return Context(self.graph, self, self.now_ns)
+
+    def every(
+        self,
+        period_s: float,
+        callback: Callable[[], None],
+        *,
+        wanted: Callable[[], bool] | None = None,
+    ) -> None:
+        """Call `callback` each period of the log's time."""
+
+        def ring() -> None:
+            if wanted is None or wanted():
+                callback()
+
+        period = ns_from_s(period_s)
+        heapq.heappush(self._alarms, (self.now_ns() + period, next(self._numbers), period, ring))
+
+    def at(self, time_ns: int, action: Callable[[], Any]) -> None:  # noqa: ARG002
+        """Refuse: nodes here think in no time."""
+        raise NodeError("a node over a log has no latency")
+
+    def listen(self, topic: str, callback: Callable[[Any], None]) -> None:
+        """Call back with each message that a node publishes on a topic."""
+
+        def take(published: Published) -> None:
+            callback(published.message)
+
+        self.graph.subscribe(topic, take)
+
+    def hear(self, topic: str, time_ns: int, message: Any) -> None:
+        """Let nodes hear a message at a time; due timers ring before."""
+        self._run_to(time_ns)
+        publisher = self._publishers.get(topic)
+        if publisher is None:
+            latched = topic == "/tf_static"
+            publisher = self.graph.advertise(topic, message.__msgtype__, latched=latched)
+            self._publishers[topic] = publisher
+        publisher.publish(message)
+        self.graph.deliver()
+
+    def wait(self, seconds: float, until: Callable[[], bool]) -> None:
+        """Let timers ring for some more seconds of the log's time, or until `until()` is true."""
+        for _ in range(round(2.0 * seconds)):
+            if until():
+                return
+            self._run_to(self.now_ns() + 500_000_000)
+
+    def _run_to(self, time_ns: int) -> None:
+        now = self._now_ns
+        if now is None or time_ns < now or time_ns > now + _LEAP_NS:
+            # The clock was set, or nobody recorded: timers go on from there.
+            shift = time_ns - (now or 0)
+            self._alarms = [(due + shift, n, p, ring) for due, n, p, ring in self._alarms]
+            heapq.heapify(self._alarms)
+            self._now_ns = time_ns
+        while self._alarms and self._alarms[0][0] <= time_ns:
+            due, number, period, ring = heapq.heappop(self._alarms)
+            self._now_ns = max(self.now_ns(), due)
+            heapq.heappush(self._alarms, (due + period, number, period, ring))
+            ring()
+            self.graph.deliver()
+        self._now_ns = time_ns

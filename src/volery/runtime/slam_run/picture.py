@@ -1,0 +1,48 @@
+"""The map of a run as a picture: walls, free space, and the way."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.errors import DataFileError
+
+Array = NDArray[np.float64]
+
+_FREE, _UNKNOWN, _WALL = (255, 255, 255), (226, 228, 230), (20, 24, 28)
+_WAY, _BEGIN, _END = (214, 80, 48), (46, 140, 80), (40, 90, 190)
+_LEAST_SIDE = 900
+"""Pixels; smaller maps are drawn larger."""
+
+
+def write_picture(
+    path: Path, values: NDArray[np.int8], origin: Array, cell_m: float, way: Array
+) -> None:
+    """Write a PNG of a grid (rows, columns) and a way (N, 2) m in the map, y up.
+
+    A green dot marks where it began, a blue one where it ended. `DataFileError` where it cannot be
+    written.
+    """
+    from PIL import Image, ImageDraw
+
+    colours = np.empty((*values.shape, 3), np.uint8)
+    colours[:] = _UNKNOWN
+    colours[values == 0] = _FREE
+    colours[values > 50] = _WALL
+    zoom = max(1, round(_LEAST_SIDE / max(values.shape)))
+    picture = np.repeat(np.repeat(colours[::-1], zoom, axis=0), zoom, axis=1)
+    image = Image.fromarray(np.ascontiguousarray(picture))
+    pen = ImageDraw.Draw(image)
+    scale = zoom / cell_m
+    x = (way[:, 0] - origin[0]) * scale
+    y = values.shape[0] * zoom - (way[:, 1] - origin[1]) * scale
+    if len(way) > 1:
+        pen.line(list(zip(x.tolist(), y.tolist(), strict=True)), fill=_WAY, width=2)
+    for k, colour in ((0, _BEGIN), (-1, _END)):
+        pen.ellipse([x[k] - 5, y[k] - 5, x[k] + 5, y[k] + 5], fill=colour)
+    try:
+        image.save(path, format="PNG")
+    except OSError as error:
+        raise DataFileError(f"{path}: the picture cannot be written: {error.strerror}") from None

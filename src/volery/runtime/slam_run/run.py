@@ -1,0 +1,229 @@
+"""Running the SLAM node over a log: everything that it says, and the scans that make the map."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.fixed_joints import FixedJoints, Mount
+from volery.core.clock import NS_PER_S
+from volery.core.errors import RecordingError
+from volery.graph.messages import LaserScan, stamp_of
+from volery.runtime.slam_run.channels import LEVEL, Asked, Channels, choose
+from volery.runtime.slam_run.log_host import LogHost
+from volery.runtime.slam_run.sources import LogSource, TextSource
+from volery.runtime.slam_run.trajectory import Trajectory, corrected
+
+Array = NDArray[np.float64]
+
+_APART_M, _APART_RAD = 0.25, 0.2
+"""Between scans that are drawn into the map."""
+_PROGRESS_S = 0.5
+_PATIENCE_S = 60.0
+"""In which the node tells of its last corrections; the first path is that of the log's end."""
+
+
+@dataclass(frozen=True)
+class SlamOptions:
+    """What the user may say beside the log."""
+
+    asked: Asked = field(default_factory=Asked)
+    start: tuple[float, float, float, float] | None = None
+    """x, y, z in m and yaw in rad."""
+    level_mount: tuple[float, float, float] | None = None
+    nodding_mount: tuple[float, float, float] | None = None
+    reach_m: float = 30.0
+    loop_closures: bool = True
+
+
+@dataclass
+class Outcome:
+    """What came of a run."""
+
+    channels: Channels
+    trajectory: Trajectory
+    scans: list[tuple[int, LaserScan]]
+    """Row of the trajectory, and the scan of then."""
+    mount: Callable[[str], Mount]
+    """Of a scanner, by its frame."""
+    heard: int
+    """Scans."""
+    lasted_s: float
+    """Time of the log."""
+    cpu_s: float
+    """Of the node alone."""
+    status: dict[str, Any]
+    """The last one."""
+    states: dict[str, float] = field(default_factory=dict)
+    """Seconds in each state."""
+    problems: dict[str, float] = field(default_factory=dict)
+    """Seconds with each problem."""
+
+
+class SlamRun:
+    """Feeds a node with a log. `RecordingError` where the log has not what it needs."""
+
+    def __init__(self, source: LogSource | TextSource, options: SlamOptions) -> None:
+        self._source, self._options = source, options
+        self.channels = choose(source.path, source.topics, options.asked)
+        self._joints = FixedJoints()
+        self._host = LogHost()
+        self._odometry: list[tuple[float, ...]] = []
+        self._times: list[int] = []
+        self._scans: list[tuple[int, LaserScan]] = []
+        self._newest: LaserScan | None = None
+        self._drawn: tuple[float, float, float] | None = None
+        self._path: Any = None
+        self._tilt = np.array([0.0, 0.0, 0.0, 1.0])
+        self._status: dict[str, Any] = {}
+        self._states: dict[str, float] = defaultdict(float)
+        self._problems: dict[str, float] = defaultdict(float)
+        self._status_ns = 0
+
+    def run(self, tell: Callable[[int, float], None] | None = None) -> Outcome:
+        """Go through the whole log; `tell` hears of scans and seconds of the log so far."""
+        uav, host = self.channels.uav, self._host
+        if self.channels.has_imu:
+            self._read_joints()
+        self._start_node()
+        host.listen(f"/{uav}/slam/odom", self._on_odometry)
+        host.listen(f"/{uav}/slam/status", self._on_status)
+        host.listen("/tf", self._on_tf)
+        names = {theirs: ours for ours, theirs in self.channels.names.items()}
+        heard, cpu, first, before, lasted = 0, 0.0, None, 0, 0
+        told = time.monotonic()
+        for topic, time_ns, message in self._source.messages(set(names)):
+            ours = names[topic]
+            if ours == f"/{uav}/{LEVEL}":
+                heard, self._newest = heard + 1, message
+            if topic == "/tf_static":
+                self._joints.add(message)
+            if first is not None:
+                lasted += max(time_ns - before, 0)
+            first, before = first or time_ns, time_ns
+            began = time.thread_time()
+            host.hear(ours, time_ns, message)
+            cpu += time.thread_time() - began
+            if tell is not None and time.monotonic() - told > _PROGRESS_S:
+                told = time.monotonic()
+                tell(heard, lasted / NS_PER_S)
+        self._end()
+        return self._outcome(heard, lasted / NS_PER_S, cpu)
+
+    def _read_joints(self) -> None:
+        """Where the LIDARs sit must be known before the node begins."""
+        for _, _, message in self._source.messages({"/tf_static"}):
+            self._joints.add(message)
+
+    def _start_node(self) -> None:
+        o, uav = self._options, self.channels.uav
+        parameters: dict[str, Any] = {"reach_m": o.reach_m, "loop_closures": o.loop_closures}
+        if o.start is not None:
+            parameters["start"] = list(o.start)
+        level = None if o.level_mount is None else list(o.level_mount)
+        options = {"context": self._host.context(), "namespace": f"/{uav}"}
+        if not self.channels.has_imu:
+            from volery.autonomy.slam.planar_node import PlanarSlam
+
+            if level is not None:
+                parameters["mount"] = [*level, 0.0, 0.0, 0.0]
+            PlanarSlam(**options, parameter_overrides=parameters)
+            return
+        from volery.autonomy.slam.slam_node import Slam
+
+        parameters["level_mount"] = level or self._place_of(f"{uav}/laser_horizontal")
+        nodding = o.nodding_mount
+        parameters["nodding_mount"] = (
+            list(nodding) if nodding is not None else self._place_of(f"{uav}/laser_nodding")
+        )
+        Slam(**options, parameter_overrides=parameters)
+
+    def _place_of(self, frame: str) -> list[float]:
+        return [float(number) for number in self._joints.mount_of(frame).position]
+
+    # ------------------------------------------------------------------------------ what it tells
+
+    def _on_odometry(self, message: Any) -> None:
+        p, q = message.pose.pose.position, message.pose.pose.orientation
+        self._times.append(stamp_of(message))
+        self._odometry.append((p.x, p.y, p.z, q.x, q.y, q.z, q.w))
+        scan = self._newest
+        if scan is None:
+            return
+        yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
+        last = self._drawn
+        if last is not None:
+            turn = abs(math.remainder(yaw - last[2], math.tau))
+            if math.hypot(p.x - last[0], p.y - last[1]) < _APART_M and turn < _APART_RAD:
+                return
+        self._drawn, self._newest = (p.x, p.y, yaw), None
+        self._scans.append((len(self._times) - 1, scan))
+
+    def _on_status(self, message: Any) -> None:
+        self._count_time()
+        self._status = json.loads(message.data)
+
+    def _count_time(self) -> None:
+        """Add the time since the last status to what that one said."""
+        now = self._host.now_ns()
+        if self._status and now > self._status_ns:
+            seconds = (now - self._status_ns) / NS_PER_S
+            self._states[self._status["state"]] += seconds
+            for problem in self._status["problems"]:
+                self._problems[problem] += seconds
+        self._status_ns = now
+
+    def _on_tf(self, message: Any) -> None:
+        for found in message.transforms:
+            if found.header.frame_id == "map":
+                q = found.transform.rotation
+                self._tilt = np.array([q.x, q.y, q.z, q.w])
+
+    def _end(self) -> None:
+        """Wait for the whole path at last."""
+        told: list[Any] = []
+        self._count_time()
+        status, self._status = self._status, {}
+        self._host.listen(f"/{self.channels.uav}/slam/path", told.append)
+        self._host.wait(_PATIENCE_S, lambda: len(told) > 1)
+        self._path = told[-1] if told else None
+        self._status = {**status, **self._last_counts()}
+
+    def _last_counts(self) -> dict[str, Any]:
+        """What has come to count since the log's end."""
+        return {k: v for k, v in self._status.items() if k in ("closures", "keyframes")}
+
+    def _outcome(self, heard: int, lasted_s: float, cpu_s: float) -> Outcome:
+        if not self._times:
+            reason = ", ".join(self._status.get("problems", ())) or "no scan was usable"
+            raise RecordingError(f"{self._source.path}: the SLAM never began ({reason})")
+        poses = [] if self._path is None else self._path.poses
+        keyframe_ns = np.array([stamp_of(one) for one in poses], np.int64)
+        keyframes = np.array([_four(one.pose) for one in poses]).reshape(-1, 4)
+        way = np.array(self._odometry)
+        trajectory = corrected(
+            np.array(self._times, np.int64), way[:, :3], way[:, 3:], keyframe_ns, keyframes,
+            self._tilt,
+        )  # fmt: skip
+        return Outcome(
+            self.channels, trajectory, self._scans, self._mount, heard, lasted_s, cpu_s,
+            self._status, self._states, self._problems,
+        )  # fmt: skip
+
+    def _mount(self, frame: str) -> Mount:
+        level = self._options.level_mount
+        found = self._joints.mount_of(frame)
+        return found if level is None else Mount(np.array(level), found.attitude)
+
+
+def _four(pose: Any) -> tuple[float, float, float, float]:
+    p, q = pose.position, pose.orientation
+    return p.x, p.y, p.z, 2.0 * math.atan2(q.z, q.w)

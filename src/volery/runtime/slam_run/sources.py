@@ -1,0 +1,148 @@
+"""Messages of any log: MCAP, ROS 1 bag, ROS 2 bag, or a scanner's text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from volery.bridges.logs.decoding import LogDecoder
+from volery.bridges.logs.reader import summarize
+from volery.bridges.logs.records import LogRecord, LogTopic, LogWalk, log_format
+from volery.bridges.logs.text_layout import TextLayout
+from volery.bridges.logs.text_scans import TextScans
+from volery.core.errors import GraphError, RecordingError
+
+_ROS2_FORMS = {"msg": "ros2msg", "idl": "ros2idl"}
+
+
+class Heard(NamedTuple):
+    """A message of a log."""
+
+    topic: str
+    time_ns: int
+    message: Any
+
+
+@dataclass
+class LogSource:
+    """A log with messages of types; afterwards `trouble` says what was wrong, if anything."""
+
+    path: Path
+    topics: dict[str, str]
+    """Types by topic."""
+    trouble: str = ""
+    refused: int = 0
+    """Messages that cannot be read."""
+    _walk: Any = field(default=None, repr=False)
+
+    def messages(self, wanted: set[str]) -> Iterator[Heard]:
+        """Those of some topics in the order of the file."""
+        decoder = LogDecoder()
+        walk = self._walk(self.path)
+        for record in walk:
+            if record.topic.topic not in wanted:
+                continue
+            try:
+                message = decoder.decode(record).message
+            except GraphError as error:
+                self.refused += 1
+                self.trouble = self.trouble or f"{record.topic.topic}: {error}"
+                continue
+            yield Heard(record.topic.topic, record.time_ns, message)
+        self.trouble = self.trouble or getattr(walk, "trouble", "")
+
+
+@dataclass
+class TextSource:
+    """A scanner's text log; its topics are those that `volery convert` writes."""
+
+    path: Path
+    layout: TextLayout
+    trouble: str = ""
+    refused: int = 0
+    """Lines left out."""
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """Types by topic."""
+        uav = f"/{self.layout.uav}"
+        found = {
+            f"{uav}/{self.layout.topic}": "sensor_msgs/msg/LaserScan",
+            "/tf_static": "tf2_msgs/msg/TFMessage",
+        }
+        if self.layout.odometry or self.layout.wheels:
+            found[f"{uav}/odom"] = "nav_msgs/msg/Odometry"
+        return found
+
+    def messages(self, wanted: set[str]) -> Iterator[Heard]:
+        """Those of some topics in the order of the lines."""
+        scans = TextScans(self.path, self.layout)
+        for published in scans:
+            if published.topic in wanted:
+                yield Heard(published.topic, published.time_ns, published.message)
+        self.refused = scans.left_out
+        if scans.left_out:
+            self.trouble = f"{scans.left_out:,} lines left out; {scans.trouble}"
+
+
+def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | TextSource:
+    """The log at a path: text where a layout is given.
+
+    Raises
+    ------
+    RecordingError
+        There is no such log, or it is none.
+
+    """
+    if layout is not None:
+        return TextSource(path, layout)
+    if path.is_dir() or path.suffix == ".db3":
+        return LogSource(path, _ros2_topics(path), _walk=_Ros2Walk)
+    try:
+        log_format(path)
+    except RecordingError as error:
+        if not path.is_file() or path.suffix in (".mcap", ".bag") or path.stat().st_size == 0:
+            raise
+        raise RecordingError(f"{error}; a scanner's text log needs --layout") from None
+    summary = summarize(path)
+    return LogSource(path, {t.topic: t.msgtype for t in summary.topics}, _walk=LogWalk)
+
+
+def _ros2_topics(path: Path) -> dict[str, str]:
+    from rosbags.rosbag2 import Reader
+
+    try:
+        with Reader(path) as reader:
+            return {one.topic: one.msgtype for one in reader.connections}
+    except Exception as error:  # whatever the reader makes of a folder that is no bag
+        raise RecordingError(f"{path}: cannot be read as a ROS 2 bag: {error}") from None
+
+
+class _Ros2Walk:
+    """The records of a ROS 2 bag, a folder or its SQLite file."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.trouble = ""
+
+    def __iter__(self) -> Iterator[LogRecord]:
+        from rosbags.rosbag2 import Reader
+
+        topics: dict[int, LogTopic] = {}
+        try:
+            with Reader(self._path) as reader:
+                for connection, time_ns, data in reader.messages():
+                    if connection.id not in topics:
+                        form = _ROS2_FORMS.get(connection.msgdef.format.name.lower(), "")
+                        topics[connection.id] = LogTopic(
+                            connection.topic,
+                            connection.msgtype,
+                            connection.msgdef.data,
+                            "cdr",
+                            form,
+                        )
+                    yield LogRecord(topics[connection.id], time_ns, bytes(data), 0)
+        except Exception as error:  # whatever the reader makes of damaged bytes
+            self.trouble = f"cut off or damaged: {error}"

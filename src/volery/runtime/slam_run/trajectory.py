@@ -1,0 +1,112 @@
+"""The whole way in the map, as it is known at the end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core import rotations
+from volery.core.errors import DataFileError
+
+Array = NDArray[np.float64]
+Times = NDArray[np.int64]
+
+_NEAR_NS = 100_000_000
+"""A keyframe and the odometry of its time."""
+
+
+class Trajectory(NamedTuple):
+    """Poses in the map."""
+
+    time_ns: Times
+    """(N,) as in the log."""
+    clock_ns: Times
+    """(N,) without the steps of a clock that was set back; rising."""
+    position: Array
+    """(N, 3) m"""
+    attitude: Array
+    """(N, 4) x y z w"""
+
+    @property
+    def length_m(self) -> float:
+        """Over ground."""
+        return float(np.hypot(*np.diff(self.position[:, :2], axis=0).T).sum())
+
+
+def rising(time_ns: Times) -> Times:
+    """Times without the steps back in them."""
+    steps = np.diff(time_ns, prepend=time_ns[:1])
+    back = np.where(steps < 0, 1_000_000 - steps, 0)
+    return np.asarray(time_ns + np.cumsum(back))
+
+
+def rows_of_keyframes(keyframe_ns: Times, time_ns: Times) -> NDArray[np.int64]:
+    """Rows (K,) of the odometry's times (N,) that keyframes stand at, in order; -1: none."""
+    rows, at = np.full(len(keyframe_ns), -1, np.int64), 0
+    for k, wanted in enumerate(keyframe_ns):
+        near = np.flatnonzero(np.abs(time_ns[at:] - wanted) < _NEAR_NS)
+        if len(near):
+            ends = np.flatnonzero(np.diff(near) > 1)  # of the first time that it was then
+            first = near[: ends[0] + 1] if len(ends) else near
+            best = first[np.argmin(np.abs(time_ns[at + first] - wanted))]
+            rows[k] = at = at + int(best)
+    return rows
+
+
+def corrected(
+    time_ns: Times,
+    position: Array,
+    attitude: Array,
+    keyframe_ns: Times,
+    keyframes: Array,
+    tilt: Array,
+) -> Trajectory:
+    """The odometry's way, laid onto the keyframes' poses (K, 4) x, y, z, yaw in the map.
+
+    Between two keyframes it goes from the one's correction to the other's. tilt: (4,) of the
+    odometry's frame in the map, whose heading does not count.
+    """
+    position, attitude = rotations.rotate(tilt, position), rotations.multiply(tilt, attitude)
+    rows = rows_of_keyframes(keyframe_ns, time_ns)
+    kept = np.flatnonzero(rows >= 0)
+    rows, keyframes = rows[kept], keyframes[kept]
+    clock = rising(time_ns)
+    if not len(rows):
+        return Trajectory(time_ns, clock, position, attitude)
+    turns = keyframes[:, 3] - rotations.yaw_of(attitude[rows])
+    after = np.clip(np.searchsorted(rows, np.arange(len(clock)), side="right"), 1, len(rows))
+    one, other = after - 1, np.minimum(after, len(rows) - 1)
+    span = np.maximum(clock[rows[other]] - clock[rows[one]], 1)
+    share = np.clip((clock - clock[rows[one]]) / span, 0.0, 1.0)[:, None]
+    laid = [_laid(position, attitude, rows[k], keyframes[k], turns[k]) for k in (one, other)]
+    places = laid[0][0] + share * (laid[1][0] - laid[0][0])
+    sign = np.where((laid[0][1] * laid[1][1]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+    turned = rotations.normalize((1.0 - share) * laid[0][1] + share * sign * laid[1][1])
+    return Trajectory(time_ns, clock, places, turned)
+
+
+def _laid(
+    position: Array, attitude: Array, rows: NDArray[np.int64], keyframes: Array, turns: Array
+) -> tuple[Array, Array]:
+    """All poses (N,), each carried along with its keyframe."""
+    about = np.zeros((len(turns), 4))
+    about[:, 2], about[:, 3] = np.sin(0.5 * turns), np.cos(0.5 * turns)
+    moved = rotations.rotate(about, position - position[rows]) + keyframes[:, :3]
+    return moved, rotations.multiply(about, attitude)
+
+
+def write_tum(path: Path, trajectory: Trajectory) -> None:
+    """Write it as text: a pose a line, `timestamp x y z qx qy qz qw`, s and m."""
+    try:
+        with path.open("w", encoding="utf-8") as file:
+            file.write("# timestamp x y z qx qy qz qw\n")
+            for when, place, turn in zip(
+                trajectory.time_ns, trajectory.position, trajectory.attitude, strict=True
+            ):
+                numbers = " ".join(f"{number:.6f}" for number in (*place, *turn))
+                file.write(f"{when // 10**9}.{when % 10**9:09d} {numbers}\n")
+    except OSError as error:
+        raise DataFileError(f"{path}: the path cannot be written: {error.strerror}") from None
