@@ -35,11 +35,13 @@ _JUMP_BACK_NS = NS_PER_S // 2
 class Surroundings:
     """Takes in scans, joint angles and ranges, in the frame of the odometry."""
 
-    def __init__(self, mounts: dict[str, Any], cell_m: float, scan_rate_hz: float) -> None:
+    def __init__(
+        self, mounts: dict[str, Any], cell_m: float, scan_rates_hz: dict[str, float]
+    ) -> None:
         self.motion, self._nod = MotionHistory(), NodHistory()
         self._grid = LocalGrid(cell_m, _SHAPE)
         self._makers = {name: RayMaker(mount, Beams()) for name, mount in mounts.items()}
-        self._period_ns = round(NS_PER_S / scan_rate_hz)
+        self._period_ns = {name: round(NS_PER_S / hz) for name, hz in scan_rates_hz.items()}
         self._repeats = {name: ScanRepeats() for name in mounts}
         self._stuck: set[str] = set()
         """LIDARs that repeat themselves."""
@@ -101,7 +103,8 @@ class Surroundings:
         self._stuck.discard(name)
         self._heard_ns[name] = stamp
         taken = self._taken_ns.get(name)
-        if taken is not None and taken <= stamp < taken + self._period_ns - NS_PER_S // 200:
+        due = 0 if taken is None else taken + self._period_ns[name] - NS_PER_S // 200
+        if taken is not None and taken <= stamp < due:
             return
         newest = self.motion.newest
         if newest is None:

@@ -61,7 +61,7 @@ class Slam(Node):
 
     """
 
-    _PLAIN = ("_nod", "_omega", "_told", "_taken_ns", "_odom_ns", "_refused", "_resets")
+    _PLAIN = ("_nod", "_omega", "_told", "_taken_ns", "_odom_ns", "_refused", "_resets", "_shown")
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)
@@ -96,6 +96,8 @@ class Slam(Node):
         self._odom_ns = 0
         self._refused = self._resets = 0
         self._told = ""
+        self._shown = (0, 0)
+        """Keyframes and closures of the path that was told last."""
 
     def _open(self, pose_period_s: float) -> None:
         self._odom = self.create_publisher(Odometry, "slam/odom", 5)
@@ -227,7 +229,9 @@ class Slam(Node):
         if text != self._told:
             self._told = text
             self._status.publish(String(text))
-        if self._path.wanted and way.frames:
+        shown = (len(way.frames), way.closures)
+        if shown != self._shown and way.frames:
+            self._shown = shown
             times = [frame.time_ns for frame in way.frames]
             self._path.publish(reports.path(t.time_ns, times, way.poses))
 
