@@ -9,6 +9,7 @@ magnetometer, barometer) is told whole or not at all.
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -30,6 +31,7 @@ _GENERIC, _NO_AUTOPILOT = 0, 8
 _LOCK_STEP = 1
 """Of HIL_ACTUATOR_CONTROLS: PX4 was built to take its time from the simulator."""
 _GAUSS_A_TESLA = 1e4
+_MOST_CM_S = 32767
 
 
 class Inertial(NamedTuple):
@@ -79,7 +81,7 @@ class HilLink:
     def __init__(self, system: int) -> None:
         self._codec = Codec(system, SIMULATOR)
         self._framer, self._parser = Framer(), Parser()
-        self._sequence = 0
+        self._numbers = itertools.count()  # drawn from in two threads
         self.locked = False
         """Whether PX4 has begun to answer in lock step, and is to be waited for from now on."""
 
@@ -111,8 +113,7 @@ class HilLink:
         return answers
 
     def _pack(self, message: object) -> bytes:
-        self._sequence = (self._sequence + 1) % 256
-        return self._codec.pack(message, self._sequence)
+        return self._codec.pack(message, next(self._numbers) % 256)
 
     def _sensor(self, time_us: int, sensed: Sensed) -> bytes:
         fields = ACCELEROMETER | GYROSCOPE
@@ -141,7 +142,10 @@ class HilLink:
 
     def _gps(self, time_us: int, fix: Fix) -> bytes:
         seen = math.isfinite(fix.latitude)
-        north, east, down = (round(100.0 * part) for part in ned_of_enu(fix.velocity))
+        north, east, down = (
+            min(max(round(100.0 * part), -_MOST_CM_S), _MOST_CM_S)
+            for part in ned_of_enu(fix.velocity)
+        )
         speed = round(math.hypot(north, east))
         course = round(math.degrees(math.atan2(east, north)) % 360.0 * 100.0) % 36000
         place = (fix.latitude, fix.longitude, fix.altitude) if seen else (0.0, 0.0, 0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from volery.graph.session import Gateway
@@ -16,10 +16,10 @@ _log = logging.getLogger(__name__)
 
 
 class Way(Protocol):
-    """What carries bytes to a PX4."""
+    """What carries bytes to a PX4; any thread may use it."""
 
     def send(self, data: bytes) -> None:
-        """Send frames."""
+        """Send frames; must not block."""
 
     def end(self) -> None:
         """End the connection."""
@@ -50,8 +50,9 @@ class HilSeat:
 
     def take(self, way: Way) -> Callable[[bytes], None]:
         """Let a new PX4 sit down; what it sends is to be given to the result."""
-        self._way = way
-        self._link = HilLink(self._system)
+        with self._meetings.lock:
+            self._way = way
+            self._link = HilLink(self._system)
         return self._hear
 
     def heartbeat(self) -> bytes:
@@ -60,19 +61,20 @@ class HilSeat:
 
     def leave(self, why: str) -> None:
         """The connection has ended; the rotors stop."""
-        if self._way is None:
-            return
-        self._way = None
-        self._meetings.turn_rotors(_STILL)
-        _log.warning("%s: %s", self.uav, why)
-        self._meetings.go_on()
+        with self._meetings.lock:
+            if self._way is None:
+                return
+            self._way = None
+            _log.warning("%s: %s", self.uav, why)
+            self._meetings.go_on(_STILL)
 
     def close(self) -> None:
         """Give everything back; a second time nothing happens."""
-        way, self._way = self._way, None
-        if way is not None:
-            self._meetings.turn_rotors(_STILL)
-            way.end()
+        with self._meetings.lock:
+            way, self._way = self._way, None
+            if way is not None:
+                self._meetings.turn_rotors(_STILL)
+                way.end()
         self._meetings.close()
 
     # --------------------------------------------------------------------------------- of meetings
@@ -101,12 +103,13 @@ class HilSeat:
 
     def _hear(self, data: bytes) -> None:
         for actuators in self._link.feed(data):
-            self._obey(actuators)
-            if actuators.time_ns >= self._meetings.time_ns:
-                self._meetings.go_on()
+            with self._meetings.lock:
+                if actuators.time_ns >= self._meetings.time_ns:
+                    self._meetings.go_on(_shares(actuators))
+                else:
+                    self._meetings.turn_rotors(_shares(actuators))
 
-    def _obey(self, actuators: Actuators) -> None:
-        armed = actuators.armed
-        self._meetings.turn_rotors(
-            [max(0.0, part) for part in actuators.controls] if armed else _STILL
-        )
+
+def _shares(actuators: Actuators) -> Sequence[float]:
+    """Shares of the rotors' full speed that are asked for."""
+    return [max(0.0, part) for part in actuators.controls] if actuators.armed else _STILL
