@@ -13,10 +13,8 @@ begins anew.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import math
-import socket
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
@@ -129,7 +127,6 @@ class _Seat(asyncio.DatagramProtocol):
         self.peer: Address | None = None
         self._motors = motors
         self._transport: asyncio.DatagramTransport | None = None
-        self._socket: socket.socket | None = None
         self._number = -1
         self._line = b""
         self._slow: dict[str, Any] = {}
@@ -141,10 +138,8 @@ class _Seat(asyncio.DatagramProtocol):
 
     def close(self) -> None:
         """Give everything back; a second time nothing happens."""
-        with self._meetings.lock:
-            if self.peer is not None:
-                self._meetings.turn_rotors([0.0] * len(self._motors))
-            self.peer = None
+        if self.peer is not None:
+            self._meetings.turn_rotors([0.0] * len(self._motors))
         self._meetings.close()
         if self._transport is not None:
             self._transport.close()
@@ -155,12 +150,12 @@ class _Seat(asyncio.DatagramProtocol):
         """As of `Pilot`."""
         self._slow.update({name: news[name] for name in _SLOW if name in news})
         state = _state_of({**self._slow, **news})
-        if self.peer is None or state is None:
+        if self.peer is None or self._transport is None or state is None:
             return False
         if self._begin_ns is None:
             self._begin_ns = time_ns - PERIOD_NS
         self._line = state_line((time_ns - self._begin_ns) / NS_PER_S, state)
-        self._send_line()
+        self._transport.sendto(self._line, self.peer)
         return True
 
     def begin_anew(self) -> None:
@@ -177,26 +172,12 @@ class _Seat(asyncio.DatagramProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """As of asyncio."""
         self._transport = cast(asyncio.DatagramTransport, transport)  # no such class in 3.11
-        self._socket = transport.get_extra_info("socket").dup()
-        self._socket.setblocking(False)
-
-    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
-        """As of asyncio."""
-        if self._socket is not None:
-            self._socket.close()
 
     def datagram_received(self, data: bytes, addr: Address) -> None:
         """As of asyncio."""
         servos = parse_servos(data)
-        if servos is not None:
-            with self._meetings.lock:
-                self._take(servos, addr)
-
-    def error_received(self, exc: Exception) -> None:
-        """As of asyncio: nobody listens at its address just now; its silence will tell."""
-        _log.debug("%s: %s", self.uav, exc)
-
-    def _take(self, servos: Servos, addr: Address) -> None:
+        if servos is None:
+            return
         if self.peer is None or servos.number < self._number:
             self._welcome(addr)
         if addr != self.peer:  # there is one already
@@ -206,24 +187,22 @@ class _Seat(asyncio.DatagramProtocol):
         else:
             self._obey(servos)
 
+    def error_received(self, exc: Exception) -> None:
+        """As of asyncio: nobody listens at its address just now; its silence will tell."""
+        _log.debug("%s: %s", self.uav, exc)
+
     def _welcome(self, peer: Address) -> None:
         self.peer, self._begin_ns, self._number = peer, None, -1
         _log.info("%s: an ArduPilot flies it", self.uav)
 
     def _repeat(self) -> None:
         """Say again what it has not heard."""
-        if self._meetings.waits:
-            self._send_line()
+        if self._meetings.waits and self._transport is not None:
+            self._transport.sendto(self._line, self.peer)
 
     def _obey(self, servos: Servos) -> None:
         self._number = servos.number
         self._meetings.go_on(shares(servos.pwm, self._motors))
-
-    def _send_line(self) -> None:
-        """In the thread of whoever has something to say; what is lost is asked for again."""
-        if self._socket is not None and self.peer is not None:
-            with contextlib.suppress(OSError):
-                self._socket.sendto(self._line, self.peer)
 
 
 def _state_of(news: News) -> State | None:

@@ -9,7 +9,6 @@ magnetometer, barometer) is told whole or not at all.
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import NamedTuple
 
@@ -81,7 +80,7 @@ class HilLink:
     def __init__(self, system: int) -> None:
         self._codec = Codec(system, SIMULATOR)
         self._framer, self._parser = Framer(), Parser()
-        self._numbers = itertools.count()  # drawn from in two threads
+        self._sequence = 0
         self.locked = False
         """Whether PX4 has begun to answer in lock step, and is to be waited for from now on."""
 
@@ -113,7 +112,8 @@ class HilLink:
         return answers
 
     def _pack(self, message: object) -> bytes:
-        return self._codec.pack(message, next(self._numbers) % 256)
+        self._sequence = (self._sequence + 1) % 256
+        return self._codec.pack(message, self._sequence)
 
     def _sensor(self, time_us: int, sensed: Sensed) -> bytes:
         fields = ACCELEROMETER | GYROSCOPE

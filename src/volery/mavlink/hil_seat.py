@@ -16,10 +16,10 @@ _log = logging.getLogger(__name__)
 
 
 class Way(Protocol):
-    """What carries bytes to a PX4; any thread may use it."""
+    """What carries bytes to a PX4."""
 
     def send(self, data: bytes) -> None:
-        """Send frames; must not block."""
+        """Send frames."""
 
     def end(self) -> None:
         """End the connection."""
@@ -50,9 +50,8 @@ class HilSeat:
 
     def take(self, way: Way) -> Callable[[bytes], None]:
         """Let a new PX4 sit down; what it sends is to be given to the result."""
-        with self._meetings.lock:
-            self._way = way
-            self._link = HilLink(self._system)
+        self._way = way
+        self._link = HilLink(self._system)
         return self._hear
 
     def heartbeat(self) -> bytes:
@@ -61,20 +60,18 @@ class HilSeat:
 
     def leave(self, why: str) -> None:
         """The connection has ended; the rotors stop."""
-        with self._meetings.lock:
-            if self._way is None:
-                return
-            self._way = None
-            _log.warning("%s: %s", self.uav, why)
-            self._meetings.go_on(_STILL)
+        if self._way is None:
+            return
+        self._way = None
+        _log.warning("%s: %s", self.uav, why)
+        self._meetings.go_on(_STILL)
 
     def close(self) -> None:
         """Give everything back; a second time nothing happens."""
-        with self._meetings.lock:
-            way, self._way = self._way, None
-            if way is not None:
-                self._meetings.turn_rotors(_STILL)
-                way.end()
+        way, self._way = self._way, None
+        if way is not None:
+            self._meetings.turn_rotors(_STILL)
+            way.end()
         self._meetings.close()
 
     # --------------------------------------------------------------------------------- of meetings
@@ -103,11 +100,10 @@ class HilSeat:
 
     def _hear(self, data: bytes) -> None:
         for actuators in self._link.feed(data):
-            with self._meetings.lock:
-                if actuators.time_ns >= self._meetings.time_ns:
-                    self._meetings.go_on(_shares(actuators))
-                else:
-                    self._meetings.turn_rotors(_shares(actuators))
+            if actuators.time_ns >= self._meetings.time_ns:
+                self._meetings.go_on(_shares(actuators))
+            else:
+                self._meetings.turn_rotors(_shares(actuators))
 
 
 def _shares(actuators: Actuators) -> Sequence[float]:

@@ -3,9 +3,6 @@
 At each meeting the autopilot is told what is new of its UAV, and the simulation stands still until
 `go_on`. What it asks of the rotors before is in force from the next physics step. One that is
 waited for and stays silent ends the run with an error, or is given up with a warning.
-
-It is told in the simulation's own thread, which would only wait meanwhile for another to do so;
-its answers come in the thread of the loop. `lock` keeps the two apart.
 """
 
 from __future__ import annotations
@@ -13,8 +10,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import threading
-import time
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
@@ -33,8 +28,6 @@ _SPEEDS = "std_msgs/msg/Float32MultiArray"
 _CLOCK = "rosgraph_msgs/msg/Clock"
 _MARGIN_S = 5.0
 """By which the simulation is more patient than a seat that gives its autopilot up by itself."""
-_LOOKS = 8
-"""Times that the patience with a silent autopilot is looked after while it lasts."""
 _log = logging.getLogger(__name__)
 
 News = Mapping[str, Any]
@@ -54,7 +47,7 @@ PATIENCE = Patience()
 
 
 class Pilot(Protocol):
-    """The autopilot's side; called with the lock of its meetings held."""
+    """The autopilot's side."""
 
     def tell(self, time_ns: int, news: News) -> bool:
         """Tell it of a meeting; whether its answer is waited for: it calls `go_on`."""
@@ -67,7 +60,7 @@ class Pilot(Protocol):
 
 
 class Meetings:
-    """Joins the lock step for `uav` at once; `close` leaves it. Make it in a running loop.
+    """Joins the lock step for `uav` at once; `close` leaves it.
 
     kind: `px4` or another word for names. topics: message types by topic below the UAV's name.
     """
@@ -89,10 +82,7 @@ class Meetings:
         self._rotors = f"/{uav}/rotor_speeds"
         meeting = f"/volery/lock_step/{kind}_of_{uav}"
         self._done = f"{meeting}/done"
-        self.lock = threading.RLock()
-        """Held while the autopilot is told; whoever else touches what `Pilot` does holds it too."""
         self._pending = False
-        self._since_s = 0.0
         self._alarm: asyncio.TimerHandle | None = None
         self._time_ns = -1
         self._boxes: dict[str, Mailbox] = {
@@ -104,10 +94,8 @@ class Meetings:
         self._clock = message_type(_CLOCK)
         self._session.advertise(self._rotors, _SPEEDS)
         self._session.advertise(self._done, _CLOCK)
-        self._go = self._session.subscribe(f"{meeting}/go", _CLOCK, depth=1, wake=self._meet)
+        self._go = self._session.subscribe(f"{meeting}/go", _CLOCK, depth=1, wake=self._wake)
         self._join(f"{kind}_of_{uav}", period_ns)
-        if patience.drops:
-            self._look()
 
     @property
     def time_ns(self) -> int:
@@ -125,20 +113,20 @@ class Meetings:
 
     def go_on(self, shares: Sequence[float] | None = None) -> None:
         """End the meeting, `shares` as of `turn_rotors`; without a meeting only those are asked."""
-        asked = () if shares is None else ((self._rotors, self._asked(shares)),)
-        with self.lock:
-            ends, self._pending = self._pending, False
-            done = (self._done, self._clock(clock=time_from_ns(self._time_ns)))
-            self._publish(*asked, *((done,) if ends else ()))
+        if self._alarm is not None:
+            self._alarm.cancel()
+            self._alarm = None
+        messages = [] if shares is None else [(self._rotors, self._asked(shares))]
+        if self._pending:
+            self._pending = False
+            messages.append((self._done, self._clock(clock=time_from_ns(self._time_ns))))
+        self._publish(*messages)
 
     def close(self) -> None:
         """Leave the lock step and the graph; a second time nothing happens."""
         if self._alarm is not None:
             self._alarm.cancel()
         self._session.close()
-
-    def _asked(self, shares: Sequence[float]) -> Any:
-        return self._speeds(layout=self._layout, data=np.array(shares, np.float32))
 
     def _join(self, name: str, period_ns: int) -> None:
         request = zero_message(f"{_JOIN}_Request")
@@ -150,34 +138,25 @@ class Meetings:
         request.restarts = True
         self._session.call("/volery/join_lock_step", request, Reply(_answered, _answered))
 
+    def _wake(self) -> None:
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self._meet)
+
     def _meet(self) -> None:
-        """In the simulation's thread: a meeting has begun."""
-        with self.lock:
-            for published in self._go.take():
-                clock = published.message.clock
-                time_ns = clock.sec * NS_PER_S + clock.nanosec
-                if time_ns <= self._time_ns:
-                    self._pilot.begin_anew()
-                self._time_ns, self._pending = time_ns, True
-                self._since_s = time.monotonic()
-                if not self._pilot.tell(time_ns, self._news()):
-                    self.go_on()
+        for published in self._go.take():
+            clock = published.message.clock
+            time_ns = clock.sec * NS_PER_S + clock.nanosec
+            if time_ns <= self._time_ns:
+                self._pilot.begin_anew()
+            self._time_ns, self._pending = time_ns, True
+            if not self._pilot.tell(time_ns, self._news()):
+                self.go_on()
+            elif self._pending and self._patience.drops:
+                self._alarm = self._loop.call_later(self._patience.timeout_s, self._give_up)
 
     def _news(self) -> News:
         found = {name: box.take() for name, box in self._boxes.items()}
         return {name: published[-1].message for name, published in found.items() if published}
-
-    def _look(self) -> None:
-        """Give the autopilot up once it has been silent for long enough; look again until then."""
-        with self.lock:
-            silent_s = time.monotonic() - self._since_s if self._pending else 0.0
-            if silent_s >= self._patience.timeout_s:
-                self._give_up()
-                silent_s = 0.0
-        most_s = self._patience.timeout_s / _LOOKS
-        self._alarm = self._loop.call_later(
-            min(most_s, self._patience.timeout_s - silent_s), self._look
-        )
 
     def _give_up(self) -> None:
         _log.warning(
@@ -187,6 +166,9 @@ class Meetings:
         )
         self._pilot.drop()
         self.go_on()
+
+    def _asked(self, shares: Sequence[float]) -> Any:
+        return self._speeds(layout=self._layout, data=np.array(shares, np.float32))
 
     def _publish(self, *messages: tuple[str, Any]) -> None:
         with contextlib.suppress(GraphError):  # the simulation is closing

@@ -13,9 +13,6 @@ reset of the simulation all are sent away, because none can go back in time.
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import socket
-import threading
 from collections.abc import Callable
 
 from volery.core.errors import BridgeError
@@ -97,45 +94,15 @@ class _Connection(asyncio.Protocol):
     def __init__(self, seat: HilSeat) -> None:
         self._seat = seat
         self._hear: Callable[[bytes], None] = _ignore
-        self._loop = asyncio.get_running_loop()
-        self._socket: socket.socket | None = None
-        self._handed = 0
-        """Pieces that wait for the loop to write them."""
-        self._counts = threading.Lock()
 
     def send(self, data: bytes) -> None:
-        """As of `Way`: at once, or by the loop what the connection does not take now."""
-        if self._handed == 0 and self._transport.get_write_buffer_size() == 0:
-            data = data[self._send_now(data) :]
-        if data:
-            with self._counts:
-                self._handed += 1
-            self._tell_loop(self._write, data)
+        """As of `Way`."""
+        self._transport.write(data)
 
     def end(self) -> None:
         """As of `Way`."""
         self._hear = _ignore
-        self._tell_loop(self._transport.abort)
-
-    def _send_now(self, data: bytes) -> int:
-        """How many bytes the connection has taken; all of them where it has ended."""
-        if self._socket is None:
-            return len(data)
-        try:
-            return self._socket.send(data)
-        except BlockingIOError:
-            return 0
-        except OSError:
-            return len(data)
-
-    def _write(self, data: bytes) -> None:
-        self._transport.write(data)
-        with self._counts:
-            self._handed -= 1
-
-    def _tell_loop(self, action: Callable[..., object], *arguments: object) -> None:
-        with contextlib.suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(action, *arguments)
+        self._transport.abort()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """As of asyncio."""
@@ -144,10 +111,7 @@ class _Connection(asyncio.Protocol):
         if self._seat.taken:
             transport.abort()
             return
-        link = transport.get_extra_info("socket")
-        tend(link)
-        self._socket = link.dup()
-        self._socket.setblocking(False)
+        tend(transport.get_extra_info("socket"))
         self._hear = self._seat.take(self)
 
     def data_received(self, data: bytes) -> None:
@@ -158,9 +122,6 @@ class _Connection(asyncio.Protocol):
         """As of asyncio."""
         if self._hear is not _ignore:
             self._seat.leave("its PX4 has left")
-        own, self._socket = self._socket, None
-        if own is not None:
-            own.close()
 
 
 def _ignore(_data: bytes) -> None:

@@ -9,8 +9,6 @@ simulation must run in real time; a PX4 that takes its time from the simulator i
 from __future__ import annotations
 
 import asyncio
-import contextlib
-from collections.abc import Callable
 
 from volery.core.errors import BridgeError
 from volery.graph.session import Gateway
@@ -36,7 +34,6 @@ class Px4Serial:
         self._patience = patience
         self._line: SerialLine | None = None
         self._seat: HilSeat | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
         self._beats: asyncio.Task[None] | None = None
 
     @property
@@ -61,7 +58,6 @@ class Px4Serial:
         free = [uav for uav in uavs if uav not in flown]
         if not free:
             raise BridgeError(f"{self._path}: no UAV with an IMU is left for a PX4 there")
-        self._loop = asyncio.get_running_loop()
         self._line = SerialLine(self._path, self._baud, self._take)
         self._seat = HilSeat(gateway, free[0], uavs.index(free[0]) + 1, self._patience)
         self._hear = self._seat.take(self)
@@ -75,22 +71,15 @@ class Px4Serial:
         if self._seat is not None:
             self._seat.close()
             self._seat = None
-        self._close_line()
+        self.end()
 
     def send(self, data: bytes) -> None:
         """As of `Way`."""
-        self._tell_loop(lambda: None if self._line is None else self._line.send(data))
+        if self._line is not None:
+            self._line.send(data)
 
     def end(self) -> None:
         """As of `Way`."""
-        self._tell_loop(self._close_line)
-
-    def _tell_loop(self, action: Callable[[], None]) -> None:
-        with contextlib.suppress(RuntimeError):  # the loop has ended
-            if self._loop is not None:
-                self._loop.call_soon_threadsafe(action)
-
-    def _close_line(self) -> None:
         if self._line is not None:
             self._line.close()
             self._line = None
