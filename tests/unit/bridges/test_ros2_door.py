@@ -285,6 +285,17 @@ def test_parameters_are_set_and_that_is_told(world, other):
     assert (event.node, event.changed_parameters[0].name) == (NODE, "height_m")
 
 
+@pytest.mark.parametrize("node", [NODE, "/volery", "/uav1/quiet"])
+@pytest.mark.parametrize("base", ["SetParameters", "SetParametersAtomically"])
+def test_simulated_time_is_what_launch_files_may_ask_for_and_nothing_else(world, other, base, node):
+    for value in (True, False):
+        wanted = [parameter_message("use_sim_time", value)]
+        response = parameters(other, base, node=node, parameters=wanted)
+        (result,) = getattr(response, "results", None) or [response.result]
+        assert result.successful is value
+        assert ("read-only" in result.reason) is not value
+
+
 def test_parameters_are_set_all_or_none(world, other):
     before = world.graph.parameters.get(NODE, "height_m").value
     wanted = [parameter_message("height_m", 9.0), parameter_message("name", "y")]
