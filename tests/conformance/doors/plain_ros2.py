@@ -4,9 +4,12 @@ It runs as a process of its own and does what comes as lines of JSON on stdin; w
 stdout. Its types are written by hand in the package's IDL, their bytes come from the tests.
 
     {"op": "subscribe", "topic": "/chatter", "type": "std_msgs/msg/String"}
+
+What it has it gives up with `{"op": "leave"}`, and can be somebody else then.
 """
 
 import base64
+import ctypes
 import json
 import struct
 import sys
@@ -14,6 +17,7 @@ import threading
 import time
 from dataclasses import dataclass
 
+from cyclonedds.__library__ import library_path
 from cyclonedds.core import (
     InstanceState,
     Policy,
@@ -34,7 +38,7 @@ from cyclonedds.util import duration
 CONFIG = """<CycloneDDS><Domain id="any">
   <General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>
     <AllowMulticast>false</AllowMulticast></General>
-  <Discovery><LeaseDuration>1 s</LeaseDuration><SPDPInterval>500 ms</SPDPInterval>
+  <Discovery><LeaseDuration>{lease} s</LeaseDuration><SPDPInterval>500 ms</SPDPInterval>
     <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
     <Peers><Peer address="localhost"/></Peers></Discovery>
 </Domain></CycloneDDS>"""
@@ -121,13 +125,26 @@ def qos(*, reliable=True, latched=False, user_data=b""):
 
 
 class Peer:
-    def __init__(self, domain_id):
-        self.domain = Domain(domain_id, CONFIG)
-        self.participant = DomainParticipant(domain_id)
-        self.writers, self.readers, self.told = {}, [], threading.Lock()
+    def __init__(self, domain_id, lease_s):
+        self.domain_id = domain_id
+        self.domain = Domain(domain_id, CONFIG.format(lease=lease_s))
+        self.told = threading.Lock()
+        self.library = ctypes.CDLL(str(library_path))
+        self.join()
+
+    def join(self):
+        self.participant = DomainParticipant(self.domain_id)
+        self.writers, self.hearers, self.leaving = {}, [], False
         self.waitset = WaitSet(self.participant)
-        self.hearers = []
-        threading.Thread(target=self.listen, daemon=True).start()
+        self.listener = threading.Thread(target=self.listen, daemon=True)
+        self.listener.start()
+
+    def leave(self):
+        self.leaving = True
+        self.listener.join()
+        self.library.dds_delete(self.participant._ref)
+        self.join()
+        return True
 
     def tell(self, **fields):
         with self.told:
@@ -135,7 +152,7 @@ class Peer:
             sys.stdout.flush()
 
     def listen(self):
-        while True:
+        while not self.leaving:
             self.waitset.wait(duration(milliseconds=50))
             for reader, hear in tuple(self.hearers):
                 for sample in reader.take(100):
@@ -219,7 +236,7 @@ class Peer:
 
 
 def main():
-    peer = Peer(int(sys.argv[1]))
+    peer = Peer(int(sys.argv[1]), float(sys.argv[2]))
     peer.tell(ready=True)
     for line in sys.stdin:
         fields = json.loads(line)
