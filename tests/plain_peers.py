@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import json
 import os
 import queue
@@ -26,6 +27,7 @@ class PlainPeer:
     def __init__(self, lease_s):
         self.lease_s = lease_s
         self.hear = None
+        self._ended = False
         self._done = queue.Queue()
         self._process = subprocess.Popen(
             [sys.executable, str(_PROGRAM), str(DOMAIN), str(lease_s)],
@@ -59,25 +61,27 @@ class PlainPeer:
         """Have it go on."""
         os.kill(self._process.pid, signal.SIGCONT)
 
-    @property
-    def lives(self):
-        """Whether it runs."""
-        return self._process.poll() is None
-
     def give_back(self):
         """Let others have it, if it lives."""
         self.hear = None
-        if self.lives and self not in _idle[self.lease_s]:
-            self.go_on()
+        if self._ended or self in _idle[self.lease_s]:
+            return
+        self.go_on()
+        try:
             self.do("leave")
-            _idle[self.lease_s].append(self)
+        except (queue.Empty, OSError):
+            self.kill()
+            raise
+        _idle[self.lease_s].append(self)
 
     def kill(self):
         """End it without farewell."""
+        self._ended = True
         self._process.kill()
         self._process.wait()
         self._reader.join()
-        self._process.stdin.close()
+        with contextlib.suppress(BrokenPipeError):  # of an order that it never read
+            self._process.stdin.close()
         self._process.stdout.close()
 
 

@@ -56,6 +56,8 @@ def configuration(interfaces: Sequence[str] = (), lease_s: float = 10.0) -> str:
         f"<General><Interfaces>{chosen}</Interfaces>{how}</General>"
         f"<Discovery>{lease}{peers}</Discovery>"
         f'<Internal><SocketReceiveBufferSize max="{_RECEIVE_BUFFER}"/></Internal>'
+        # Else each malformed packet of whoever sends some would be printed on stderr.
+        "<Tracing><Verbosity>severe</Verbosity></Tracing>"
         "</Domain></CycloneDDS>"
     )
 
