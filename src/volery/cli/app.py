@@ -15,6 +15,7 @@ from volery.cli.options import (
     DoorsOption,
     DropOption,
     InterfaceOption,
+    MavlinkKeyOption,
     MiddlewareOption,
     PageCommand,
     Px4DirOption,
@@ -109,6 +110,7 @@ def run(
     px4_dir: Px4DirOption = None,
     autopilot_timeout: SilenceOption = 10.0,
     drop_silent: DropOption = False,
+    mavlink_key: MavlinkKeyOption = None,
 ) -> None:
     """Fly a scenario.
 
@@ -147,6 +149,7 @@ def run(
         px4_dir=px4_dir,
         autopilot_timeout_s=autopilot_timeout,
         drop_silent=drop_silent,
+        mavlink_key=mavlink_key,
     )
     code = fly(options)
     if code:

@@ -54,11 +54,15 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
     from volery.bridges.door_names import DoorKind, Terms, make_door
     from volery.bridges.doors import Doors
 
-    patience = _patience_of(options)
+    patience, key = _patience_of(options), _key_of(options)
     terms = Terms(options.allow_remote, options.token, options.domain_id, options.interfaces)
     more = {
         "comms": DoorKind(10200, _comms, "makes UAVs stations of a communication server"),
-        "mavlink": DoorKind(14540, _mavlink, "MAVLink over UDP, ports as PX4's simulations"),
+        "mavlink": DoorKind(
+            14540,
+            lambda address, terms: _mavlink(address, terms, key),
+            "MAVLink over UDP, ports as PX4's simulations",
+        ),
         "px4": DoorKind(
             4560,
             lambda address, terms: _px4(address, terms, patience),
@@ -75,9 +79,16 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
             lambda address, terms: _ardupilot(address, terms, patience, simulation),
             "real ArduCopters fly the UAVs, in lock step",
         ),
-        "mavlink-tcp": DoorKind(5760, _mavlink_tcp, "MAVLink over TCP, all UAVs on each link"),
+        "mavlink-tcp": DoorKind(
+            5760,
+            lambda address, terms: _mavlink_tcp(address, terms, key),
+            "MAVLink over TCP, all UAVs on each link",
+        ),
         "mavlink-serial": DoorKind(
-            57600, _mavlink_serial, "MAVLink on a serial line", on_line=True
+            57600,
+            lambda address, _terms: _mavlink_serial(address, key),
+            "MAVLink on a serial line",
+            on_line=True,
         ),
     }
     wanted = [make_door(text, terms, more) for text in options.doors]
@@ -96,22 +107,30 @@ def _comms(address: Address, terms: Terms) -> Door:
     return UavStations(*address, token=terms.token)
 
 
-def _mavlink(address: Address, terms: Terms) -> Door:
+def _mavlink(address: Address, terms: Terms, key: bytes | None) -> Door:
     from volery.mavlink.udp_door import MavlinkUdp
 
-    return MavlinkUdp(*address, anywhere=terms.anywhere)
+    return MavlinkUdp(*address, anywhere=terms.anywhere, key=key)
 
 
-def _mavlink_tcp(address: Address, terms: Terms) -> Door:
+def _mavlink_tcp(address: Address, terms: Terms, key: bytes | None) -> Door:
     from volery.mavlink.tcp_door import MavlinkTcp
 
-    return MavlinkTcp(*address, anywhere=terms.anywhere)
+    return MavlinkTcp(*address, anywhere=terms.anywhere, key=key)
 
 
-def _mavlink_serial(address: Address, _terms: Terms) -> Door:
+def _mavlink_serial(address: Address, key: bytes | None) -> Door:
     from volery.mavlink.serial_door import MavlinkSerial
 
-    return MavlinkSerial(*address)
+    return MavlinkSerial(*address, key=key)
+
+
+def _key_of(options: RunOptions) -> bytes | None:
+    if options.mavlink_key is None:
+        return None
+    from volery.mavlink.signing import key_of
+
+    return key_of(options.mavlink_key)
 
 
 def _px4(address: Address, terms: Terms, patience: Patience) -> Door:

@@ -58,6 +58,8 @@ class RunOptions:
     """Wall time that an autopilot in lock step may be silent ..."""
     drop_silent: bool = False
     """... and whether it is then waited for no more; else the run ends."""
+    mavlink_key: Path | None = None
+    """File with the text that signs MAVLink."""
 
 
 class _StoppedError(Exception):

@@ -43,6 +43,10 @@ SilenceOption = Annotated[
     float,
     typer.Option(min=0.1, help="Wall seconds that an autopilot in lock step may be silent."),
 ]
+MavlinkKeyOption = Annotated[
+    Path | None,
+    typer.Option(help="File with a text whose SHA-256 signs MAVLink; what is unsigned counts not."),
+]
 DropOption = Annotated[
     bool,
     typer.Option("--drop-silent", help="Go on without a silent autopilot; else the run ends."),

@@ -6,7 +6,7 @@ import itertools
 import threading
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -116,11 +116,10 @@ def array_bytes(message: Any) -> int:
     What makes messages large lies there; the rest is small beside the limit.
     """
     size = 0
-    for field in fields(message):
-        value = getattr(message, field.name)
+    for name, value in vars(message).items():
         if isinstance(value, np.ndarray):
             size += value.nbytes
-        elif isinstance(value, str | bytes | list | Rows) and not field.name.startswith("__"):
+        elif isinstance(value, str | bytes | list | Rows) and not name.startswith("__"):
             size += len(value)
         elif is_dataclass(value):
             inner = vars(value).values()

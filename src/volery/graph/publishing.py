@@ -9,6 +9,7 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -367,6 +368,7 @@ def _fixed_frame(parent: str, child: str) -> TransformStamped:
     return TransformStamped(header(0, parent), child, Transform(Vector3(0.0, 0.0, 0.0), _IDENTITY))
 
 
+@lru_cache(maxsize=256)
 def _diagonal(variance: float) -> Array:
     return _read_only(np.diag([variance] * 3).reshape(9))
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import itertools
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -186,17 +186,28 @@ class Session:
 
     def publish(self, topic: str, message: Any) -> None:
         """Publish a message of the announced type; its arrays must not be written to any more."""
+        self.publish_all(((topic, message),))
+
+    def publish_all(self, messages: Sequence[tuple[str, Any]]) -> None:
+        """Like `publish`, of messages by topic that are taken in together, in their order."""
+        known = [(self._publisher(topic), message) for topic, message in messages]
+
+        def publish() -> None:
+            for publisher, message in known:
+                publisher.check(message)
+                topic = publisher.topic
+                self._note(topic)
+                self._watch(Taken(self.name, "publish", topic, publisher.msgtype, message))
+                publisher.publish_posted(message)
+
+        if known:
+            self._gateway.post(publish)
+
+    def _publisher(self, topic: str) -> Publisher:
         publisher = self._publishers.get(topic)
         if publisher is None:
             raise GraphError(f"{self.name} has not advertised '{topic}'")
-
-        def publish() -> None:
-            publisher.check(message)
-            self._note(topic)
-            self._watch(Taken(self.name, "publish", topic, publisher.msgtype, message))
-            publisher.publish_posted(message)
-
-        self._gateway.post(publish)
+        return publisher
 
     def subscribe(
         self,

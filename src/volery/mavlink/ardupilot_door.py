@@ -4,9 +4,10 @@
         doors.open(ArdupilotDoor(rotors))     # 9002 + 10 i; `arducopter --model JSON -I i` speaks
         simulation.run(speed=1.0)
 
-Every 2 ms of simulated time each ArduPilot is told the state of its UAV, and the simulation waits
-for the outputs that it answers with. Who is silent ends the run or is given up, see `Patience`. One
-that was restarted counts its frames from 0 again: it is met anew, with a clock that begins anew.
+Every 1.25 ms of simulated time each ArduPilot is told the state of its UAV, and the simulation
+waits for the outputs that it answers with. Who is silent ends the run or is given up, see
+`Patience`. One that was restarted counts its frames from 0 again: it is met anew, with a clock that
+begins anew.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from volery.core.errors import BridgeError
 from volery.core.listening import check_address
 from volery.graph.session import Gateway
 from volery.mavlink.json_frames import (
+    STATE_HZ,
     Rotor,
     Servos,
     State,
@@ -38,8 +40,7 @@ from volery.mavlink.vehicle import Vector
 PORT = 9002
 PORT_STEP = 10
 """ArduPilot's instances shift all their ports by this."""
-PERIOD_NS = 2_000_000
-"""500 Hz: above ArduCopter's loop of 400 Hz, as its interface asks, and whole physics steps."""
+PERIOD_NS = NS_PER_S // STATE_HZ
 _TRUTH = "ground_truth/odom"
 _TOPICS = {
     "imu": "sensor_msgs/msg/Imu",
@@ -201,8 +202,7 @@ class _Seat(asyncio.DatagramProtocol):
 
     def _obey(self, servos: Servos) -> None:
         self._number = servos.number
-        self._meetings.turn_rotors(shares(servos.pwm, self._motors))
-        self._meetings.go_on()
+        self._meetings.go_on(shares(servos.pwm, self._motors))
 
 
 def _state_of(news: News) -> State | None:

@@ -2,18 +2,19 @@
 
 A frame counts where its start, its length, its message's id and its checksum agree; else the search
 goes on with the next byte, so that nothing that is whole gets lost behind noise. Both generations
-of frames are known; signatures are passed over.
+of frames are known; signatures are not looked at here.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from volery.mavlink.codec import check_of, dialect
 
 _SECOND, _FIRST = 0xFD, 0xFE
 """Start of a frame of MAVLink 2 and 1."""
-_SIGNED = 1
+SIGNED = 1
 """The only flag of a frame that may be set: others say that it cannot be understood."""
 _SIGNATURE = 13
 
@@ -73,12 +74,21 @@ class Framer:
             number = int.from_bytes(data[7:10], "little")
             end = 10 + data[1]
         known = self._known.get(number)
-        if known is None or (data[0] == _SECOND and data[2] & ~_SIGNED):
+        if known is None or (data[0] == _SECOND and data[2] & ~SIGNED):
             return None
         check = check_of(data[1:end] + bytes((known.crc_extra,)))
         if check != int.from_bytes(data[end : end + 2], "little"):
             return None
         return Frame(data, number, system, component)
+
+
+def lengths_of(data: bytes) -> Iterator[int]:
+    """Bytes of each of the frames of MAVLink 2 that `data` is made of."""
+    at = 0
+    while at < len(data):
+        length = 12 + data[at + 1] + (_SIGNATURE if data[at + 2] & SIGNED else 0)
+        yield length
+        at += length
 
 
 def _start_in(data: bytes, at: int) -> int:
@@ -94,9 +104,9 @@ def _length_at(data: bytes, start: int) -> int | None:
         return None
     if data[start] == _FIRST:
         return 8 + data[start + 1]
-    return 12 + data[start + 1] + (_SIGNATURE if data[start + 2] & _SIGNED else 0)
+    return 12 + data[start + 1] + (_SIGNATURE if data[start + 2] & SIGNED else 0)
 
 
 def _may_grow(data: bytes, start: int) -> bool:
     """Whether what is there of a frame can still become one."""
-    return not (data[start] == _SECOND and len(data) - start > 2 and data[start + 2] & ~_SIGNED)
+    return not (data[start] == _SECOND and len(data) - start > 2 and data[start + 2] & ~SIGNED)

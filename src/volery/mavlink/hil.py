@@ -30,6 +30,7 @@ _GENERIC, _NO_AUTOPILOT = 0, 8
 _LOCK_STEP = 1
 """Of HIL_ACTUATOR_CONTROLS: PX4 was built to take its time from the simulator."""
 _GAUSS_A_TESLA = 1e4
+_MOST_CM_S = 32767
 
 
 class Inertial(NamedTuple):
@@ -141,7 +142,10 @@ class HilLink:
 
     def _gps(self, time_us: int, fix: Fix) -> bytes:
         seen = math.isfinite(fix.latitude)
-        north, east, down = (round(100.0 * part) for part in ned_of_enu(fix.velocity))
+        north, east, down = (
+            min(max(round(100.0 * part), -_MOST_CM_S), _MOST_CM_S)
+            for part in ned_of_enu(fix.velocity)
+        )
         speed = round(math.hypot(north, east))
         course = round(math.degrees(math.atan2(east, north)) % 360.0 * 100.0) % 36000
         place = (fix.latitude, fix.longitude, fix.altitude) if seen else (0.0, 0.0, 0.0)

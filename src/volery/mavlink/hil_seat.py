@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from volery.graph.session import Gateway
@@ -63,9 +63,8 @@ class HilSeat:
         if self._way is None:
             return
         self._way = None
-        self._meetings.turn_rotors(_STILL)
         _log.warning("%s: %s", self.uav, why)
-        self._meetings.go_on()
+        self._meetings.go_on(_STILL)
 
     def close(self) -> None:
         """Give everything back; a second time nothing happens."""
@@ -101,12 +100,12 @@ class HilSeat:
 
     def _hear(self, data: bytes) -> None:
         for actuators in self._link.feed(data):
-            self._obey(actuators)
             if actuators.time_ns >= self._meetings.time_ns:
-                self._meetings.go_on()
+                self._meetings.go_on(_shares(actuators))
+            else:
+                self._meetings.turn_rotors(_shares(actuators))
 
-    def _obey(self, actuators: Actuators) -> None:
-        armed = actuators.armed
-        self._meetings.turn_rotors(
-            [max(0.0, part) for part in actuators.controls] if armed else _STILL
-        )
+
+def _shares(actuators: Actuators) -> Sequence[float]:
+    """Shares of the rotors' full speed that are asked for."""
+    return [max(0.0, part) for part in actuators.controls] if actuators.armed else _STILL

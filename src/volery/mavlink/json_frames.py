@@ -17,6 +17,10 @@ from volery.core.errors import BridgeError
 from volery.core.frames import frd_of_flu, ned_of_enu, q_ned_frd_of_enu_flu
 from volery.mavlink.vehicle import Quaternion, Vector
 
+STATE_HZ = 800
+"""ArduCopter's loop of 400 Hz begins with a state, and its pre-arm checks want 720 Hz or more."""
+_AHEAD = 1.0 + 1e-8
+"""Its reader cuts what a state adds to its clock to whole microseconds: 1249 of 1249.99999998."""
 _FRAMES = {18458: struct.Struct("<HHI16H"), 29569: struct.Struct("<HHI32H")}
 """By their first number: frames of 16 and of 32 outputs."""
 _PWM_OFF, _PWM_FULL = 1000, 2000
@@ -75,7 +79,7 @@ def state_line(time_s: float, state: State) -> bytes:
     """The line that tells a state at a time of the simulator's clock."""
     x, y, z, w = q_ned_frd_of_enu_flu(state.attitude)
     told: dict[str, object] = {
-        "timestamp": time_s,
+        "timestamp": time_s * _AHEAD,
         "imu": {"gyro": frd_of_flu(state.rates), "accel_body": frd_of_flu(state.force)},
         "position": ned_of_enu(state.position),
         "quaternion": (w, x, y, z),

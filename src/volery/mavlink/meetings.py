@@ -109,17 +109,18 @@ class Meetings:
 
     def turn_rotors(self, shares: Sequence[float]) -> None:
         """Ask for shares of the rotors' full speed, in the order of the airframe."""
-        data = np.array(shares, np.float32)
-        self._publish(self._rotors, self._speeds(layout=self._layout, data=data))
+        self._publish((self._rotors, self._asked(shares)))
 
-    def go_on(self) -> None:
-        """End the meeting; without one nothing happens."""
+    def go_on(self, shares: Sequence[float] | None = None) -> None:
+        """End the meeting, `shares` as of `turn_rotors`; without a meeting only those are asked."""
         if self._alarm is not None:
             self._alarm.cancel()
             self._alarm = None
+        messages = [] if shares is None else [(self._rotors, self._asked(shares))]
         if self._pending:
             self._pending = False
-            self._publish(self._done, self._clock(clock=time_from_ns(self._time_ns)))
+            messages.append((self._done, self._clock(clock=time_from_ns(self._time_ns))))
+        self._publish(*messages)
 
     def close(self) -> None:
         """Leave the lock step and the graph; a second time nothing happens."""
@@ -166,9 +167,12 @@ class Meetings:
         self._pilot.drop()
         self.go_on()
 
-    def _publish(self, topic: str, message: Any) -> None:
+    def _asked(self, shares: Sequence[float]) -> Any:
+        return self._speeds(layout=self._layout, data=np.array(shares, np.float32))
+
+    def _publish(self, *messages: tuple[str, Any]) -> None:
         with contextlib.suppress(GraphError):  # the simulation is closing
-            self._session.publish(topic, message)
+            self._session.publish_all(messages)
 
 
 def uavs_with(gateway: Gateway, topic: str) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from volery.mavlink.codec import dialect
+from volery.mavlink.json_frames import STATE_HZ
 from volery.scenario.load import parse_scenario
 from volery.scenario.schema import Scenario
 
@@ -24,9 +25,7 @@ def with_autopilots(scenario: Scenario) -> Scenario:
         if all(entry.node != NODE for entry in uav_type.nodes):
             kept = [entry.model_dump(exclude_unset=True) for entry in uav_type.nodes]
             data["types"][name] = {**data["types"][name], "nodes": [*kept, {"node": NODE}]}
-    changed = parse_scenario(data, where=scenario.name)
-    changed._folder = scenario.folder
-    return changed
+    return _parsed_like(scenario, data)
 
 
 def with_px4(scenario: Scenario) -> Scenario:
@@ -40,11 +39,18 @@ def with_px4(scenario: Scenario) -> Scenario:
 
 
 def with_ardupilot(scenario: Scenario) -> Scenario:
-    """The scenario for real ArduPilots: IMU and true state at 500 Hz; none starts by itself.
+    """The scenario for real ArduPilots: IMU and true state at 800 Hz; none starts by itself.
 
-    ArduPilot makes all further sensors of its own from the true state.
+    Physics steps that do not fit are made as long as the time between two states. ArduPilot makes
+    all further sensors of its own from the true state.
     """
-    return _with_sensors(scenario, {"imu": 500.0, "ground_truth": 500.0}, ("battery",))
+    dialect()
+    if scenario.physics.rate_hz % STATE_HZ:
+        data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
+        data["physics"] = {**data.get("physics", {}), "rate_hz": STATE_HZ}
+        scenario = _parsed_like(scenario, data)
+    rate = float(STATE_HZ)
+    return _with_sensors(scenario, {"imu": rate, "ground_truth": rate}, ("battery",))
 
 
 def _with_sensors(
@@ -61,6 +67,11 @@ def _with_sensors(
                 sensor["rate_hz"] = rates[sensor["kind"]]
         data["types"][name] = {**data["types"][name], "sensors": sensors}
     data["uavs"] = [{**group, "on_start": "wait"} for group in data["uavs"]]
+    return _parsed_like(scenario, data)
+
+
+def _parsed_like(scenario: Scenario, data: dict[str, Any]) -> Scenario:
+    """The scenario of `data`, with the folder of `scenario`."""
     changed = parse_scenario(data, where=scenario.name)
     changed._folder = scenario.folder
     return changed

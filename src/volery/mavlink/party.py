@@ -7,13 +7,15 @@ import errno
 from volery.mavlink.codec import Parser
 from volery.mavlink.fleet import Fleet
 from volery.mavlink.framing import Framer
+from volery.mavlink.signing import Signing
 
 
 class Party:
     """One connection that carries all vehicles: TCP clients and serial lines."""
 
-    def __init__(self, fleet: Fleet, number: int, profile: int) -> None:
+    def __init__(self, fleet: Fleet, number: int, profile: int, key: bytes | None = None) -> None:
         self.number = number
+        self._signing = Signing(key, number)
         self._fleet, self._profile = fleet, profile
         self._framer, self._parser = Framer(), Parser()
         self._systems: set[int] = set()
@@ -25,11 +27,15 @@ class Party:
 
     def take(self, data: bytes) -> None:
         """Bring what came to the vehicles that it is for."""
-        for frame in self._framer.feed(data):
+        for frame in filter(self._signing.accepts, self._framer.feed(data)):
             target = getattr(self._parser.decode(frame.data), "target_system", 0)
             chosen = self._systems if target == 0 else self._systems & {target}
             for system in sorted(chosen):
                 self._fleet.send(system, self.number, self._profile, frame.data)
+
+    def sign(self, data: bytes) -> bytes:
+        """Frames as they go over this connection."""
+        return self._signing.sign(data)
 
     def leave(self) -> None:
         """Tell the vehicles that it is there no more."""

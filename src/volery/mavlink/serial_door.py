@@ -18,7 +18,8 @@ class MavlinkSerial:
     path: of the device. baud: its speed.
     """
 
-    def __init__(self, path: str, baud: int = 57600) -> None:
+    def __init__(self, path: str, baud: int = 57600, *, key: bytes | None = None) -> None:
+        self._key = key
         self._path, self._baud = path, baud
         self._fleet: Fleet | None = None
         self._looks: asyncio.Task[None] | None = None
@@ -35,7 +36,7 @@ class MavlinkSerial:
         dialect()
         self._line = SerialLine(self._path, self._baud, self._take)
         self._fleet = Fleet(gateway, self.name, self._join, lambda _system: None)
-        self._party = Party(self._fleet, self._line.number, GROUND)
+        self._party = Party(self._fleet, self._line.number, GROUND, self._key)
         self._fleet.look()
         self._looks = asyncio.create_task(self._fleet.keep_looking())
 
@@ -55,11 +56,11 @@ class MavlinkSerial:
         assert self._party is not None
         assert self._line is not None
         self._party.greet(system)
-        line, own = self._line, self._party.number
+        line, party = self._line, self._party
 
         def sink(number: int, data: bytes) -> None:
-            if number in (-1, own):
-                line.send(data)
+            if number in (-1, party.number):
+                line.send(party.sign(data))
 
         return sink
 

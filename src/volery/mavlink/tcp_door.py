@@ -26,8 +26,14 @@ class MavlinkTcp:
     """
 
     def __init__(
-        self, host: str = "127.0.0.1", port: int = ports.TCP, *, anywhere: bool = False
+        self,
+        host: str = "127.0.0.1",
+        port: int = ports.TCP,
+        *,
+        anywhere: bool = False,
+        key: bytes | None = None,
     ) -> None:
+        self._key = key
         self.host = host
         self.port = port
         self._anywhere = anywhere
@@ -89,7 +95,7 @@ class MavlinkTcp:
             return
         self._numbers += 1
         number = (self.port + self._numbers) % 65535
-        client.party = Party(self._fleet, number, GROUND)
+        client.party = Party(self._fleet, number, GROUND, self._key)
         self._clients[number] = client
         for system in self._fleet.systems:
             client.party.greet(system)
@@ -114,7 +120,7 @@ class _TcpClient(asyncio.Protocol):
     def send(self, data: bytes) -> None:
         """Send frames, whole or not at all."""
         if not self._full:
-            self.transport.write(data)
+            self.transport.write(self.party.sign(data))
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """As of asyncio."""

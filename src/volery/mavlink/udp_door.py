@@ -15,8 +15,9 @@ from volery.graph.session import Gateway
 from volery.mavlink import ports
 from volery.mavlink.codec import dialect
 from volery.mavlink.fleet import Fleet, Sink
-from volery.mavlink.framing import Framer
+from volery.mavlink.framing import Framer, lengths_of
 from volery.mavlink.party import why_not
+from volery.mavlink.signing import Signing
 from volery.mavlink.streams import GROUND, ONBOARD
 
 _MOST_DATAGRAM = 1400
@@ -29,6 +30,7 @@ class MavlinkUdp:
     host: where those are. port: of the first companion computer, 14540; the others follow, and the
     vehicles' own ports keep their distance to it, so that several runs can stand side by side.
     Vehicles send from the beginning, to the stated ports and to whoever has spoken to them last.
+    key: of 32 bytes, by which both sides sign; see `signing`.
     """
 
     def __init__(
@@ -38,7 +40,9 @@ class MavlinkUdp:
         *,
         ground_port: int | None = None,
         anywhere: bool = False,
+        key: bytes | None = None,
     ) -> None:
+        self._key = key
         self._host = host
         self._shift = port - ports.ONBOARD_TO
         self._ground = ports.GROUND_TO + self._shift if ground_port is None else ground_port
@@ -81,7 +85,9 @@ class MavlinkUdp:
         opened: list[_UdpLink] = []
         try:
             for own, to, profile in links:
-                opened.append(_UdpLink(self._fleet, system, profile, own, (self._host, to)))
+                opened.append(
+                    _UdpLink(self._fleet, system, profile, own, (self._host, to), self._key)
+                )
         except BridgeError as error:
             for link in opened:
                 link.close()
@@ -104,12 +110,19 @@ class _UdpLink:
     """One socket of one vehicle; its own port is the link's number."""
 
     def __init__(
-        self, fleet: Fleet, system: int, profile: int, own: int, to: tuple[str, int]
+        self,
+        fleet: Fleet,
+        system: int,
+        profile: int,
+        own: int,
+        to: tuple[str, int],
+        key: bytes | None,
     ) -> None:
         self.number = own
         self._fleet, self._system, self._profile = fleet, system, profile
         self._peers = [to]
         self._framer = Framer()
+        self._signing = Signing(key, profile)
         family = socket.AF_INET6 if ":" in to[0] else socket.AF_INET
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -124,6 +137,7 @@ class _UdpLink:
 
     def send(self, data: bytes) -> None:
         """Send frames; where nobody listens they are lost, as by radio."""
+        data = self._signing.sign(data)
         for peer in self._peers:
             for part in _pieces(data):
                 with contextlib.suppress(OSError):
@@ -143,9 +157,12 @@ class _UdpLink:
                 return
             except OSError:  # what was sent found nobody
                 continue
+            heard = self._framer.datagram(data)
+            frames = b"".join(frame.data for frame in heard if self._signing.accepts(frame))
+            if self._signing.has_key and not frames:  # a stranger
+                continue
             if peer not in self._peers:  # the place agreed upon, and who spoke last
                 self._peers = [self._peers[0], peer[:2]]
-            frames = b"".join(frame.data for frame in self._framer.datagram(data))
             if frames:
                 self._fleet.send(self._system, self.number, self._profile, frames)
 
@@ -155,8 +172,7 @@ def _pieces(data: bytes) -> list[bytes]:
     if len(data) <= _MOST_DATAGRAM:
         return [data]
     pieces, start, at = [], 0, 0
-    while at < len(data):
-        length = data[at + 1] + 12 + (13 if data[at + 2] & 1 else 0)
+    for length in lengths_of(data):
         if at + length - start > _MOST_DATAGRAM and at > start:
             pieces.append(data[start:at])
             start = at

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import base64
-import json
-import os
-import queue
-import signal
 import socket
 import struct
-import subprocess
-import sys
-import threading
 from collections import Counter
-from pathlib import Path
 from types import MappingProxyType
 
-from door_bench import IMAGE, PATIENCE_S, STRING, TRIGGER, Bench, Client, Refused
+from door_bench import IMAGE, STRING, TRIGGER, Bench, Client, Refused
 from door_ros_tcp import Form
+from plain_peers import take_peer
 from ros2_bench import DOMAIN
 from ros_tcp_client import until
 
@@ -26,7 +19,6 @@ from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
 
 LATCHED = ("/map", "/plan")
-_PEER = Path(__file__).with_name("plain_ros2.py")
 _BASE_PORT, _PORTS_A_DOMAIN, _UNICAST = 7400, 250, 10  # RTPS 2.5, 9.6.2.3
 _HALF = b"RTPS\2\5\1\x10" + bytes(12) + b"\x15\5\xff\xff\0\0"
 _SUCCESS_AT = 4  # of a Trigger's response, behind the four bytes that name the encoding
@@ -41,24 +33,13 @@ class PeerClient(Client):
         self._reading = reading
         self._form = Form("ros2")
         self._kinds = {}
-        self._done = queue.Queue()
-        self._process = subprocess.Popen(
-            [sys.executable, str(_PEER), str(DOMAIN)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-        self._done.get(timeout=PATIENCE_S)
+        self._peer = take_peer(self._hear)
 
-    def _read(self):
-        for line in self._process.stdout:
-            told = json.loads(line)
-            if "heard" in told:
-                self._take(told["heard"], base64.b64decode(told["data"]), told["size"])
-            else:
-                self._done.put(told.get("done"))
+    def _hear(self, told):
+        self._take(told["heard"], base64.b64decode(told["data"]), told["size"])
+
+    def _do(self, op, **fields):
+        return self._peer.do(op, **fields)
 
     def _take(self, topic, data, total):
         if self._kinds[topic] == IMAGE:
@@ -68,11 +49,6 @@ class PeerClient(Client):
         else:
             (length,) = struct.unpack_from("<I", data, 4)
             self.messages.put(data[8 : 8 + length - 1].decode())
-
-    def _do(self, op, **fields):
-        self._process.stdin.write(json.dumps({"op": op, **fields}) + "\n")
-        self._process.stdin.flush()
-        return self._done.get(timeout=PATIENCE_S)
 
     def advertise(self, topic, msgtype=STRING, *, latched=False):
         self._do("advertise", topic=topic, type=msgtype, latched=latched, wait=True)
@@ -96,7 +72,7 @@ class PeerClient(Client):
         self._bench.readers[topic] += 1
         until(lambda: self._bench.is_heard(topic))
         if not self._reading:
-            os.kill(self._process.pid, signal.SIGSTOP)
+            self._peer.stop()
 
     def call(self, service):
         answer = self._do("call", service=service)
@@ -113,6 +89,7 @@ class PeerClient(Client):
         answer = None if self.their_answer is None else self._form.triggered(self.their_answer)
         data = None if answer is None else base64.b64encode(answer).decode()
         self._do("offer", service=service, answer=data)
+        until(lambda: self._bench.is_offered(service))
 
     def settle(self):
         """Nothing is answered; matches are waited for when they are made."""
@@ -122,33 +99,24 @@ class PeerClient(Client):
         base = _BASE_PORT + _PORTS_A_DOMAIN * DOMAIN + _UNICAST
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
             for port in range(base, base + 20):
-                sock.sendto(
-                    b"RTPS\2\5\1\x10" + bytes(12) + b"\x15\5\xff\xff\0\0", ("127.0.0.1", port)
-                )
+                sock.sendto(_HALF, ("127.0.0.1", port))
 
     def reset(self):
-        self._process.kill()
+        self._peer.kill()
+        topics = tuple(self._kinds)
         self._end()
         # Until its lease is over the door takes it for a listener, and who comes back for heard.
-        until(lambda: not any(map(self._bench.is_heard, self._kinds)))
+        until(lambda: not any(map(self._bench.is_overheard, topics)))
 
     def close(self):
-        if self._process.poll() is None:
-            os.kill(self._process.pid, signal.SIGCONT)
-            self._process.stdin.close()  # it reads the end of its orders, and leaves
-            try:
-                self._process.wait(PATIENCE_S)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
-        self._end()
+        if self._peer is not None:
+            self._peer.give_back()
+            self._peer = None  # it may be somebody else's from now on
+            self._end()
 
     def _end(self):
         while self._kinds:
             self._bench.readers[self._kinds.popitem()[0]] -= 1
-        self._process.wait()
-        self._reader.join()
-        self._process.stdin.close()
-        self._process.stdout.close()
 
 
 class Ros2Bench(Bench):
@@ -182,11 +150,20 @@ class Ros2Bench(Bench):
 
     def is_heard(self, topic):
         """Whether a subscription has reached the graph, and the door's writer each reader."""
-        outlet = self.door._shared.topics._outlets.get(topic)
         known = any(t.name == topic and t.subscribers for t in self.ours.live.graph.topics())
-        if outlet is None or not known:
-            return False
-        return library.subscriptions(outlet._writer._writer) >= self.readers[topic]
+        return known and self._subscribers(topic) >= self.readers[topic]
+
+    def is_overheard(self, topic):
+        """Whether the door's writer has readers that are none."""
+        return self._subscribers(topic) > self.readers[topic]
+
+    def is_offered(self, service):
+        """Whether the door has found a server."""
+        return self.door._shared.services._callers[service].ready
+
+    def _subscribers(self, topic):
+        outlet = self.door._shared.topics._outlets.get(topic)
+        return 0 if outlet is None else library.subscriptions(outlet._writer._writer)
 
     def _connect(self, reading):
         return PeerClient(self, reading)

@@ -4,9 +4,12 @@ It runs as a process of its own and does what comes as lines of JSON on stdin; w
 stdout. Its types are written by hand in the package's IDL, their bytes come from the tests.
 
     {"op": "subscribe", "topic": "/chatter", "type": "std_msgs/msg/String"}
+
+What it has it gives up with `{"op": "leave"}`, and can be somebody else then.
 """
 
 import base64
+import ctypes
 import json
 import struct
 import sys
@@ -14,7 +17,9 @@ import threading
 import time
 from dataclasses import dataclass
 
+from cyclonedds.__library__ import library_path
 from cyclonedds.core import (
+    DDSException,
     InstanceState,
     Policy,
     Qos,
@@ -25,7 +30,7 @@ from cyclonedds.core import (
 )
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import int32, int64, sequence, uint8, uint32, uint64
+from cyclonedds.idl.types import float64, int32, int64, sequence, uint8, uint32, uint64
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -34,7 +39,7 @@ from cyclonedds.util import duration
 CONFIG = """<CycloneDDS><Domain id="any">
   <General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>
     <AllowMulticast>false</AllowMulticast></General>
-  <Discovery><LeaseDuration>1 s</LeaseDuration><SPDPInterval>500 ms</SPDPInterval>
+  <Discovery><LeaseDuration>{lease} s</LeaseDuration><SPDPInterval>500 ms</SPDPInterval>
     <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
     <Peers><Peer address="localhost"/></Peers></Discovery>
 </Domain></CycloneDDS>"""
@@ -121,13 +126,26 @@ def qos(*, reliable=True, latched=False, user_data=b""):
 
 
 class Peer:
-    def __init__(self, domain_id):
-        self.domain = Domain(domain_id, CONFIG)
-        self.participant = DomainParticipant(domain_id)
-        self.writers, self.readers, self.told = {}, [], threading.Lock()
+    def __init__(self, domain_id, lease_s):
+        self.domain_id = domain_id
+        self.domain = Domain(domain_id, CONFIG.format(lease=lease_s))
+        self.told = threading.Lock()
+        self.library = ctypes.CDLL(str(library_path))
+        self.join()
+
+    def join(self):
+        self.participant = DomainParticipant(self.domain_id)
+        self.writers, self.hearers, self.leaving = {}, [], False
         self.waitset = WaitSet(self.participant)
-        self.hearers = []
-        threading.Thread(target=self.listen, daemon=True).start()
+        self.listener = threading.Thread(target=self.listen, daemon=True)
+        self.listener.start()
+
+    def leave(self):
+        self.leaving = True
+        self.listener.join()
+        self.library.dds_delete(self.participant._ref)
+        self.join()
+        return True
 
     def tell(self, **fields):
         with self.told:
@@ -135,7 +153,7 @@ class Peer:
             sys.stdout.flush()
 
     def listen(self):
-        while True:
+        while not self.leaving:
             self.waitset.wait(duration(milliseconds=50))
             for reader, hear in tuple(self.hearers):
                 for sample in reader.take(100):
@@ -169,8 +187,24 @@ class Peer:
         self.writers[topic] = writer, kind
         return self.matched(writer.get_matched_subscriptions) if wait else True
 
+    def advertise_oddly(self, dds_topic, type_name, user_data):
+        """A writer whose names are taken as they are, of a structure that ROS 2 has not."""
+
+        @dataclass
+        class Odd(IdlStruct, typename=type_name):
+            numbers: sequence[int32]
+            more: float64
+
+        stay_bytes(Odd)
+        writer = self.speak(dds_topic, Odd, qos(user_data=user_data.encode()))
+        self.writers[dds_topic] = writer, Odd
+        return True
+
     def publish(self, topic, data):
-        self.write(*self.writers[topic], base64.b64decode(data))
+        try:
+            self.write(*self.writers[topic], base64.b64decode(data))
+        except DDSException:  # the library looks at what it is given
+            return False
         return True
 
     def subscribe(self, topic, type, reliable, latched):
@@ -219,7 +253,7 @@ class Peer:
 
 
 def main():
-    peer = Peer(int(sys.argv[1]))
+    peer = Peer(int(sys.argv[1]), float(sys.argv[2]))
     peer.tell(ready=True)
     for line in sys.stdin:
         fields = json.loads(line)

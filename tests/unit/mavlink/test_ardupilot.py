@@ -1,5 +1,6 @@
 """The door for real ArduPilots against a strict stand-in, and its frames by themselves."""
 
+import json
 import logging
 import math
 import socket
@@ -14,10 +15,19 @@ from autopilot_bench import free_port, irises
 from volery.bridges.doors import Doors
 from volery.core.errors import BridgeError, PartnerError
 from volery.mavlink.ardupilot_door import ArdupilotDoor
-from volery.mavlink.json_frames import Rotor, State, motors_of, parse_servos, shares, state_line
+from volery.mavlink.json_frames import (
+    STATE_HZ,
+    Rotor,
+    State,
+    motors_of,
+    parse_servos,
+    shares,
+    state_line,
+)
 from volery.mavlink.meetings import PATIENCE, Patience
 from volery.mavlink.outfit import with_ardupilot
 from volery.runtime import Simulation
+from volery.scenario.load import parse_scenario
 
 X = (
     Rotor(0.1, -0.2, "ccw"),
@@ -75,12 +85,12 @@ def finish(*pilots):
 @pytest.mark.parametrize("magic", [18458, 29569])
 def test_a_vehicle_flies_in_lock_step(opened, magic):
     simulation, door = opened()
-    pilot = ArdupilotStandIn(door._port, 600, pwm=CLIMB, arm_at=50, magic=magic)
+    pilot = ArdupilotStandIn(door._port, 960, pwm=CLIMB, arm_at=80, magic=magic)
     pilot.start()
     meet(simulation, door, 1)
     simulation.run(1.2)
     finish(pilot)
-    resting, climbing = pilot.states[20], pilot.states[-1]
+    resting, climbing = pilot.states[40], pilot.states[-1]
     assert resting["imu", "accel_body"][2] == pytest.approx(-9.81, abs=0.4)
     assert climbing["", "velocity"][2] < -0.3
     assert climbing["", "position"][2] < resting["", "position"][2] - 0.1
@@ -89,7 +99,7 @@ def test_a_vehicle_flies_in_lock_step(opened, magic):
 
 def test_several_have_ports_of_their_own(opened):
     simulation, door = opened(count=2)
-    pilots = [ArdupilotStandIn(door._port + 10 * k, 100, pwm=1000 + k) for k in range(2)]
+    pilots = [ArdupilotStandIn(door._port + 10 * k, 160, pwm=1000 + k) for k in range(2)]
     for pilot in pilots:
         pilot.start()
     meet(simulation, door, 2)
@@ -102,19 +112,19 @@ def test_several_have_ports_of_their_own(opened):
 def test_one_that_was_restarted_is_met_anew(opened):
     simulation, door = opened()
     for first in (5, 0):
-        pilot = ArdupilotStandIn(door._port, 50, first=first)
+        pilot = ArdupilotStandIn(door._port, 80, first=first)
         pilot.start()
         end = time.monotonic() + 20.0
         while door._seats[0]._number != first and time.monotonic() < end:
             time.sleep(0.01)
         simulation.run(0.1)
         finish(pilot)
-        assert pilot.states[0]["", "timestamp"] == [0.002]
+        assert pilot.states[0]["", "timestamp"] == pytest.approx([0.00125])
 
 
 def test_it_flies_on_after_a_reset(opened):
     simulation, door = opened()
-    pilot = ArdupilotStandIn(door._port, 100, pwm=CLIMB, may_jump=True)
+    pilot = ArdupilotStandIn(door._port, 160, pwm=CLIMB, may_jump=True)
     pilot.start()
     meet(simulation, door, 1)
     simulation.run(0.1)
@@ -146,7 +156,7 @@ def test_what_was_lost_is_said_again(opened):
     pilot = ArdupilotStandIn(door._port, 1)
     pilot.send(0)
     meet(simulation, door, 1)
-    run = threading.Thread(target=simulation.run, args=(0.0035,))
+    run = threading.Thread(target=simulation.run, args=(0.0022,))
     run.start()
     first = pilot.link.recv(65000)
     pilot.send(0)  # as one that has not heard it
@@ -159,7 +169,7 @@ def test_what_was_lost_is_said_again(opened):
 
 def test_noise_and_a_second_one_are_passed_over(opened):
     simulation, door = opened()
-    pilot = ArdupilotStandIn(door._port, 100, pwm=CLIMB)
+    pilot = ArdupilotStandIn(door._port, 160, pwm=CLIMB)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         for data in (
             b"",
@@ -184,12 +194,31 @@ def test_frames_that_are_none():
 
 
 def test_the_line_is_as_its_reader_wants_it():
-    line = state_line(1.5, STILL._replace(range_m=2.0, battery=(12.0, 3.0)))
+    line = state_line(0.0, STILL._replace(range_m=2.0, battery=(12.0, 3.0)))
     assert line == (
-        b'\n{"timestamp":1.5,"imu":{"gyro":[0.1,-0.2,-0.3],"accel_body":[0.0,-0.0,-9.8]},'
+        b'\n{"timestamp":0.0,"imu":{"gyro":[0.1,-0.2,-0.3],"accel_body":[0.0,-0.0,-9.8]},'
         b'"position":[2.0,1.0,-3.0],"quaternion":[0.7071067811865476,0.0,0.0,0.7071067811865476],'
         b'"velocity":[5.0,4.0,-6],"rng_1":2.0,"battery":{"voltage":12.0,"current":3.0}}\n'
     )
+
+
+def test_its_clock_of_whole_microseconds_keeps_the_pace():
+    """As SIM_JSON reads it: what is added to a count of microseconds is cut to a whole one."""
+    clock_us, last_s = 0, 0.0
+    for k in range(1, 100_001):
+        time_s = json.loads(state_line(k / STATE_HZ, STILL))["timestamp"]
+        clock_us, last_s = int(clock_us + (time_s - last_s) * 1e6), time_s
+    assert clock_us == 125_000_000
+
+
+@pytest.mark.parametrize(("given", "flown"), [(None, 800), (1000, 800), (1600, 1600)])
+def test_physics_steps_fit_between_two_states(given, flown):
+    data = irises(1).model_dump(exclude_unset=True)
+    if given is not None:
+        data["physics"] = {"rate_hz": given, "on_contact": "bounce"}
+    fitted = with_ardupilot(parse_scenario(data, where="flat"))
+    assert fitted.physics.rate_hz == flown
+    assert fitted.physics.on_contact == ("crash" if given is None else "bounce")
 
 
 def test_motors_follow_the_arms():

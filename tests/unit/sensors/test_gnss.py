@@ -98,15 +98,15 @@ def test_velocity_is_that_of_the_antenna():
     np.testing.assert_allclose(reading.velocity_map[0], expected, atol=2e-3)
 
 
-def test_noise_and_drift_are_as_the_model_says():
-    model, count, fleet = load_gnss_model("gnss_m8"), 4000, fleet_of()
-    bank = gnss_bank(count, noise=True)
+@pytest.mark.parametrize("name", ["gnss_m8", "gnss_gazebo_classic"])
+def test_noise_and_drift_are_as_the_model_says(name):
+    model, count, fleet = load_gnss_model(name), 4000, fleet_of()
+    bank = gnss_bank(count, noise=True, **model.model_dump())
     readings = [bank.sample(k, k * PERIOD, fleet) for k in range(61)]
     error = np.array([r.position_map for r in readings]) - fleet.state.position_map[0]
     sigma = np.array([model.horizontal_drift_m] * 2 + [model.vertical_drift_m])
     for k in (0, 60):  # as spread at the start as later
         np.testing.assert_allclose(error[k].std(axis=0), sigma, rtol=0.04)
-    # Twelve seconds are about one correlation time.
     together = (error[0] * error[60]).mean(axis=0) / sigma**2
     np.testing.assert_allclose(together, math.exp(-12.0 / model.drift_correlation_s), atol=0.05)
     speed = np.array([r.velocity_map for r in readings[:10]])

@@ -57,6 +57,21 @@ class Outlet:
         """Have it served."""
         self._worker.post(self.serve)
 
+    def adapt(self) -> None:
+        """Begin or end to listen to the graph, as subscribers come and go."""
+        if self.wanted != self.holds:
+            self._worker.post(self._adapt)
+
+    def _adapt(self) -> None:
+        if self._closed or self.wanted == self.holds:
+            return
+        if self.holds:
+            self._let_go()
+        else:
+            self._mailbox = self._session.subscribe(
+                self.spec.topic, self.spec.msgtype, depth=_DEPTH, wake=self.wake
+            )
+
     def leave_out(self, message: Any) -> None:
         """Do not send a message that came from ROS 2 itself."""
         if self._mailbox is not None:
@@ -65,16 +80,9 @@ class Outlet:
                 self._own.popitem(last=False)
 
     def serve(self) -> None:
-        """Send what waits; begin or end to listen to the graph as subscribers come and go."""
-        if self._closed:
+        """Send what waits."""
+        if self._mailbox is None:  # it listens no more, or is closed
             return
-        if not self.wanted:
-            self._let_go()
-            return
-        if self._mailbox is None:
-            self._mailbox = self._session.subscribe(
-                self.spec.topic, self.spec.msgtype, depth=_DEPTH, wake=self.wake
-            )
         for published in self._mailbox.take():
             if not self._own or self._own.pop(id(published.message), None) is None:
                 self._send(published)

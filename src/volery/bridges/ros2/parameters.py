@@ -26,6 +26,7 @@ from volery.graph.zero import zero_message
 
 _SIM_TIME = "use_sim_time"
 """Every ROS 2 node has it; here it is true and nobody's to change."""
+_ALWAYS_SIM_TIME = f"parameter '{_SIM_TIME}' is read-only: nodes here follow /clock"
 _EVENTS = "/parameter_events"
 _EVENT_TYPE = "rcl_interfaces/msg/ParameterEvent"
 _SERVICES = (
@@ -166,7 +167,7 @@ class ParameterServices:
     def _set_all(self, node: NodeName, request: Any, reply: Reply) -> None:
         """All or none: refused before anything is set where one is read-only or unknown."""
         response = message_type("rcl_interfaces/srv/SetParametersAtomically_Response")
-        bad = [p.name for p in request.parameters if self._is_read_only(node, p.name)]
+        bad = [p.name for p in request.parameters if self._refuses(node, p)]
         if bad:
             text = f"read-only or not declared: {', '.join(bad)}"
             reply.answer(response(_result(text)))
@@ -177,6 +178,11 @@ class ParameterServices:
             reply.answer(response(wrong[0] if wrong else _result("")))
 
         self._set_each(node, request.parameters, done)
+
+    def _refuses(self, node: NodeName, parameter: Any) -> bool:
+        if self._is_clock(node, parameter.name):
+            return plain_of(parameter.value) is not True
+        return self._is_read_only(node, parameter.name)
 
     def _set_each(
         self, node: NodeName, wanted: list[Any], done: Callable[[list[Any]], None]
@@ -191,16 +197,22 @@ class ParameterServices:
             parameter = wanted[len(results)]
             if parameter.value.type == NOT_SET:
                 finish(f"parameter '{parameter.name}' cannot be deleted")
+            elif self._is_clock(node, parameter.name):
+                finish("" if plain_of(parameter.value) is True else _ALWAYS_SIM_TIME)
             else:
                 self._set_value(node.full, parameter.name, plain_of(parameter.value), finish)
 
         def finish(reason: str) -> None:
-            if not reason:
+            if not reason and not self._is_clock(node, wanted[len(results)].name):
                 self._tell_event(node, wanted[len(results)])
             results.append(_result(reason))
             go_on()
 
         go_on()
+
+    def _is_clock(self, node: NodeName, name: str) -> bool:
+        """Whether it is the parameter that every node has without declaring it."""
+        return name == _SIM_TIME and (node.full, name) not in self._declared.names()
 
     def _tell_event(self, node: NodeName, parameter: Any) -> None:
         event = zero_message(_EVENT_TYPE)

@@ -91,8 +91,7 @@ class Topics:
         if outlet is None:
             outlet = Outlet(self._participant, self._session, self._worker, spec)
             self._outlets[topic.name] = outlet
-        if outlet.wanted != outlet.holds:
-            outlet.wake()
+        outlet.adapt()
 
     def _update_inlet(
         self, topic: TopicInfo, publishers: int, remote: list[RemotePublisher]

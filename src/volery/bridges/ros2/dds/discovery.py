@@ -14,6 +14,7 @@ from cyclonedds.builtin import (
 )
 from cyclonedds.domain import DomainParticipant
 
+from volery.bridges.ros2.dds.counterparts import CLIENT
 from volery.bridges.ros2.dds.listening import Ear
 from volery.bridges.ros2.dds.qos import profile_of, user_data_of
 from volery.bridges.ros2.middleware import Profile, RemotePublisher
@@ -79,6 +80,14 @@ class Discovery:
             if service and reader.msgtype.endswith(_REQUEST):
                 found[service] = reader.msgtype[: -len(_REQUEST)]
         return found
+
+    def foreign_clients(self) -> set[str]:
+        """Services with clients that do not speak as rmw_cyclonedds does."""
+        with self._lock:
+            writers = tuple(self._writers.values())
+        mark = f"{CLIENT}=".encode()
+        named = (service_of(w.dds_topic) for w in writers if mark not in w.user_data)
+        return {service for service in named if service}
 
     def _taker(self, known: dict[Any, Endpoint]) -> Callable[[list[Any]], None]:
         def take(samples: list[Any]) -> None:

@@ -107,9 +107,17 @@ class DdsServer:
         """Offer it no more."""
         self._half.close()
 
+    def look_at(self, foreign: set[str]) -> None:
+        """Warn if it is among the services that others ask in vain.
+
+        Their requests may be too short for Cyclone DDS to hand them over.
+        """
+        if self._name in foreign:
+            self._complaints.tell(self._name, f"a client is not answered: it {FOREIGN}")
+
     def _on_request(self, data: bytes, client: int) -> None:
         if not self._clients.understands(client):
-            self._complaints.tell(self._name, f"a client is not answered: it {FOREIGN}")
+            self.look_at({self._name})
             return
         header = data[_CDR_HEADER : _CDR_HEADER + _HEADER.size]
 

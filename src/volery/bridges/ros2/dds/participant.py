@@ -39,11 +39,13 @@ class DdsParticipant:
         reach = ", ".join(interfaces) or "this machine"
         self.where = f"DDS domain {domain_id} ({reach})"
         self._callers: weakref.WeakSet[DdsCaller] = weakref.WeakSet()
+        self._servers: weakref.WeakSet[DdsServer] = weakref.WeakSet()
         self._lock = threading.Lock()
         self._ear = Ear(self._participant, self._check_callers)
         self._record = Record(self._participant)
         self._place = Place(self._participant, self._ear, self._record)
         self._discovery = Discovery(self._participant, self._ear)
+        self._discovery.when_changed(self._check_clients)
         self._closed = False
 
     def add_node(self, node: NodeName) -> None:
@@ -68,7 +70,11 @@ class DdsParticipant:
 
     def server(self, spec: ServiceSpec, take: TakeRequest) -> DdsServer:
         """Offer a service."""
-        return DdsServer(self._place, spec, take)
+        server = DdsServer(self._place, spec, take)
+        with self._lock:
+            self._servers.add(server)
+        server.look_at(self._discovery.foreign_clients())
+        return server
 
     def caller(self, spec: ServiceSpec) -> DdsCaller:
         """Become a client of a service."""
@@ -95,6 +101,14 @@ class DdsParticipant:
             self._closed = True
             self._ear.close()
             leave_domain(self._domain_id, self._participant)
+
+    def _check_clients(self) -> None:
+        foreign = self._discovery.foreign_clients()
+        if foreign:
+            with self._lock:
+                servers = tuple(self._servers)
+            for server in servers:
+                server.look_at(foreign)
 
     def _check_callers(self) -> None:
         with self._lock:

@@ -1,0 +1,109 @@
+"""Signed frames of MAVLink 2: who has the key may speak, and nobody may say it again.
+
+A frame's signature is its link's number, a time stamp in 10 us since 2015 and six bytes of the
+SHA-256 of the key and all that comes before. As of https://mavlink.io/en/guide/message_signing.html.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from volery.core.errors import BridgeError
+from volery.mavlink.codec import check_of, dialect
+from volery.mavlink.framing import SIGNED, Frame, lengths_of
+
+_RADIO_STATUS = 109
+"""Made by radios, which have no key."""
+_BEGIN_S = 1_420_070_400.0
+"""2015-01-01 in UNIX time."""
+_PER_S = 100_000
+_FRESH = 60 * _PER_S
+"""How far behind the first stamp of a stream may be."""
+_LAST = 2**48 - 1
+_STAMP_AND_HASH, _HASH = 12, 6
+"""Last bytes of a frame."""
+_SECOND = 0xFD
+"""Start of a frame of MAVLink 2."""
+
+
+def key_of(path: Path) -> bytes:
+    """The key that a file's text stands for: its SHA-256, as ground stations make it.
+
+    Blanks around the text do not count. `BridgeError` where there is none.
+    """
+    try:
+        text = path.read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        raise BridgeError(f"{path} cannot be read as a key for MAVLink: {error}") from None
+    if not text:
+        raise BridgeError(f"{path} is empty; a key for MAVLink is a text")
+    return hashlib.sha256(text.encode()).digest()
+
+
+class Signing:
+    """Signs what goes over one link and checks what comes; without a key all passes as it is.
+
+    key: (32,) bytes, or None. link: a number from 0 to 255. clock: UNIX time in s.
+    """
+
+    def __init__(
+        self, key: bytes | None, link: int = 0, clock: Callable[[], float] = time.time
+    ) -> None:
+        self._key = key
+        self._link = link % 256
+        self._clock = clock
+        self._stamp = 0
+        self._newest: dict[tuple[int, int, int], int] = {}
+
+    @property
+    def has_key(self) -> bool:
+        """Whether only signed frames count."""
+        return self._key is not None
+
+    def sign(self, data: bytes) -> bytes:
+        """The same frames of MAVLink 2, signed."""
+        if self._key is None:
+            return data
+        signed, at = [], 0
+        for length in lengths_of(data):
+            signed.append(self._signed(data[at : at + length], self._key))
+            at += length
+        return b"".join(signed)
+
+    def accepts(self, frame: Frame) -> bool:
+        """Whether a frame that came counts."""
+        if self._key is None or frame.message == _RADIO_STATUS:
+            return True
+        data = frame.data
+        if data[0] != _SECOND or not data[2] & SIGNED:
+            return False
+        if not hmac.compare_digest(_hash(self._key, data[:-_HASH]), data[-_HASH:]):
+            return False
+        stamp = int.from_bytes(data[-_STAMP_AND_HASH:-_HASH], "little")
+        stream = (frame.system, frame.component, data[-_STAMP_AND_HASH - 1])
+        before = self._newest.get(stream, self._now() - _FRESH - 1)
+        if stamp <= before:
+            return False
+        self._newest[stream] = stamp
+        self._stamp = max(self._stamp, stamp)
+        return True
+
+    def _signed(self, frame: bytes, key: bytes) -> bytes:
+        end = len(frame) - 2
+        extra = dialect().mavlink_map[int.from_bytes(frame[7:10], "little")].crc_extra
+        body = frame[:2] + bytes((frame[2] | SIGNED,)) + frame[3:end]
+        check = check_of(body[1:] + bytes((extra,))).to_bytes(2, "little")
+        self._stamp = min(max(self._stamp + 1, self._now()), _LAST)
+        stamped = body + check + bytes((self._link,)) + self._stamp.to_bytes(6, "little")
+        return stamped + _hash(key, stamped)
+
+    def _now(self) -> int:
+        return int((self._clock() - _BEGIN_S) * _PER_S)
+
+
+def _hash(key: bytes, data: bytes) -> bytes:
+    return hashlib.sha256(key + data).digest()[:_HASH]

@@ -1,0 +1,190 @@
+"""What plain DDS programs do to the ROS 2 door that stand still, vanish or talk nonsense."""
+
+from __future__ import annotations
+
+import base64
+import queue
+import random
+import socket
+import time
+
+import numpy as np
+import pytest
+from live_graph import LiveGraph
+from plain_peers import take_peer
+from ros2_bench import DOMAIN
+from ros_tcp_client import until
+
+from volery.bridges.doors import Doors
+from volery.bridges.ros2.door import Ros2Door
+from volery.bridges.ros2.environment import Ros2Terms
+from volery.graph.cdr import encode_cdr
+from volery.graph.messages import String, header, message_type
+
+STRING = "std_msgs/msg/String"
+IMAGE = "sensor_msgs/msg/Image"
+SIZE = 1_000_000
+COUNT = 30
+SOON_S = 1.0
+"""An engine that waited for a peer would wait for half a minute, until it is taken for gone."""
+
+
+class World(LiveGraph):
+    """A graph with a door, and a plain peer that proves that all goes on."""
+
+    def __init__(self):
+        super().__init__()
+        self.heard, self.seen = queue.Queue(), []
+        self.chatter = self.graph.advertise("/chatter", STRING)
+        self.pictures = self.graph.advertise("/pictures", IMAGE)
+        self.atlas = self.graph.advertise("/atlas", IMAGE, latched=True)
+        self.do(lambda: self.graph.subscribe("/in", self.note, STRING))
+        self.doors = Doors(self.gateway)
+        self.doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN), reliable=("/pictures",)))
+        self.witness = take_peer(self.heard.put)
+        self.hear(self.witness, "/chatter", STRING)
+        assert self.witness.do("advertise", topic="/in", type=STRING, latched=False, wait=True)
+
+    def note(self, published):
+        self.seen.append(published.message.data)
+
+    def hear(self, peer, topic, msgtype, *, latched=False):
+        """Have a peer subscribe reliably, and wait for the door to know."""
+        found = {t.name: t for t in self.graph.topics()}[topic]
+        peer.do("subscribe", topic=topic, type=msgtype, reliable=True, latched=latched)
+        until(lambda: {t.name: t for t in self.graph.topics()}[topic].subscribers)
+        assert found.msgtype == msgtype
+
+    def goes_on(self):
+        """Send a word each way; seconds until both are there."""
+        began = time.monotonic()
+        word = f"{began}"
+        self.do(lambda: self.chatter.publish(String(word)))
+        publish(self.witness, "/in", encode_cdr(String(word), STRING))
+        while True:
+            told = base64.b64decode(self.heard.get(timeout=10.0)["data"])
+            if word.encode() in told:
+                break
+        until(lambda: word in self.seen)
+        return time.monotonic() - began
+
+    def close(self):
+        self.witness.give_back()
+        self.doors.close()
+        super().close()
+
+
+def publish(peer, topic, cdr):
+    return peer.do("publish", topic=topic, data=base64.b64encode(cdr).decode())
+
+
+def picture(number):
+    pixels = np.full(SIZE, number, np.uint8)
+    return message_type(IMAGE)(header(number, ""), 1, SIZE, "mono8", 0, SIZE, pixels)
+
+
+@pytest.fixture(scope="module")
+def world():
+    made = World()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def peer():
+    taken = take_peer(patient=True)
+    yield taken
+    taken.give_back()
+
+
+@pytest.mark.parametrize("latched", [False, True])
+def test_large_reliable_messages_wait_for_nobody_who_stands_still(world, peer, latched):
+    topic = "/atlas" if latched else "/pictures"
+    sizes = queue.Queue()
+    peer.hear = lambda told: sizes.put(told["size"])
+    world.hear(peer, topic, IMAGE, latched=latched)
+    publisher = world.atlas if latched else world.pictures
+    world.do(lambda: publisher.publish(picture(0)))
+    assert sizes.get(timeout=10.0) >= SIZE
+    world.goes_on()
+    peer.stop()
+    began = time.monotonic()
+    for number in range(COUNT):
+        world.do(lambda n=number: publisher.publish(picture(n)))
+    assert time.monotonic() - began < SOON_S
+    assert world.goes_on() < SOON_S
+    peer.go_on()
+    assert sizes.get(timeout=10.0) >= SIZE  # it still hears, of what was kept
+
+
+@pytest.mark.parametrize("kind", [b"\0\3", b"\0\7", b"\0\x7f", b"\1\2"])
+def test_encodings_that_ros2_has_not_harm_nobody(world, peer, kind):
+    """Parameter lists, XCDR2, and what there is not at all."""
+    assert peer.do("advertise", topic="/in", type=STRING, latched=False, wait=True)
+    before = len(world.seen)
+    publish(peer, "/in", kind + b"\0\0\4\0\0\0abc\0")
+    assert world.goes_on() < SOON_S
+    assert "abc" not in world.seen[before:]
+
+
+@pytest.mark.parametrize(
+    ("type_name", "said"),
+    [
+        ("geometry_msgs.msg.dds_.Twist_", "a publisher of geometry_msgs/msg/Twist is not heard"),
+        ("no_pkg.msg.dds_.Nothing_", "a publisher of no_pkg/msg/Nothing is not heard"),
+        ("std_msgs.msg.dds_.String_", f"another definition of {STRING} (RIHS01_1234)"),
+    ],
+)
+def test_publishers_of_something_else_are_warned_of_once(world, peer, caplog, type_name, said):
+    odd = {"type_name": type_name, "user_data": "typehash=RIHS01_1234;"}
+    peer.do("advertise_oddly", dds_topic="rt/in", **odd)
+    until(lambda: said in caplog.text)
+    for number in range(20):
+        publish(peer, "rt/in", b"\0\1\0\0" + bytes([number]) * 20)
+    assert world.goes_on() < SOON_S
+    assert caplog.text.count(said) == 1
+
+
+@pytest.mark.parametrize(
+    ("dds_topic", "type_name"),
+    [
+        ("rt", "std_msgs.msg.dds_.String_"),
+        ("rt/", "std_msgs.msg.dds_.String_"),
+        ("rt//in", "std_msgs.msg.dds_.String_"),
+        ("rt/1/uav-1", "std_msgs.msg.dds_.String_"),
+        ("rt/" + "x" * 3000, "std_msgs.msg.dds_.String_"),
+        ("rq/Request", "std_srvs.srv.dds_.Trigger_Request_"),
+        ("rr/x", "std_srvs.srv.dds_.Trigger_Response_"),
+        ("ros_discovery_info", "rmw_dds_common.msg.dds_.ParticipantEntitiesInfo_"),
+        ("rt/in", "HelloWorld"),
+        ("rt/in", "a.b.c.d.e"),
+    ],
+)
+def test_names_that_ros2_has_not_are_passed_over(world, peer, dds_topic, type_name):
+    peer.do("advertise_oddly", dds_topic=dds_topic, type_name=type_name, user_data="typehash=;\0")
+    publish(peer, dds_topic, b"\0\1\0\0" + bytes(20))
+    assert world.goes_on() < SOON_S
+
+
+def test_noise_on_its_ports_harms_nobody(world):
+    noise = random.Random(9)
+    first = 7400 + 250 * DOMAIN
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        for _ in range(300):
+            body = noise.randbytes(noise.randrange(200))
+            begin = noise.choice([b"", b"RTPS", b"RTPS\2\5\1\x10" + noise.randbytes(12)])
+            sock.sendto(begin + body, ("127.0.0.1", first + 10 + noise.randrange(8)))
+    assert world.goes_on() < SOON_S
+
+
+def test_who_vanishes_while_it_is_told_much_is_missed_by_nobody(world):
+    peer = take_peer()
+    world.hear(peer, "/pictures", IMAGE)
+    for number in range(5):
+        world.do(lambda n=number: world.pictures.publish(picture(n)))
+    peer.kill()
+    for number in range(5):
+        world.do(lambda n=number: world.pictures.publish(picture(n)))
+    assert world.goes_on() < SOON_S
+    until(lambda: not {t.name: t for t in world.graph.topics()}["/pictures"].subscribers)
+    assert world.goes_on() < SOON_S

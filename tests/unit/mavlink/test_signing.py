@@ -1,0 +1,145 @@
+"""Signed frames, with pymavlink at the other end."""
+
+import hashlib
+import threading
+
+import pytest
+from autopilot_bench import free_port, irises
+
+from volery.bridges.doors import Doors
+from volery.core.errors import BridgeError
+from volery.mavlink.codec import Codec, Parser, dialect
+from volery.mavlink.framing import Framer
+from volery.mavlink.outfit import with_autopilots
+from volery.mavlink.signing import Signing, key_of
+from volery.mavlink.tcp_door import MavlinkTcp
+from volery.runtime import Simulation
+
+mavutil = pytest.importorskip("pymavlink.mavutil")
+
+KEY = hashlib.sha256(b"a word among friends").digest()
+NOW_S = 1_800_000_000.0
+STAMP = int((NOW_S - 1_420_070_400.0) * 100_000)
+
+
+def station(key=KEY, stamp=STAMP):
+    """A ground station that signs, by pymavlink."""
+    mav = dialect().MAVLink(None, 255, 190)
+    mav.signing.secret_key = key
+    mav.signing.link_id = 3
+    mav.signing.timestamp = stamp
+    mav.signing.sign_outgoing = key is not None
+    return mav
+
+
+def frame_of(mav, message=None):
+    """One of its frames, as it comes out of a stream."""
+    message = message or dialect().MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3)
+    (frame,) = Framer().feed(message.pack(mav))
+    return frame
+
+
+def ours(**changes):
+    return Signing(KEY, clock=lambda: NOW_S, **changes)
+
+
+def test_pymavlink_takes_what_is_signed():
+    codec, signing = Codec(1), ours(link=7)
+    message = dialect().MAVLink_attitude_message(1, 0.1, 0.2, 0.3, 0.0, 0.0, 0.0)
+    data = signing.sign(codec.pack(message, 0) + codec.pack(message, 1))
+    mav = station()
+    frames = Framer().feed(data)
+    assert len(frames) == 2
+    for frame in frames:
+        heard = mav.decode(bytearray(frame.data))
+        assert heard.get_signed()
+        assert heard.get_link_id() == 7
+        assert heard.pitch == pytest.approx(0.2)
+        assert Parser().decode(frame.data).roll == pytest.approx(0.1)
+
+
+def test_what_pymavlink_signs_is_accepted_once():
+    signing, mav = ours(), station()
+    first, second = frame_of(mav), frame_of(mav)
+    assert signing.accepts(second)
+    assert not signing.accepts(second)
+    assert not signing.accepts(first)
+    assert signing.accepts(frame_of(mav))
+
+
+@pytest.mark.parametrize(
+    "mav",
+    [station(None), station(bytes(32)), station(stamp=STAMP - 6_100_000)],
+    ids=["unsigned", "another key", "more than a minute old"],
+)
+def test_strangers_are_refused(mav):
+    assert not ours().accepts(frame_of(mav))
+
+
+def test_a_changed_frame_is_refused():
+    frame = frame_of(station())
+    for at in range(-13, 0):
+        data = bytearray(frame.data)
+        data[at] ^= 1
+        assert not ours().accepts(frame._replace(data=bytes(data)))
+
+
+def test_radios_have_no_key():
+    status = dialect().MAVLink_radio_status_message(1, 1, 1, 1, 1, 1, 1)
+    assert ours().accepts(frame_of(station(None), status))
+
+
+def test_stamps_follow_the_newest_that_was_heard():
+    signing, mav = ours(), station(stamp=STAMP + 50_000_000)
+    assert signing.accepts(frame_of(mav))
+    data = signing.sign(Codec(1).pack(dialect().MAVLink_ping_message(0, 0, 0, 0), 0))
+    assert int.from_bytes(data[-12:-6], "little") > STAMP + 50_000_000
+
+
+def test_without_a_key_all_passes():
+    data = Codec(1).pack(dialect().MAVLink_ping_message(0, 0, 0, 0), 0)
+    assert Signing(None).sign(data) == data
+    assert Signing(None).accepts(frame_of(station(None)))
+    assert Signing(None).accepts(frame_of(station()))
+
+
+def test_a_key_is_the_text_of_a_file(tmp_path):
+    path = tmp_path / "key.txt"
+    path.write_text("a word among friends\n")
+    assert key_of(path) == KEY
+    path.write_text("\n")
+    with pytest.raises(BridgeError, match="is empty"):
+        key_of(path)
+    with pytest.raises(BridgeError, match="cannot be read"):
+        key_of(tmp_path / "nowhere")
+
+
+def test_a_vehicle_hears_only_who_has_the_key():
+    simulation = Simulation(with_autopilots(irises(1)), threads=1)
+    run = threading.Thread(target=lambda: simulation.run(60.0, speed=1.0))
+    with simulation, Doors(simulation.gateway) as doors:
+        door = MavlinkTcp(port=free_port(), key=KEY)
+        doors.open(door)
+        simulation.be_prompt()
+        run.start()
+        try:
+            assert ack(door.port, None) is None
+            assert ack(door.port, KEY).get_signed()
+        finally:
+            simulation.quit()
+            run.join()
+
+
+def ack(port, key):
+    """What a station with this key is answered, or None."""
+    link = mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}", source_system=245)
+    try:
+        if key is not None:
+            link.setup_signing(key, allow_unsigned_callback=lambda *_: False)
+        assert link.wait_heartbeat(timeout=20)
+        link.mav.command_long_send(1, 1, 512, 0, 242, 0, 0, 0, 0, 0, 0)
+        return link.recv_match(
+            type="COMMAND_ACK", blocking=True, timeout=20.0 if key is not None else 1.0
+        )
+    finally:
+        link.close()
