@@ -67,19 +67,15 @@ class LocalGrid:
             self._score[tuple(index)] = UNKNOWN
         self._low = low
 
-    def add(self, rays: Rays) -> None:
-        """Take in the rays of one scan."""
+    def add(self, rays: Rays, *, clears: bool = True) -> None:
+        """Take in the rays of one scan; `clears`: not only its hits, but what they pass, too."""
         assert self._low is not None
         self._number += 2
-        _cast(
-            rays.starts / self.cell_m,
-            rays.ends / self.cell_m,
-            rays.hits,
-            self._low,
-            self._number,
-            self._score,
-            self._scan,
-        )
+        ends, number = rays.ends / self.cell_m, self._number
+        _mark(ends, rays.hits, self._low, number, self._score, self._scan)
+        if clears:
+            starts = rays.starts / self.cell_m
+            _cast(starts, ends, self._low, number, self._score, self._scan)
 
     def clear_around(self, place: Array, radius_m: float) -> None:
         """The vehicle itself is at `place`: what is not known there is free."""
@@ -112,8 +108,7 @@ def _copy(score: Scores, low: Integers, out: Scores) -> None:
 
 
 @kernel
-def _cast(
-    starts: Array,
+def _mark(
     ends: Array,
     hits: NDArray[np.bool_],
     low: Integers,
@@ -121,7 +116,7 @@ def _cast(
     score: Scores,
     scan: NDArray[np.int32],
 ) -> None:
-    """Rays in units of cells; cells on the way after Amanatides and Woo (Eurographics 1987)."""
+    """Ends of rays (K, 3) that hit something, in units of cells."""
     nx, ny, nz = score.shape
     for k in range(len(hits)):
         if not hits[k]:
@@ -133,7 +128,20 @@ def _cast(
             scan[i, j, m] = number
             before = 0 if score[i, j, m] == UNKNOWN else score[i, j, m]
             score[i, j, m] = min(before + _HIT, _MOST)
-    for k in range(len(hits)):
+
+
+@kernel
+def _cast(
+    starts: Array,
+    ends: Array,
+    low: Integers,
+    number: int,
+    score: Scores,
+    scan: NDArray[np.int32],
+) -> None:
+    """Rays in units of cells; cells on the way after Amanatides and Woo (Eurographics 1987)."""
+    nx, ny, nz = score.shape
+    for k in range(len(starts)):
         x, y, z = starts[k, 0], starts[k, 1], starts[k, 2]
         dx, dy, dz = ends[k, 0] - x, ends[k, 1] - y, ends[k, 2] - z
         a, b, c = math.floor(x), math.floor(y), math.floor(z)

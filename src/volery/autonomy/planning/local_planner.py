@@ -61,8 +61,9 @@ class LocalPlanner(Node):
     period_s: time between plans. ahead_s: so long after its input a plan takes over; not less than
         the node's latency.
     arrival_m: so near to its end the way is done.
-    scan_rate_hz, nodding_scan_rate_hz: scans taken of each LIDAR a second; cell_m: of the local
-        grid. Of a nodding LIDAR all count: what is thin is seen in few of them.
+    scan_rate_hz: scans taken of each LIDAR a second, at best no multiple of a nodding mount's rate,
+        or it is always looked at the same angles; of a nodding LIDAR the hits of all scans count.
+    cell_m: of the local grid.
     separation_m: to keep in plan from the UAVs that are heard on `radio/team`.
 
     """
@@ -74,11 +75,8 @@ class LocalPlanner(Node):
             for name in ("level", "nodding")
         }
         cell = float(self.declare_parameter("cell_m", 0.25).value)
-        rates = {
-            "level": float(self.declare_parameter("scan_rate_hz", 10.0).value),
-            "nodding": float(self.declare_parameter("nodding_scan_rate_hz", 40.0).value),
-        }
-        self._sight = Surroundings(mounts, cell, rates)
+        scan_rate = float(self.declare_parameter("scan_rate_hz", 13.3).value)
+        self._sight = Surroundings(mounts, cell, scan_rate)
         self._height = self.declare_parameter("height_m", 3.0, read_only=False)
         self._speed = self.declare_parameter("speed_m_s", 3.0, read_only=False)
         self._acceleration = float(self.declare_parameter("acceleration_m_s2", 2.5).value)

@@ -35,13 +35,11 @@ _JUMP_BACK_NS = NS_PER_S // 2
 class Surroundings:
     """Takes in scans, joint angles and ranges, in the frame of the odometry."""
 
-    def __init__(
-        self, mounts: dict[str, Any], cell_m: float, scan_rates_hz: dict[str, float]
-    ) -> None:
+    def __init__(self, mounts: dict[str, Any], cell_m: float, scan_rate_hz: float) -> None:
         self.motion, self._nod = MotionHistory(), NodHistory()
         self._grid = LocalGrid(cell_m, _SHAPE)
         self._makers = {name: RayMaker(mount, Beams()) for name, mount in mounts.items()}
-        self._period_ns = {name: round(NS_PER_S / hz) for name, hz in scan_rates_hz.items()}
+        self._period_ns = round(NS_PER_S / scan_rate_hz)
         self._repeats = {name: ScanRepeats() for name in mounts}
         self._stuck: set[str] = set()
         """LIDARs that repeat themselves."""
@@ -103,20 +101,23 @@ class Surroundings:
         self._stuck.discard(name)
         self._heard_ns[name] = stamp
         taken = self._taken_ns.get(name)
-        due = 0 if taken is None else taken + self._period_ns[name] - NS_PER_S // 200
-        if taken is not None and taken <= stamp < due:
+        due = 0 if taken is None else taken + self._period_ns - NS_PER_S // 200
+        is_due = taken is None or not taken <= stamp < due
+        if not is_due and name != "nodding":
             return
         newest = self.motion.newest
         if newest is None:
             return
-        self._taken_ns[name] = stamp
+        if is_due:
+            self._taken_ns[name] = stamp
         rays = self._makers[name].rays(scan, self.motion, self._nod if name == "nodding" else None)
         if rays is None or len(rays.hits) == 0:
             return
         if rays.hits.any():
             self._seen_ns[name] = stamp
         self._grid.move_to(newest.position)
-        self._grid.add(rays)
+        # What is thin is seen in few of a nodding LIDAR's scans: the hits of all count.
+        self._grid.add(rays, clears=is_due)
         self._ground.add(rays.ends[rays.hits], now_ns)
 
     def problems(self, now_ns: int) -> list[str]:

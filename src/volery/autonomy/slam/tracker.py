@@ -272,8 +272,8 @@ class Tracker:
         pitch = math.atan2(-up[0], math.hypot(up[1], up[2]))
         attitude = rotations.from_rpy(roll, pitch, 0.0)
         self.settling = self._turned_before()
-        turn = turn_of_heading(Level(IDENTITY, 0.0), attitude, self.settling)
-        attitude = rotations.from_rpy(roll, pitch, float(self.start[3]) + turn)
+        heading = turn_of_heading(Level(IDENTITY, 0.0), attitude, self.settling)
+        attitude = rotations.from_rpy(roll, pitch, float(self.start[3]) + heading)
         self.state[:] = 0.0
         self.state[:3], self.state[Q : Q + 4] = self.start[:3], attitude
         self.state[G + 2] = -GRAVITY_M_S2

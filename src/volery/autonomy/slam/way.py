@@ -153,7 +153,7 @@ class Way:
         """Of the first keyframe in the map, (4,): where it stood, by what is known of gravity."""
         attitude = self.frames[0].attitude
         turn = turn_of_heading(level_of(gravity, attitude), attitude, self._settling)
-        return self._start + np.array([0.0, 0.0, 0.0, turn])
+        return np.add(self._start, [0.0, 0.0, 0.0, turn])
 
     def _level_again(self, gravity: Array) -> None:
         """Take what is now known of gravity for the last keyframes, too."""
