@@ -12,10 +12,13 @@ from volery.autonomy.motion_history import NodHistory
 from volery.autonomy.scan_rays import is_usable, scan_times
 from volery.autonomy.slam import reports
 from volery.autonomy.slam.health import Health
-from volery.autonomy.slam.inertial_kernels import BG, Q, V
+from volery.autonomy.slam.inertial_kernels import BG, G, V
+from volery.autonomy.slam.keyframes import levelling
+from volery.autonomy.slam.level_odometry import LevelOdometry
 from volery.autonomy.slam.settings import ImuNoise, Matching
 from volery.autonomy.slam.tracker import Sweep, Tracker
 from volery.autonomy.slam.way import Way
+from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.errors import NodeError
 from volery.core.kept import keep, put_back
@@ -88,6 +91,7 @@ class Slam(Node):
     def _begin(self) -> None:
         self._tracker = Tracker(self._start, self._imu_noise, self._matching)
         self._tracker.standing_height = self._standing
+        self._level = LevelOdometry()
         self._way = Way(self._matching, self._start, self._has_loops)
         self._health = Health(("IMU", "level LIDAR", "nodding LIDAR"), self.get_clock().now_ns())
         self._nod = NodHistory()
@@ -119,7 +123,7 @@ class Slam(Node):
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        parts = {n: getattr(self, n).get_state() for n in ("_tracker", "_way", "_health")}
+        parts = {n: getattr(self, n).get_state() for n in ("_tracker", "_level", "_way", "_health")}
         return {"parts": parts, **keep(self, self._PLAIN)}
 
     def set_state(self, state: dict[str, Any]) -> None:
@@ -193,8 +197,9 @@ class Slam(Node):
 
     def _tell_odometry(self, time_ns: int) -> None:
         t = self._tracker
-        state = t.state
-        parts = (state[:3].copy(), state[Q : Q + 4].copy(), state[V : V + 3].copy(), self._omega)
+        position, attitude = self._level.follow(t.state)
+        velocity = rotations.rotate(levelling(t.state[G : G + 3]), t.state[V : V + 3])
+        parts = (position, attitude, velocity, self._omega)
         self._odom.publish(reports.odometry(time_ns, self._uav, parts, t.covariance[:9, :9]))
 
     def _tell_pose(self) -> None:
@@ -207,8 +212,10 @@ class Slam(Node):
         x, y, z, yaw = np.hypot(four, own)
         sigmas = np.array([x, y, z, tilt[0], tilt[1], yaw])
         self._pose.publish(reports.pose_in_map(t.time_ns, position, attitude, sigmas))
-        at = self._way.correction
-        self._tf.publish(reports.map_from_odom(t.time_ns, self._uav, at.position, at.attitude))
+        here, own = self._level.follow(t.state)
+        turn = rotations.multiply(attitude, rotations.conjugate(own))
+        place = position - rotations.rotate(turn, here)
+        self._tf.publish(reports.map_from_odom(t.time_ns, self._uav, place, turn))
 
     def _tell_status(self) -> None:
         t, way, now = self._tracker, self._way, self.get_clock().now_ns()
