@@ -103,7 +103,8 @@ def take_peer(hear=None, *, patient=False):
 
 
 @atexit.register
-def _end_all():
+def end_idle_peers():
+    """Even idle ones cost what DDS does."""
     for peers in _idle.values():
         while peers:
             peers.pop().kill()

@@ -15,8 +15,8 @@ _CELL_M = 2.0
 _CELLS = 16
 _RADIUS_M = 13.0
 _NOISE_M = 0.05
-_ENOUGH = 8
-"""Cells with returns from which on these tell the height, where no sonar does."""
+_ENOUGH, _BELOW_M = 8, 0.5
+"""Cells with returns so far below the vehicle from which on these tell the height, without a sonar."""
 _RIDGE = 8.0
 """Weight that pulls the slope to zero where few returns reach the ground."""
 
@@ -50,7 +50,8 @@ class GroundPlane:
         near = np.hypot(offset[:, 0], offset[:, 1]) < _RADIUS_M
         offset, z = offset[near], fresh[near, 2]
         base = height_below if height_below is not None else float(self.height_at(position[:2]))
-        is_told = height_below is not None or len(z) < _ENOUGH
+        low = z < position[2] - _BELOW_M
+        is_told = height_below is not None or low.sum() < _ENOUGH
         slope = self.slope
         for _ in range(3):
             residual = z - base - offset @ slope
@@ -59,7 +60,8 @@ class GroundPlane:
             normal = (offset * weight[:, None]).T @ offset + _RIDGE * np.eye(2)
             slope = np.linalg.solve(normal, (offset * weight[:, None]).T @ (z - base))
             if not is_told:
-                base += float(weight @ (z - base - offset @ slope) / weight.sum())
+                left = (z - base - offset @ slope)[low]
+                base += float(weight[low] @ left / weight[low].sum())
         steepness = float(np.hypot(*slope))
         self.slope = slope if steepness < 1.0 else slope / steepness
         self.anchor = position[:2].copy()

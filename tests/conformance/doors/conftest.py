@@ -8,6 +8,7 @@ from door_ros2 import Ros2Bench
 from door_ros_tcp import ConnectorBench, EndpointBench
 from door_rosbridge import ClientBench, ServerBench
 from door_sensor_link import SensorLinkBench
+from plain_peers import end_idle_peers
 
 BENCHES = {
     "ros_tcp": (EndpointBench, "ros1"),
@@ -27,6 +28,12 @@ ROSPY = [  # it uses what is deprecated and forgets to close sockets
     pytest.mark.filterwarnings("ignore:notifyAll:DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _no_peers_afterwards():
+    yield
+    end_idle_peers()
 
 
 @pytest.fixture(

@@ -154,6 +154,9 @@ class Peer:
 
     def listen(self):
         while not self.leaving:
+            if not self.hearers:
+                time.sleep(0.02)
+                continue
             self.waitset.wait(duration(milliseconds=50))
             for reader, hear in tuple(self.hearers):
                 for sample in reader.take(100):
