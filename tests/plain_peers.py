@@ -47,6 +47,8 @@ class PlainPeer:
 
     def _read(self):
         for line in self._process.stdout:
+            if not line.endswith("\n"):
+                break  # killed while it told
             told = json.loads(line)
             if "heard" not in told:
                 self._done.put(told.get("done"))

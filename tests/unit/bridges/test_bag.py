@@ -256,7 +256,10 @@ def test_file_size_limit_stops_the_run_with_one_error(
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_messages_are_those_that_can_be_read(tmp_path: Path, flight: Flight, suffix: str) -> None:
+def test_messages_are_those_that_can_be_read(
+    tmp_path: Path, flight: Flight, suffix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("volery.bridges.logs.bag.CHUNK_WALL_S", float("inf"))
     log = open_log(tmp_path / f"flight{suffix}")
     counts = []
     for message in flight(10.0):
