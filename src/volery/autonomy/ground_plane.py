@@ -16,7 +16,7 @@ _CELLS = 16
 _RADIUS_M = 13.0
 _NOISE_M = 0.05
 _ENOUGH, _BELOW_M = 8, 0.5
-"""Cells with returns so far below the vehicle from which on these tell the height, without a sonar."""
+"""So many cells with returns so far below the vehicle tell the height where no sonar does."""
 _RIDGE = 8.0
 """Weight that pulls the slope to zero where few returns reach the ground."""
 

@@ -34,14 +34,13 @@ class Terms(NamedTuple):
 
 
 class DoorKind(NamedTuple):
-    """A door that can be asked for: the port where none is said, how it is made, what it is.
+    """A door that can be asked for: the port where none is said, how it is made.
 
     on_line: it is no port of a host but a serial line, PATH[:BAUD].
     """
 
     port: int
     make: Callable[[Address, Terms], Door]
-    what: str
     on_line: bool = False
 
 
@@ -59,11 +58,6 @@ def make_door(text: str, terms: Terms, more: Mapping[str, DoorKind] | None = Non
         raise BridgeError(f"no door '{name}'.{hint} Doors: {', '.join(kinds)}")
     parse = _parse_line if kind.on_line else _parse
     return kind.make(parse(address, kind.port, text), terms)
-
-
-def describe_doors() -> dict[str, str]:
-    """All doors and what they are."""
-    return {name: kind.what for name, kind in _KINDS.items()}
 
 
 def _parse(address: str, port: int, text: str) -> Address:
@@ -156,14 +150,12 @@ def _sensor_link(address: Address, terms: Terms) -> Door:
 _HERE = "127.0.0.1"
 _UNSAID = -1
 _KINDS = {
-    "rosbridge": DoorKind(9090, _rosbridge, "rosbridge v2 server (WebSocket, JSON and CBOR)"),
-    "ros-tcp": DoorKind(10000, _ros_tcp, "server for Unity's ROS-TCP-Connector, ROS 1 messages"),
-    "ros-tcp-2": DoorKind(10000, _ros_tcp_2, "the same with ROS 2 messages"),
-    "ros-tcp-connector": DoorKind(10000, _ros_tcp_connector, "connects to a ROS-TCP-Endpoint"),
-    "ros1": DoorKind(0, _ros1, "joins the roscore of ROS_MASTER_URI"),
-    "ros2": DoorKind(_UNSAID, _ros2, "ROS 2 over DDS; =N: domain N instead of ROS_DOMAIN_ID"),
-    "ros2-zenoh": DoorKind(_UNSAID, _ros2_zenoh, "ROS 2 over zenoh; =[HOST:]PORT: its router"),
-    "sensor-link": DoorKind(
-        10100, _sensor_link, "binary frames with CRC-16; images on the next port"
-    ),
+    "rosbridge": DoorKind(9090, _rosbridge),
+    "ros-tcp": DoorKind(10000, _ros_tcp),
+    "ros-tcp-2": DoorKind(10000, _ros_tcp_2),
+    "ros-tcp-connector": DoorKind(10000, _ros_tcp_connector),
+    "ros1": DoorKind(0, _ros1),
+    "ros2": DoorKind(_UNSAID, _ros2),
+    "ros2-zenoh": DoorKind(_UNSAID, _ros2_zenoh),
+    "sensor-link": DoorKind(10100, _sensor_link),
 }

@@ -57,38 +57,18 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
     patience, key = _patience_of(options), _key_of(options)
     terms = Terms(options.allow_remote, options.token, options.domain_id, options.interfaces)
     more = {
-        "comms": DoorKind(10200, _comms, "makes UAVs stations of a communication server"),
-        "mavlink": DoorKind(
-            14540,
-            lambda address, terms: _mavlink(address, terms, key),
-            "MAVLink over UDP, ports as PX4's simulations",
-        ),
-        "px4": DoorKind(
-            4560,
-            lambda address, terms: _px4(address, terms, patience),
-            "real PX4s fly the UAVs, in lock step",
-        ),
+        "comms": DoorKind(10200, _comms),
+        "mavlink": DoorKind(14540, lambda address, terms: _mavlink(address, terms, key)),
+        "px4": DoorKind(4560, lambda address, terms: _px4(address, terms, patience)),
         "px4-serial": DoorKind(
-            921600,
-            lambda address, _terms: _px4_serial(address, patience),
-            "a PX4 on a serial line flies a UAV",
-            on_line=True,
+            921600, lambda address, _terms: _px4_serial(address, patience), on_line=True
         ),
         "ardupilot": DoorKind(
-            9002,
-            lambda address, terms: _ardupilot(address, terms, patience, simulation),
-            "real ArduCopters fly the UAVs, in lock step",
+            9002, lambda address, terms: _ardupilot(address, terms, patience, simulation)
         ),
-        "mavlink-tcp": DoorKind(
-            5760,
-            lambda address, terms: _mavlink_tcp(address, terms, key),
-            "MAVLink over TCP, all UAVs on each link",
-        ),
+        "mavlink-tcp": DoorKind(5760, lambda address, terms: _mavlink_tcp(address, terms, key)),
         "mavlink-serial": DoorKind(
-            57600,
-            lambda address, _terms: _mavlink_serial(address, key),
-            "MAVLink on a serial line",
-            on_line=True,
+            57600, lambda address, _terms: _mavlink_serial(address, key), on_line=True
         ),
     }
     wanted = [make_door(text, terms, more) for text in options.doors]

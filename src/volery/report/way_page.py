@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 
 _LEAST = 10
 """Poses in common that an error can be told from."""
-_LEAST_S = 3.0
-"""Seconds that a common time can be found from."""
+_LEAST_S, _MOST_S = 3.0, 86_400.0
+"""Seconds that a common time can be found from, and is looked for in."""
 
 
 def write_log_report(
@@ -99,6 +99,10 @@ def _comparison_section(uav: LoggedUav, real: Way, log: Path) -> list[str]:
     simulated = uav.truth or uav.estimate
     if simulated is None or min(real.lasts_s, simulated.lasts_s) < _LEAST_S:
         raise VoleryError(f"{log}: too few poses to lay it over {uav.name}")
+    if real.lasts_s > _MOST_S:
+        raise VoleryError(
+            f"{log}: its poses span {real.lasts_s / 3600.0:.0f} hours; was its clock set meanwhile?"
+        )
     shift = time_shift_s(simulated.time_s, simulated.position, real.time_s, real.position)
     times = real.time_s + shift
     known = common_times(times, simulated.time_s)

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from volery.scenario.base import Data, NonNegative, Positive, Topic
 
 _Decibels = Annotated[float, Field(ge=0.0, le=200.0)]
+_Interval = Annotated[float, Field(ge=1e-3)]
 
 
 class RelayedTopic(Data):
@@ -42,7 +43,7 @@ class Radio(Data):
     """Of the path loss over distance; 2: free space."""
     shadowing_db: _Decibels = 3.0
     """Standard deviation of the slow fading of a pair."""
-    shadowing_s: Positive = 1.0
+    shadowing_s: _Interval = 1.0
     """For so long the slow fading of a pair stays as it is."""
     vegetation: Literal["p833", "weissberger", "none"] = "p833"
     """Law of the loss in foliage."""
@@ -57,7 +58,7 @@ class Radio(Data):
     """Repetitions of a frame for one station; frames for many are sent once."""
     queue_s: Positive = 0.2
     """What would have to wait longer for the channel is dropped."""
-    update_s: Positive = 0.25
+    update_s: _Interval = 0.25
     """For so long what stands between two stations is taken to be the same."""
 
     @model_validator(mode="after")

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -130,6 +131,20 @@ def test_summary(tmp_path: Path, flight: Flight, suffix: str) -> None:
     assert scan.messages == 80
     assert scan.msgtype == "sensor_msgs/msg/LaserScan"
     assert scan.rate_hz == pytest.approx(40.0)
+
+
+def test_a_topic_that_nobody_spoke_on_has_no_rate(tmp_path: Path) -> None:
+    """As recorders of ROS 2 leave them."""
+    path = tmp_path / "silent.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        _, heard = (writer.register_channel(name, "cdr", schema) for name in ("/a", "/b"))
+        for k in range(11):
+            writer.add_message(heard, k * 10**8, b"", k * 10**8)
+        writer.finish()
+    assert {t.topic: t.rate_hz for t in summarize(path).topics} == {"/a": 0.0, "/b": 10.0}
 
 
 @pytest.mark.parametrize("suffix", FORMATS)

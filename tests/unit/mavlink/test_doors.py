@@ -114,7 +114,7 @@ def test_a_port_that_is_taken_is_told(running):
 def _kinds():
     from volery.bridges.door_names import DoorKind
 
-    return {"mavlink": DoorKind(1, lambda a, t: MavlinkUdp(*a, anywhere=t.anywhere), "")}
+    return {"mavlink": DoorKind(1, lambda a, t: MavlinkUdp(*a, anywhere=t.anywhere))}
 
 
 def test_tcp_carries_all_vehicles_on_each_connection(running):

@@ -111,6 +111,17 @@ def test_a_real_flight_is_laid_over_it(log: Path, tmp_path: Path) -> None:
         read_way(real, "/odom")
 
 
+def test_a_clock_that_was_set_in_flight_is_told(log: Path, tmp_path: Path) -> None:
+    """As that of a computer without a battery for it, until it hears of the time."""
+    real = tmp_path / "real.bag"
+    with closing(open_log(real)) as out:
+        for k in range(1000):
+            time_ns = k * S // 20 + (k > 500) * 1_700_000_000 * S
+            write(out, "/mavros/odom", time_ns, odometry(time_ns, place_at(k / 20.0)))
+    with pytest.raises(VoleryError, match="span 472222 hours; was its clock set"):
+        write_log_report(log, tmp_path / "out", compare=real)
+
+
 def test_a_log_without_uavs(tmp_path: Path) -> None:
     path = tmp_path / "empty.mcap"
     with closing(open_log(path)) as log:

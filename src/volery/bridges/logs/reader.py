@@ -67,7 +67,7 @@ def summarize(path: str | Path) -> LogSummary:
     start, end = indexed
     seconds = (end - start) / NS_PER_S
     topics = tuple(
-        TopicSummary(topic, msgtype, count, (count - 1) / seconds if seconds > 0.0 else 0.0)
+        TopicSummary(topic, msgtype, count, max(count - 1, 0) / seconds if seconds > 0.0 else 0.0)
         for (topic, msgtype), count in sorted(counts.items())
     )
     size = path.stat().st_size
