@@ -211,6 +211,48 @@ def test_a_silent_imu_is_told_of(flown):
     assert told.state() != "tracking"
 
 
+@pytest.mark.parametrize("gap_s", [0.1, 0.4, 1.0])
+@pytest.mark.parametrize("everything", [False, True])
+def test_after_a_gap_in_the_imu_it_finds_its_place_and_speed_again(flown, gap_s, everything):
+    """On an arc at 2 m/s; the LIDARs go on meanwhile, or nothing is heard at all."""
+    begin, end = 6 * S, round((6 + gap_s) * S)
+    left = [row for row in flown
+            if not begin <= row[0] < end or not (everything or row[1] == "imu")]  # fmt: skip
+    told = Listening().hear(left)
+    off, turned = errors(m for m in told.pose if stamp_ns(m) > end + S)
+    assert len(off) > 10
+    assert np.abs(off).max() < 0.3
+    assert np.abs(turned).max() < 0.05
+    speeds = [np.hypot(m.twist.twist.linear.x, m.twist.twist.linear.y) for m in told.odom
+              if stamp_ns(m) > end + S]  # fmt: skip
+    assert np.abs(np.array(speeds) - 2.0).max() < 0.3
+    assert told.last_status()["sessions"] == 1
+    assert told.state() == "tracking"
+
+
+def stamp_ns(message):
+    return message.header.stamp.sec * S + message.header.stamp.nanosec
+
+
+def test_what_the_imu_left_out_is_told_until_the_place_is_found(flown):
+    """Nothing is seen for half a second after the gap."""
+    blind = [(when, topic, unseeing(m) if "laser" in topic and when > 6 * S else m)
+             for when, topic, m in flown if not (topic == "imu" and 6 * S <= when < 6.6 * S)
+             and when < 7.1 * S]  # fmt: skip
+    told = Listening().hear(blind)
+    assert told.state() == "lost"
+    assert "the IMU has left out how it moved" in told.last_status()["problems"]
+    assert all(stamp_ns(m) <= 6 * S for m in told.pose)
+    told.hear([row for row in flown if row[0] >= 7.1 * S])
+    off, _ = errors(told.pose[-5:])
+    assert told.state() == "tracking"
+    assert np.abs(off).max() < 0.3
+
+
+def unseeing(scan):
+    return dataclasses.replace(scan, ranges=np.full_like(scan.ranges, np.inf))
+
+
 def test_featureless_space_is_told_of():
     flat = messages(Flight(), np.zeros((0, 3)), 7.0)
     told = Listening().hear(flat)
@@ -256,7 +298,7 @@ def test_a_kidnapped_uav_finds_itself_or_says_lost(flown):
 
 def test_new_maps_in_flight_leave_the_velocity_right(flown):
     told = Listening().hear([row for row in flown if row[0] <= 7 * S])
-    told.node._lose(0.5)
+    told.node._lose(0.5, 0.0)
     since = told.bench.now_ns
     told.hear([row for row in flown if row[0] > 7 * S])
     speeds = [np.hypot(m.twist.twist.linear.x, m.twist.twist.linear.y) for m in told.odom

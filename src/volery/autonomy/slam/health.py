@@ -43,11 +43,13 @@ class Health:
         misfit = self._is_lost(tracker)
         if misfit:
             self.problems.append("what is seen is not what was there")
+        if tracker.is_astray:
+            self.problems.append("the IMU has left out how it moved")
         if not is_placed:
             self.problems.append("where in the map is not known")
         if self._scarce_ns is not None and now_ns - self._scarce_ns > _LOST_NS:
             self.problems.append("too few things in reach")
-        if misfit or not is_placed:
+        if misfit or tracker.is_astray or not is_placed:
             self.state = "lost"
         else:
             self.state = "degraded" if self.problems else "tracking"
@@ -55,6 +57,8 @@ class Health:
 
     def _is_lost(self, tracker: Tracker) -> bool:
         now = tracker.time_ns
+        if tracker.is_astray:
+            return tracker.recovery.has_failed(tracker.covariance, now)
         fresh = [m for m in tracker.match.values() if now - m.time_ns < NS_PER_S // 2]
         met = sum(m.met for m in fresh)
         few = met < _FEW and not tracker.is_standing

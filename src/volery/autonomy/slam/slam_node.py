@@ -41,8 +41,11 @@ _JUMP_NS = NS_PER_S // 2
 """A stamp so far before the newest one is a clock that was set back."""
 _LONGEST_GAP_NS = 2 * NS_PER_S
 """Without readings of the IMU for longer it is not known where the vehicle has gone."""
-_UNKNOWN_SPEED_M_S, _DOUBTED_SPEED_M_S = 3.0, 0.5
-"""How far the velocity may be off after such a gap, and after what is seen did not fit the map."""
+_UNKNOWN, _DOUBTED = (3.0, 0.3), (0.5, 0.0)
+"""How far velocity (m/s) and attitude (rad) may be off after such a gap, and after what is seen did
+not fit the map."""
+_QUEUE = 500
+"""Readings that wait while the node's process does not get to them: two seconds at 200 Hz."""
 _MOST_RAD_S, _MOST_M_S2 = 60.0, 500.0
 """Beyond what any IMU measures."""
 
@@ -109,8 +112,8 @@ class Slam(Node):
         self._path = self.create_publisher(PathMessage, "slam/path", 1, latched=True)
         self._status = self.create_publisher(String, "slam/status", 1, latched=True)
         self._tf = self.create_publisher(TFMessage, "/tf", 10)
-        self.create_subscription(Imu, "imu", self._on_imu, 50)
-        self.create_subscription(JointState, "joint_states", self._on_joint, 20)
+        self.create_subscription(Imu, "imu", self._on_imu, _QUEUE)
+        self.create_subscription(JointState, "joint_states", self._on_joint, _QUEUE)
         self.create_subscription(Range, "range", self._on_range, 5)
         self.create_subscription(
             LaserScan, "laser/horizontal/scan", lambda m: self._on_scan("level", m), 5
@@ -161,7 +164,7 @@ class Slam(Node):
         self._resets += 1
         self._tracker.set_clock(time_ns)
         if self._tracker.is_ready:
-            self._lose(_UNKNOWN_SPEED_M_S)
+            self._lose(*_UNKNOWN)
 
     def _on_joint(self, message: JointState) -> None:
         if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
@@ -204,7 +207,7 @@ class Slam(Node):
 
     def _tell_pose(self) -> None:
         t = self._tracker
-        if not t.is_ready or not self._way.frames or not self._way.is_placed:
+        if not t.is_ready or t.is_astray or not self._way.frames or not self._way.is_placed:
             return
         position, attitude = self._way.pose(t)
         four, tilt = self._way.sigmas(t), np.sqrt(np.diag(t.covariance)[15:17])
@@ -220,7 +223,7 @@ class Slam(Node):
     def _tell_status(self) -> None:
         t, way, now = self._tracker, self._way, self.get_clock().now_ns()
         if self._health.look(t, now, way.is_placed):
-            self._lose(_DOUBTED_SPEED_M_S)
+            self._lose(*_DOUBTED)
         told = {
             "state": self._health.state,
             "problems": self._health.problems,
@@ -242,9 +245,9 @@ class Slam(Node):
             times = [frame.time_ns for frame in way.frames]
             self._path.publish(reports.path(t.time_ns, times, way.poses))
 
-    def _lose(self, speed_sigma: float) -> None:
+    def _lose(self, speed_sigma: float, turn_sigma: float) -> None:
         """Begin new maps; where in the old one they lie must be found out."""
-        self._tracker.begin_anew(speed_sigma)
+        self._tracker.begin_anew(speed_sigma, turn_sigma)
         self._health.begin_anew()
         if self._way.frames:
             self._way.begin_anew()

@@ -36,6 +36,7 @@ from volery.autonomy.slam.matching_kernels import (
     seed_ground,
     update,
 )
+from volery.autonomy.slam.recovery import GAP_S, Recovery
 from volery.autonomy.slam.settings import GRAVITY_M_S2, ImuNoise, Matching
 from volery.autonomy.slam.sweep import unskew
 from volery.autonomy.slam.upright_kernels import CELLS, LAYERS
@@ -47,7 +48,6 @@ Array = NDArray[np.float64]
 
 _KEPT = 64
 """IMU readings by whose states beams are placed: 0.3 s at 200 Hz."""
-_LONGEST_STEP_S = 0.1
 _STILL = 100
 """Readings over which standing still is judged: 0.5 s at 200 Hz."""
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
@@ -140,8 +140,8 @@ class Tracker:
 
     _STATE = (
         "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "standing_height",
-        "travelled_m", "_times", "_states", "_imu", "_waiting", "_maps", "_inserted", "_still",
-        "settling", "_turns", "_broad", "_near_ground_ns", "_range", "_standing_ns",
+        "travelled_m", "recovery", "_times", "_states", "_imu", "_waiting", "_maps", "_inserted",
+        "_still", "settling", "_turns", "_broad", "_near_ground_ns", "_range", "_standing_ns",
         "_is_high", "refused",
     )  # fmt: skip
 
@@ -161,6 +161,7 @@ class Tracker:
         self._times = np.zeros(_KEPT, np.int64)
         self._states = np.zeros((_KEPT, STATE_NUMBERS))
         self._imu: tuple[int, Array, Array] | None = None
+        self.recovery = Recovery()
         self._waiting: deque[Sweep] = deque()
         self._maps = Maps()
         self._inserted: dict[str, tuple[int, Array, float]] = {}
@@ -187,6 +188,15 @@ class Tracker:
     def time_ns(self) -> int:
         """Time of the state."""
         return 0 if self._imu is None else self._imu[0]
+
+    @property
+    def is_astray(self) -> bool:
+        """Whether a gap in the IMU's readings has left open where it is in its own maps."""
+        return self.recovery.since_ns is not None
+
+    @property
+    def _is_aslant(self) -> bool:
+        return self.recovery.is_aslant(self.covariance)
 
     @property
     def sigma_m(self) -> float:
@@ -239,10 +249,12 @@ class Tracker:
         dt = (time_ns - before[0]) / NS_PER_S
         here = self.state[:3].copy()
         mean_gyro, mean_accel = 0.5 * (before[1] + gyro), 0.5 * (before[2] + accel)
-        while dt > 0.0:
-            step = min(dt, _LONGEST_STEP_S)
-            move(self.state, self.covariance, mean_gyro, mean_accel, step, self._noise)
-            dt -= step
+        known = min(dt, GAP_S)
+        move(self.state, self.covariance, mean_gyro, mean_accel, known, self._noise)
+        if dt > known:
+            span = before[0], time_ns
+            self.recovery.coast(self.state, self.covariance, span, dt - known, self._noise)
+        self.recovery.keep_upright(self.state, self.covariance, time_ns)
         self.travelled_m += float(np.hypot(*(self.state[:2] - here[:2])))
         self._remember(time_ns)
 
@@ -336,7 +348,8 @@ class Tracker:
 
     def _take_in(self, sweep: Sweep) -> Seen | None:
         m = self.matching
-        if sweep.first_ns < self._times[0]:
+        in_gap = self.recovery.is_in_gap(sweep.first_ns, sweep.last_ns)
+        if sweep.first_ns < self._times[0] or in_gap:
             self.refused += 1
             return None
         points = np.empty((len(sweep.ranges), 3))
@@ -346,6 +359,10 @@ class Tracker:
             self._times, self._states, points,
         )  # fmt: skip
         points = points[:count]
+        if self.is_astray and not self.recovery.find(
+            self.state, self.covariance, self._states, self._maps, points
+        ):
+            return None
         maps, slope = self._maps, self._broad[1:3].copy()
         known = broad_plane(self.state, maps.ground_keys, maps.sums, 6, slope, self._broad)
         kinds, planes = np.empty(count, np.int8), np.zeros((count, 3))
@@ -414,19 +431,23 @@ class Tracker:
         self._still.clear()
         self._near_ground_ns = self._range = None
         self._standing_ns = time_ns
+        self.recovery = Recovery()
         self._times[:] = time_ns - np.arange(_KEPT)[::-1] * 1_000_000
         self._states[:] = self.state
 
-    def begin_anew(self, speed_sigma: float) -> None:
+    def begin_anew(self, speed_sigma: float, turn_sigma: float) -> None:
         """Forget the maps, and follow the motion in new ones.
 
-        `speed_sigma`, m/s, is how far the velocity may be off by now.
+        `speed_sigma`, m/s, and `turn_sigma`, rad about each axis, are how far velocity and attitude
+        may be off by now.
         """
         self._maps = Maps()
         self._inserted, self.match = {}, {}
         self.covariance[:3] = self.covariance[:, :3] = 0.0
         self.covariance[np.arange(3), np.arange(3)] = 1e-4
         self.covariance[np.arange(3, 6), np.arange(3, 6)] += speed_sigma**2
+        self.covariance[np.arange(6, 9), np.arange(6, 9)] += turn_sigma**2
+        self.recovery = Recovery(self.time_ns if self._is_aslant else None)
         if self._range is not None and self.time_ns - self._range[0] < _RECENT_NS:
             self._seed_below(self._range[1])
 

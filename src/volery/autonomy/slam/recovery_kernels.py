@@ -1,0 +1,161 @@
+"""Finding attitude and place again after a motion that nothing told of: by trying."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.ground_kernels import GROUND_CELL_M, GROUND_CELLS, Keys, key_of
+from volery.autonomy.slam.inertial_kernels import P, rotation_matrix, turn_left
+from volery.autonomy.slam.upright_kernels import CELL_M, CELLS, LAYER_M, LAYERS, LEAST, Cells
+from volery.core.compiled import inner_kernel, kernel, owning_kernel
+
+Array = NDArray[np.float64]
+
+_ON_GROUND_M = 0.35
+_OVER_GROUND_M = 0.6
+_FEWEST_GROUND, _FEWEST_UPRIGHTS = 60, 40
+"""Returns below which nothing can be told."""
+_PER_RAD2 = 0.3
+"""How much worse a large turn must not fit than a small one."""
+_STEP_M, _STEP_RAD = 0.25, 0.05
+_APART_M, _APART_RAD = 0.8, 0.2
+"""Places so far from the best one are others."""
+
+
+@kernel
+def find_attitude(
+    state: Array,
+    points: Array,
+    ground_keys: Keys,
+    sums: Array,
+    upright_keys: Keys,
+    cells: Cells,
+    reach: float,
+) -> float:
+    """Turn the attitude in `state` (19,) so that returns (K, 3) of the body lie where the map is.
+
+    Turns of up to `reach` rad about each axis are tried, in steps of a sixth of it, then of a
+    third of that. Returns the share of them that lie on known ground or where something stood, of
+    those above known ground; 0: too few to tell.
+    """
+    step, best, share = reach / 6.0, np.zeros(3), 0.0
+    for level in range(2):
+        most, middle, count = -1.0, best.copy(), 6 if level == 0 else 3
+        for i in range(-count, count + 1):
+            for j in range(-count, count + 1):
+                for k in range(-count, count + 1):
+                    tried = state.copy()
+                    x, y, z = middle[0] + i * step, middle[1] + j * step, middle[2] + k * step
+                    turn_left(tried, x, y, z)
+                    fits = _share(tried, points, ground_keys, sums, upright_keys, cells)
+                    worth = fits - _PER_RAD2 * (x * x + y * y + z * z)
+                    if fits > 0.0 and worth > most:
+                        most, share = worth, fits
+                        best[0], best[1], best[2] = x, y, z
+        step /= 3.0
+    turn_left(state, best[0], best[1], best[2])
+    return share
+
+
+@owning_kernel
+def _share(
+    state: Array, points: Array, ground_keys: Keys, sums: Array, upright_keys: Keys, cells: Cells
+) -> float:
+    turn, fits, told = np.empty((3, 3)), 0, 0
+    rotation_matrix(state, turn)
+    for n in range(points.shape[0]):
+        bx, by, bz = points[n, 0], points[n, 1], points[n, 2]
+        x = state[P] + turn[0, 0] * bx + turn[0, 1] * by + turn[0, 2] * bz
+        y = state[P + 1] + turn[1, 0] * bx + turn[1, 1] * by + turn[1, 2] * bz
+        z = state[P + 2] + turn[2, 0] * bx + turn[2, 1] * by + turn[2, 2] * bz
+        over = _over_ground(ground_keys, sums, x, y, z)
+        if math.isnan(over):
+            continue
+        told += 1
+        on_ground = abs(over) < _ON_GROUND_M
+        if on_ground or (over > _OVER_GROUND_M and _stands(upright_keys, cells, x, y, z)):
+            fits += 1
+    return fits / told if told >= _FEWEST_GROUND else 0.0
+
+
+@inner_kernel
+def _over_ground(keys: Keys, sums: Array, x: float, y: float, z: float) -> float:
+    """Height over the mean of a cell's ground; nan where none is known."""
+    i, j = math.floor(x / GROUND_CELL_M), math.floor(y / GROUND_CELL_M)
+    a, b = i % GROUND_CELLS, j % GROUND_CELLS
+    if keys[a, b] != key_of(i, j, 0):
+        return math.nan
+    return float(z - sums[a, b, 3] / sums[a, b, 0])
+
+
+@inner_kernel
+def _stands(keys: Keys, cells: Cells, x: float, y: float, z: float) -> bool:
+    i, j, k = math.floor(x / CELL_M), math.floor(y / CELL_M), math.floor(z / LAYER_M)
+    a, b, c = i % CELLS, j % CELLS, k % LAYERS
+    return bool(keys[a, b, c] == key_of(i, j, k) and cells[a, b, c, 0] >= LEAST)
+
+
+@kernel
+def find_place(
+    points: Array,
+    middle: Array,
+    ground_keys: Keys,
+    sums: Array,
+    upright_keys: Keys,
+    cells: Cells,
+    reach_m: float,
+    reach_rad: float,
+    found: Array,
+) -> None:
+    """Move uprights among returns (K, 3), m in the frame, to where some stood.
+
+    They are turned about the vertical through `middle` (3,) and moved in the plane. `found` (5,)
+    gets x, y (m), the turn (rad), the share of the uprights that meet some then, and the highest
+    such share elsewhere; all zero if there are too few.
+    """
+    found[:] = 0.0
+    uprights, count = np.empty_like(points), 0
+    for n in range(points.shape[0]):
+        over = _over_ground(ground_keys, sums, points[n, 0], points[n, 1], points[n, 2])
+        if over > _OVER_GROUND_M:  # leaves out nan
+            for axis in range(3):
+                uprights[count, axis] = points[n, axis] - middle[axis]
+            count += 1
+    if count < _FEWEST_UPRIGHTS:
+        return
+    steps, turns = math.ceil(reach_m / _STEP_M), math.ceil(reach_rad / _STEP_RAD)
+    wide, shares = 2 * steps + 1, np.zeros((2 * turns + 1, 2 * steps + 1, 2 * steps + 1))
+    for k in range(2 * turns + 1):
+        c, s = math.cos((k - turns) * _STEP_RAD), math.sin((k - turns) * _STEP_RAD)
+        for n in range(count):
+            x = middle[0] + c * uprights[n, 0] - s * uprights[n, 1]
+            y = middle[1] + s * uprights[n, 0] + c * uprights[n, 1]
+            z = middle[2] + uprights[n, 2]
+            for i in range(wide):
+                for j in range(wide):
+                    dx, dy = (i - steps) * _STEP_M, (j - steps) * _STEP_M
+                    if _stands(upright_keys, cells, x + dx, y + dy, z):
+                        shares[k, i, j] += 1.0 / count
+    _take_best(shares, steps, turns, found)
+
+
+@inner_kernel
+def _take_best(shares: Array, steps: int, turns: int, found: Array) -> None:
+    bk = bi = bj = 0
+    for k in range(shares.shape[0]):
+        for i in range(shares.shape[1]):
+            for j in range(shares.shape[2]):
+                if shares[k, i, j] > shares[bk, bi, bj]:
+                    bk, bi, bj = k, i, j
+    found[0], found[1] = (bi - steps) * _STEP_M, (bj - steps) * _STEP_M
+    found[2], found[3] = (bk - turns) * _STEP_RAD, shares[bk, bi, bj]
+    for k in range(shares.shape[0]):
+        for i in range(shares.shape[1]):
+            for j in range(shares.shape[2]):
+                near = math.hypot(i - bi, j - bj) * _STEP_M < _APART_M
+                if near and abs(k - bk) * _STEP_RAD < _APART_RAD:
+                    continue
+                found[4] = max(found[4], shares[k, i, j])
