@@ -245,3 +245,16 @@ def odometry_of(simulation):
     simulation.run(0.1)
     topic.cancel()
     return heard[-1]
+
+
+def test_it_stays_while_it_stands_and_tells_that_no_poses_come(simulate, slam_data):
+    """Without poses the IMU alone would carry the estimate away by hundreds of metres."""
+    simulation = simulate(slam_data)
+    rows = errors_of(simulation)
+    simulation.run(45.0)
+    at_start, at_end = np.array(rows[0][1:4]), np.array(rows[-1][1:4])
+    assert np.linalg.norm(at_end - at_start) < 0.5
+    told = [event.describe() for event in simulation.events if "hears no poses" in event.detail]
+    assert len(told) == 1
+    assert told[0].startswith("5.0")
+    assert "slam/odom" in told[0]

@@ -67,3 +67,35 @@ def test_two_share_the_forest_and_repeat_themselves() -> None:
         assert simulation.digest() == digest
         again = [uav.position_map for uav in simulation.uavs.values()]
         np.testing.assert_array_equal(again, places)
+
+
+@pytest.mark.slow
+def test_an_operators_hold_holds_until_resume() -> None:
+    """The planners' next velocities do not end it, and another one takes the sector over."""
+    scenario = overrides.apply(load_scenario("forest_search"), uavs=2)
+    with Simulation(scenario) as simulation:
+        simulation.run(14.0)
+        uav, graph = simulation.uavs["uav2"], simulation.graph
+        (manager,) = (
+            node
+            for node in simulation.nodes
+            if isinstance(node, TaskManager) and node.settings.name == "uav2"
+        )
+        assert str(manager.phase) == "search"
+        assert np.linalg.norm(uav.velocity_map) > 0.5
+        assert graph.call("/uav2/task_manager/hold").success
+        simulation.run(3.0)
+        place = uav.position_map
+        simulation.run(3.0)
+        assert uav.mode.name == "HOLD"
+        assert (str(manager.phase), manager.sector) == ("hold", -1)
+        assert "held by the operator" in manager.trouble
+        assert np.linalg.norm(uav.position_map - place) < 0.3
+        assert graph.call("/uav2/task_manager/resume").success
+        simulation.run(5.0)
+        assert str(manager.phase) == "search"
+        assert np.linalg.norm(uav.position_map - place) > 1.5
+        assert graph.call("/uav2/task_manager/land").success
+        simulation.run(8.0)
+        assert (str(manager.phase), manager.sector) == ("done", -1)
+        assert manager.trouble == "landed by the operator"

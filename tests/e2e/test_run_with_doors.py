@@ -173,6 +173,8 @@ def test_the_services_are_told_without_rosbridge_too():
         (("topic", "list", "--via", "rosbridge://127.0.0.1:1"), "nobody speaks rosbridge"),
         (("topic", "list", "--via", "ros-tcp://127.0.0.1:1"), "nobody speaks ROS-TCP"),
         (("topic", "list", "--via", "ros-tcp://127.0.0.1:x"), "no way into a graph"),
+        (("topic", "--via", "pigeon://post", "list"), "'pigeon://post' is no way"),
+        (("service", "--via", "a://b", "call", "/x", "--via", "c://d"), "'c://d' is no way"),
     ],
 )
 def test_slips_are_told_in_a_line(run, words, reason):

@@ -9,6 +9,7 @@ that do not hear each other go on, each by itself, until they do again.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from typing import Any
@@ -24,7 +25,14 @@ from volery.autonomy.team.sectors import Coverage
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
 from volery.graph.client import Client
-from volery.graph.messages import PolygonStamped, PoseStamped, String, message_type
+from volery.graph.messages import (
+    Bool,
+    PolygonStamped,
+    PoseStamped,
+    Range,
+    String,
+    message_type,
+)
 
 _PERIOD_S = 0.2
 _REPEAT_S = 2.0
@@ -37,6 +45,12 @@ _LOST_S = 30.0
 """After so long without knowing where it is it lands."""
 _HOME_M, _NEARER_M = 1.5, 1.0
 _LANDED_M, _SUNK_M, _STILL_M_S = 0.3, 0.25, 0.2
+_ALOFT_M = 0.6
+"""Farther than this above where it stood last it flies again."""
+_GROUND_M, _GROUND_S = 0.35, 2.0
+"""So near to the ground by its sonar, and still, for so long: it stands on it."""
+HELD, LANDED = "held by the operator", "landed by the operator"
+DOWN = "came down, and not by its mission"
 """All modelling choices."""
 
 
@@ -45,7 +59,11 @@ class TaskManager(TeamMember):
 
     Says `search_area` (where to explore; no corners: nowhere), the goal to fly to on `goal_topic`,
     `mission`, `targets` and, for the radio, `team`. Hears odometry, `battery`,
-    `target_detection/targets` and, from the radio, `radio/team`. `~/return_home` ends its search.
+    `target_detection/targets` and, from the radio, `radio/team`.
+    People's orders are services: `~/return_home` ends its search, `~/hold` and `~/land` have it
+    wait where it is or land there, its sector left to others, until `~/resume`. While it holds
+    `planning/pause` (std_msgs/Bool) has planners command nothing. One that stands on the ground by
+    its sonar (`range`) though nothing here had it land gives its sector up, too.
     An explorer may tell on `exploration/status` (JSON with a `state`: searching, then done or
     blocked) that it is through with an area; else what has been in sight decides.
 
@@ -75,6 +93,10 @@ class TaskManager(TeamMember):
         "_nearest_m",
         "_highest_m",
         "_ordered_home",
+        "_order",
+        "_paused",
+        "_stands_m",
+        "_low_ns",
         "_explores",
         *TeamMember.STATE,
     )
@@ -90,6 +112,13 @@ class TaskManager(TeamMember):
         self._highest_m = -math.inf
         """Since the landing began."""
         self._ordered_home = False
+        self._order = ""
+        """What an operator has it do, in words; empty: nothing."""
+        self._paused = False
+        self._stands_m = 0.0
+        """Height in the map of the place on which it stood last, and ..."""
+        self._low_ns: int | None = None
+        """... since when its sonar says that it stands on the ground; None: it does not."""
         self._explores = False
         """Whether the explorer has taken up the present sector."""
         self._area = self.create_publisher(PolygonStamped, "search_area", 1, latched=True)
@@ -97,7 +126,10 @@ class TaskManager(TeamMember):
         self._take_off = self.create_client("volery_interfaces/srv/TakeOffTo", "take_off_to")
         self._land = self.create_client("std_srvs/srv/Trigger", "land")
         self._hold = self.create_client("std_srvs/srv/Trigger", "hold")
-        self.create_service("std_srvs/srv/Trigger", "~/return_home", self._on_return_home)
+        self._pause = self.create_publisher(Bool, "planning/pause", 1, latched=True)
+        for order in ("return_home", "hold", "land", "resume"):
+            self.create_service("std_srvs/srv/Trigger", f"~/{order}", getattr(self, f"_on_{order}"))
+        self.create_subscription(Range, "range", self._on_range, 5)
         self.create_subscription(String, "exploration/status", self._on_explorer, 5)
         self.create_timer(_PERIOD_S, self._on_timer)
 
@@ -111,10 +143,83 @@ class TaskManager(TeamMember):
             self._given_up[self.sector] |= state == "blocked"
             self._drop(now)
 
+    def _on_range(self, message: Range) -> None:
+        if not (message.range <= _GROUND_M):  # too near to be measured is -inf
+            self._low_ns = None
+        elif self._low_ns is None:
+            self._low_ns = self.now_ns
+
+    # ------------------------------------------------------------------------------ people's orders
+
     def _on_return_home(self, _request: Any, response: Any) -> Any:
         self._ordered_home = True
-        response.success, response.message = True, str(self.phase)
-        return response
+        now, aloft = self.now_ns, self._is_aloft()
+        waits = self.phase in (Phase.HOLD, Phase.DONE, Phase.DOWN)
+        if (aloft and waits) or self._lands_by_order():
+            self._call(self._hold)  # ends what else is flown
+            self._go_home(now)
+        return _answer(response, True, "goes home and lands" if aloft else "stays on the ground")
+
+    def _on_hold(self, _request: Any, response: Any) -> Any:
+        if not self._is_aloft():
+            return _answer(response, False, f"it is not in the air ({self.phase})")
+        self._give_way(Phase.HOLD, HELD)
+        self._call(self._hold)
+        return _answer(response, True, "holds until resume, return or land")
+
+    def _on_land(self, _request: Any, response: Any) -> Any:
+        if not self._is_aloft():
+            self._ordered_home = True
+            return _answer(response, True, "stays on the ground until resume")
+        self._give_way(Phase.LAND, LANDED)
+        self._asked_ns = -1 << 62  # `land` is asked for with the next tick
+        return _answer(response, True, "lands, and stays there until resume")
+
+    def _on_resume(self, _request: Any, response: Any) -> Any:
+        if self._pose is None or self._began_ns is None:
+            return _answer(response, False, "it does not know where it is")
+        self._ordered_home = False
+        if self._must_go_home(self.now_ns):
+            return _answer(response, False, "it must be at home: battery, time or radio")
+        if self.phase in (Phase.WAIT, Phase.RISE, Phase.SEARCH, Phase.IDLE):
+            return _answer(response, True, "searches already")
+        if self._is_aloft():
+            if self.phase is not Phase.RETURN:
+                self._call(self._hold)
+            self._enter(Phase.IDLE)
+        else:
+            self._stands_m = float(self._pose.position[2])
+            self._asked_ns = -1 << 62
+            self._enter(Phase.RISE)
+        self._order = ""
+        self._set_pause(False)
+        return _answer(response, True, "searches")
+
+    def _is_aloft(self) -> bool:
+        """Whether it flies, whoever had it take off."""
+        if self._pose is None or self.phase is Phase.WAIT:
+            return False
+        stands = self.phase in (Phase.DONE, Phase.DOWN)
+        return not stands or self._pose.position[2] > self._stands_m + _ALOFT_M
+
+    def _lands_by_order(self) -> bool:
+        return self.phase is Phase.LAND and bool(self._order)
+
+    def _give_way(self, phase: Phase, order: str) -> None:
+        """Leave the sector to others and have planners command nothing."""
+        self._order = order
+        self._leave_sector(self.now_ns)
+        self._set_pause(True)
+        self._enter(phase)
+
+    def _set_pause(self, paused: bool) -> None:
+        if paused != self._paused:
+            self._paused = paused
+            self._pause.publish(Bool(paused))
+
+    def what_is_wrong(self, now: int) -> str:
+        """As of every member of the team, and what an operator has it do."""
+        return "; ".join(filter(None, (self._order, super().what_is_wrong(now))))
 
     # ------------------------------------------------------------------------------- what it does
 
@@ -125,6 +230,7 @@ class TaskManager(TeamMember):
         if self._began_ns is None:
             self._began_ns = self._heard_ns = now
             self._home = pose.position.copy()
+            self._stands_m = float(self._home[2])
             self._enter(Phase.WAIT)
         self.trouble = self.what_is_wrong(now)
         lost_s = (now - self._pose_ns) / NS_PER_S
@@ -136,7 +242,9 @@ class TaskManager(TeamMember):
         self.tell_status()
 
     def _act(self, pose: Pose, now: int) -> None:
-        if self.phase in (Phase.SEARCH, Phase.IDLE) and self._must_go_home(now):
+        if self.phase in ALOFT and self._has_come_down(pose, now):
+            self._give_way(Phase.DOWN, DOWN)
+        elif self._turns_home(now):
             self._go_home(now)
         if self.phase is Phase.WAIT:
             if now - self._phase_ns >= self.settings.gather_s * NS_PER_S:
@@ -152,6 +260,12 @@ class TaskManager(TeamMember):
         elif self.phase is Phase.LAND:
             self._sink(pose)
 
+    def _has_come_down(self, pose: Pose, now: int) -> bool:
+        """Whether it has stood on the ground for a while, by its sonar."""
+        if self._low_ns is None or float(np.linalg.norm(pose.velocity)) >= _STILL_M_S:
+            return False
+        return now - self._low_ns > _GROUND_S * NS_PER_S
+
     def _wait_or_land(self, lost_s: float) -> None:
         """Stay until it knows where it is again; land where that takes too long."""
         if lost_s < _LOST_S:
@@ -162,7 +276,7 @@ class TaskManager(TeamMember):
         self._ask_now_and_then(self._land)
 
     def _rise(self, pose: Pose, now: int) -> None:
-        climbed = pose.position[2] - self._home[2]
+        climbed = pose.position[2] - self._stands_m
         if climbed > 0.8 * self.settings.altitude_m and abs(pose.velocity[2]) < _STILL_M_S:
             self._enter(Phase.IDLE)
         elif now - self._phase_ns > _RISE_S * NS_PER_S:
@@ -220,6 +334,12 @@ class TaskManager(TeamMember):
         if self.phase is Phase.IDLE:
             self._area.publish(polygon_of(None, float(self._home[2]), now))
 
+    def _turns_home(self, now: int) -> bool:
+        """Whether it goes home now; held by an operator, only for its battery."""
+        if self.phase is Phase.HOLD:
+            return self._battery < self.settings.low_battery
+        return self.phase in (Phase.SEARCH, Phase.IDLE) and self._must_go_home(now)
+
     def _must_go_home(self, now: int) -> bool:
         assert self._began_ns is not None
         settings = self.settings
@@ -228,11 +348,16 @@ class TaskManager(TeamMember):
         return self._ordered_home or over or alone or self._battery < settings.low_battery
 
     def _go_home(self, now: int) -> None:
-        self.sector, self._coverage = -1, None
         self._nearest_m, self._news_ns = math.inf, now
+        self._order = ""
+        self._set_pause(False)
         self._enter(Phase.RETURN)
-        self._area.publish(polygon_of(None, float(self._home[2]), now))
+        self._leave_sector(now)
         self._send_home(now)
+
+    def _leave_sector(self, now: int) -> None:
+        self.sector, self._coverage = -1, None
+        self._area.publish(polygon_of(None, float(self._home[2]), now))
 
     def _send_home(self, now: int) -> None:
         self._asked_ns = now
@@ -259,6 +384,8 @@ class TaskManager(TeamMember):
     def _enter(self, phase: Phase) -> None:
         self._highest_m = -math.inf
         self.phase, self._phase_ns = phase, self.now_ns
+        if phase in (Phase.DONE, Phase.DOWN) and self._pose is not None:
+            self._stands_m = float(self._pose.position[2])
 
     def _ask_now_and_then(self, client: Client, request: Any | None = None) -> None:
         """Call a service unless it was called lately."""
@@ -266,10 +393,17 @@ class TaskManager(TeamMember):
         if now - self._asked_ns < _REPEAT_S * NS_PER_S:
             return
         self._asked_ns = now
-        try:
+        self._call(client, request)
+
+    def _call(self, client: Client, request: Any | None = None) -> None:
+        """Call a service, where somebody offers it."""
+        with contextlib.suppress(GraphError):
             client.call_async(request)
-        except GraphError:
-            return  # nobody offers it at the moment
+
+
+def _answer(response: Any, success: bool, message: str) -> Any:
+    response.success, response.message = success, message
+    return response
 
 
 def _state_in(text: str) -> str:

@@ -68,6 +68,10 @@ def run(
     uavs: Annotated[int | None, typer.Option(help="Number of UAVs.")] = None,
     seconds: Annotated[float | None, typer.Option(help="Simulated seconds to fly.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of everything random.")] = None,
+    no_nodes: Annotated[
+        bool,
+        typer.Option("--no-nodes", help="Without the scenario's nodes: they run elsewhere."),
+    ] = False,
     speed: Annotated[
         str | None,
         typer.Option(help="Factor of real time, such as 1 or 2.5, or max; 1 where doors are open."),
@@ -132,6 +136,7 @@ def run(
         uavs=uavs,
         seconds=seconds,
         seed=seed,
+        nodes=not no_nodes,
         speed=parse_speed(speed or ("1" if doors else "max")),
         doors=doors,
         domain_id=domain_id,

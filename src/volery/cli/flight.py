@@ -33,6 +33,8 @@ class RunOptions:
     uavs: int | None = None
     seconds: float | None = None
     seed: int | None = None
+    nodes: bool = True
+    """Whether the scenario's nodes run inside; else they run elsewhere, or not at all."""
     speed: float | None = None
     threads: int | None = None
     record: Path | None = None

@@ -11,20 +11,38 @@ from volery.cli.guard import guarded
 from volery.cli.links import DEFAULT_VIA, WAYS
 
 _CONTEXT = {"help_option_names": ["-h", "--help"]}
-topic_app = typer.Typer(
-    help="Look at topics and publish on them.", no_args_is_help=True, context_settings=_CONTEXT
-)
-service_app = typer.Typer(
-    help="Look at services and call them.", no_args_is_help=True, context_settings=_CONTEXT
-)
+topic_app = typer.Typer(no_args_is_help=True, context_settings=_CONTEXT)
+service_app = typer.Typer(no_args_is_help=True, context_settings=_CONTEXT)
 
 Via = Annotated[
     str,
-    typer.Option(envvar="VOLERY_VIA", help=f"Way into the graph: {WAYS}."),
+    typer.Option(help=f"Way into the graph: {WAYS}; else VOLERY_VIA."),
+]
+ViaOfAll = Annotated[
+    str,
+    typer.Option("--via", envvar="VOLERY_VIA", help=f"Way into the graph, here or last: {WAYS}."),
 ]
 Topic = Annotated[str, typer.Argument(help="Name of a topic.")]
 Service = Annotated[str, typer.Argument(help="Name of a service.")]
 Types = Annotated[bool, typer.Option("--types", "-t", help="Show types too.")]
+
+
+@topic_app.callback()
+def topics(context: typer.Context, via: ViaOfAll = DEFAULT_VIA) -> None:
+    """Look at topics and publish on them."""
+    _use(context, via)
+
+
+@service_app.callback()
+def services(context: typer.Context, via: ViaOfAll = DEFAULT_VIA) -> None:
+    """Look at services and call them."""
+    _use(context, via)
+
+
+def _use(context: typer.Context, via: str) -> None:
+    """Have the group's commands take this way unless they are given one themselves."""
+    commands = getattr(context.command, "commands", {})
+    context.default_map = {name: {"via": via} for name in commands}
 
 
 @guarded

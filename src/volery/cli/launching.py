@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from volery.cli.links import DEFAULT_VIA, open_link
+from volery.cli.links import DEFAULT_VIA, await_link
 from volery.core.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def launch_profile(
     if namespace is not None:
         profile = profile.model_copy(update={"namespace": namespace})
     way = via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
-    with closing(open_link(way, profile.name)) as link:
+    with closing(await_link(way, profile.name)) as link:
         host = NodeHost(link, clock=profile.clock)
         nodes = start_profile(profile, host, path.parent)
         if lock_step_s is not None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, urlsplit
 
-from volery.core.errors import BridgeError
+import typer
+
+from volery.core.errors import BridgeError, UnreachableError
 
 if TYPE_CHECKING:
     from volery.bridges.ros2.environment import Ros2Terms
@@ -16,6 +19,9 @@ DEFAULT_VIA = "rosbridge://127.0.0.1:9090"
 WAYS = "rosbridge://HOST:PORT, ros-tcp://HOST:PORT, ros1, ros2, ros2-zenoh or rclpy"
 ROS2_WAYS = ("ros2", "ros2-zenoh", "rclpy")
 _ROS_TCP_PORT = 10000
+PATIENCE_S = 30.0
+"""So long nodes in processes of their own wait for their graph; a world takes a while to build."""
+_AGAIN_S = 0.2
 
 
 def open_link(via: str, name: str) -> Link:
@@ -42,6 +48,22 @@ def open_link(via: str, name: str) -> Link:
 
         return Ros2Client(_ros2_terms(via), f"/{_own_name(name)}")
     raise _no_way(via)
+
+
+def await_link(via: str, name: str, patience_s: float = PATIENCE_S) -> Link:
+    """As `open_link`, for programs that may be started before the graph: waits, and says so."""
+    until = time.monotonic() + patience_s
+    told = False
+    while True:
+        try:
+            return open_link(via, name)
+        except UnreachableError as error:
+            if time.monotonic() >= until:
+                raise
+            if not told:
+                told = True
+                typer.echo(f"{error}; waits {patience_s:.0f} s for it", err=True)
+            time.sleep(_AGAIN_S)
 
 
 def _ros2_terms(via: str) -> Ros2Terms:

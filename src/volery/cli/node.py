@@ -11,7 +11,7 @@ from typing import Any
 
 import typer
 
-from volery.cli.links import DEFAULT_VIA, ROS2_WAYS, open_link
+from volery.cli.links import DEFAULT_VIA, ROS2_WAYS, await_link
 from volery.cli.yaml_form import from_yaml
 from volery.core.errors import BridgeError
 
@@ -55,7 +55,7 @@ def run_node(options: NodeOptions) -> None:
         raise BridgeError(
             "--lock-step: ROS 2 keeps no order between topics; use rosbridge or ros-tcp"
         )
-    with closing(open_link(via, name)) as link:
+    with closing(await_link(via, name)) as link:
         host = NodeHost(link, clock=profile.clock)
         context = host.context(absolute_names(profile.remap, namespace))
         folder = options.profile.parent if options.profile else None

@@ -117,6 +117,7 @@ def _scenario_of(options: RunOptions) -> Scenario:
         uavs=options.uavs,
         seconds=options.seconds,
         seed=options.seed,
+        nodes=options.nodes,
     )
     if options.changes is not None:
         scenario = changes.apply(scenario, options.changes)

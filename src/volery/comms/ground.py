@@ -6,18 +6,23 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from volery.comms.addresses import PLANES_PER_BATCH, Identity, is_station
+from volery.comms.addresses import PLANES_PER_BATCH, Identity, is_meant, is_station
 from volery.comms.bodies import Refusal
 from volery.comms.payloads import (
     COMMANDS,
+    MISSION,
+    MISSION_TYPE,
     REPLY,
     REPLY_TYPE,
+    SLAM,
+    SLAM_TYPE,
     STATE,
     STATE_TYPE,
     decode_named,
     encode_named,
 )
 from volery.comms.protocol import Frame, Kind
+from volery.comms.statuses import mission_gist, slam_gist
 from volery.comms.targets import address_of
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
@@ -26,18 +31,21 @@ from volery.graph.messages import Point, message_type
 Send = Callable[[Kind, int, bytes], int]
 
 HELP = """\
-list                        state of each UAV
+list                        state of each UAV; of those that tell it, mission and SLAM
 take_off WHO [ALTITUDE]     m above where it stands
 land WHO                    where it is
-hold WHO                    where it is
-return WHO                  home, and land
+hold WHO                    where it is; a mission waits until resume
+resume WHO                  go on with the mission
+return WHO                  home, and land; by its mission where it has one, else straight
 go_to WHO X Y Z [HEADING]   m in the map; degrees from its x axis to the left
 help                        this
 quit                        leave
 
 WHO: a linear id such as 3, batch.plane such as 0.3, a name such as uav4, batch1, or all."""
 
-_SIMPLE = {"land": "land", "hold": "hold", "return": "return_home"}
+_SIMPLE = {"land": "land", "hold": "hold", "return": "return_home", "resume": "resume"}
+_TYPED = {"return_home": "return", "take_off_to": "take_off"}
+"""Words of people for commands of another name."""
 
 
 class Row(NamedTuple):
@@ -50,9 +58,24 @@ class Row(NamedTuple):
     speed: str
     battery: str
     age: str
+    mission: str = "-"
+    """Phase and sector; `-`: it tells of none."""
+    slam: str = "-"
+    trouble: str = ""
 
 
-HEAD = ("UAV", "station", "mode", "position (m)", "speed (m/s)", "battery", "heard (s ago)")
+HEAD = (
+    "UAV",
+    "station",
+    "mode",
+    "position (m)",
+    "speed (m/s)",
+    "battery",
+    "heard (s ago)",
+    "mission",
+    "SLAM",
+    "trouble",
+)
 
 
 class Ground:
@@ -65,6 +88,8 @@ class Ground:
         self._send = send
         self._planes = planes_per_batch
         self._states: dict[int, tuple[Any, int]] = {}
+        self._missions: dict[int, Any] = {}
+        self._slams: dict[int, str] = {}
         self._asked: dict[int, str] = {}
 
     def take(self, frame: Frame, now_ns: int) -> str | None:
@@ -79,9 +104,26 @@ class Ground:
             mode = named.message.mode
             changed = before is None or before[0].mode != mode
             return f"{self._name(frame.source)}: {mode}" if changed else None
+        if named[:2] == (MISSION, MISSION_TYPE):
+            return self._take_mission(frame.source, named.message)
+        if named[:2] == (SLAM, SLAM_TYPE):
+            return self._take_slam(frame.source, slam_gist(named.message.data))
         if named[:2] == (REPLY, REPLY_TYPE):
-            return f"{self._name(frame.source)}: {named.message.data}"
+            name, colon, said = named.message.data.partition(": ")
+            return f"{self._name(frame.source)}: {_TYPED.get(name, name)}{colon}{said}"
         return f"{self._name(frame.source)}: {named.name} ({named.msgtype})"
+
+    def _take_mission(self, source: int, status: Any) -> str | None:
+        """A line where phase, sector or trouble have changed."""
+        before, self._missions[source] = self._missions.get(source), status
+        said = mission_gist(status.phase, status.sector), status.trouble
+        if before and said == (mission_gist(before.phase, before.sector), before.trouble):
+            return None
+        return f"{self._name(source)}: mission {said[0]}{', ' + said[1] if said[1] else ''}"
+
+    def _take_slam(self, source: int, said: str) -> str | None:
+        before, self._slams[source] = self._slams.get(source), said
+        return None if said == before else f"{self._name(source)}: SLAM {said}"
 
     def refused(self, refusal: Refusal) -> str:
         """Line about what the server refused."""
@@ -114,9 +156,12 @@ class Ground:
         request = f"{COMMANDS[name]}_Request"
         message = message_type(request)(**fields)
         sequence = self._send(Kind.COMMAND, address, encode_named(name, request, message))
-        said = f"{name} to {rest[0]}"
+        said = f"{word} to {rest[0]}"
         self._asked[sequence] = said
-        return f"sent: {said}"
+        anybody = is_station(address) or any(
+            is_meant(each, address, self._planes) for each in self._states
+        )
+        return f"sent: {said}{'' if anybody else ' (no UAV there has been heard so far)'}"
 
     def _name(self, address: int) -> str:
         known = self._states.get(address)
@@ -134,6 +179,7 @@ class Ground:
 
     def _row(self, address: int, state: Any, age_ns: int) -> Row:
         place, velocity = state.position, state.velocity
+        mission = self._missions.get(address)
         speed = math.hypot(velocity.x, velocity.y, velocity.z)
         return Row(
             state.name,
@@ -143,6 +189,9 @@ class Ground:
             f"{speed:.1f}",
             "-" if math.isnan(state.battery) else f"{100.0 * state.battery:.0f} %",
             f"{age_ns / NS_PER_S:.1f}",
+            "-" if mission is None else mission_gist(mission.phase, mission.sector),
+            self._slams.get(address, "-"),
+            "" if mission is None else mission.trouble,
         )
 
 

@@ -6,6 +6,8 @@ a u8 length and so many bytes of UTF-8. The name is what would follow the UAV's 
 | kind | name | type | meaning |
 |---|---|---|---|
 | SENSING | `state` | `volery_interfaces/msg/VehicleState` | how a UAV fares |
+| SENSING | `mission` | `volery_interfaces/msg/MissionStatus` | how its mission fares |
+| SENSING | `slam` | `std_msgs/msg/String` | what its SLAM says of itself, JSON |
 | SENSING | `reply` | `std_msgs/msg/String` | what became of a command, for people |
 | COMMAND | one of `COMMANDS` | the service's request | call that service of the UAV |
 
@@ -20,6 +22,8 @@ from volery.core.errors import CommsError, GraphError
 from volery.graph.cdr import decode_cdr, encode_cdr
 
 STATE, STATE_TYPE = "state", "volery_interfaces/msg/VehicleState"
+MISSION, MISSION_TYPE = "mission", "volery_interfaces/msg/MissionStatus"
+SLAM, SLAM_TYPE = "slam", "std_msgs/msg/String"
 REPLY, REPLY_TYPE = "reply", "std_msgs/msg/String"
 _TRIGGER = "std_srvs/srv/Trigger"
 COMMANDS = {
@@ -28,9 +32,12 @@ COMMANDS = {
     "land": _TRIGGER,
     "hold": _TRIGGER,
     "return_home": _TRIGGER,
+    "resume": _TRIGGER,
     "go_to": "volery_interfaces/srv/GoTo",
 }
 """Services of a UAV that stations may call, and their types."""
+MISSION_COMMANDS = frozenset({"land", "hold", "return_home", "resume"})
+"""Those that its mission takes, where it has one; `resume` is of missions alone."""
 
 _LONGEST_TEXT_BYTES = 255
 

@@ -94,9 +94,14 @@ class PostOffice:
         self.wake(station)  # there is room on its way again
 
     def _receivers(self, frame: Frame, now_ns: int) -> list[Known] | None:
-        """Stations that a message is meant for; None where it is for one that is not known."""
+        """Stations that a message is meant for; None where nobody is known for whom it is.
+
+        Sensing for many may have no receiver: nobody listens.
+        """
         if not is_station(frame.destination):
-            return self.directory.meant(frame)
+            meant = self.directory.meant(frame)
+            vain = not meant and frame.kind == Kind.COMMAND and not self.directory.expects(now_ns)
+            return None if vain else meant
         station = self.directory.find(frame.destination)
         if station is None and self.directory.expects(now_ns):
             station = self.expect(frame.destination, now_ns)
@@ -155,7 +160,8 @@ class PostOffice:
         source = self.directory.find(frame.source)
         if source is None or source.session != frame.session:
             return
-        text = _REFUSED[reason].format(at)
+        known = is_station(at) or reason is not Reason.UNKNOWN
+        text = _REFUSED[reason].format(at) if known else "nobody of them is here"
         refusal = encode_refusal(Refusal(reason, frame.sequence, text))
         source.control.append(encode_frame(Kind.REFUSAL, SERVER, frame.source, payload=refusal))
         self.wake(source)

@@ -2,6 +2,9 @@
 
     doors.open(UavStations("127.0.0.1", 10200))
 
+Where a UAV has a mission (`task_manager`), that takes hold, land and return, so that it does not
+fly on against them; before a `go_to` it is put on hold.
+
 uavN is the station with linear id N - 1; UAVs of other names take the lowest id that is free.
 """
 
@@ -9,6 +12,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from functools import partial
 from typing import Any
 
@@ -16,8 +20,13 @@ from volery.comms.addresses import ALL_GROUND, PLANES_PER_BATCH, Identity
 from volery.comms.naming import free_address
 from volery.comms.payloads import (
     COMMANDS,
+    MISSION,
+    MISSION_COMMANDS,
+    MISSION_TYPE,
     REPLY,
     REPLY_TYPE,
+    SLAM,
+    SLAM_TYPE,
     STATE,
     STATE_TYPE,
     decode_named,
@@ -26,7 +35,9 @@ from volery.comms.payloads import (
 from volery.comms.protocol import Frame, Kind
 from volery.comms.server import PORT
 from volery.comms.station import Station
+from volery.comms.statuses import slam_gist
 from volery.core.errors import CommsError, GraphError
+from volery.graph.mailbox import Mailbox
 from volery.graph.messages import message_type
 from volery.graph.reply import Reply
 from volery.graph.session import Gateway, Session
@@ -35,6 +46,40 @@ _VEHICLES = "/volery/vehicles"
 _VEHICLES_TYPE = "volery_interfaces/msg/VehicleStates"
 _PERIOD_S = 0.2
 """As often as the simulation tells of its vehicles."""
+_MISSION = "task_manager"
+_TOLD = ((MISSION, "mission", MISSION_TYPE), (SLAM, "slam/status", SLAM_TYPE))
+"""What else is told of a UAV that says it: name, topic below its own name, type."""
+_REPEAT_S = 2.0
+"""What has not changed is told again after so long."""
+
+
+class _Told:
+    """One topic of a UAV, told to ground stations when it changes and now and then."""
+
+    def __init__(self, name: str, msgtype: str, mailbox: Mailbox) -> None:
+        self.mailbox = mailbox
+        self._name, self._type = name, msgtype
+        self._said: object = None
+        self._said_at = -math.inf
+
+    def payload(self, now: float) -> bytes | None:
+        """What is to be told now, at `now` s; None: nothing."""
+        published = self.mailbox.take()
+        if not published:
+            return None
+        message = published[-1].message
+        gist = _gist(message)
+        if gist == self._said and now - self._said_at < _REPEAT_S:
+            return None
+        self._said, self._said_at = gist, now
+        return encode_named(self._name, self._type, message)
+
+
+def _gist(message: Any) -> object:
+    """What of a status makes people look up."""
+    if hasattr(message, "phase"):
+        return message.phase, message.sector, message.trouble
+    return slam_gist(message.data)
 
 
 class UavStations:
@@ -56,6 +101,7 @@ class UavStations:
         self._token = token
         self._planes = planes_per_batch
         self._stations: dict[str, Station] = {}
+        self._told: dict[tuple[str, str], _Told] = {}
         self._task: asyncio.Task[None] | None = None
         self._session: Session | None = None
 
@@ -79,6 +125,7 @@ class UavStations:
         for station in self._stations.values():
             await station.stop()
         self._stations.clear()
+        self._told.clear()
         if self._session is not None:
             self._session.close()
 
@@ -89,11 +136,27 @@ class UavStations:
                 states = {state.name: state for state in published[-1].message.vehicles}
                 for gone in self._stations.keys() - states.keys():
                     await self._stations.pop(gone).stop()
+                    for name, _, _ in _TOLD:
+                        if told := self._told.pop((gone, name), None):
+                            session.unsubscribe(told.mailbox)
                 for name, state in states.items():
                     station = self._stations.get(name) or await self._join(session, name)
                     if station.joined:
                         _send(station, ALL_GROUND, encode_named(STATE, STATE_TYPE, state))
+                        self._tell_more(session, name, station)
             await asyncio.sleep(_PERIOD_S)
+
+    def _tell_more(self, session: Session, uav: str, station: Station) -> None:
+        for name, below, msgtype in _TOLD:
+            topic, key = f"/{uav}/{below}", (uav, name)
+            if key not in self._told:
+                if session.graph.topic_type(topic) != msgtype:
+                    continue  # it has none of the kind, so far
+                mailbox = session.subscribe(topic, msgtype, depth=1, wake=lambda: None)
+                self._told[key] = _Told(name, msgtype, mailbox)
+            payload = self._told[key].payload(self._loop.time())
+            if payload is not None:
+                _send(station, ALL_GROUND, payload)
 
     async def _join(self, session: Session, uav: str) -> Station:
         used = {station.core.address for station in self._stations.values()}
@@ -131,7 +194,22 @@ class UavStations:
         def failed(error: GraphError) -> None:
             self._tell_soon(tell, f"{command.name}: {error}")
 
-        session.call(f"/{uav}/{command.name}", command.message, Reply(answered, failed))
+        def ask(_response: Any = None) -> None:
+            session.call(service, command.message, Reply(answered, failed))
+
+        service = f"/{uav}/{command.name}"
+        mission = f"/{uav}/{_MISSION}"
+        missioned = session.graph.has_service(f"{mission}/hold")
+        if command.name in MISSION_COMMANDS and missioned:
+            service = f"{mission}/{command.name}"
+        elif command.name == "resume":
+            failed(GraphError(f"{uav} has no mission"))
+            return
+        if command.name == "go_to" and missioned:
+            trigger = message_type(f"{COMMANDS['hold']}_Request")()
+            session.call(f"{mission}/hold", trigger, Reply(ask, failed))
+        else:
+            ask()
 
     def _tell_soon(self, tell: Any, text: str) -> None:
         """From whatever thread answers, into the loop; nobody is told once that has ended."""

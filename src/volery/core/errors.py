@@ -49,6 +49,10 @@ class BridgeError(VoleryError):
     """A door to the graph cannot be opened, or its peer breaks the protocol."""
 
 
+class UnreachableError(BridgeError):
+    """Nobody answers where a graph is looked for; somebody may later."""
+
+
 class NodeError(VoleryError):
     """A node failed while it ran; the message names node, cause and simulated time."""
 

@@ -133,6 +133,15 @@ class Estimation:
             rows, pose.stamp_ns, pose.position_map[None], pose.attitude[None], variances
         )
 
+    def pose_ns(self, uav: int) -> int:
+        """Stamp of the newest pose that was taken for a UAV, a row of the fleet; long ago: none."""
+        return int(self._pose_ns[self.rows_of(np.array([uav]))[0]])
+
+    def stand_still(self, uav: int, stamp_ns: int) -> None:
+        """Feed what is known of a UAV that stands on the ground: it does not move."""
+        rows = self.rows_of(np.array([uav]))
+        self.estimator.fuse_velocity(rows, stamp_ns, np.zeros((1, 3)), _STANDING_VARIANCE)
+
     def restart(self, keys: Mapping[int, np.uint64]) -> None:
         """Begin anew for UAVs that have begun anew, with a random stream for each of their rows."""
         rows = np.array([e for e, uav in enumerate(self.setup.uavs) if int(uav) in keys], np.int64)
@@ -229,6 +238,8 @@ class Estimation:
 
 _NEVER_NS = -(10**18)
 
+_STANDING_VARIANCE = np.full(3, 0.02**2)
+"""(m/s)^2, of a landed UAV in the wind; modelling choice."""
 _LEAST_VARIANCE = 1e-4
 """m^2 and (m/s)^2: no measurement is taken for better than a centimetre."""
 

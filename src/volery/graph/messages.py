@@ -58,6 +58,7 @@ PointCloud2 = _ros2.sensor_msgs__msg__PointCloud2
 PointField = _ros2.sensor_msgs__msg__PointField
 Range = _ros2.sensor_msgs__msg__Range
 Temperature = _ros2.sensor_msgs__msg__Temperature
+Bool = _ros2.std_msgs__msg__Bool
 Float32 = _ros2.std_msgs__msg__Float32
 Header = _ros2.std_msgs__msg__Header
 String = _ros2.std_msgs__msg__String

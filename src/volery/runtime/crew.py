@@ -23,7 +23,7 @@ from volery.runtime.graph_building import announce_sensors, start_nodes, start_s
 from volery.runtime.message_loading import learn_messages
 from volery.runtime.outlet import Outlet
 from volery.runtime.placement import Start
-from volery.runtime.pose_aids import open_pose_aids
+from volery.runtime.pose_aids import PoseAids
 from volery.runtime.sensor_fitting import Fitted
 from volery.runtime.services.offering import Close
 from volery.runtime.services.uav_services import offer_uav_services
@@ -66,15 +66,18 @@ class Crew:
     """In fleet order, then those of the whole system."""
     beginnings: dict[str, Beginning] = field(default_factory=dict)
     flight_states: FlightStates = field(init=False)
+    pose_aids: PoseAids = field(init=False)
     _closes: dict[str, list[Close]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         origin = self.scenario.world.origin
+        self.pose_aids = PoseAids(self.graph, self.engine)
         self.flight_states = FlightStates(self.graph, self.engine, origin)
 
     def open(self, parts: Assembly) -> None:
         """Let the UAVs that the engine was made with take part in the graph."""
         self.flight_states.start(self.engine.every)
+        self.pose_aids.start(self.engine.every)
         self._take_over(parts, self.starts)
         learn_messages(self.scenario)
         self.start_nodes()
@@ -154,7 +157,7 @@ class Crew:
             *open_commands(self.graph, uav, self._now_ns),
             *offer_uav_services(self.graph, uav),
             *self.flight_states.open(uav),
-            *open_pose_aids(self.graph, self.engine, start.name, self._sensors_of(start)),
+            *self.pose_aids.open(start.name, self._sensors_of(start)),
         ]
         if self.radio is not None and self.scenario.types[start.type_name].radio:
             closes.append(self.radio.join(start.name))

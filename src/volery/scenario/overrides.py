@@ -15,11 +15,13 @@ def apply(
     uavs: int | None = None,
     seconds: float | None = None,
     seed: int | None = None,
+    nodes: bool = True,
 ) -> Scenario:
     """Return the scenario with another fleet size, duration or seed, checked anew.
 
     `uavs` sets the count of a scenario's only group; a scenario with several groups says itself
-    how many fly, and asking for another number raises `ScenarioError`.
+    how many fly, and asking for another number raises `ScenarioError`. `nodes`: False: none of
+    its nodes, because they run elsewhere.
     """
     data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
     if seconds is not None:
@@ -40,6 +42,9 @@ def apply(
                 f"--uavs: scenario '{scenario.name}' gives no last_position_m to spread UAVs to"
             )
         data["uavs"] = [{**data["uavs"][0], "count": uavs}]
+    if not nodes:
+        data["nodes"] = []
+        data["types"] = {name: {**kind, "nodes": []} for name, kind in data["types"].items()}
     changed = parse_scenario(data, where=scenario.name)
     changed._folder = scenario.folder
     return changed

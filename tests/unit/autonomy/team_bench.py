@@ -10,6 +10,7 @@ import numpy as np
 
 from volery.autonomy.task_manager import TaskManager
 from volery.core import rng
+from volery.core.errors import GraphError
 from volery.graph.graph import Graph
 from volery.graph.messages import (
     BatteryState,
@@ -74,6 +75,10 @@ class FakeUav:
         self.stuck = False
         self.silent = False
         self.charge = 1.0
+        self.asked: list[str] = []
+        """Flight modes that were asked for."""
+        self.paused = False
+        """Whether its planners are told to command nothing."""
         self.frame = "map"
         """Of its odometry."""
         self.way: list[np.ndarray] = []
@@ -84,19 +89,30 @@ class FakeUav:
         rise = message_type("volery_interfaces/srv/TakeOffTo_Response")
 
         def take_off(request: Any) -> Any:
+            self.asked.append("take_off_to")
             self.flies, self.place[2] = True, request.altitude
             return rise(True, "")
 
+        def hold(_request: Any) -> Any:
+            self.asked.append("hold")
+            return trigger(True, "")
+
         def land(_request: Any) -> Any:
+            self.asked.append("land")
             self.flies, self.place[2] = False, 0.0
             return trigger(True, "")
 
         graph.offer(f"/{name}/take_off_to", "volery_interfaces/srv/TakeOffTo", take_off)
         graph.offer(f"/{name}/land", "std_srvs/srv/Trigger", land)
-        graph.offer(f"/{name}/hold", "std_srvs/srv/Trigger", lambda _r: trigger(True, ""))
+        graph.offer(f"/{name}/hold", "std_srvs/srv/Trigger", hold)
+        graph.subscribe(f"/{name}/planning/pause", self._pause, "std_msgs/msg/Bool")
         graph.subscribe(f"/{name}/search_area", self._sweep, "geometry_msgs/msg/PolygonStamped")
         graph.subscribe(f"/{name}/planning/goal", self._go, "geometry_msgs/msg/PoseStamped")
         bench.clock.every(_MOVE_S, self._move)
+
+    def _pause(self, published: Published) -> None:
+        self.paused = published.message.data
+        self.way = []
 
     def _sweep(self, published: Published) -> None:
         corners = published.message.polygon.points
@@ -113,7 +129,7 @@ class FakeUav:
 
     def _move(self) -> None:
         step = _MOVE_S * _SPEED_M_S
-        if self.flies and self.way and not self.stuck:
+        if self.flies and self.way and not self.stuck and not self.paused:
             to = self.way[0] - self.place[:2]
             away = float(np.linalg.norm(to))
             self.place[:2] += to * min(step / max(away, 1e-9), 1.0)
@@ -166,6 +182,13 @@ class TeamBench:
     def run(self, seconds: float) -> None:
         """Let time pass."""
         self.clock.run_to(self.clock.now_ns + round(seconds * S), self.graph.deliver)
+
+    def order(self, name: str, order: str) -> str:
+        """What a task manager answers to an operator's order; `GraphError` where it refuses."""
+        response = self.graph.call(f"/{name}/task_manager/{order}")
+        if not response.success:
+            raise GraphError(response.message)
+        return str(response.message)
 
     def phases(self) -> dict[str, str]:
         """Of all task managers."""

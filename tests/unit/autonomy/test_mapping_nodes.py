@@ -213,13 +213,29 @@ def test_maps_are_saved_and_loaded_only_by_name(tmp_path):
     answer = load(fine, "room.bt")
     assert not answer.success
     assert "0.2 m wide; this node works with 0.1 m" in answer.message
-    assert "folder is empty" in bench_without_folder().message
+    nowhere = NodeBench()
+    mapping(nowhere, folder="")
+    assert "folder is empty" in nowhere.graph.call("/uav1/mapping/save", BY_NAME("room.bt")).message
 
 
-def bench_without_folder():
+def test_maps_have_a_folder_of_their_own_from_the_start(tmp_path, monkeypatch):
+    """Below the working folder, made with the first map; it does not grow without end."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("volery.autonomy.mapping.mapping_node._MOST_FILES", 2)
     bench = NodeBench()
-    mapping(bench)
-    return bench.graph.call("/uav1/mapping/save", BY_NAME("room.bt"))
+    node = mapping(bench)
+    fly(bench, 1.0)
+    assert list(tmp_path.iterdir()) == []
+    save = lambda name: bench.graph.call("/uav1/mapping/save", BY_NAME(name))  # noqa: E731
+    answer = save("room.bt")
+    written = int(answer.message.split()[0])
+    assert (tmp_path / "maps/uav1/room.bt").exists()
+    assert f"({node._octree.nodes} in memory" in answer.message
+    assert save("other.bt").success
+    assert save("room.bt").success  # anew
+    assert "holds 2 maps already" in save("third.bt").message
+    read = bench.graph.call("/uav1/mapping/load", BY_NAME("room.bt")).message
+    assert read.startswith(f"{written} nodes read from maps/uav1/room.bt")
 
 
 def test_the_drift_correction_of_tf_places_the_map():

@@ -190,6 +190,96 @@ def test_low_battery_brings_one_home_and_the_others_do_its_part() -> None:
     assert bench.managers["uav1"].searched.all()
 
 
+def test_one_that_is_held_waits_and_others_take_its_sector() -> None:
+    bench = TeamBench(HOMES)
+    bench.run(10.0)
+    uav, manager = bench.uavs["uav2"], bench.managers["uav2"]
+    left, place = manager.sector, uav.place.copy()
+    assert bench.order("uav2", "hold") == "holds until resume, return or land"
+    bench.run(30.0)
+    assert uav.asked[-1] == "hold"
+    assert (str(manager.phase), manager.sector) == ("hold", -1)
+    assert manager.trouble == "held by the operator"
+    np.testing.assert_allclose(uav.place, place, atol=1.0)
+    assert {bench.managers[n].sector for n in ("uav1", "uav3")} & {left} or manager.searched[left]
+    bench.order("uav2", "resume")
+    bench.run(2.0)
+    assert (str(manager.phase), manager.trouble, uav.paused) == ("search", "", False)
+    bench.run(140.0)
+    assert set(bench.phases().values()) == {"done"}
+    assert manager.searched.all()
+
+
+def test_one_that_is_landed_gives_its_sector_up_and_may_go_on() -> None:
+    bench = TeamBench(HOMES)
+    bench.run(10.0)
+    uav, manager = bench.uavs["uav1"], bench.managers["uav1"]
+    left = manager.sector
+    bench.order("uav1", "land")
+    bench.run(3.0)
+    assert not uav.flies
+    assert (str(manager.phase), manager.sector) == ("done", -1)
+    assert manager.trouble == "landed by the operator"
+    while not manager.searched[left]:  # by another one
+        bench.run(1.0)
+    assert not manager.searched.all()
+    bench.order("uav1", "resume")
+    bench.run(1.0)
+    assert uav.flies
+    bench.run(1.0)
+    assert manager.sector >= 0
+
+
+def test_orders_before_the_take_off_keep_it_down() -> None:
+    bench = TeamBench({"uav1": HOMES["uav1"]})
+    bench.run(1.0)
+    with pytest.raises(GraphError, match="not in the air"):
+        bench.order("uav1", "hold")
+    assert bench.order("uav1", "land") == "stays on the ground until resume"
+    bench.run(10.0)
+    assert not bench.uavs["uav1"].flies
+    bench.order("uav1", "resume")
+    bench.run(5.0)
+    assert bench.managers["uav1"].phase == "search"
+
+
+def test_one_that_is_held_goes_home_by_order_or_with_a_low_battery() -> None:
+    bench = TeamBench(HOMES)
+    bench.run(15.0)
+    for name in ("uav1", "uav2"):
+        bench.order(name, "hold")
+    bench.run(5.0)
+    bench.uavs["uav2"].charge = 0.2
+    assert bench.order("uav1", "return_home") == "goes home and lands"
+    bench.run(1.0)
+    assert bench.phases() == {"uav1": "return", "uav2": "return", "uav3": "search"}
+    with pytest.raises(GraphError, match="battery"):
+        bench.order("uav2", "resume")
+    assert bench.order("uav1", "resume") == "searches"
+    bench.run(1.0)
+    assert bench.phases()["uav1"] == "search"
+
+
+def test_one_that_somebody_landed_says_so_and_gives_its_sector_up() -> None:
+    """By the sonar: nobody told its mission."""
+    bench = TeamBench(HOMES)
+    sonar = bench.graph.advertise("/uav3/range", "sensor_msgs/msg/Range")
+    bench.run(10.0)
+    manager, uav = bench.managers["uav3"], bench.uavs["uav3"]
+    left = manager.sector
+    bench.graph.call("/uav3/land")
+    for _ in range(30):
+        reading = zero_message("sensor_msgs/msg/Range")
+        reading.range = -math.inf  # nearer than can be measured
+        sonar.publish(reading)
+        bench.run(0.1)
+    assert (str(manager.phase), manager.sector) == ("down", -1)
+    assert manager.trouble == "came down, and not by its mission"
+    bench.run(80.0)
+    assert not uav.flies
+    assert bench.managers["uav1"].searched[left]
+
+
 def test_a_goal_of_the_explorer_that_comes_late_keeps_nobody_from_home() -> None:
     bench = TeamBench({"uav1": HOMES["uav1"]})
     bench.run(15.0)

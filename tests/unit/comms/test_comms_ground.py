@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import math
 import signal
 import subprocess
@@ -15,12 +16,17 @@ from live_graph import LiveGraph
 from volery.bench.comms import served
 from volery.bridges.doors import Doors
 from volery.cli.gcs import parse_server
-from volery.comms.addresses import ALL, ALL_GROUND, FIRST_GROUND, batch_address, is_meant
+from volery.comms.addresses import ALL, ALL_GROUND, FIRST_GROUND, Identity, batch_address, is_meant
 from volery.comms.bodies import Reason, Refusal
 from volery.comms.ground import Ground
 from volery.comms.payloads import (
+    COMMANDS,
+    MISSION,
+    MISSION_TYPE,
     REPLY,
     REPLY_TYPE,
+    SLAM,
+    SLAM_TYPE,
     STATE,
     STATE_TYPE,
     decode_named,
@@ -28,10 +34,12 @@ from volery.comms.payloads import (
 )
 from volery.comms.protocol import Frame, Kind
 from volery.comms.server import CommsServer
+from volery.comms.station import Station
 from volery.comms.targets import address_of
 from volery.comms.uav_stations import UavStations
 from volery.core.errors import CommsError
-from volery.graph.messages import Header, Point, Time, Vector3, message_type
+from volery.graph.messages import Header, Point, String, Time, Vector3, message_type
+from volery.graph.zero import zero_message
 
 State = message_type(STATE_TYPE)
 States = message_type("volery_interfaces/msg/VehicleStates")
@@ -124,7 +132,10 @@ def test_states_replies_and_refusals_are_shown() -> None:
     other = frame(STATE, STATE_TYPE, state("uav6", battery=math.nan), source=5)
     desk.ground.take(other, 10**9)
     first, second = desk.ground.rows(3 * 10**9)
-    assert first == ("uav1", "0.0", "LAND", "1.0 -2.0 3.0", "5.0", "50 %", "2.0")
+    assert first == (
+        *("uav1", "0.0", "LAND", "1.0 -2.0 3.0", "5.0", "50 %", "2.0"),
+        *("-", "-", ""),
+    )
     assert (second.name, second.address, second.battery) == ("uav6", "1.1", "-")
     said = message_type(REPLY_TYPE)("land: done")
     assert desk.ground.take(frame(REPLY, REPLY_TYPE, said), 0) == "uav1: land: done"
@@ -133,6 +144,36 @@ def test_states_replies_and_refusals_are_shown() -> None:
     assert refused == "refused: hold to 9: no station 9"
     broken = Frame(Kind.SENSING, 5, 0, 1, 1, 0, b"\x05stat")
     assert "not a message" in desk.ground.take(broken, 0)
+
+
+def test_missions_and_slams_are_shown_where_they_are_told() -> None:
+    desk = Desk()
+    desk.ground.take(frame(STATE, STATE_TYPE, state()), 0)
+    status = zero_message(MISSION_TYPE)
+    status.phase, status.sector = "search", 4
+    assert desk.ground.take(frame(MISSION, MISSION_TYPE, status), 0) == "uav1: mission search 4"
+    assert desk.ground.take(frame(MISSION, MISSION_TYPE, status), 0) is None
+    held = zero_message(MISSION_TYPE)
+    held.phase, held.sector, held.trouble = "hold", -1, "held by the operator"
+    line = desk.ground.take(frame(MISSION, MISSION_TYPE, held), 0)
+    assert line == "uav1: mission hold, held by the operator"
+    lost = json.dumps({"state": "lost", "problems": ["no imu"], "keyframes": 3})
+    assert desk.ground.take(frame(SLAM, SLAM_TYPE, String(lost)), 0) == "uav1: SLAM lost: no imu"
+    (row,) = desk.ground.rows(0)
+    assert (row.mission, row.slam, row.trouble) == ("hold", "lost: no imu", "held by the operator")
+    assert desk.ground.take(frame(SLAM, SLAM_TYPE, String("[1]")), 0) == "uav1: SLAM ?"
+
+
+def test_commands_are_echoed_as_they_were_typed() -> None:
+    desk = Desk()
+    assert desk.ground.command("take_off 0 4") == "sent: take_off to 0"
+    assert desk.ground.command("return 0") == "sent: return to 0"
+    done = String("return_home: goes home")
+    assert desk.ground.take(frame(REPLY, REPLY_TYPE, done), 0) == "0.0: return: goes home"
+    assert desk.ground.command("land all").endswith(" (no UAV there has been heard so far)")
+    desk.ground.take(frame(STATE, STATE_TYPE, state()), 0)
+    assert desk.ground.command("land all") == "sent: land to all"
+    assert desk.ground.command("resume batch1").endswith("so far)")
 
 
 @pytest.mark.parametrize("name", ["state", "reply"])
@@ -206,6 +247,71 @@ def test_uavs_of_a_graph_are_commanded_by_lines_of_another_process(graph) -> Non
         ["uav2", "0.1", "HOLD"],
     ]
     assert gcs.returncode == 0
+
+
+def _is_answer(line: str | None) -> bool:
+    return line is not None and ("done" in line or "no mission" in line)
+
+
+def test_a_mission_takes_what_would_go_against_it(graph) -> None:
+    """Hold, land, return and resume are the mission's where there is one; go_to is held before."""
+    asked, told = [], []
+
+    def offer(service: str, srvtype: str = "std_srvs/srv/Trigger") -> None:
+        response = message_type(f"{srvtype}_Response")
+
+        def answer(_request):
+            asked.append(service)
+            return response(True, "")
+
+        graph.do(lambda: graph.graph.offer(service, srvtype, answer))
+
+    for name in ("hold", "land", "return_home"):
+        offer(f"/uav1/{name}")
+        offer(f"/uav2/{name}")
+        offer(f"/uav1/task_manager/{name}")
+    offer("/uav1/task_manager/resume")
+    offer("/uav1/go_to", COMMANDS["go_to"])
+    vehicles = graph.do(lambda: graph.graph.advertise("/volery/vehicles", States))
+    missions = graph.do(lambda: graph.graph.advertise("/uav1/mission", MISSION_TYPE))
+
+    both = States(Header(Time(0, 0), "map"), [state("uav1"), state("uav2")])
+    status = zero_message(MISSION_TYPE)
+    status.phase = "wait"
+
+    async def command() -> None:
+        station = Station(Identity.ground(0), lambda f: told.append(ground.take(f, 0)), port=port)
+        ground = Ground(station.send)
+        await station.start()
+
+        async def until(true) -> None:
+            for _ in range(200):
+                graph.do(lambda: vehicles.publish(both))
+                graph.do(lambda: missions.publish(status))
+                if true():
+                    return
+                await asyncio.sleep(0.05)
+            raise AssertionError((asked, told))
+
+        await until(lambda: "uav1: mission wait 0" in told and "uav2: HOLD" in told)
+        lines = ("hold 0", "land 0", "return 0", "resume 0", "go_to 0 1 2 3", "hold 1", "resume 1")
+        for count, line in enumerate(lines):
+            ground.command(line)
+            await until(
+                lambda count=count: sum("done" in t or "no m" in t for t in told if t) > count
+            )
+        await station.stop()
+
+    with served() as (_, port), Doors(graph.gateway) as doors:
+        doors.open(UavStations(port=port))
+        asyncio.run(command())
+    mission = "/uav1/task_manager"
+    assert asked == [
+        *(f"{mission}/{name}" for name in ("hold", "land", "return_home", "resume", "hold")),
+        "/uav1/go_to",
+        "/uav2/hold",
+    ]
+    assert told[-1] == "uav2: resume: uav2 has no mission"
 
 
 def test_the_server_ends_in_good_order() -> None:

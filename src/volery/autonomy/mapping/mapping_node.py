@@ -15,7 +15,7 @@ from volery.autonomy.ground_plane import GroundPlane
 from volery.autonomy.map_frame import MAP, UNKNOWN_PLACE, MapFrame
 from volery.autonomy.mapping import reports
 from volery.autonomy.mapping.level_grid import LevelGrid, Slab
-from volery.autonomy.mapping.map_files import MapLimits, read_map, write_map
+from volery.autonomy.mapping.map_files import MapLimits, node_count, read_map, write_map
 from volery.autonomy.mapping.octree import Octree
 from volery.autonomy.mapping.scan_intake import ScanIntake
 from volery.autonomy.motion_history import MotionHistory, NodHistory
@@ -43,6 +43,8 @@ _SILENT_S = 2.0
 """A sensor that says nothing, or sees nothing, for so long is told of."""
 _LEAST_HEIGHT_M = 1.0
 """Lower than this above ground nothing is drawn at the height of flight: it would be the ground."""
+_MOST_FILES = 100
+"""In a folder of maps: clients of the graph name them. Modelling choice."""
 _PLAIN_STATE = ("_motion", "_nod", "_intakes", "_ground", "_range", "_told", "_slab_z")
 
 
@@ -63,7 +65,8 @@ class Mapping(Node):
     max_nodes: bound of the octree; extent_m: of the grid, and of maps that are loaded.
     half_height_m: half the thickness of the slab that the grid shows.
     voxels_period_s, grid_period_s: how often they are published.
-    folder: where maps are saved and loaded; empty: nowhere.
+    folder: where maps are saved and loaded, made with the first one; empty: nowhere. Unless said
+        `maps/uavN` of the working folder.
     map_file: a map in `folder` to begin with.
 
     """
@@ -77,7 +80,7 @@ class Mapping(Node):
         extent = float(self.declare_parameter("extent_m", 500.0).value)
         nodes = int(self.declare_parameter("max_nodes", 3_000_000).value)
         self._half = float(self.declare_parameter("half_height_m", 0.6).value)
-        self._folder = str(self.declare_parameter("folder", "").value)
+        self._folder = str(self.declare_parameter("folder", f"maps{self.get_namespace()}").value)
         self._limits = MapLimits(self._resolution, extent, nodes)
         beams = Beams(reach_m=self._reach, every=every)
         self._intakes = {
@@ -250,14 +253,19 @@ class Mapping(Node):
 
     def _save(self, name: str) -> str:
         path = self._path(name)
-        write_map(path, self._octree.binary(), self._resolution)
-        return f"{self._octree.nodes} nodes written to {path.name}"
+        if not path.exists() and len(list(path.parent.glob("*.bt"))) >= _MOST_FILES:
+            raise NodeError(f"{path.parent} holds {_MOST_FILES} maps already; delete some")
+        data = self._octree.binary()
+        write_map(path, data, self._resolution)
+        joined = f"{self._octree.nodes} in memory, where equal cubes are not joined"
+        return f"{node_count(data)} nodes written to {path} ({joined})"
 
     def _load(self, name: str) -> str:
         path = self._path(name)
         found = read_map(path, self._limits)
         self._octree.take(path)
-        return f"{found.voxels.size} cubes read from {path.name}"
+        nodes = f"{node_count(found.data)} nodes"
+        return f"{nodes} read from {path}: {found.voxels.size} known cubes and their branches"
 
     def _path(self, name: str) -> Path:
         """A file in the node's folder: clients of the graph write and read nowhere else."""

@@ -14,7 +14,14 @@ from volery.autonomy.scan_points import Pose
 from volery.autonomy.stuck_sensors import is_stuck
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.kept import keep, put_back
-from volery.graph.messages import MultiDOFJointTrajectory, Odometry, String, Twist, Vector3
+from volery.graph.messages import (
+    Bool,
+    MultiDOFJointTrajectory,
+    Odometry,
+    String,
+    Twist,
+    Vector3,
+)
 from volery.graph.node import Node
 
 Array = NDArray[np.float64]
@@ -27,7 +34,7 @@ _CARRIED_S = 0.1
 _TURN_GAIN, _TURN_RAD_S = 1.8, 1.2
 _OFF_M = 2.0
 """Farther from its plan it stops and waits for another one."""
-_STATE = ("_pose", "_heard_ns", "_frame", "_plan", "_next", "_told")
+_STATE = ("_pose", "_heard_ns", "_frame", "_plan", "_next", "_told", "_paused")
 
 
 class TrajectoryFollower(Node):
@@ -35,7 +42,8 @@ class TrajectoryFollower(Node):
 
     Velocities rather than places are commanded: places would be those of whoever flies the vehicle,
     and without GNSS nobody knows where the map of the one lies in that of the other. At the end of
-    a plan, and without odometry, the command is to stand still.
+    a plan, and without odometry, the command is to stand still. While `planning/pause`
+    (std_msgs/Bool) says so it commands nothing and forgets its plan.
 
     Parameters
     ----------
@@ -56,12 +64,14 @@ class TrajectoryFollower(Node):
         self._plan: Samples | None = None
         self._next: Samples | None = None
         self._told = ""
+        self._paused = False
         self._command = self.create_publisher(Twist, "cmd_vel", 1)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)
         self.create_subscription(Odometry, odometry, self._on_odometry, 5)
         self.create_subscription(
             MultiDOFJointTrajectory, "planning/trajectory", self._on_trajectory, 2
         )
+        self.create_subscription(Bool, "planning/pause", self._on_pause, 1)
         self.create_timer(_PERIOD_S, self._on_timer)
 
     def get_state(self) -> dict[str, Any]:
@@ -89,7 +99,15 @@ class TrajectoryFollower(Node):
             return
         self._next = samples
 
+    def _on_pause(self, message: Bool) -> None:
+        self._paused = bool(message.data)
+        self._plan = self._next = None
+        if self._paused:
+            self._tell("paused", "")
+
     def _on_timer(self) -> None:
+        if self._paused:
+            return
         now = self.get_clock().now_ns()
         if self._next is not None and self._next.time_ns[0] <= now:
             self._plan, self._next = self._next, None

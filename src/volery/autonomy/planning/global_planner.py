@@ -18,6 +18,7 @@ from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, PlanError
 from volery.core.kept import keep, put_back
 from volery.graph.messages import (
+    Bool,
     Odometry,
     PathMessage,
     Point,
@@ -47,8 +48,8 @@ class GlobalPlanner(Node):
     """`planning/goal` (PoseStamped, map) becomes `planning/path`; tells `planning/goal_status`.
 
     The status is JSON: state (waiting, planned, refused, unreachable), reason, goal, length_m,
-    plans. Where nothing is known of the map the way is straight. Service `~/stop`: forget the goal
-    and stay.
+    plans. Where nothing is known of the map the way is straight. Service `~/stop` and
+    `planning/pause` (std_msgs/Bool, true): forget the goal and stay.
 
     Parameters
     ----------
@@ -94,6 +95,7 @@ class GlobalPlanner(Node):
             self.create_subscription(TFMessage, "/tf", self._frame.on_tf, 50)
         self.create_subscription(PoseStamped, "planning/goal", self._on_goal, 1)
         self.create_subscription(OCTOMAP, "octomap_binary", self._on_map, 1)
+        self.create_subscription(Bool, "planning/pause", self._on_pause, 1)
         self.create_service("std_srvs/srv/Trigger", "~/stop", self._on_stop)
         self.create_timer(_PERIOD_S, self._on_timer)
 
@@ -141,6 +143,12 @@ class GlobalPlanner(Node):
             return
         if space is not None and not self._is_clear(space, self._way, self._place):
             self._plan()
+
+    def _on_pause(self, message: Bool) -> None:
+        """Whoever pauses the flight says anew where to, afterwards."""
+        if message.data:
+            self._goal = None
+            self._give_up("waiting", "paused")
 
     def _on_stop(self, _request: Any, response: Any) -> Any:
         self._goal = None

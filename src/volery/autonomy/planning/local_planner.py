@@ -21,6 +21,7 @@ from volery.autonomy.scan_points import Pose
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.kept import keep, put_back
 from volery.graph.messages import (
+    Bool,
     JointState,
     LaserScan,
     MultiDOFJointTrajectory,
@@ -41,14 +42,15 @@ _LEAST_HEIGHT_M = 1.0
 """Lower than this nothing is planned: it takes off or lands."""
 _TELL_S = 1.0
 """The status is told at each change of state or problems, else so often."""
-_STATE = ("_way", "_way_map", "_neighbours", "_told", "_told_ns", "_plans", "_frame_was")
+_STATE = ("_way", "_way_map", "_neighbours", "_told", "_told_ns", "_plans", "_frame_was", "_paused")
 
 
 class LocalPlanner(Node):
     """Follows `planning/path` by `planning/trajectory`; tells `planning/status`.
 
     An empty path: stay. The status is JSON: state (waiting, holding, flying, turning, blocked,
-    arrived), problems, left_m, clearance_m, plans.
+    arrived, paused), problems, left_m, clearance_m, plans. While `planning/pause` (std_msgs/Bool)
+    says so it plans nothing; the way is forgotten.
 
     Parameters
     ----------
@@ -96,6 +98,7 @@ class LocalPlanner(Node):
         self._told = ""
         self._told_ns = 0
         self._plans = 0
+        self._paused = False
         self._open()
 
     def _open(self) -> None:
@@ -114,6 +117,7 @@ class LocalPlanner(Node):
         self.create_subscription(PathMessage, "planning/path", self._on_path, 1)
         report = message_type("volery_interfaces/msg/TeamReport")
         self.create_subscription(report, "radio/team", self._on_report, 20)
+        self.create_subscription(Bool, "planning/pause", self._on_pause, 1)
         self.create_timer(period, self._on_timer)
 
     def get_state(self) -> dict[str, Any]:
@@ -152,6 +156,10 @@ class LocalPlanner(Node):
         self._way_map = found if len(found) else None
         self._way = None
 
+    def _on_pause(self, message: Bool) -> None:
+        self._paused = bool(message.data)
+        self._way_map = self._way = None
+
     def _on_report(self, report: Any) -> None:
         self._neighbours.hear(report, self.get_clock().now_ns())
 
@@ -169,6 +177,10 @@ class LocalPlanner(Node):
         present = State(pose.position, pose.velocity, np.zeros(3))
         self._planning.policy = self._policy()
         then = now + self._ahead_ns
+        if self._paused:
+            self._planning.forget()
+            self._tell("paused", problems)
+            return
         if height < _LEAST_HEIGHT_M:
             self._planning.forget()
             self._tell("waiting", ["too low above ground to plan", *problems])

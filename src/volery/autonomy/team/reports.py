@@ -32,6 +32,8 @@ class Phase(StrEnum):
     """Aloft with nothing to search at the moment."""
     RETURN = "return"
     LAND = "land"
+    HOLD = "hold"
+    """An operator has it wait where it is, or flies it."""
     DONE = "done"
     """Has landed."""
     DOWN = "down"
@@ -40,7 +42,7 @@ class Phase(StrEnum):
 
 AT_WORK = frozenset({Phase.WAIT, Phase.RISE, Phase.SEARCH, Phase.IDLE})
 """Searches, or will."""
-ALOFT = frozenset({Phase.SEARCH, Phase.IDLE, Phase.RETURN})
+ALOFT = frozenset({Phase.SEARCH, Phase.IDLE, Phase.RETURN, Phase.HOLD})
 
 
 @dataclass

@@ -28,7 +28,7 @@ from volery.bridges.ros_tcp.dial import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUS
 from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.wire import Frame, FrameParser, Generation, number_field
-from volery.core.errors import BridgeError, GraphError
+from volery.core.errors import BridgeError, GraphError, UnreachableError
 from volery.graph.mailbox import Mailbox, Wake
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.reply import Reply
@@ -114,7 +114,7 @@ class RosTcpClient:
     def wait_until_connected(self, timeout_s: float) -> None:
         """Wait for the endpoint. `BridgeError` where it does not answer in time."""
         if not self._connected.wait(timeout_s):
-            raise BridgeError(f"nobody speaks ROS-TCP at {self._where}: {self._why}")
+            raise UnreachableError(f"nobody speaks ROS-TCP at {self._where}: {self._why}")
 
     @property
     def trouble(self) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from websockets.exceptions import WebSocketException
 from volery.bridges.rosbridge.client_state import ClientState
 from volery.bridges.rosbridge.forms import Generation
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES, Frame
-from volery.core.errors import BridgeError, GraphError
+from volery.core.errors import BridgeError, GraphError, UnreachableError
 from volery.graph.mailbox import Mailbox, Wake
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.reply import Reply
@@ -106,7 +106,7 @@ class RosbridgeClient:
     def wait_until_connected(self, timeout_s: float) -> None:
         """Wait for the server. `BridgeError` where it does not answer in time."""
         if not self._connected.wait(timeout_s):
-            raise BridgeError(f"nobody speaks rosbridge at {self.url}: {self._trouble}")
+            raise UnreachableError(f"nobody speaks rosbridge at {self.url}: {self._trouble}")
 
     @property
     def trouble(self) -> tuple[str, ...]:

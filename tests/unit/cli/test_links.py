@@ -1,0 +1,31 @@
+"""Waiting for a graph that is not there yet."""
+
+import pytest
+
+from volery.cli import links
+from volery.core.errors import BridgeError, UnreachableError
+
+
+def test_nodes_wait_for_their_graph_and_say_so(monkeypatch, capsys) -> None:
+    tries = []
+
+    def open_link(via: str, name: str) -> str:
+        tries.append(name)
+        if len(tries) < 3:
+            raise UnreachableError(f"nobody at {via}")
+        return "link"
+
+    monkeypatch.setattr(links, "open_link", open_link)
+    monkeypatch.setattr(links, "_AGAIN_S", 0.0)
+    assert links.await_link("x://y", "node") == "link"
+    assert capsys.readouterr().err == "nobody at x://y; waits 30 s for it\n"
+    tries.clear()
+    with pytest.raises(UnreachableError):
+        links.await_link("x://y", "node", patience_s=0.0)
+    assert tries == ["node"]
+
+
+def test_what_never_comes_is_not_waited_for(capsys) -> None:
+    with pytest.raises(BridgeError, match="no way into a graph"):
+        links.await_link("pigeon://post", "node")
+    assert capsys.readouterr().err == ""
