@@ -17,7 +17,7 @@ from volery.report.alignment import (
     time_shift_s,
     umeyama,
 )
-from volery.report.logged_flights import LoggedUav, read_uavs, read_way
+from volery.report.logged_flights import LoggedUav, read_flight, read_way
 from volery.report.page import STYLE, ReportError
 from volery.report.way_charts import Line, over_time, ways_from_above
 from volery.report.ways import Way
@@ -44,7 +44,7 @@ def write_log_report(
     time by their speeds and in space by rotation and translation. compare_topic: its poses; None:
     the only ones there. `VoleryError` for logs that do not hold what is asked for.
     """
-    uavs = read_uavs(log)
+    uavs = read_flight(log).uavs
     parts = [section for each in uavs for section in _estimate_section(each)]
     if compare is not None:
         simulated = _chosen(uavs, uav, log)
@@ -75,6 +75,16 @@ def _estimate_section(uav: LoggedUav) -> list[str]:
     if uav.estimate is not None:
         lines.append(Line("estimated", uav.estimate.time_s, uav.estimate.position))
     told = "Trajectory and trunk map."
+    if len(uav.trunks):
+        told = (
+            f"Trajectory, and {len(uav.trunks)} trunks that the level LIDAR saw three times or "
+            "more, where the estimate puts them."
+        )
+        if not uav.is_founded:
+            told += (
+                " No nodding LIDAR tells what stands on the ground: crowns and rises of the "
+                "ground may be among them."
+            )
     if uav.truth is not None and uav.estimate is not None:
         told += _error_text(uav.estimate, uav.truth)
     return [f"<h2>{escape(uav.name)}</h2>", *_figures(lines, uav.trunks, told)]
