@@ -1,7 +1,8 @@
 """Trunks that one UAV has seen, from its own sensors and where it thought that it was.
 
 The level scan shows what stands out at flight height: trunks, but also crowns of saplings, and the
-ground where it rises or the UAV leans. The nodding LIDAR tells them apart: see `columns`.
+ground where it rises or the UAV leans. The nodding LIDAR tells them apart: see
+`autonomy.mapping.columns`.
 """
 
 from __future__ import annotations
@@ -12,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.fixed_joints import FixedJoints, Mount
+from volery.autonomy.mapping.columns import Columns
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.graph.messages import stamp_of
-from volery.report.columns import Columns
 from volery.report.trunks import TrunkMap, trunks_of_scan
 from volery.report.ways import Way
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.fixed_joints import Mount
+from volery.autonomy.mapping.columns import Columns
 from volery.autonomy.mapping.log_odds import LogOddsGrid
 from volery.core import rotations
 from volery.core.errors import RecordingError
@@ -25,13 +26,20 @@ _SLAB_M = 0.5
 branches."""
 
 
+_OVER_GROUND_M = 0.6
+"""What a flying scanner meets lower than this may be the ground."""
+_EVERY, _NEAREST_GROUND_M, _FARTHEST_GROUND_M = 4, 0.6, 20.0
+"""Beams of the nodding LIDAR that tell where the ground is: each fourth, m."""
+
+
 def draw_map(outcome: Outcome, cell_m: float, reach_m: float) -> LogOddsGrid:
     """The grid of a run, cells of `cell_m`; returns beyond `reach_m` are free space up to there.
 
     `RecordingError` where it would need too much memory.
     """
+    ground = _ground(outcome)
     rays = [
-        _rays(outcome.trajectory, row, scan, outcome.mount(scan.header.frame_id), reach_m)
+        _rays(outcome.trajectory, row, scan, outcome.mount(scan.header.frame_id), reach_m, ground)
         for row, scan in outcome.scans
     ]
     ends = [np.concatenate([starts[:1], ends]) for starts, ends, _ in rays if len(starts)]
@@ -50,7 +58,12 @@ def draw_map(outcome: Outcome, cell_m: float, reach_m: float) -> LogOddsGrid:
 
 
 def _rays(
-    trajectory: Trajectory, row: int, scan: LaserScan, mount: Mount, reach_m: float
+    trajectory: Trajectory,
+    row: int,
+    scan: LaserScan,
+    mount: Mount,
+    reach_m: float,
+    ground: Columns | None,
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Starts and ends (K, 2) of a scan in the map, and which end in something."""
     ranges = np.asarray(scan.ranges, np.float64)
@@ -67,7 +80,31 @@ def _rays(
     rise = np.abs(ends[:, 2] - starts[:, 2])
     short = np.minimum(_SLAB_M / np.maximum(rise, 1e-9), 1.0)[:, None]
     ends = starts + short * (ends - starts)
-    return starts[:, :2], ends[:, :2], hits & (short[:, 0] >= 1.0)
+    hits &= short[:, 0] >= 1.0
+    if ground is not None:  # where it has not been seen a return may well be one of it
+        hits[hits] = ground.heights_m(ends[hits]) > _OVER_GROUND_M
+    return starts[:, :2], ends[:, :2], hits
+
+
+def _ground(outcome: Outcome) -> Columns | None:
+    """Where the ground is, by the nodding LIDAR; None where there is none."""
+    if not outcome.nodding or not len(outcome.nods):
+        return None
+    found = [np.zeros((0, 3))]
+    for row, scan in outcome.nodding:
+        ranges = np.asarray(scan.ranges, np.float64)[::_EVERY]
+        near = (ranges > _NEAREST_GROUND_M) & (ranges < _FARTHEST_GROUND_M)
+        length, beams = ranges[near], np.flatnonzero(near) * _EVERY
+        when = stamp_of(scan) * 1e-9 + beams * float(scan.time_increment)
+        nod = np.interp(when, outcome.nods[:, 0], outcome.nods[:, 1])
+        angle = float(scan.angle_min) + beams * float(scan.angle_increment)
+        x, y = length * np.cos(angle), length * np.sin(angle)
+        along = np.stack([np.cos(nod) * x, y, -np.sin(nod) * x], axis=1)
+        mount = outcome.mount(scan.header.frame_id)
+        body = rotations.rotate(mount.attitude, along) + mount.position
+        place, turn = _poses(outcome.trajectory, row, scan, beams)
+        found.append(rotations.rotate(turn, body) + place)
+    return Columns(np.concatenate(found))
 
 
 def _poses(

@@ -18,6 +18,8 @@ _FOOT_M, _BAND_M, _BANDS = 0.6, 0.4, 4
 _LEAST_RETURNS, _LEAST_BANDS = 2, 2
 _CLEAR_M = 1.0
 """A level scan that meets something lower than this may have met the ground (modelling choices)."""
+_CELL_M = 0.5
+"""In which the ground counts as level, where many heights above it are asked for."""
 
 
 class _Cells:
@@ -48,6 +50,7 @@ class Columns:
     """Returns (N, 3) of the map, m, in a form that tells what stands upright among them."""
 
     def __init__(self, points: Array) -> None:
+        self._grounds: dict[tuple[int, int], float] = {}
         self._wide, self._slim = _Cells(points, _GROUND_WITHIN_M), _Cells(points, _BESIDE_M)
 
     def ground_m(self, place: Array) -> float:
@@ -56,6 +59,18 @@ class Columns:
         if len(heights) < _LEAST_GROUND:
             return float("nan")
         return float(np.quantile(heights, _LOWEST_SHARE))
+
+    def heights_m(self, seen: Array) -> Array:
+        """Heights (K,) of points (K, 3) above the ground; nan where it has not been seen."""
+        cells = np.floor(seen[:, :2] / _CELL_M).astype(np.int64)
+        _, first, of = np.unique(_key(cells), return_index=True, return_inverse=True)
+        ground = np.array([self._cell_ground(int(i), int(j)) for i, j in cells[first]])
+        return np.asarray(seen[:, 2] - ground[of.ravel()]) if len(seen) else np.zeros(0)
+
+    def _cell_ground(self, i: int, j: int) -> float:
+        if (i, j) not in self._grounds:
+            self._grounds[i, j] = self.ground_m((np.array([i, j]) + 0.5) * _CELL_M)
+        return self._grounds[i, j]
 
     def stands(self, seen: Array) -> bool:
         """Whether what was seen at a place (3,) is clear of the ground and reaches down to it."""
