@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 _NEAREST_M = 0.05
 _MARGIN_M = 1.0
 _MOST_CELLS = 100_000_000
+_COARSEST_M = 2.0
+"""Width of cells in which a map says nothing any more: it is of a way that ran away."""
 _SLAB_M = 0.5
 """Returns so far above or below the scanner, along a leaning scan, are of other things: ground,
 branches."""
@@ -33,9 +35,10 @@ _EVERY, _NEAREST_GROUND_M, _FARTHEST_GROUND_M = 4, 0.6, 20.0
 
 
 def draw_map(outcome: Outcome, cell_m: float, reach_m: float) -> LogOddsGrid:
-    """The grid of a run, cells of `cell_m`; returns beyond `reach_m` are free space up to there.
+    """The grid of a run; returns beyond `reach_m` are free space up to there.
 
-    `RecordingError` where it would need too much memory.
+    Its cells are `cell_m` wide, or so many times doubled that it needs no more memory than there
+    may be. `RecordingError` where that makes them too coarse.
     """
     ground = _ground(outcome)
     rays = [
@@ -45,16 +48,25 @@ def draw_map(outcome: Outcome, cell_m: float, reach_m: float) -> LogOddsGrid:
     ends = [np.concatenate([starts[:1], ends]) for starts, ends, _ in rays if len(starts)]
     spread = np.concatenate(ends) if ends else outcome.trajectory.position[:, :2]
     low, high = spread.min(axis=0) - _MARGIN_M, spread.max(axis=0) + _MARGIN_M
-    cells = float(np.prod((high - low) / cell_m))
-    if cells > _MOST_CELLS:
-        raise RecordingError(
-            f"a map of {high[0] - low[0]:.0f} m x {high[1] - low[1]:.0f} m in cells of "
-            f"{cell_m:g} m is too large; try a coarser --resolution"
-        )
-    grid = LogOddsGrid(low, high, cell_m)
+    grid = LogOddsGrid(low, high, fitting_cell(high - low, cell_m))
     for starts, ends_, hits in rays:
         grid.add(starts, ends_, hits)
     return grid
+
+
+def fitting_cell(size: Array, cell_m: float) -> float:
+    """Width of the cells that a map of a size (2,) m can have, the one wished for or a coarser.
+
+    `RecordingError` where there is none.
+    """
+    wished = cell_m
+    while np.isfinite(size).all() and cell_m <= max(_COARSEST_M, wished):
+        if float(np.prod(size / cell_m)) <= _MOST_CELLS:
+            return cell_m
+        cell_m *= 2.0
+    raise RecordingError(
+        f"a map of {size[0]:.0f} m x {size[1]:.0f} m is too large: the way ran away"
+    )
 
 
 def _rays(
