@@ -15,7 +15,7 @@ _GROUND_WITHIN_M, _LOWEST_SHARE, _LEAST_GROUND = 1.5, 0.05, 6
 _BESIDE_M = 0.3
 _FOOT_M, _BAND_M, _BANDS = 0.6, 0.4, 4
 """Above the ground: where undergrowth and errors of the ground end, and the bands beyond it."""
-_LEAST_RETURNS, _LEAST_BANDS = 2, 2
+_LEAST_RETURNS, _LEAST_BANDS = 2, 3
 _CLEAR_M = 1.0
 """A level scan that meets something lower than this may have met the ground (modelling choices)."""
 _CELL_M = 0.5
