@@ -30,7 +30,7 @@ _LEAST = 10
 """Poses in common that an error can be told from."""
 _APART = ".chart + .pair { margin-top: 1.2rem; }\n"
 """Between the way from above and the charts below it, as between these."""
-_ALIKE, _LEFT_SHARE = 0.5, 0.3
+_ALIKE, _LEFT_SHARE = 0.5, 0.2
 """Speeds less alike, or ways farther apart, are hardly of one flight (modelling choices)."""
 _LEAST_S, _MOST_S = 3.0, 86_400.0
 """Seconds that a common time can be found from, and is looked for in."""
