@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +13,8 @@ from numpy.typing import NDArray
 from volery.engine.events import EventKind
 from volery.graph.messages import Published, stamp_of
 from volery.report.alignment import Alignment, at_times, ate_rmse_m, common_times, umeyama
-from volery.report.logged_flights import ESTIMATES, SCAN, TRUTH
-from volery.report.trunks import in_map, trunks_of_scan
+from volery.report.logged_flights import ESTIMATES, TRUTH
+from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
 from volery.report.ways import Way
 from volery.runtime import Simulation
 from volery.scenario import overrides
@@ -27,9 +26,7 @@ Array = NDArray[np.float64]
 SIGHT_M = 6.0
 """As far as the task manager takes a place for seen."""
 _CELL_M = 2.0
-_SCAN_NS, _POSE_NS = 500_000_000, 100_000_000
-_SEEN_OFTEN = 3
-_SAME_TREE_M = 0.6
+_POSE_NS = 100_000_000
 _TARGET_GATE_M = 4.0
 
 
@@ -40,8 +37,8 @@ class Flown:
     truth: list[tuple[float, ...]] = field(default_factory=list)
     """Time, position (3), attitude (4)."""
     estimate: list[tuple[float, ...]] = field(default_factory=list)
-    scans: list[tuple[float, Array]] = field(default_factory=list)
-    """Time, and trunks (K, 2) in the scanner's frame."""
+    survey: TrunkSurvey = field(default_factory=TrunkSurvey)
+    """What its trunks are told from."""
     targets: list[tuple[float, Array]] = field(default_factory=list)
     """Time, and the places (T, 2) on its list, whenever it is published."""
 
@@ -105,33 +102,22 @@ class Search:
         return float(seen.sum()) * _CELL_M**2
 
     def trunk_errors_m(self, *, aligned: bool = False) -> Array:
-        """Distances of mapped trunks from their trees, of those seen three times or more.
+        """Distances of mapped trunks from the nearest trees, of those seen three times or more.
 
-        A sighting is of the tree at which it lies by the true pose; a tree's place in the map is
-        the mean of its sightings by the estimated poses. `aligned`: each UAV's map is laid onto the
-        world as its way is for the trajectory error, else by the place of take-off alone.
+        They are all that each UAV takes for trunks by its own sensors and its own idea of its way;
+        what is none is as far off as the next tree stands. `aligned`: each UAV's map is laid onto
+        the world as its way is for the trajectory error, else by the place of take-off alone.
         """
-        sums, counts = np.zeros_like(self.trees), np.zeros(len(self.trees), np.int64)
+        errors = [np.zeros(0)]
         for uav in self.uavs.values():
-            way, own_way = uav.way, uav.own_way
+            found = uav.survey.trunks(uav.own_way).seen_often
             alignment = uav.alignment() if aligned else None
-            for seconds, trunks in uav.scans:
-                true, own = way.pose_at(seconds), own_way.pose_at(seconds)
-                if true is None or own is None or not len(trunks):
-                    continue
-                there = in_map(trunks, *true)
-                away = np.linalg.norm(self.trees[None] - there[:, None], axis=2)
-                tree = away.argmin(axis=1)
-                sure = away.min(axis=1) <= _SAME_TREE_M
-                found = in_map(trunks, *own)
-                if alignment is not None:
-                    height = np.full((len(found), 1), own[0][2])
-                    found = alignment.apply(np.concatenate([found, height], axis=1))[:, :2]
-                np.add.at(sums, tree[sure], found[sure])
-                np.add.at(counts, tree[sure], 1)
-        often = counts >= _SEEN_OFTEN
-        mean = sums[often] / counts[often, None]
-        return np.asarray(np.linalg.norm(mean - self.trees[often], axis=1))
+            if alignment is not None:
+                found = alignment.apply(found)
+            for trunk in found:
+                away = np.hypot(*(self.trees - trunk[:2]).T)
+                errors.append(away.min(keepdims=True, initial=np.inf))
+        return np.concatenate(errors)
 
     def target_delays_s(self) -> list[float]:
         """For each thing found: from the first list that has it to the last one, inf if never."""
@@ -216,8 +202,11 @@ def _listen(simulation: Simulation, name: str, flown: Flown) -> None:
     for topic, rows in ((TRUTH, flown.truth), (estimate, flown.estimate)):
         take = _thinning(_POSE_NS, partial(_take_pose, rows))
         graph.subscribe(f"/{name}/{topic}", take)
-    scan = _thinning(_SCAN_NS, partial(_take_scan, flown.scans))
-    graph.subscribe(f"/{name}/{SCAN}", scan, "sensor_msgs/msg/LaserScan")
+    for scan in (LEVEL, NODDING):
+        take = partial(_take_scan, flown.survey, scan)
+        graph.subscribe(f"/{name}/{scan}", take, "sensor_msgs/msg/LaserScan")
+    graph.subscribe(f"/{name}/joint_states", partial(_take_nods, flown.survey))
+    graph.subscribe("/tf_static", partial(_take_joints, flown.survey))
     targets = partial(_take_targets, flown.targets)
     graph.subscribe(f"/{name}/targets", targets, "volery_interfaces/msg/Targets")
 
@@ -240,10 +229,17 @@ def _take_pose(rows: list[tuple[float, ...]], published: Published) -> None:
     rows.append((stamp_of(published.message) * 1e-9, p.x, p.y, p.z, q.x, q.y, q.z, q.w))
 
 
-def _take_scan(scans: list[tuple[float, Array]], published: Published) -> None:
-    scan: Any = published.message
-    trunks = trunks_of_scan(scan.ranges, scan.angle_min, scan.angle_increment)
-    scans.append((stamp_of(scan) * 1e-9, trunks))
+def _take_scan(survey: TrunkSurvey, scan: str, published: Published) -> None:
+    if survey.wants(scan, published.time_ns):
+        survey.add_scan(scan, published.time_ns, published.message)
+
+
+def _take_nods(survey: TrunkSurvey, published: Published) -> None:
+    survey.add_nods(published.message)
+
+
+def _take_joints(survey: TrunkSurvey, published: Published) -> None:
+    survey.joints.add(published.message)
 
 
 def _take_targets(lists: list[tuple[float, Array]], published: Published) -> None:

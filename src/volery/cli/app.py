@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
+from volery.bench.registry import BENCHES
 from volery.cli.graph_commands import node, service_app, topic_app
-from volery.cli.guard import guarded
+from volery.cli.guard import guarded, warn
 from volery.cli.options import (
     BatchSizeOption,
     DomainOption,
@@ -25,6 +26,8 @@ from volery.cli.options import (
     ThreadsOption,
     TokenOption,
 )
+
+_QUICK = [name for name, bench in BENCHES.items() if bench.has_quick]
 
 app = typer.Typer(
     name="volery",
@@ -436,16 +439,14 @@ def slam(
 @app.command()
 @guarded
 def bench(
-    name: Annotated[
-        str, typer.Argument(help="lidar, fleet, dynamics, start, all of them, or peers.")
-    ],
+    name: Annotated[str, typer.Argument(help=f"all, or one: {', '.join(BENCHES)}.")],
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object a bench.")] = False,
     out: Annotated[Path | None, typer.Option(help="Write the JSON to this file too.")] = None,
     markdown: Annotated[
         Path | None, typer.Option(help="Write a page with figures and bounds.")
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Shorter, where the bench can: forest_search, load.")
+        bool, typer.Option("--quick", help=f"Shorter, where the bench can: {', '.join(_QUICK)}.")
     ] = False,
 ) -> None:
     """Measure how fast Volery is on this machine."""
@@ -457,7 +458,7 @@ def bench(
 @app.command()
 @guarded
 def launch(
-    profile: Annotated[Path, typer.Argument(help="A .toml profile with [[launch]] in it.")],
+    profile: Annotated[Path, typer.Argument(help="A .toml profile with \\[\\[launch]] in it.")],
     via: Annotated[
         str | None, typer.Option(help="Way into the graph, as of `volery node`.")
     ] = None,
@@ -486,13 +487,20 @@ def report(
         str | None,
         typer.Option(help="Its topic of poses, where there are several."),
     ] = None,
-    uav: Annotated[str | None, typer.Option(help="UAV to compare with; the first.")] = None,
+    uav: Annotated[
+        str | None, typer.Option(help="UAV to draw, else all; or to compare with, else the first.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an older one.")] = False,
 ) -> None:
     """Draw the ways of a log, simulated against estimated, with a map of trunks."""
     from volery.report.way_page import write_log_report
 
-    path = write_log_report(log, out, compare=compare, compare_topic=compare_topic, uav=uav)
-    typer.echo(f"report  {path}")
+    written = write_log_report(
+        log, out, compare=compare, compare_topic=compare_topic, uav=uav, overwrite=overwrite
+    )
+    for text in written.warnings:
+        warn(text)
+    typer.echo(f"report  {written.path}")
 
 
 @app.command()

@@ -24,6 +24,11 @@ def complain(text: str) -> None:
     typer.echo(f"error: {text}", err=True)
 
 
+def warn(text: str) -> None:
+    """Say `warning: ...` on stderr, of what does not end a command."""
+    typer.echo(f"warning: {text}", err=True)
+
+
 def guarded(command: Callable[P, None]) -> Callable[P, None]:
     """Turn a user's mistakes and Ctrl-C into a line and an exit code."""
 

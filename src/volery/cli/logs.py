@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from volery.cli.guard import complain
+from volery.cli.guard import complain, warn
 from volery.cli.tables import print_table
 from volery.core.clock import NS_PER_S
 from volery.core.errors import RecordingError
@@ -74,5 +74,5 @@ def convert_log(path: Path, out: Path, layout: Path, *, overwrite: bool) -> None
         log.close()
         made.unlink(missing_ok=True)
     if scans.left_out:
-        complain(f"{path}: {scans.left_out:,} lines left out; {scans.trouble}")
+        warn(f"{path}: {scans.left_out:,} lines left out; {scans.trouble}")
     typer.echo(f"{scans.scans:,} scans, {log.messages:,} messages written to {out}")

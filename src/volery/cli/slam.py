@@ -5,19 +5,25 @@ from __future__ import annotations
 import json
 import math
 import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from volery.cli.guard import complain
+from volery.cli.guard import warn
 from volery.core.errors import RecordingError, VoleryError
 
 if TYPE_CHECKING:
     from volery.runtime.slam_run.run import Outcome
 
-_NAMES = ("map.png", "map.pgm", "map.yaml", "path.tum", "summary.json")
+_MAPS = ("map.png", "map.pgm", "map.yaml")
+_NAMES = (*_MAPS, "path.tum", "summary.json")
+_PLAIN_PERIOD_S = 10.0
+"""Between lines of progress where nobody watches a terminal."""
+_DEGRADED = 0.1
+"""Share of the log's time from which on an IMU that was not used is worth a word."""
 
 
 @dataclass(frozen=True)
@@ -65,15 +71,42 @@ def map_log(asked: SlamAsked) -> None:
         asked.reach,
         asked.loops,
     )
-    outcome = SlamRun(source, options).run(_progress if sys.stderr.isatty() else None)
+    run = SlamRun(source, options)
+    typer.echo(f"mapping {asked.log}", err=True)
+    outcome = run.run(_Progress().tell)
     if source.trouble:
-        complain(f"{asked.log}: {source.trouble}")
-    _write(asked, outcome)
-    _tell(asked.out, _summary(asked, outcome, source.refused))
+        warn(f"{asked.log}: {source.trouble}")
+    cell_m = _write(asked, outcome)
+    _tell(asked.out, _summary(asked, outcome, source.refused, cell_m))
+    _advise(outcome, source.topics)
 
 
-def _progress(scans: int, seconds: float) -> None:
-    typer.echo(f"{scans:,} scans, {seconds:.0f} s of the log", err=True)
+class _Progress:
+    """Tells how far it is, now and then where that goes into a file."""
+
+    def __init__(self) -> None:
+        self._told = time.monotonic()
+
+    def tell(self, scans: int, seconds: float) -> None:
+        """What has been read so far."""
+        now = time.monotonic()
+        if sys.stderr.isatty() or now - self._told >= _PLAIN_PERIOD_S:
+            self._told = now
+            typer.echo(f"{scans:,} scans, {seconds:.0f} s of the log", err=True)
+
+
+def _advise(outcome: Outcome, topics: dict[str, str]) -> None:
+    """Say that an IMU might help that the log has and that was not used."""
+    from volery.runtime.slam_run.channels import IMU
+
+    total = sum(outcome.states.values())
+    poor = outcome.states.get("degraded", 0.0) + outcome.states.get("lost", 0.0)
+    imus = sorted(topic for topic, kind in topics.items() if kind == IMU)
+    if imus and not outcome.channels.has_imu and poor > _DEGRADED * total:
+        warn(
+            f"degraded or lost for {poor / total:.0%} of the time, in the plane; of a vehicle that "
+            f"leans or flies the log's IMU ({', '.join(imus)}) may tell more: --imu"
+        )
 
 
 def _check_folder(out: Path, *, overwrite: bool) -> None:
@@ -97,23 +130,43 @@ def _numbers(text: str | None, count: int, option: str) -> Any:
     return found
 
 
-def _write(asked: SlamAsked, outcome: Outcome) -> None:
+def _write(asked: SlamAsked, outcome: Outcome) -> float | None:
+    """The path, and the map if there can be one: the width of its cells, m."""
+    from volery.runtime.slam_run.trajectory import write_tum
+
+    asked.out.mkdir(parents=True, exist_ok=True)
+    for name in _MAPS:
+        (asked.out / name).unlink(missing_ok=True)
+    write_tum(asked.out / "path.tum", outcome.trajectory)
+    try:
+        return _write_map(asked, outcome)
+    except RecordingError as error:
+        warn(f"no map is written: {error}")
+        return None
+
+
+def _write_map(asked: SlamAsked, outcome: Outcome) -> float:
     from volery.autonomy.mapping.grid_files import write_grid
     from volery.runtime.slam_run.drawing import draw_map
     from volery.runtime.slam_run.picture import write_picture
-    from volery.runtime.slam_run.trajectory import write_tum
 
-    out = asked.out
-    out.mkdir(parents=True, exist_ok=True)
     grid = draw_map(outcome, asked.resolution, asked.reach)
+    if grid.cell_m > asked.resolution:
+        rows, columns = grid.odds.shape
+        warn(
+            f"the map is {columns * grid.cell_m:.0f} m x {rows * grid.cell_m:.0f} m, too large for "
+            f"cells of {asked.resolution:g} m: they are {grid.cell_m:g} m wide"
+        )
     values = grid.occupancy()
-    write_grid(out / "map", values, grid.origin, grid.cell_m)
+    write_grid(asked.out / "map", values, grid.origin, grid.cell_m)
     way = outcome.trajectory.position[:, :2]
-    write_picture(out / "map.png", values, grid.origin, grid.cell_m, way)
-    write_tum(out / "path.tum", outcome.trajectory)
+    write_picture(asked.out / "map.png", values, grid.origin, grid.cell_m, way)
+    return grid.cell_m
 
 
-def _summary(asked: SlamAsked, outcome: Outcome, refused: int) -> dict[str, Any]:
+def _summary(
+    asked: SlamAsked, outcome: Outcome, refused: int, cell_m: float | None
+) -> dict[str, Any]:
     status = outcome.status
     told = {
         "log": asked.log.name,
@@ -122,6 +175,7 @@ def _summary(asked: SlamAsked, outcome: Outcome, refused: int) -> dict[str, Any]
         "scans": outcome.heard,
         "lasted_s": round(outcome.lasted_s, 3),
         "way_m": round(outcome.trajectory.length_m, 2),
+        "cell_m": cell_m,
         "keyframes": status.get("keyframes", 0),
         "closures": status.get("closures", 0),
         "sessions": status.get("sessions", 1),
@@ -144,7 +198,7 @@ def _summary(asked: SlamAsked, outcome: Outcome, refused: int) -> dict[str, Any]
 def _tell(out: Path, told: dict[str, Any]) -> None:
     share = told["cpu_share"]
     typer.echo(
-        f"{told['scans']:,} scans over {told['lasted_s']:.1f} s, {told['way_m']:.1f} m "
+        f"{told['scans']:,} scans over {told['lasted_s']:.1f} s, {told['way_m']:.1f} m over ground "
         f"({'with' if told['mode'] == 'imu' else 'without'} IMU)"
     )
     typer.echo(
@@ -159,4 +213,5 @@ def _tell(out: Path, told: dict[str, Any]) -> None:
     if share is not None:
         typer.echo(f"CPU       {told['cpu_s']:.1f} s, {share:.1%} of the log's time")
     for name in _NAMES:
-        typer.echo(f"written   {out / name}")
+        if name not in _MAPS or told["cell_m"] is not None:
+            typer.echo(f"written   {out / name}")

@@ -65,7 +65,17 @@ def common_times(one_s: Array, other_s: Array) -> NDArray[np.bool_]:
     return within
 
 
-def time_shift_s(one_s: Array, one: Array, other_s: Array, other: Array) -> float:
+class TimeShift(NamedTuple):
+    """How the times of two ways lie to each other."""
+
+    seconds: float
+    """To be added to the times of the other way."""
+    alike: float
+    """Correlation of the speeds then: 1 where they are the same, 0 where neither tells of the
+    other."""
+
+
+def time_shift(one_s: Array, one: Array, other_s: Array, other: Array) -> TimeShift:
     """What to add to the times of the other way so that both are flown at the same time.
 
     The shift at which their speeds, over a second, are most alike (by their correlation, where at
@@ -82,7 +92,7 @@ def time_shift_s(one_s: Array, one: Array, other_s: Array, other: Array) -> floa
         alike = float(a @ b) / spread if spread > _LEAST_SPREAD else -1.0
         if alike > best:
             best, best_lag = alike, lag
-    return float(one_s[0] - other_s[0]) + best_lag / _RATE_HZ
+    return TimeShift(float(one_s[0] - other_s[0]) + best_lag / _RATE_HZ, best)
 
 
 def _speeds(time_s: Array, places: Array) -> Array:

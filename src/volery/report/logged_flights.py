@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.autonomy.fixed_joints import FixedJoints
 from volery.bridges.logs.decoding import LogDecoder
-from volery.bridges.logs.records import LogWalk
+from volery.bridges.logs.records import LogRecord, LogWalk
+from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError, VoleryError
 from volery.graph.messages import stamp_of
-from volery.report.trunks import TrunkMap, in_map, trunks_of_scan
+from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
 from volery.report.ways import Way
 
 Array = NDArray[np.float64]
@@ -23,14 +25,15 @@ Array = NDArray[np.float64]
 TRUTH = "ground_truth/odom"
 ESTIMATES = ("slam/pose", "slam/odom", "odom")
 """Where a UAV's own idea of its pose is looked for, the first that there is."""
-SCAN = "laser/horizontal/scan"
+_SCAN_TYPE, _JOINTS_TYPE = "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/JointState"
 _POSE_TYPES = (
     "nav_msgs/msg/Odometry",
     "geometry_msgs/msg/PoseStamped",
     "geometry_msgs/msg/PoseWithCovarianceStamped",
 )
-_SCAN_NS, _POSE_NS = 500_000_000, 50_000_000
-_SEEN_OFTEN = 3
+_WISHES = ("goal", "setpoint", "target", "waypoint", "command")
+"""Words in topics of poses that tell where a vehicle should be, not where it was."""
+_POSE_NS = 50_000_000
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,21 @@ class LoggedUav:
     truth: Way | None
     estimate: Way | None
     trunks: Array
-    """(T, 2) m, where the estimate puts them; of those seen three times."""
+    """(T, 3) m, where the estimate puts them; of those seen three times."""
+    is_founded: bool
+    """Whether it is known of the trunks that they stand on the ground; else by shape alone."""
+
+
+@dataclass(frozen=True)
+class LoggedFlight:
+    """What a log tells of a flight."""
+
+    uavs: list[LoggedUav]
+    """By name."""
+    scenario: str
+    """Name, if it is told."""
+    description: str
+    lasts_s: float
 
 
 @dataclass
@@ -65,26 +82,73 @@ class _Rows:
         return Way.of_rows(self.poses)
 
 
-def read_uavs(path: Path) -> list[LoggedUav]:
-    """The UAVs of a log by the topics that Volery gives them, by name.
+@dataclass
+class _Log:
+    """What is kept of a log's messages."""
+
+    ways: dict[str, _Rows] = field(default_factory=dict)
+    """By topic."""
+    surveys: dict[str, TrunkSurvey] = field(default_factory=dict)
+    """By UAV."""
+    joints: FixedJoints = field(default_factory=FixedJoints)
+    types: dict[str, str] = field(default_factory=dict)
+    scenario: dict[str, Any] = field(default_factory=dict)
+    first_ns: int | None = None
+    last_ns: int = 0
+
+    def take(self, record: LogRecord, decoder: LogDecoder) -> None:
+        """Keep what is needed of a message; `GraphError` where its type is not known here."""
+        topic, time_ns = record.topic.topic, record.time_ns
+        self.first_ns = time_ns if self.first_ns is None else self.first_ns
+        self.last_ns = max(self.last_ns, time_ns)
+        self.types.setdefault(topic, record.topic.msgtype)
+        kind = decoder.type_of(record.topic)
+        self.types[topic] = kind
+        name, _, what = topic[1:].partition("/")
+        if kind == _SCAN_TYPE and what in (LEVEL, NODDING):
+            survey = self._survey(name)
+            if survey.wants(what, time_ns):
+                survey.add_scan(what, time_ns, decoder.decode(record).message)
+        elif kind == _JOINTS_TYPE and what == "joint_states":
+            self._survey(name).add_nods(decoder.decode(record).message)
+        elif topic == "/tf_static":
+            self.joints.add(decoder.decode(record).message)
+        elif topic == "/volery/scenario":
+            self.scenario = _content(decoder.decode(record).message)
+        elif kind in _POSE_TYPES:
+            message = decoder.decode(record).message
+            self.ways.setdefault(topic, _Rows()).take(message, stamp_of(message) or time_ns)
+
+    def _survey(self, name: str) -> TrunkSurvey:
+        return self.surveys.setdefault(name, TrunkSurvey(self.joints))
+
+    def uav(self, name: str) -> LoggedUav | None:
+        """One of the UAVs; None where nothing tells where it was."""
+        truth = self.ways.get(f"/{name}/{TRUTH}")
+        own = next((f"/{name}/{t}" for t in ESTIMATES if f"/{name}/{t}" in self.ways), None)
+        if truth is None and own is None:
+            return None
+        way = None if own is None else self.ways[own].way()
+        survey = self.surveys.get(name, TrunkSurvey())
+        trunks = np.zeros((0, 3)) if way is None else survey.trunks(way).seen_often
+        return LoggedUav(
+            name, None if truth is None else truth.way(), way, trunks, survey.is_founded
+        )
+
+
+def read_flight(path: Path) -> LoggedFlight:
+    """The UAVs of a log by the topics that Volery gives them.
 
     `RecordingError` where the file is no log, `VoleryError` where there is no UAV in it.
     """
-    ways, scans = _read(path)
-    names = {topic.split("/")[1] for topic in ways if topic.count("/") > 1}
-    found = []
-    for name in sorted(names):
-        truth = ways.get(f"/{name}/{TRUTH}")
-        own = next((f"/{name}/{t}" for t in ESTIMATES if f"/{name}/{t}" in ways), None)
-        if truth is None and own is None:
-            continue
-        estimate = None if own is None else ways[own].way()
-        seen = scans.get(f"/{name}/{SCAN}", [])
-        trunks = np.zeros((0, 2)) if estimate is None else _map_of(estimate, seen)
-        found.append(LoggedUav(name, None if truth is None else truth.way(), estimate, trunks))
-    if not found:
+    log = _read(path)
+    names = sorted({topic.split("/")[1] for topic in log.ways if topic.count("/") > 1})
+    uavs = [uav for name in names if (uav := log.uav(name)) is not None]
+    if not uavs:
         raise VoleryError(f"{path}: no UAV tells its pose in it (/NAME/{ESTIMATES[-1]})")
-    return found
+    told = {word: str(log.scenario.get(word) or "") for word in ("name", "description")}
+    lasts_s = (log.last_ns - (log.first_ns or 0)) / NS_PER_S
+    return LoggedFlight(uavs, told["name"], told["description"], lasts_s)
 
 
 def read_way(path: Path, topic: str | None = None) -> Way:
@@ -92,49 +156,37 @@ def read_way(path: Path, topic: str | None = None) -> Way:
 
     `VoleryError` names the topics where that cannot be said.
     """
-    ways, _ = _read(path)
-    known = [name for name, rows in ways.items() if not name.endswith(TRUTH) and rows.poses]
+    log = _read(path)
+    known = [name for name, rows in log.ways.items() if rows.poses and _tells_a_way(name)]
     if topic is None and len(known) == 1:
-        return ways[known[0]].way()
-    if topic is None or topic not in ways:
-        what = "which way is meant" if topic is None else f"there is no {topic}"
-        raise VoleryError(
-            f"{path}: {what}? Poses stand on: {', '.join(sorted(known)) or 'nothing'}"
-        )
-    return ways[topic].way()
+        return log.ways[known[0]].way()
+    if topic is None or topic not in log.ways:
+        what = "which way is meant?" if topic is None else f"there is no {topic}."
+        if topic in log.types:
+            what = f"{topic} tells no poses: it is a {log.types[topic]}."
+        raise VoleryError(f"{path}: {what} Poses stand on: {', '.join(sorted(known)) or 'nothing'}")
+    return log.ways[topic].way()
 
 
-def _read(path: Path) -> tuple[dict[str, _Rows], dict[str, list[tuple[float, Array]]]]:
-    decoder = LogDecoder()
-    ways: dict[str, _Rows] = {}
-    scans: dict[str, list[tuple[float, Array]]] = {}
-    due: dict[str, int] = {}
+def _tells_a_way(topic: str) -> bool:
+    words = topic.lower()
+    return not topic.endswith(TRUTH) and not any(wish in words for wish in _WISHES)
+
+
+def _read(path: Path) -> _Log:
+    decoder, log = LogDecoder(), _Log()
     for record in LogWalk(path):
-        topic = record.topic.topic
-        is_scan = topic.endswith(SCAN)
-        if is_scan and record.time_ns < due.get(topic, 0):
-            continue
         try:
-            kind = decoder.type_of(record.topic)
-            if kind not in _POSE_TYPES and not (is_scan and kind == "sensor_msgs/msg/LaserScan"):
-                continue
-            message = decoder.decode(record).message
+            log.take(record, decoder)
         except GraphError:
             continue  # of a type that is not known here
-        stamp = stamp_of(message) or record.time_ns
-        if is_scan:
-            due[topic] = record.time_ns + _SCAN_NS
-            trunks = trunks_of_scan(message.ranges, message.angle_min, message.angle_increment)
-            scans.setdefault(topic, []).append((stamp * 1e-9, trunks))
-        else:
-            ways.setdefault(topic, _Rows()).take(message, stamp)
-    return ways, scans
+    return log
 
 
-def _map_of(way: Way, scans: Sequence[tuple[float, Array]]) -> Array:
-    trunks = TrunkMap()
-    for seconds, seen in scans:
-        pose = way.pose_at(seconds)
-        if pose is not None:
-            trunks.add(in_map(seen, *pose))
-    return trunks.places[trunks.sightings >= _SEEN_OFTEN]
+def _content(message: Any) -> dict[str, Any]:
+    """The scenario that a run tells, empty where it is none."""
+    try:
+        told = json.loads(message.data)
+        return dict(told["content"])
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return {}

@@ -1,8 +1,9 @@
-"""A map of trunks from level scans and the poses that they are thought to be from.
+"""What may be trunks in level scans, and a map of them.
 
 A trunk is a short run of beams that stands apart: nearer than what is beside it, a few centimetres
 to a metre wide. It is taken for a circle whose visible width is its diameter. This is a yardstick
-for poses, not a mapping method of its own.
+for poses, not a mapping method of its own. Crowns and the ground can look the same in one scan;
+`trunk_survey` tells them apart.
 """
 
 from __future__ import annotations
@@ -12,8 +13,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-
-from volery.core import rotations
 
 Array = NDArray[np.float64]
 
@@ -26,10 +25,11 @@ _LEAST_BEAMS = 4
 _NARROWEST_M, _WIDEST_M = 0.06, 1.2
 _SAME_M = 0.8
 """Nearer to each other than this, two sightings are of one trunk. All modelling choices."""
+_SEEN_OFTEN = 3
 
 
 def trunks_of_scan(ranges: NDArray[np.floating], angle_min: float, increment: float) -> Array:
-    """(K, 2) middles of trunks in the scanner's frame, m, in a scan of B beams."""
+    """(K, 3) middles x, y of what may be trunks in the scanner's frame, m, and the beam to each."""
     r = np.asarray(ranges, np.float64)
     r = np.where(np.isfinite(r) & (r > _NEAREST_M), r, np.inf)
     near = np.minimum(r, 2.0 * _FARTHEST_M)
@@ -42,32 +42,31 @@ def trunks_of_scan(ranges: NDArray[np.floating], angle_min: float, increment: fl
         wide = float(part.mean()) * (end - first) * increment
         stands_out = min(near[first - 1] - part[0], near[end] - part[-1]) > _STANDS_OUT_M
         if stands_out and _NARROWEST_M < wide < _WIDEST_M:
-            angle = angle_min + 0.5 * (first + end - 1) * increment
+            beam = 0.5 * (first + end - 1)
+            angle = angle_min + beam * increment
             away = float(part.min()) + 0.5 * wide
-            found.append((away * np.cos(angle), away * np.sin(angle)))
-    return np.array(found).reshape(-1, 2)
-
-
-def in_map(places: Array, position: Array, attitude: Array) -> Array:
-    """(K, 2) places of the level scanner's frame in the map, from a pose (3,), (4,)."""
-    flat = np.concatenate([places, np.zeros((len(places), 1))], axis=1)
-    moved: Array = flat @ rotations.matrix(attitude).T + position
-    return moved[:, :2]
+            found.append((away * np.cos(angle), away * np.sin(angle), beam))
+    return np.array(found).reshape(-1, 3)
 
 
 @dataclass
 class TrunkMap:
     """Trunks, each the mean of its sightings."""
 
-    places: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    """(T, 2) m, map"""
+    places: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    """(T, 3) m, map, at the height at which they were seen."""
     sightings: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     """(T,)"""
 
+    @property
+    def seen_often(self) -> Array:
+        """(S, 3) those that have been seen three times or more."""
+        return self.places[self.sightings >= _SEEN_OFTEN]
+
     def add(self, seen: Array) -> None:
-        """Take in the trunks (K, 2) of one scan."""
+        """Take in the trunks (K, 3) of one scan."""
         for place in seen:
-            away = np.hypot(*(self.places - place).T)
+            away = np.hypot(*(self.places - place)[:, :2].T)
             if len(away) and away.min() <= _SAME_M:
                 k = int(np.argmin(away))
                 self.sightings[k] += 1

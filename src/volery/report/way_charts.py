@@ -30,10 +30,10 @@ class Line(NamedTuple):
 
 
 def ways_from_above(lines: Sequence[Line], trunks: Array) -> str:
-    """Ways over the map of trunks (T, 2), as SVG."""
+    """Ways over the map of trunks (T, 2 or 3), as SVG."""
     figure, axes = new_axes(*_MAP_SIZE)
     if len(trunks):
-        axes.plot(*trunks.T, ".", color=FAINT, markersize=4, label="trunks, by the estimate")
+        axes.plot(*trunks[:, :2].T, ".", color=FAINT, markersize=4, label="trunks, by the estimate")
     for number, line in enumerate(lines):
         every = max(len(line.position) // _POINTS, 1)
         x, y = line.position[::every, :2].T

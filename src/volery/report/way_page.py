@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.errors import VoleryError
 from volery.report.alignment import (
+    TimeShift,
     at_times,
     ate_rmse_m,
     common_times,
-    time_shift_s,
+    time_shift,
     umeyama,
 )
-from volery.report.logged_flights import LoggedUav, read_uavs, read_way
+from volery.report.logged_flights import LoggedFlight, LoggedUav, read_flight, read_way
 from volery.report.page import STYLE, ReportError
 from volery.report.way_charts import Line, over_time, ways_from_above
 from volery.report.ways import Way
@@ -26,8 +28,20 @@ Array = NDArray[np.float64]
 
 _LEAST = 10
 """Poses in common that an error can be told from."""
+_APART = ".chart + .pair { margin-top: 1.2rem; }\n"
+"""Between the way from above and the charts below it, as between these."""
+_ALIKE, _LEFT_SHARE = 0.5, 0.2
+"""Speeds less alike, or ways farther apart, are hardly of one flight (modelling choices)."""
 _LEAST_S, _MOST_S = 3.0, 86_400.0
 """Seconds that a common time can be found from, and is looked for in."""
+
+
+class LogReport(NamedTuple):
+    """What was written."""
+
+    path: Path
+    warnings: list[str]
+    """What whoever reads it should know."""
 
 
 def write_log_report(
@@ -37,26 +51,33 @@ def write_log_report(
     compare: Path | None = None,
     compare_topic: str | None = None,
     uav: str | None = None,
-) -> Path:
-    """Write `index.html` into `folder` and return its path.
+    overwrite: bool = False,
+) -> LogReport:
+    """Write `index.html` into `folder`; one that is there already only with `overwrite`.
 
     compare: log of a real flight, laid over that of `uav` (None: the first) in `log`, aligned in
     time by their speeds and in space by rotation and translation. compare_topic: its poses; None:
-    the only ones there. `VoleryError` for logs that do not hold what is asked for.
+    the only ones there. Without it `uav` alone is drawn, None: all. `VoleryError` for logs that do
+    not hold what is asked for.
     """
-    uavs = read_uavs(log)
-    parts = [section for each in uavs for section in _estimate_section(each)]
+    path, warnings = folder / "index.html", list[str]()
+    if path.exists() and not overwrite:
+        raise ReportError(f"{path} exists; --overwrite replaces it")
+    flight = read_flight(log)
+    chosen = _chosen(flight.uavs, uav, log)
+    drawn = flight.uavs if uav is None or compare is not None else [chosen]
+    parts = [section for each in drawn for section in _estimate_section(each)]
     if compare is not None:
-        simulated = _chosen(uavs, uav, log)
         real = read_way(compare, compare_topic)
-        parts += _comparison_section(simulated, real, compare)
-    path = folder / "index.html"
+        laid = _laid_over(chosen, real, compare)
+        parts += _comparison_section(chosen, laid, compare)
+        warnings += laid.doubts(compare)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        path.write_text(_page(log.name, parts), encoding="utf-8")
+        path.write_text(_page(log.name, _lead(flight), parts), encoding="utf-8")
     except OSError as error:
         raise ReportError(f"{path}: cannot write the report: {error.strerror}") from None
-    return path
+    return LogReport(path, warnings)
 
 
 def _chosen(uavs: Sequence[LoggedUav], name: str | None, log: Path) -> LoggedUav:
@@ -75,6 +96,16 @@ def _estimate_section(uav: LoggedUav) -> list[str]:
     if uav.estimate is not None:
         lines.append(Line("estimated", uav.estimate.time_s, uav.estimate.position))
     told = "Trajectory and trunk map."
+    if len(uav.trunks):
+        told = (
+            f"Trajectory, and {len(uav.trunks)} trunks that the level LIDAR saw three times or "
+            "more, where the estimate puts them."
+        )
+        if not uav.is_founded:
+            told += (
+                " No nodding LIDAR tells what stands on the ground: crowns and rises of the "
+                "ground may be among them."
+            )
     if uav.truth is not None and uav.estimate is not None:
         told += _error_text(uav.estimate, uav.truth)
     return [f"<h2>{escape(uav.name)}</h2>", *_figures(lines, uav.trunks, told)]
@@ -86,7 +117,7 @@ def _error_text(estimate: Way, truth: Way) -> str:
         return ""
     own = estimate.position[known]
     true = at_times(truth.time_s, truth.position, estimate.time_s[known])
-    raw = float(np.sqrt(((own - true) ** 2).sum(axis=1).mean()))
+    raw = _rms(own - true)
     return (
         f" Root mean square error {raw:.2f} m as it stands, {ate_rmse_m(own, true):.2f} m after "
         "rigid alignment (Umeyama), over "
@@ -94,8 +125,35 @@ def _error_text(estimate: Way, truth: Way) -> str:
     )
 
 
-def _comparison_section(uav: LoggedUav, real: Way, log: Path) -> list[str]:
-    """A real flight over the simulated one."""
+class _Laid(NamedTuple):
+    """A real way laid over a simulated one."""
+
+    lines: list[Line]
+    shift: TimeShift
+    left_m: float
+    """Root mean square distance."""
+    size_m: float
+    """That of the simulated way from its middle."""
+    share: float
+    """Of the real way's poses that have a time in common."""
+
+    def doubts(self, log: Path) -> list[str]:
+        """Why the two may not be of one flight; empty where they fit."""
+        found = []
+        if self.shift.alike < _ALIKE:
+            found.append(
+                f"the speeds are hardly alike (correlation {self.shift.alike:.2f}: 1 is the same "
+                "flight, 0 an unrelated one), so the shift in time says little"
+            )
+        if self.left_m > _LEFT_SHARE * self.size_m:
+            found.append(
+                f"the ways are {self.left_m:.1f} m apart (root mean square) where the simulated "
+                f"one spreads by {self.size_m:.1f} m"
+            )
+        return [f"{log}: it hardly fits: {doubt}" for doubt in found]
+
+
+def _laid_over(uav: LoggedUav, real: Way, log: Path) -> _Laid:
     simulated = uav.truth or uav.estimate
     if simulated is None or min(real.lasts_s, simulated.lasts_s) < _LEAST_S:
         raise VoleryError(f"{log}: too few poses to lay it over {uav.name}")
@@ -103,24 +161,45 @@ def _comparison_section(uav: LoggedUav, real: Way, log: Path) -> list[str]:
         raise VoleryError(
             f"{log}: its poses span {real.lasts_s / 3600.0:.0f} hours; was its clock set meanwhile?"
         )
-    shift = time_shift_s(simulated.time_s, simulated.position, real.time_s, real.position)
-    times = real.time_s + shift
+    shift = time_shift(simulated.time_s, simulated.position, real.time_s, real.position)
+    times = real.time_s + shift.seconds
     known = common_times(times, simulated.time_s)
     if known.sum() < _LEAST:
         raise VoleryError(f"{log}: it has no time in common with {uav.name}")
     there = at_times(simulated.time_s, simulated.position, times[known])
     aligned = umeyama(real.position[known], there).apply(real.position)
-    left = float(np.sqrt(((aligned[known] - there) ** 2).sum(axis=1).mean()))
     lines = [
         Line(f"simulated {uav.name}", simulated.time_s, simulated.position),
         Line("real", times, aligned),
     ]
+    left, size = (_rms(way) for way in (aligned[known] - there, there - there.mean(axis=0)))
+    return _Laid(lines, shift, left, size, float(known.mean()))
+
+
+def _rms(offsets: Array) -> float:
+    return float(np.sqrt((offsets**2).sum(axis=1).mean()))
+
+
+def _comparison_section(uav: LoggedUav, laid: _Laid, log: Path) -> list[str]:
+    """A real flight over the simulated one."""
+    moved = round(laid.shift.seconds, 2) + 0.0  # which is no -0.0
     told = (
         f"The flight of {escape(log.name)} over that of {escape(uav.name)}: its clock moved by "
-        f"{shift:.2f} s (where their speeds are most alike), turned and moved onto it. Root mean "
-        f"square distance {left:.2f} m over {float(known.sum()) / len(known):.0%} of it."
+        f"{moved:.2f} s (where their speeds are most alike, with a correlation of "
+        f"{laid.shift.alike:.2f}), turned and moved onto it. Root mean square distance "
+        f"{laid.left_m:.2f} m over {laid.share:.0%} of it."
     )
-    return ["<h2>Real against simulated</h2>", *_figures(lines, uav.trunks, told)]
+    notes = [f'<p class="note">{escape(doubt)}.</p>' for doubt in laid.doubts(Path(log.name))]
+    return ["<h2>Real against simulated</h2>", *notes, *_figures(laid.lines, uav.trunks, told)]
+
+
+def _lead(flight: LoggedFlight) -> list[str]:
+    """What the log tells of the whole flight."""
+    count = len(flight.uavs)
+    fleet = f"{count} UAV{'s' if count != 1 else ''}"
+    scenario = f"Scenario {flight.scenario}, " if flight.scenario else ""
+    texts = [flight.description, f"{scenario}{flight.lasts_s:.1f} s with {fleet}."]
+    return [f'<p class="lead">{escape(text)}</p>' for text in texts if text]
 
 
 def _figures(lines: Sequence[Line], trunks: Array, told: str) -> list[str]:
@@ -136,7 +215,7 @@ def _figures(lines: Sequence[Line], trunks: Array, told: str) -> list[str]:
     ]
 
 
-def _page(title: str, parts: Sequence[str]) -> str:
+def _page(title: str, lead: Sequence[str], parts: Sequence[str]) -> str:
     name = escape(title)
     head = [
         "<!doctype html>",
@@ -144,7 +223,9 @@ def _page(title: str, parts: Sequence[str]) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         '<meta name="color-scheme" content="light dark">',
         f"<title>{name} · flight report</title>",
-        f"<style>{STYLE}</style></head><body><main>",
-        f'<header><p class="kicker">Volery flight report</p><h1>{name}</h1></header>',
+        f"<style>{STYLE}{_APART}</style></head><body><main>",
+        f'<header><p class="kicker">Volery flight report</p><h1>{name}</h1>',
+        *lead,
+        "</header>",
     ]
     return "\n".join([*head, *parts, "</main></body></html>"]) + "\n"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +12,13 @@ from volery.bench.forest_flight import SIGHT_M, Flown, Search, area_of, search_s
 from volery.bench.forest_search import figures_of
 from volery.bench.registry import find
 from volery.core.errors import VoleryError
+from volery.graph import messages as m
+from volery.graph.zero import zero_message
+from volery.report.trunk_survey import LEVEL
 
 TREES = np.array([[30.0, 250.0], [34.0, 260.0], [200.0, 430.0]])
+STANDING = np.concatenate([TREES, [[60.0, 252.0]]])
+"""What looks like a trunk; the last one is none of the forest's trees."""
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -24,10 +30,25 @@ def flown(start_x: float, y: float, *, off: float = 0.0, seconds: float = 60.0) 
         place = np.array([start_x + 2.0 * t, y])
         uav.truth.append((t, *place, 3.0, *UPRIGHT))
         uav.estimate.append((t, place[0], place[1] + off, 3.0, *UPRIGHT))
-        near = TREES[np.linalg.norm(TREES - place, axis=1) < 12.0]
         if k % 5 == 2:
-            uav.scans.append((t, near - place))
+            uav.survey.add_scan(LEVEL, k * 100_000_000, scan_of(k * 100_000_000, STANDING - place))
     return uav
+
+
+def scan_of(time_ns: int, posts: np.ndarray) -> Any:
+    """What a scanner sees that turns as fast as it likes, of posts with 0.2 m radius."""
+    scan = zero_message("sensor_msgs/msg/LaserScan")
+    scan.header = m.header(time_ns, "laser")
+    scan.angle_min, scan.angle_increment = -math.pi, math.radians(0.25)
+    angles = scan.angle_min + scan.angle_increment * np.arange(1440)
+    ranges = np.full(1440, np.inf, np.float32)
+    for post in posts:
+        along = post @ [np.cos(angles), np.sin(angles)]
+        aside = np.abs(post @ [-np.sin(angles), np.cos(angles)])
+        hit = (aside < 0.2) & (along > 0.0) & (along < 12.0)
+        ranges[hit] = along[hit] - np.sqrt(0.04 - aside[hit] ** 2)
+    scan.ranges = ranges
+    return scan
 
 
 def search_of(uavs: dict[str, Flown], wall_s: float = 30.0, collisions: int = 0) -> Search:
@@ -53,8 +74,9 @@ def test_what_was_searched_is_a_band_along_the_way() -> None:
 def test_errors_of_poses_and_of_trunks() -> None:
     search = search_of({"uav1": flown(24.0, 254.0, off=0.7)})
     assert search.ate_rmse_m()["uav1"] == pytest.approx(0.0, abs=1e-6)  # moved as a whole
-    np.testing.assert_allclose(search.trunk_errors_m(), [0.7, 0.7], atol=1e-6)
-    np.testing.assert_allclose(search.trunk_errors_m(aligned=True), [0.0, 0.0], atol=1e-6)
+    astray = np.hypot(26.0, 8.0)  # from the post to the nearest tree, 0.7 m north as it is told
+    np.testing.assert_allclose(search.trunk_errors_m()[:2], [0.7, 0.7], atol=0.05)
+    np.testing.assert_allclose(search.trunk_errors_m(aligned=True), [0.0, 0.0, astray], atol=0.06)
     assert search.distances_m()["uav1"] == pytest.approx(120.0)
 
 
@@ -72,18 +94,20 @@ def test_a_target_counts_from_the_first_list_to_the_last() -> None:
 
 
 def test_figures_of_a_team_and_one() -> None:
-    ys = (260.0, 320.0, 380.0)
+    ys = (258.0, 320.0, 380.0)
     team = [
         search_of({f"uav{k + 1}": flown(40.0, y) for k, y in enumerate(ys)}, 30.0 + 10.0 * n, n)
         for n in range(3)
     ]
-    measured = figures_of(team, [search_of({"uav1": flown(40.0, 260.0)})])
+    measured = figures_of(team, [search_of({"uav1": flown(40.0, 258.0)})])
     figures = measured.figures
     assert figures["realtime_factor"] == pytest.approx(1.5)
     assert figures["realtime_factor_worst"] == pytest.approx(1.2)
     assert figures["collisions"] == 3.0
     assert figures["searched_three_to_one"] == pytest.approx(3.0)
     assert figures["ate_rmse_m_worst"] == pytest.approx(0.0, abs=1e-6)
+    assert figures["trunks"] == 6.0  # a tree and the post, three times
+    assert figures["trunks_within_half_m"] == 0.5
     assert measured.failures == {"target_delay_s_worst": "nothing was found"}
 
 

@@ -217,3 +217,9 @@ def test_identify_writes_a_model_that_loads(tmp_path: Path) -> None:
     missing = runner.invoke(app, ["identify", "f450", "--out", str(tmp_path / "no" / "a.toml")])
     assert missing.exit_code == 2
     assert "no folder" in missing.output
+
+
+def test_help_names_all_benches_and_tables_of_profiles() -> None:
+    told = runner.invoke(app, ["bench", "--help"]).output
+    assert [name for name in registry.BENCHES if name not in told] == []
+    assert "[[launch]]" in runner.invoke(app, ["launch", "--help"]).output

@@ -8,7 +8,12 @@ from PIL import Image
 from planar_bench import Carried, storey
 from typer.testing import CliRunner
 
+from volery.autonomy.fixed_joints import LEVEL
 from volery.cli.app import app
+from volery.cli.slam import _advise
+from volery.runtime.slam_run.channels import Channels
+from volery.runtime.slam_run.run import Outcome
+from volery.runtime.slam_run.trajectory import Trajectory
 
 CORNERS = [(0.0, 0.0), (16.0, 0.0)]
 FILES = ("map.pgm", "map.png", "map.yaml", "path.tum", "summary.json")
@@ -68,7 +73,11 @@ def test_a_text_log_becomes_map_path_and_summary(mapped, carried):
     assert told["scans"] == len(carried.time_s)
     assert told["refused"] == 1
     assert told["way_m"] == pytest.approx(16.0, abs=0.3)
+    assert "mapping " in said
+    assert "m over ground (without IMU)" in said
     assert f"1 lines left out; line {len(carried.time_s) + 1}: " in said
+    assert "warning: " in said
+    assert "error: " not in said
     path = tum_of(folder)
     assert path.shape == (len(carried.time_s), 8)
     np.testing.assert_allclose(path[:, 0], carried.time_s, atol=1e-6)
@@ -141,6 +150,50 @@ def test_odometry_and_closures_can_be_left_out(text, tmp_path):
     np.testing.assert_allclose(first[1:4], [10.0, 5.0, 0.0], atol=0.05)
     np.testing.assert_allclose(last[1:3], [10.0, 21.0], atol=0.4)
     assert grid_of(tmp_path / "out")[2] == 0.1
+
+
+@pytest.mark.parametrize("most", [40_000, 40])
+def test_a_map_that_is_too_large_costs_nothing_else(most, text, tmp_path, monkeypatch):
+    """Its cells become coarser, and where that does not help the path is written all the same."""
+    monkeypatch.setattr("volery.runtime.slam_run.drawing._MOST_CELLS", most)
+    out = tmp_path / "out"
+    result = slam(text / "scans.txt", "--layout", text / "layout.toml", "--out", out)
+    assert result.exit_code == 0, result.output
+    told = json.loads((out / "summary.json").read_text())
+    assert len(tum_of(out)) == told["scans"]
+    if most == 40:
+        assert "warning: no map is written: " in result.output
+        assert told["cell_m"] is None
+        assert sorted(path.name for path in out.iterdir()) == ["path.tum", "summary.json"]
+    else:
+        assert f"they are {told['cell_m']:g} m wide" in result.output
+        assert told["cell_m"] in (0.1, 0.2, 0.4)
+        assert grid_of(out)[2] == told["cell_m"]
+
+
+def test_a_uav_that_is_not_in_the_log_is_told(text, tmp_path):
+    command = (text / "scans.txt", "--layout", text / "layout.toml", "--out", tmp_path / "out")
+    result = slam(*command, "--uav", "uav9")
+    assert result.exit_code == 2
+    assert "there is no uav9 in it; there is uav1" in result.output
+
+
+def test_an_imu_that_was_not_used_is_advised_where_the_plane_does_not_do(capsys):
+    channels = Channels("uav1", {}, has_imu=False)
+    empty = np.zeros(0, np.int64)
+    way = Trajectory(empty, empty, np.zeros((0, 3)), np.zeros((0, 4)))
+    outcome = Outcome(channels, way, [], lambda _: LEVEL, 9, 9.0, 0.1, {})
+    topics = {"/uav1/imu": "sensor_msgs/msg/Imu"}
+    outcome.states.update(tracking=6.0, degraded=3.0)
+    _advise(outcome, {})
+    assert capsys.readouterr().err == ""
+    _advise(outcome, topics)
+    told = capsys.readouterr().err
+    assert told.startswith("warning: degraded or lost for 33% of the time, in the plane")
+    assert "(/uav1/imu) may tell more: --imu" in told
+    outcome.states.update(tracking=60.0)
+    _advise(outcome, topics)
+    assert capsys.readouterr().err == ""
 
 
 def test_a_clock_set_back_in_the_middle_costs_no_scan(text, carried, tmp_path):

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from volery.core import rotations
-from volery.report.alignment import at_times, ate_rmse_m, common_times, time_shift_s, umeyama
-from volery.report.trunks import TrunkMap, in_map, trunks_of_scan
+from volery.report.alignment import at_times, ate_rmse_m, common_times, time_shift, umeyama
+from volery.report.trunks import TrunkMap, trunks_of_scan
 
 ANGLES = st.floats(-3.0, 3.0)
 
@@ -49,7 +49,9 @@ def test_two_logs_of_one_flight_find_their_common_time(late_s: float) -> None:
     time_s, way = way_of(60.0)
     turn = rotations.matrix(rotations.from_rpy(0.0, 0.0, 2.0))
     other_s, other = time_s[100:1000] + late_s, way[100:1000] @ turn.T + 30.0
-    assert time_shift_s(time_s, way, other_s, other) == pytest.approx(-late_s, abs=0.06)
+    found = time_shift(time_s, way, other_s, other)
+    assert found.seconds == pytest.approx(-late_s, abs=0.06)
+    assert found.alike > 0.9
 
 
 def test_times_in_common() -> None:
@@ -75,23 +77,19 @@ def test_trunks_are_found_where_they_stand() -> None:
     found = trunks_of_scan(scan_of(trunks), np.radians(-135.0), np.radians(0.25))
     expected = np.array([t[:2] for t in trunks[:3]])  # the last one is no trunk
     assert len(found) == 3
-    away = np.linalg.norm(found[None] - expected[:, None], axis=2).min(axis=1)
+    away = np.linalg.norm(found[None, :, :2] - expected[:, None], axis=2).min(axis=1)
     assert away.max() < 0.05
     none = trunks_of_scan(np.full(1081, np.inf), np.radians(-135.0), np.radians(0.25))
-    assert none.shape == (0, 2)
+    assert none.shape == (0, 3)
 
 
-def test_a_map_from_several_poses() -> None:
-    tree, trunks = np.array([10.0, 5.0]), TrunkMap()
-    for yaw in (0.0, 0.7, -0.7):
-        place = np.array([6.0, 3.0 + yaw, 2.0])
-        turn = rotations.from_rpy(0.0, 0.0, yaw)
-        seen = (tree - place[:2]) @ rotations.matrix(turn)[:2, :2]
-        scan = scan_of([(*seen, 0.2)])
-        found = trunks_of_scan(scan, np.radians(-135.0), np.radians(0.25))
-        trunks.add(in_map(found, place, turn))
-    assert trunks.sightings.tolist() == [3]
-    np.testing.assert_allclose(trunks.places[0], tree, atol=0.05)
+def test_a_map_from_several_scans() -> None:
+    """Sightings within 0.8 m are of one trunk, whatever their heights."""
+    trunks = TrunkMap()
+    for step in (-0.2, 0.0, 0.2):
+        trunks.add(np.array([[10.0 + step, 5.0, 3.0 + step], [20.0, 5.0 + 10.0 * step, 3.0]]))
+    assert trunks.sightings.tolist() == [3, 1, 1, 1]
+    np.testing.assert_allclose(trunks.seen_often, [[10.0, 5.0, 3.0]], atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from contextlib import closing
 from pathlib import Path
@@ -15,7 +16,8 @@ from volery.core import rotations
 from volery.core.errors import VoleryError
 from volery.graph import messages as m
 from volery.graph.zero import zero_message
-from volery.report.logged_flights import read_uavs, read_way
+from volery.report.logged_flights import read_flight, read_way
+from volery.report.page import ReportError
 from volery.report.way_page import write_log_report
 
 S = 1_000_000_000
@@ -73,21 +75,86 @@ def write(log: Any, topic: str, time_ns: int, message: Any) -> None:
 
 
 def test_ways_and_trunks_of_a_log(log: Path) -> None:
-    (uav,) = read_uavs(log)
+    (uav,) = read_flight(log).uavs
     assert uav.name == "uav1"
     assert uav.truth is not None
     assert uav.estimate is not None
     np.testing.assert_allclose(uav.estimate.position - uav.truth.position, np.tile(OFF, (1200, 1)))
-    away = np.linalg.norm(uav.trunks[None] - (TREES + OFF[:2])[:, None], axis=2)
+    away = np.linalg.norm(uav.trunks[None, :, :2] - (TREES + OFF[:2])[:, None], axis=2)
     assert len(uav.trunks) == 3
+    assert not uav.is_founded
     assert away.min(axis=1).max() < 0.08
 
 
 def test_the_page_tells_the_error(log: Path, tmp_path: Path) -> None:
-    page = write_log_report(log, tmp_path / "new").read_text(encoding="utf-8")
+    page = write_log_report(log, tmp_path / "new").path.read_text(encoding="utf-8")
     assert "error 0.50 m as it stands, 0.00 m after" in page
     assert page.count("<svg") == 3
-    assert "uav1" in page
+    assert "3 trunks that the level LIDAR saw" in page
+    assert "No nodding LIDAR tells" in page
+    assert '<p class="lead">60.0 s with 1 UAV.</p>' in page.replace("59.9", "60.0")
+
+
+def test_an_older_report_is_replaced_only_if_asked(log: Path, tmp_path: Path) -> None:
+    """Such as that of the run itself, which stands under the same name."""
+    (tmp_path / "index.html").write_text("the run's own")
+    with pytest.raises(ReportError, match=r"index\.html exists; --overwrite replaces it"):
+        write_log_report(log, tmp_path)
+    assert (tmp_path / "index.html").read_text() == "the run's own"
+    assert "<svg" in write_log_report(log, tmp_path, overwrite=True).path.read_text()
+
+
+def test_a_uav_that_is_not_there_is_told(log: Path, tmp_path: Path) -> None:
+    with pytest.raises(VoleryError, match="there is no uav9 in it; known: uav1"):
+        write_log_report(log, tmp_path / "none", uav="uav9")
+    assert not (tmp_path / "none").exists()
+
+
+def test_the_scenario_is_named(log: Path, tmp_path: Path) -> None:
+    told, path = {"name": "glade", "content": {"name": "glade"}}, tmp_path / "flight.mcap"
+    with closing(open_log(path)) as out:
+        write(out, "/volery/scenario", 0, m.String(json.dumps(told)))
+        write(out, "/uav1/odom", 0, odometry(0, place_at(0.0)))
+        write(out, "/uav2/odom", 4 * S, odometry(4 * S, place_at(4.0)))
+    page = write_log_report(path, tmp_path / "out").path.read_text()
+    assert '<p class="lead">Scenario glade, 4.0 s with 2 UAVs.</p>' in page
+    one = write_log_report(path, tmp_path / "one", uav="uav2").path.read_text()
+    assert "<h2>uav2</h2>" in one
+    assert "<h2>uav1</h2>" not in one
+
+
+def test_where_it_should_be_is_not_where_it_was(tmp_path: Path) -> None:
+    path = tmp_path / "real.mcap"
+    with closing(open_log(path)) as out:
+        for topic in ("/mavros/local_position/pose", "/mavros/setpoint_position/local", "/goal"):
+            pose = zero_message("geometry_msgs/msg/PoseStamped")
+            pose.header = m.header(S, "map")
+            out.write(m.Published(topic, "geometry_msgs/msg/PoseStamped", S, pose))
+        write(out, "/chat", S, m.String("x"))
+    assert len(read_way(path).time_s) == 1
+    offered = r"Poses stand on: /mavros/local_position/pose$"
+    with pytest.raises(VoleryError, match=r"/chat tells no poses: it is a std_msgs/msg/String\. "):
+        read_way(path, "/chat")
+    with pytest.raises(VoleryError, match=offered):
+        read_way(path, "/none")
+    assert len(read_way(path, "/goal").time_s) == 1  # who asks for it gets it
+
+
+def test_a_flight_that_is_another_one_is_told(log: Path, tmp_path: Path) -> None:
+    real, random = tmp_path / "real.mcap", np.random.default_rng(3)
+    way = np.cumsum(random.normal(0.0, 0.3, (600, 3)), axis=0)
+    with closing(open_log(real)) as out:
+        for k, place in enumerate(way):
+            write(out, "/odom", (k + 1) * S // 20, odometry((k + 1) * S // 20, place))
+    written = write_log_report(log, tmp_path / "out", compare=real)
+    assert any("it hardly fits" in text for text in written.warnings)
+    assert '<p class="note">real.mcap: it hardly fits' in written.path.read_text()
+
+
+def test_a_flight_laid_over_itself_is_moved_by_nothing(log: Path, tmp_path: Path) -> None:
+    written = write_log_report(log, tmp_path / "out", compare=log)
+    assert written.warnings == []
+    assert "its clock moved by 0.00 s" in written.path.read_text()
 
 
 def test_a_real_flight_is_laid_over_it(log: Path, tmp_path: Path) -> None:
@@ -99,7 +166,9 @@ def test_a_real_flight_is_laid_over_it(log: Path, tmp_path: Path) -> None:
             time_ns = (k + 5000) * S // 20
             place = (place_at((k + 100) / 20.0) + noise[k]) @ turn.T + [40.0, 7.0, 1.0]
             write(out, "/mavros/odom", time_ns, odometry(time_ns, place))
-    page = write_log_report(log, tmp_path / "out", compare=real).read_text(encoding="utf-8")
+    written = write_log_report(log, tmp_path / "out", compare=real)
+    assert written.warnings == []
+    page = written.path.read_text(encoding="utf-8")
     (moved,) = re.findall(r"its clock moved by (\S+) s", page)
     assert float(moved) == pytest.approx(-245.0, abs=0.11)
     (left,) = re.findall(r"Root mean square distance (\S+) m", page)
@@ -107,7 +176,7 @@ def test_a_real_flight_is_laid_over_it(log: Path, tmp_path: Path) -> None:
     assert page.count("<svg") == 6
     with pytest.raises(VoleryError, match="there is no uav7 in it; known: uav1"):
         write_log_report(log, tmp_path, compare=real, uav="uav7")
-    with pytest.raises(VoleryError, match="there is no /odom\\? Poses stand on: /mavros/odom"):
+    with pytest.raises(VoleryError, match=r"there is no /odom\. Poses stand on: /mavros/odom"):
         read_way(real, "/odom")
 
 
@@ -127,7 +196,7 @@ def test_a_log_without_uavs(tmp_path: Path) -> None:
     with closing(open_log(path)) as log:
         write(log, "/talk", 0, m.String("x"))
     with pytest.raises(VoleryError, match="no UAV tells its pose"):
-        read_uavs(path)
+        read_flight(path)
     with pytest.raises(VoleryError, match="Poses stand on: nothing"):
         read_way(path)
 
@@ -159,7 +228,7 @@ def test_what_slam_tells_is_the_estimate(tmp_path: Path) -> None:
             pose.header = m.header(time_ns, "map")
             pose.pose.pose = odometry(time_ns, place + OFF).pose.pose
             write(log, "/uav1/slam/pose", time_ns, pose)
-    (uav,) = read_uavs(path)
+    (uav,) = read_flight(path).uavs
     assert uav.estimate is not None
     assert uav.truth is not None
     np.testing.assert_allclose(uav.estimate.position - uav.truth.position, np.tile(OFF, (100, 1)))

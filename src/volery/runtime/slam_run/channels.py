@@ -41,6 +41,7 @@ class Channels:
 
 def choose(path: Path, topics: dict[str, str], asked: Asked) -> Channels:
     """The topics of a log, types by topic. `RecordingError` where it cannot be said which."""
+    _check_uav(path, topics, asked)
     scan = _one(path, topics, SCAN, asked.scan, asked.uav, LEVEL)
     assert scan is not None
     uav = asked.uav or (scan.split("/")[1] if scan.endswith(f"/{LEVEL}") else "") or "uav1"
@@ -59,6 +60,15 @@ def choose(path: Path, topics: dict[str, str], asked: Asked) -> Channels:
         if odometry is not None:
             names[f"/{uav}/odom"] = odometry
     return Channels(uav, names, bool(wanted))
+
+
+def _check_uav(path: Path, topics: dict[str, str], asked: Asked) -> None:
+    """Refuse a UAV of which the log has nothing."""
+    uav = asked.uav
+    if uav is None or asked.scan is not None or any(t.startswith(f"/{uav}/") for t in topics):
+        return
+    known = sorted({t.split("/")[1] for t in topics if t.endswith(f"/{LEVEL}")} - {""})
+    raise RecordingError(f"{path}: there is no {uav} in it; there is {_list(known)}")
 
 
 def _one(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.fixed_joints import Mount
+from volery.autonomy.mapping.columns import Columns
 from volery.autonomy.mapping.log_odds import LogOddsGrid
 from volery.core import rotations
 from volery.core.errors import RecordingError
@@ -20,37 +21,61 @@ Array = NDArray[np.float64]
 _NEAREST_M = 0.05
 _MARGIN_M = 1.0
 _MOST_CELLS = 100_000_000
+_COARSEST_M = 2.0
+"""Width of cells in which a map says nothing any more: it is of a way that ran away."""
 _SLAB_M = 0.5
 """Returns so far above or below the scanner, along a leaning scan, are of other things: ground,
 branches."""
 
 
-def draw_map(outcome: Outcome, cell_m: float, reach_m: float) -> LogOddsGrid:
-    """The grid of a run, cells of `cell_m`; returns beyond `reach_m` are free space up to there.
+_OVER_GROUND_M = 0.6
+"""What a flying scanner meets lower than this may be the ground."""
+_EVERY, _NEAREST_GROUND_M, _FARTHEST_GROUND_M = 4, 0.6, 20.0
+"""Beams of the nodding LIDAR that tell where the ground is: each fourth, m."""
 
-    `RecordingError` where it would need too much memory.
+
+def draw_map(outcome: Outcome, cell_m: float, reach_m: float) -> LogOddsGrid:
+    """The grid of a run; returns beyond `reach_m` are free space up to there.
+
+    Its cells are `cell_m` wide, or so many times doubled that it needs no more memory than there
+    may be. `RecordingError` where that makes them too coarse.
     """
+    ground = _ground(outcome)
     rays = [
-        _rays(outcome.trajectory, row, scan, outcome.mount(scan.header.frame_id), reach_m)
+        _rays(outcome.trajectory, row, scan, outcome.mount(scan.header.frame_id), reach_m, ground)
         for row, scan in outcome.scans
     ]
     ends = [np.concatenate([starts[:1], ends]) for starts, ends, _ in rays if len(starts)]
     spread = np.concatenate(ends) if ends else outcome.trajectory.position[:, :2]
     low, high = spread.min(axis=0) - _MARGIN_M, spread.max(axis=0) + _MARGIN_M
-    cells = float(np.prod((high - low) / cell_m))
-    if cells > _MOST_CELLS:
-        raise RecordingError(
-            f"a map of {high[0] - low[0]:.0f} m x {high[1] - low[1]:.0f} m in cells of "
-            f"{cell_m:g} m is too large; try a coarser --resolution"
-        )
-    grid = LogOddsGrid(low, high, cell_m)
+    grid = LogOddsGrid(low, high, fitting_cell(high - low, cell_m))
     for starts, ends_, hits in rays:
         grid.add(starts, ends_, hits)
     return grid
 
 
+def fitting_cell(size: Array, cell_m: float) -> float:
+    """Width of the cells that a map of a size (2,) m can have, the one wished for or a coarser.
+
+    `RecordingError` where there is none.
+    """
+    wished = cell_m
+    while np.isfinite(size).all() and cell_m <= max(_COARSEST_M, wished):
+        if float(np.prod(size / cell_m)) <= _MOST_CELLS:
+            return cell_m
+        cell_m *= 2.0
+    raise RecordingError(
+        f"a map of {size[0]:.0f} m x {size[1]:.0f} m is too large: the way ran away"
+    )
+
+
 def _rays(
-    trajectory: Trajectory, row: int, scan: LaserScan, mount: Mount, reach_m: float
+    trajectory: Trajectory,
+    row: int,
+    scan: LaserScan,
+    mount: Mount,
+    reach_m: float,
+    ground: Columns | None,
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Starts and ends (K, 2) of a scan in the map, and which end in something."""
     ranges = np.asarray(scan.ranges, np.float64)
@@ -67,7 +92,31 @@ def _rays(
     rise = np.abs(ends[:, 2] - starts[:, 2])
     short = np.minimum(_SLAB_M / np.maximum(rise, 1e-9), 1.0)[:, None]
     ends = starts + short * (ends - starts)
-    return starts[:, :2], ends[:, :2], hits & (short[:, 0] >= 1.0)
+    hits &= short[:, 0] >= 1.0
+    if ground is not None:  # where it has not been seen a return may well be one of it
+        hits[hits] = ground.heights_m(ends[hits]) > _OVER_GROUND_M
+    return starts[:, :2], ends[:, :2], hits
+
+
+def _ground(outcome: Outcome) -> Columns | None:
+    """Where the ground is, by the nodding LIDAR; None where there is none."""
+    if not outcome.nodding or not len(outcome.nods):
+        return None
+    found = [np.zeros((0, 3))]
+    for row, scan in outcome.nodding:
+        ranges = np.asarray(scan.ranges, np.float64)[::_EVERY]
+        near = (ranges > _NEAREST_GROUND_M) & (ranges < _FARTHEST_GROUND_M)
+        length, beams = ranges[near], np.flatnonzero(near) * _EVERY
+        when = stamp_of(scan) * 1e-9 + beams * float(scan.time_increment)
+        nod = np.interp(when, outcome.nods[:, 0], outcome.nods[:, 1])
+        angle = float(scan.angle_min) + beams * float(scan.angle_increment)
+        x, y = length * np.cos(angle), length * np.sin(angle)
+        along = np.stack([np.cos(nod) * x, y, -np.sin(nod) * x], axis=1)
+        mount = outcome.mount(scan.header.frame_id)
+        body = rotations.rotate(mount.attitude, along) + mount.position
+        place, turn = _poses(outcome.trajectory, row, scan, beams)
+        found.append(rotations.rotate(turn, body) + place)
+    return Columns(np.concatenate(found))
 
 
 def _poses(

@@ -17,15 +17,18 @@ from volery.autonomy.fixed_joints import FixedJoints, Mount
 from volery.core.clock import NS_PER_S
 from volery.core.errors import RecordingError
 from volery.graph.messages import LaserScan, stamp_of
-from volery.runtime.slam_run.channels import LEVEL, Asked, Channels, choose
+from volery.runtime.slam_run.channels import LEVEL, NODDING, Asked, Channels, choose
 from volery.runtime.slam_run.log_host import LogHost
 from volery.runtime.slam_run.sources import LogSource, TextSource
 from volery.runtime.slam_run.trajectory import Trajectory, corrected
 
 Array = NDArray[np.float64]
 
+_JOINT = "laser_nodding"
 _APART_M, _APART_RAD = 0.25, 0.2
 """Between scans that are drawn into the map."""
+_NODDING_NS = 175_000_000
+"""Between nodding scans that tell where the ground is; a second is no multiple of it."""
 _PROGRESS_S = 0.5
 _PATIENCE_S = 60.0
 """In which the node tells of its last corrections; the first path is that of the log's end."""
@@ -66,6 +69,10 @@ class Outcome:
     """Seconds in each state."""
     problems: dict[str, float] = field(default_factory=dict)
     """Seconds with each problem."""
+    nodding: list[tuple[int, LaserScan]] = field(default_factory=list)
+    """As `scans`, of the nodding LIDAR; empty where there is none."""
+    nods: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    """(J, 2) times, s, and angles of its mount, rad, positive down; times rise."""
 
 
 class SlamRun:
@@ -79,6 +86,9 @@ class SlamRun:
         self._odometry: list[tuple[float, ...]] = []
         self._times: list[int] = []
         self._scans: list[tuple[int, LaserScan]] = []
+        self._nodding: list[tuple[int, LaserScan]] = []
+        self._next_nodding_ns = 0
+        self._nods: list[tuple[float, float]] = []
         self._newest: LaserScan | None = None
         self._drawn: tuple[float, float, float] | None = None
         self._path: Any = None
@@ -106,6 +116,7 @@ class SlamRun:
                 heard, self._newest = heard + 1, message
             if topic == "/tf_static":
                 self._joints.add(message)
+            self._keep_nodding(ours, time_ns, message)
             if first is not None:
                 lasted += max(time_ns - before, 0)
             first, before = first or time_ns, time_ns
@@ -117,6 +128,15 @@ class SlamRun:
                 tell(heard, lasted / NS_PER_S)
         self._end()
         return self._outcome(heard, lasted / NS_PER_S, cpu)
+
+    def _keep_nodding(self, topic: str, time_ns: int, message: Any) -> None:
+        uav = self.channels.uav
+        if topic == f"/{uav}/joint_states" and _JOINT in message.name:
+            angle = float(message.position[list(message.name).index(_JOINT)])
+            self._nods.append((stamp_of(message) / NS_PER_S, angle))
+        elif topic == f"/{uav}/{NODDING}" and self._times and time_ns >= self._next_nodding_ns:
+            self._next_nodding_ns = time_ns + _NODDING_NS
+            self._nodding.append((len(self._times) - 1, message))
 
     def _read_joints(self) -> None:
         """Where the LIDARs sit must be known before the node begins."""
@@ -215,13 +235,14 @@ class SlamRun:
         )  # fmt: skip
         return Outcome(
             self.channels, trajectory, self._scans, self._mount, heard, lasted_s, cpu_s,
-            self._status, self._states, self._problems,
+            self._status, self._states, self._problems, self._nodding,
+            np.array(sorted(self._nods)).reshape(-1, 2),
         )  # fmt: skip
 
     def _mount(self, frame: str) -> Mount:
-        level = self._options.level_mount
-        found = self._joints.mount_of(frame)
-        return found if level is None else Mount(np.array(level), found.attitude)
+        o, found = self._options, self._joints.mount_of(frame)
+        place = o.nodding_mount if frame.endswith(_JOINT) else o.level_mount
+        return found if place is None else Mount(np.array(place), found.attitude)
 
 
 def _four(pose: Any) -> tuple[float, float, float, float]:

@@ -1,0 +1,83 @@
+"""What stands upright, told from returns at all heights: ground below, and something above it.
+
+A crown hangs in the air and the ground lies flat; a trunk is met at several heights of one place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_GROUND_WITHIN_M, _LOWEST_SHARE, _LEAST_GROUND = 1.5, 0.05, 6
+"""The ground is what lies lowest around a place, but for a few returns that are off."""
+_BESIDE_M = 0.3
+_FOOT_M, _BAND_M, _BANDS = 0.6, 0.4, 4
+"""Above the ground: where undergrowth and errors of the ground end, and the bands beyond it."""
+_LEAST_RETURNS, _LEAST_BANDS = 2, 3
+_CLEAR_M = 1.0
+"""A level scan that meets something lower than this may have met the ground (modelling choices)."""
+_CELL_M = 0.5
+"""In which the ground counts as level, where many heights above it are asked for."""
+
+
+class _Cells:
+    """Points (N, 3) that can be asked for by their place in the plane."""
+
+    def __init__(self, points: Array, size_m: float) -> None:
+        self._size = size_m
+        cells = np.floor(points[:, :2] / size_m).astype(np.int64)
+        order = np.argsort(_key(cells), kind="stable")
+        self._points, self._keys = points[order], _key(cells)[order]
+
+    def near(self, place: Array) -> Array:
+        """Points (K, 3) within a cell's size of a place (2,)."""
+        i, j = np.floor(place / self._size).astype(np.int64)
+        low, high = (np.array([(i + a, j + b) for a in (-1, 0, 1)]) for b in (-1, 1))
+        first = np.searchsorted(self._keys, _key(low), side="left")
+        end = np.searchsorted(self._keys, _key(high), side="right")
+        found = np.concatenate([self._points[a:b] for a, b in zip(first, end, strict=True)])
+        return np.asarray(found[np.hypot(*(found[:, :2] - place).T) <= self._size])
+
+
+def _key(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Numbers of cells (N, 2); those of one column of cells follow each other."""
+    return np.asarray(cells[:, 0] * (1 << 32) + cells[:, 1])
+
+
+class Columns:
+    """Returns (N, 3) of the map, m, in a form that tells what stands upright among them."""
+
+    def __init__(self, points: Array) -> None:
+        self._grounds: dict[tuple[int, int], float] = {}
+        self._wide, self._slim = _Cells(points, _GROUND_WITHIN_M), _Cells(points, _BESIDE_M)
+
+    def ground_m(self, place: Array) -> float:
+        """Height of the ground at a place (2,) of the map; nan where it has not been seen."""
+        heights = self._wide.near(place)[:, 2]
+        if len(heights) < _LEAST_GROUND:
+            return float("nan")
+        return float(np.quantile(heights, _LOWEST_SHARE))
+
+    def heights_m(self, seen: Array) -> Array:
+        """Heights (K,) of points (K, 3) above the ground; nan where it has not been seen."""
+        cells = np.floor(seen[:, :2] / _CELL_M).astype(np.int64)
+        _, first, of = np.unique(_key(cells), return_index=True, return_inverse=True)
+        ground = np.array([self._cell_ground(int(i), int(j)) for i, j in cells[first]])
+        return np.asarray(seen[:, 2] - ground[of.ravel()]) if len(seen) else np.zeros(0)
+
+    def _cell_ground(self, i: int, j: int) -> float:
+        if (i, j) not in self._grounds:
+            self._grounds[i, j] = self.ground_m((np.array([i, j]) + 0.5) * _CELL_M)
+        return self._grounds[i, j]
+
+    def stands(self, seen: Array) -> bool:
+        """Whether what was seen at a place (3,) is clear of the ground and reaches down to it."""
+        ground = self.ground_m(seen[:2])
+        if not seen[2] - ground > _CLEAR_M:  # nor where the ground is not known
+            return False
+        above = self._slim.near(seen[:2])[:, 2] - ground
+        bands = np.floor((above - _FOOT_M) / _BAND_M)
+        met = [int((bands == band).sum()) >= _LEAST_RETURNS for band in range(_BANDS)]
+        return sum(met) >= _LEAST_BANDS

@@ -1,0 +1,67 @@
+"""Trunks among crowns and rises of the ground, from a level and a nodding LIDAR."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from post_scans import HEIGHT_M, TRUNK, nods_message, scan_message, seen_from
+
+from volery.autonomy.mapping.columns import Columns
+from volery.core import rotations
+from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
+from volery.report.ways import Way
+
+S = 1_000_000_000
+
+
+def surveyed(*, nodding: bool) -> tuple[TrunkSurvey, Way]:
+    """Five seconds to and fro beside the posts."""
+    survey, rows = TrunkSurvey(), []
+    for k in range(1, 101):
+        time_ns = k * S // 20
+        place = np.array([0.0, 0.5 * math.sin(0.1 * k), HEIGHT_M])
+        rows.append((time_ns / S, *place, *rotations.IDENTITY))
+        survey.add_scan(LEVEL, time_ns, scan_message("level", time_ns, seen_from(place, 0.0)))
+        if nodding:
+            angle = 0.8 * math.sin(0.3 * k)
+            survey.add_nods(nods_message(time_ns, angle))
+            ranges = seen_from(place, angle)
+            survey.add_scan(NODDING, time_ns, scan_message("nodding", time_ns, ranges))
+    return survey, Way.of_rows(rows)
+
+
+def test_a_crown_in_the_air_is_no_trunk() -> None:
+    survey, way = surveyed(nodding=True)
+    assert survey.is_founded
+    (trunk,) = survey.trunks(way).seen_often
+    np.testing.assert_allclose(trunk, [TRUNK.x, TRUNK.y, HEIGHT_M], atol=0.05)
+
+
+def test_without_a_nodding_lidar_shapes_alone_count() -> None:
+    survey, way = surveyed(nodding=False)
+    assert not survey.is_founded
+    assert len(survey.trunks(way).seen_often) == 2
+
+
+def test_nothing_is_known_of_a_way_that_is_unknown() -> None:
+    survey, way = surveyed(nodding=True)
+    before = Way.of_rows([(s - 100.0, *p, *a) for s, p, a in zip(*vars(way).values(), strict=True)])
+    assert len(survey.trunks(before).places) == 0
+
+
+def test_a_rise_of_the_ground_is_no_trunk() -> None:
+    """A slope of one in three, a post on it, and a bush."""
+    x, y = (a.ravel() for a in np.meshgrid(np.arange(0.0, 12.0, 0.2), np.arange(-3.0, 3.0, 0.2)))
+    ground = np.stack([x, y, x / 3.0], axis=1)
+    height = np.arange(0.0, 3.0, 0.1)
+    post = np.stack([np.full(30, 6.0), np.zeros(30), 2.0 + height], axis=1)
+    bush = np.stack([np.full(5, 3.0), np.zeros(5), 1.0 + 0.1 * np.arange(5)], axis=1)
+    columns = Columns(np.concatenate([ground, post, bush]))
+    assert columns.ground_m(np.array([6.0, 0.0])) == pytest.approx(2.0, abs=0.5)
+    assert columns.stands(np.array([6.0, 0.0, 4.5]))
+    assert not columns.stands(np.array([9.0, 0.0, 3.0]))
+    assert not columns.stands(np.array([3.0, 0.0, 4.0]))
+    assert math.isnan(columns.ground_m(np.array([40.0, 0.0])))
+    assert not columns.stands(np.array([40.0, 0.0, 4.0]))
