@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from volery.cli.door_checks import check_autopilots
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
 
@@ -29,6 +30,7 @@ def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
         from volery.mavlink.px4_processes import find_px4
 
         find_px4(options.px4_dir)  # a wrong folder is told before anything is built
+    check_autopilots(scenario, options)
     names = {text.partition("=")[0] for text in options.doors}
     if any(name.startswith("mavlink") for name in names):
         from volery.mavlink.outfit import with_autopilots

@@ -415,6 +415,24 @@ def test_a_door_without_a_name_of_ros2_does_not_open(world):
     doors.close()
 
 
+def test_a_domain_is_joined_once_as_one_node(world):
+    doors = Doors(world.gateway)
+    with pytest.raises(BridgeError, match=rf"domain {DOMAIN} is joined already over dds"):
+        doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN)))
+    doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN + 4)))
+    doors.close()
+    doors = Doors(world.gateway)
+    doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN + 4)))  # free again
+    doors.close()
+
+
+def test_nothing_is_written_into_the_present_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    participant = join_ros2(Ros2Terms(domain_id=DOMAIN + 4))
+    participant.close()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_everything_is_given_back():
     made = LiveGraph()
     message_type(f"{TRIGGER}_Request")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
@@ -52,8 +53,10 @@ def configuration(interfaces: Sequence[str] = (), lease_s: float = 10.0) -> str:
         f"<General><Interfaces>{chosen}</Interfaces>{how}</General>"
         f"<Discovery>{lease}{peers}</Discovery>"
         f'<Internal><SocketReceiveBufferSize max="{_RECEIVE_BUFFER}"/></Internal>'
-        # Else each malformed packet of whoever sends some would be printed on stderr.
-        "<Tracing><Verbosity>severe</Verbosity></Tracing>"
+        # Else each malformed packet of whoever sends some would be printed on stderr, or, where
+        # that alone is turned down, in a file cyclonedds.log of the present folder.
+        "<Tracing><Verbosity>severe</Verbosity>"
+        f"<OutputFile>{os.devnull}</OutputFile></Tracing>"
         "</Domain></CycloneDDS>"
     )
 
