@@ -25,7 +25,7 @@ from volery.bridges.ros2.dds.records import TYPE as RECORD
 from volery.bridges.ros2.dds.records import record_message
 from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms, join_ros2
-from volery.bridges.ros2.middleware import Profile
+from volery.bridges.ros2.middleware import Profile, ServiceSpec
 from volery.bridges.ros2.names import NodeName
 from volery.bridges.ros2.parameter_values import parameter_message, plain_of
 from volery.bridges.rosbridge.beside import WithRosApi
@@ -413,6 +413,13 @@ def test_a_door_without_a_name_of_ros2_does_not_open(world):
     with pytest.raises(BridgeError, match="does not allow"):
         doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN), "/my-node"))
     doors.close()
+
+
+def test_a_client_of_another_type_is_told_of(world, other, caplog):
+    spec = ServiceSpec(other.node, "/broken", "std_srvs/srv/Empty")
+    caller = other.participant.caller(spec)
+    until(lambda: "a client of std_srvs/srv/Empty is not answered" in caplog.text)
+    caller.close()
 
 
 def test_a_domain_is_joined_once_as_one_node(world):
