@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import threading
 from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
@@ -61,13 +62,27 @@ def configuration(interfaces: Sequence[str] = (), lease_s: float = 10.0) -> str:
     )
 
 
+def _is_address(interface: str) -> bool:
+    return interface.replace(".", "").isdecimal() or ":" in interface
+
+
+def _check_there(interfaces: Sequence[str]) -> None:
+    there = [name for _number, name in socket.if_nameindex()]
+    for name in interfaces:
+        if not _is_address(name) and name not in there:
+            raise BridgeError(
+                f"there is no network interface '{name}'; there are {', '.join(there)}"
+            )
+
+
 def _called(interface: str) -> str:
-    key = "address" if interface.replace(".", "").isdecimal() or ":" in interface else "name"
+    key = "address" if _is_address(interface) else "name"
     return f"{key}={quoteattr(interface)}"
 
 
 def join_domain(domain_id: int, interfaces: Sequence[str]) -> DomainParticipant:
     """A new participant. `BridgeError` where the domain cannot be joined like this."""
+    _check_there(interfaces)
     config = configuration(interfaces)
     with _lock:
         known = _domains.get(domain_id)
