@@ -26,6 +26,7 @@ from volery.cli.options import (
     ThreadsOption,
     TokenOption,
 )
+from volery.core.errors import BridgeError
 
 _QUICK = [name for name, bench in BENCHES.items() if bench.has_quick]
 
@@ -131,6 +132,8 @@ def run(
     """
     from volery.cli.run import RunOptions, fly, parse_speed
 
+    if middleware == "zenoh" and not ros2:
+        raise BridgeError("--middleware zenoh is of --ros2; without that, --door ros2-zenoh")
     doors = (*(door or ()), *((("ros2" if middleware == "dds" else "ros2-zenoh"),) * ros2))
     if px4_dir is not None and not any(text.partition("=")[0] == "px4" for text in doors):
         doors = (*doors, "px4")
@@ -529,6 +532,22 @@ def export(
     from volery.cli.exporting import export_and_tell
 
     export_and_tell(scenario, file, detail)
+
+
+@app.command()
+@guarded
+def interfaces(
+    folder: Annotated[Path, typer.Argument(help="To write into: src of a colcon workspace.")],
+    package: Annotated[
+        list[str] | None,
+        typer.Option(help="Package to write, repeatable; volery_interfaces unless said."),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace older ones.")] = False,
+) -> None:
+    """Write Volery's message types as ROS 2 packages, which colcon builds for ros2cli and rclpy."""
+    from volery.cli.interfaces import write_and_tell
+
+    write_and_tell(folder, package or [], overwrite=overwrite)
 
 
 @app.command()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from volery.cli.door_checks import check_autopilots
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from volery.bridges.door_names import Address, Terms
     from volery.bridges.doors import Door
     from volery.mavlink.meetings import Patience
+    from volery.mavlink.px4_door import Px4Door
+    from volery.mavlink.px4_processes import Px4Instances
     from volery.scenario.schema import Scenario
 
 _LONGEST_START_S = 60.0
@@ -29,6 +32,7 @@ def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
         from volery.mavlink.px4_processes import find_px4
 
         find_px4(options.px4_dir)  # a wrong folder is told before anything is built
+    check_autopilots(scenario, options)
     names = {text.partition("=")[0] for text in options.doors}
     if any(name.startswith("mavlink") for name in names):
         from volery.mavlink.outfit import with_autopilots
@@ -161,6 +165,15 @@ def _px4_instances(simulation: Any, doors: list[Door], options: RunOptions) -> I
         end_s = time.monotonic() + _LONGEST_START_S
         while len(door.connected) < count:
             if instances.wait(_LOOK_S) or time.monotonic() > end_s:
-                missing = count - len(door.connected)
-                raise BridgeError(instances.failure or f"{missing} PX4s have not connected")
+                raise BridgeError(instances.failure or _missing(simulation, door, instances))
         yield
+
+
+def _missing(simulation: Any, door: Px4Door, instances: Px4Instances) -> str:
+    """Which PX4s have not connected, where to, and what they said last."""
+    return "\n".join(
+        f"{uav}: PX4 {number} has not connected to {door.address(number)} within "
+        f"{_LONGEST_START_S:g} s; it said last:{instances.words_of(number) or ' nothing'}"
+        for number, uav in enumerate(simulation.uav_names)
+        if uav not in door.connected
+    )

@@ -83,7 +83,7 @@ class Flight:
         self._progress = progress
         self._interrupts = interrupts
         self._keys = Keys()
-        self._wall_s = 0.0
+        self._wall_s = self._before_s = 0.0
         self._log: Log | None = None
         self._collector: FlightCollector | None = None
         if options.digest:
@@ -129,6 +129,7 @@ class Flight:
             raise _StoppedError
         for key in self._keys.pressed():
             steer(self._simulation, key, progress.real_time_factor)
+        self._before_s = progress.before_s
         self._progress.update(
             progress.time_s, progress.real_time_factor, paused=self._simulation.paused
         )
@@ -172,11 +173,12 @@ class Flight:
 
     def _tell_flight(self, trouble: str) -> None:
         simulated = self._simulation.time_s
-        factor = simulated / self._wall_s if self._wall_s > 0.0 else 0.0
+        factor = (self._before_s + simulated) / self._wall_s if self._wall_s > 0.0 else 0.0
         count = len(self._simulation.uav_names)
         head = f"{trouble}: flew" if trouble else "Flew"
+        since = " since the last reset" if self._before_s else ""
         typer.echo(
-            f"{head} {simulated:.1f} s with {count} UAV{'s' if count != 1 else ''} "
+            f"{head} {simulated:.1f} s{since} with {count} UAV{'s' if count != 1 else ''} "
             f"in {self._wall_s:.1f} s ({factor:.1f} x real time){self._reason(trouble)}"
         )
         city = self._simulation.city

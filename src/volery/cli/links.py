@@ -76,10 +76,14 @@ def _ros2_terms(via: str) -> Ros2Terms:
     zenoh = kind == "ros2-zenoh"
     domain = asked.pop("domain", [""])[-1] if zenoh else parts.netloc
     interfaces = tuple(asked.pop("interface", ())) if kind == "ros2" else ()
-    if asked or parts.path.strip("/") not in ("", kind) or parts.fragment:
+    if asked:
+        known = {"ros2": "interface", "ros2-zenoh": "domain"}.get(kind)
+        hint = f"{kind} knows {known}" if known else f"{kind} has no options"
+        raise BridgeError(f"'{via}': there is no option '{next(iter(asked))}'; {hint}")
+    if parts.path.strip("/") not in ("", kind) or parts.fragment:
         raise _no_way(via)
     if domain and not domain.isdecimal():
-        raise _no_way(via)
+        raise BridgeError(f"'{via}': a domain is a number from 0 to 232, not '{domain}'")
     domain_id = int(domain) if domain else None
     if zenoh:
         return Ros2Terms("zenoh", domain_id, router=parts.netloc)

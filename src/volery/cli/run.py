@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from volery.cli.door_checks import check_doors
 from volery.cli.doors import fit_out, open_doors
 from volery.cli.flight import Flight, RunOptions
 from volery.cli.guard import INTERRUPTED
@@ -48,6 +49,7 @@ def parse_speed(text: str) -> float | None:
 
 def fly(options: RunOptions) -> int:
     """Fly a scenario as the options say, then those that clients load; return the exit code."""
+    check_doors(options)
     with page_of(options) as page, Interrupts() as interrupts:
         try:
             code, change = _build_and_fly(options, interrupts, page)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from volery.cli.door_checks import check_doors
 from volery.cli.doors import fit_out, open_doors
 from volery.cli.flight import RunOptions
 from volery.cli.guard import complain
@@ -55,6 +56,7 @@ def serve(options: ServeOptions) -> None:
     """
     from volery.scenario.shelf import Shelf
 
+    check_doors(options.first)
     first = _first_scenario(options.first)
     shelf = Shelf(options.page.uploads, options.page.recordings, given=first)
     with Interrupts() as interrupts, serving(options.page, shelf) as page:

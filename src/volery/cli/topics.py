@@ -22,9 +22,14 @@ _DEPTH = 1000
 
 
 def list_topics(via: str, *, types: bool) -> None:
-    """Print the topics, one a line."""
+    """Print the topics, one a line, without those that ROS 2 hides: a part begins with _."""
     with closing(open_link(via, "volery_topic_list")) as link:
-        for topic, msgtype in topic_types(link).items():
+        found = topic_types(link)
+        if not found:
+            where = getattr(link, "where", via)
+            typer.echo(f"nobody was heard there: {where}", err=True)
+    for topic, msgtype in found.items():
+        if "/_" not in topic:
             typer.echo(f"{topic} [{msgtype}]" if types else topic)
 
 

@@ -39,6 +39,8 @@ _ACTION_NESTED = {
 }
 _PACKAGE = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _TYPE_NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
+_FILE_NAME = re.compile(r"[A-Z][A-Za-z0-9]*")
+"""Of a type, as ROS 2 has it: CamelCase."""
 _LINE = re.compile(
     r"(?P<type>[A-Za-z][\w/]*)(?:<=(?P<limit>\d+))?"
     r"(?P<array>\[(?:(?P<size>\d+)|<=(?P<bound>\d+))?\])?"
@@ -134,8 +136,11 @@ def find_definition_files(folder: Path) -> list[DefinitionFile]:
             path = parent / name
             if in_kind and parent.name != kind:
                 raise GraphError(f"{path}: a {suffix} file belongs in a folder {kind}/")
-            if not _TYPE_NAME.fullmatch(stem):
-                raise GraphError(f"{path}: '{stem}' cannot be the name of a ROS type")
+            if not _FILE_NAME.fullmatch(stem):
+                raise GraphError(
+                    f"{path}: '{stem}' cannot be the name of a ROS type: those are CamelCase, "
+                    "letters and digits after a capital"
+                )
             if not _PACKAGE.fullmatch(package):
                 raise GraphError(f"{path}: '{package}' cannot be the name of a ROS package")
             found.append(DefinitionFile(path, package, kind))
@@ -183,20 +188,22 @@ def parse_definition(text: str, name: str, source: str) -> list[Definition]:
         if stripped == "---" and _SECTIONS[kind] > 1:
             section += 1
             if section == _SECTIONS[kind]:
-                raise GraphError(
-                    f"{source}:{number}: a .{kind} file has {_SECTIONS[kind] - 1} lines '---'"
-                )
+                raise GraphError(f"{source}:{number}: {_dashes(kind)}, and this is one more")
         elif stripped and not stripped.startswith("#"):
             try:
                 _read_line(parts[section], stripped, package, number)
             except ValueError as error:
                 raise GraphError(f"{source}:{number}: {error}") from None
     if section != _SECTIONS[kind] - 1:
-        wanted = _SECTIONS[kind] - 1
-        raise GraphError(f"{source}: a .{kind} file has {wanted} line(s) '---', found {section}")
+        raise GraphError(f"{source}: {_dashes(kind)}, found {section}")
     if kind == "action":
         _complete_action(parts, name)
     return parts
+
+
+def _dashes(kind: str) -> str:
+    count = _SECTIONS[kind] - 1
+    return f"a .{kind} file has {count} line{'s' if count != 1 else ''} '---'"
 
 
 def _complete_action(parts: list[Definition], name: str) -> None:

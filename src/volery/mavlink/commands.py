@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from volery.core.errors import CommandError
 from volery.mavlink import arming, plans, streams, switching, telemetry, transfers
 from volery.mavlink.codec import dialect
+from volery.mavlink.fence import breach
 from volery.mavlink.modes import Mode, mode_of
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 UNSUPPORTED_FRAME = 8
 """MAV_RESULT."""
 DO_SET_MODE = 176
+_FENCE_TELLS = (0, 1)
+"""GF_ACTION of fences that keep nobody from flying there."""
 _ABOVE_HOME = (3, 6, 10, 11)
 _RETIRED_REQUESTS = {410: 242, 519: 300, 520: 148}
 """MAV_CMD that MAV_CMD_REQUEST_MESSAGE replaced, and the message that each asked for."""
@@ -120,6 +123,9 @@ def _reposition(pilot: Autopilot, _source: Source, command: Command) -> int:
         x, y, _ = pilot.earth.place(latitude, longitude, pilot.build.origin[2])
     if math.isfinite(altitude):
         z = _height_in_map(pilot, altitude, command.frame)
+    if int(pilot.parameter("GF_ACTION")) not in _FENCE_TELLS and breach(pilot, (x, y, z)):
+        pilot.say(2, "Reposition is outside geofence")
+        return DENIED
     result = _switch(pilot, Mode.HOLD)
     if result == ACCEPTED:
         if math.isfinite(speed) and speed > 0.0:

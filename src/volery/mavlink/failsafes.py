@@ -48,8 +48,13 @@ def act(pilot: Autopilot, mode: Mode | None) -> None:
     if memory.mode is Mode.LAND or (memory.mode is Mode.RETURN and mode is Mode.HOLD):
         return
     memory.failsafe = True
-    if mode is not memory.mode:
+    if mode is not memory.mode or (mode is Mode.HOLD and _is_under_way(pilot)):
         switching.enter(pilot, mode)
+
+
+def _is_under_way(pilot: Autopilot) -> bool:
+    """Whether a UAV in hold still flies somewhere, by a reposition or by another's orders."""
+    return pilot.memory.leg is not None or pilot.memory.order not in ("hold", "HOLD")
 
 
 def _position(pilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:

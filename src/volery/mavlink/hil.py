@@ -81,6 +81,8 @@ class HilLink:
         self._codec = Codec(system, SIMULATOR)
         self._framer, self._parser = Framer(), Parser()
         self._sequence = 0
+        self.spoken = False
+        """Whether any frame has come."""
         self.locked = False
         """Whether PX4 has begun to answer in lock step, and is to be waited for from now on."""
 
@@ -99,6 +101,7 @@ class HilLink:
         """Answers in what PX4 sent; its other messages need none."""
         answers = []
         for frame in self._framer.feed(data):
+            self.spoken = True
             message = self._parser.decode(frame.data)
             if message is None or message.get_type() != "HIL_ACTUATOR_CONTROLS":
                 continue

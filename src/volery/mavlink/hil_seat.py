@@ -12,6 +12,8 @@ from volery.mavlink.meetings import Meetings, News, Patience
 from volery.mavlink.sensed import TOPICS, Sensing
 
 _STILL = (0.0,) * 16
+_NOISE_BYTES = 64
+"""What may come before the first frame of a PX4, which begins with a heartbeat of 21 bytes."""
 _log = logging.getLogger(__name__)
 
 
@@ -38,6 +40,7 @@ class HilSeat:
         self._system = system
         self._way: Way | None = None
         self._link = HilLink(system)
+        self._noise, self._told = 0, False
         self._sensing = Sensing()
         self._meetings = Meetings(
             gateway, uav, kind, self, period_ns=PERIOD_NS, topics=TOPICS, patience=patience
@@ -52,6 +55,7 @@ class HilSeat:
         """Let a new PX4 sit down; what it sends is to be given to the result."""
         self._way = way
         self._link = HilLink(self._system)
+        self._noise, self._told = 0, False
         return self._hear
 
     def heartbeat(self) -> bytes:
@@ -99,7 +103,13 @@ class HilSeat:
             self.leave(why)
 
     def _hear(self, data: bytes) -> None:
-        for actuators in self._link.feed(data):
+        answers = self._link.feed(data)
+        if not self._link.spoken:
+            self._noise += len(data)
+            if self._noise > _NOISE_BYTES and not self._told:
+                self._told = True
+                _log.warning("%s: what is connected does not speak MAVLink: no PX4?", self.uav)
+        for actuators in answers:
             if actuators.time_ns >= self._meetings.time_ns:
                 self._meetings.go_on(_shares(actuators))
             else:

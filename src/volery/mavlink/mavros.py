@@ -5,6 +5,7 @@ Names, types and frames are MAVROS's: ENU and FLU, places from the autopilot's l
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -31,7 +32,7 @@ from volery.graph.messages import (
     message_type,
 )
 from volery.graph.zero import zero_message
-from volery.mavlink import commands, offboard, switching
+from volery.mavlink import arming, commands, offboard, switching
 from volery.mavlink.modes import mode_named
 from volery.mavlink.setpoints import Setpoint
 
@@ -49,6 +50,7 @@ _SLOW_NS, _FAST_NS = 1_000_000_000, 30_000_000
 """The state comes with each heartbeat, the place at about PX4's rate of LOCAL_POSITION_NED."""
 _SOURCE: Source = (-1, 1, 240)
 """System and component of MAVROS itself; the link is none of the doors'."""
+_log = logging.getLogger(__name__)
 _NOTHING = (math.nan, math.nan, math.nan)
 
 
@@ -57,6 +59,7 @@ class Mavros:
 
     def __init__(self, node: Node, pilot: Autopilot, prefix: str) -> None:
         self._pilot = pilot
+        self._prefix = prefix if prefix.startswith("/") else f"{node.get_namespace()}/{prefix}"
         self._told: dict[str, int] = {}
         self._last_state: tuple[Any, ...] = ()
 
@@ -217,17 +220,25 @@ class Mavros:
         )
 
     def _arm(self, request: Any, response: Any) -> Any:
-        why = self._do(400, (1.0 if request.value else 0.0, 0.0))
-        response.success, response.result = why == 0, why
+        troubles = arming.troubles(self._pilot) if request.value else ()
+        result = self._do(400, (1.0 if request.value else 0.0, 0.0))
+        if result:
+            _log.warning("%s: arming %s: %s", self._prefix, request.value, ", ".join(troubles))
+        response.success, response.result = result == 0, result
         return response
 
     def _set_mode(self, request: Any, response: Any) -> Any:
         mode = mode_named(request.custom_mode)
-        response.mode_sent = mode is not None and not self._switched(mode)
+        why = "there is no such mode" if mode is None else switching.ask_for(self._pilot, mode)
+        if why:
+            self._refuse(f"mode '{request.custom_mode}': {why}")
+        response.mode_sent = not why
         return response
 
-    def _switched(self, mode: Any) -> str:
-        return switching.ask_for(self._pilot, mode)
+    def _refuse(self, what: str) -> None:
+        """Tell why something is not done, for which the responses have no room."""
+        _log.warning("%s: %s", self._prefix, what)
+        self._pilot.say(2, what)
 
     def _take_off(self, request: Any, response: Any) -> Any:
         params = (0.0, 0.0, 0.0, request.yaw, request.latitude, request.longitude)

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot import Autopilot
     from volery.mavlink.memory import Link, Source
 
+_DOES_NOT_EXIST, _OUT_OF_RANGE, _READ_ONLY, _WRONG_TYPE = 1, 2, 5, 7
+"""MAV_PARAM_ERROR."""
 A_TICK = 2
 """Values that a list sends at each state of the vehicle: 200 a second, no burst for slow lines."""
 
@@ -27,31 +29,45 @@ def send_some(pilot: Autopilot, link: Link) -> None:
 
 
 def send_one(pilot: Autopilot, source: Source, message: Any) -> None:
-    """Answer a PARAM_REQUEST_READ; of parameters that are not there nobody tells."""
-    name = message.param_id
-    if 0 <= message.param_index < len(NAMES):
-        name = NAMES[message.param_index]
-    if message.param_index < len(NAMES) and name in DEFAULTS:
+    """Answer a PARAM_REQUEST_READ; of a parameter that is not there with PARAM_ERROR."""
+    name, index = message.param_id, message.param_index
+    if 0 <= index < len(NAMES):
+        name = NAMES[index]
+    if index < len(NAMES) and name in DEFAULTS:
         _tell(pilot, source[0], name)
+    else:
+        _tell_fault(pilot, source, "" if index >= 0 else name, _DOES_NOT_EXIST, index)
 
 
 def set_one(pilot: Autopilot, source: Source, message: Any) -> None:
-    """Set a parameter, tell all links its value; of what is refused, the value that holds."""
+    """Set a parameter and tell all links; of what is refused, why, and the value that holds."""
     name = message.param_id
     if name not in DEFAULTS:
         pilot.say(4, f"unknown param: {name}")
+        _tell_fault(pilot, source, name, _DOES_NOT_EXIST)
         return
     value = from_wire(message.param_type, message.param_value)
-    why = "" if message.param_type == type_of(name) else f"{name}: param types mismatch"
-    why = why or refusal(name, 0.0 if value is None else value)
-    if why:
+    fault, why = 0, ""
+    if message.param_type != type_of(name):
+        fault, why = _WRONG_TYPE, f"{name}: param types mismatch"
+    elif value is None or (why := refusal(name, value)):
+        fault = _READ_ONLY if DEFAULTS[name].fixed else _OUT_OF_RANGE
+    if fault or value is None:
         pilot.say(4, why)
+        _tell_fault(pilot, source, name, fault)
         _tell(pilot, source[0], name)
         return
-    assert value is not None
     pilot.memory.parameters[name] = value
     for number in pilot.memory.links:
         _tell(pilot, number, name)
+
+
+def _tell_fault(pilot: Autopilot, source: Source, name: str, fault: int, index: int = -1) -> None:
+    """PARAM_ERROR, which pymavlink has since 2025."""
+    message = getattr(dialect(), "MAVLink_param_error_message", None)
+    if message is not None:
+        link, system, component = source
+        pilot.send(message(system, component, name.encode(), index, fault), link)
 
 
 def _tell(pilot: Autopilot, link: int, name: str) -> None:

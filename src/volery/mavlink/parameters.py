@@ -47,6 +47,9 @@ DEFAULTS: dict[str, Parameter] = {
     "GF_MAX_VER_DIST": Parameter(0.0, 0.0, 10000.0, "m above home; 0: any"),
     "MAV_SYS_ID": Parameter(1, 1, 250, "system id", fixed=True),
     "MAV_TYPE": Parameter(2, 0, 22, "2 quadrotor, 13 hexarotor, 14 octorotor", fixed=True),
+    "MIS_DIST_1WP": Parameter(
+        10000.0, -1.0, 100000.0, "m from home: farther first waypoints are told of; <= 0: none"
+    ),
     "MIS_TAKEOFF_ALT": Parameter(2.5, 0.0, 80.0, "m: height of a take-off that names none"),
     "MPC_ACC_HOR": Parameter(3.0, 0.5, 15.0, "m/s^2 of the way to places"),
     "MPC_MAN_TILT_MAX": Parameter(35.0, 1.0, 70.0, "deg at full stick, altitude mode"),

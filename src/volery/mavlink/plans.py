@@ -18,13 +18,16 @@ JUMP, CHANGE_SPEED, SET_HOME = 177, 178, 179
 RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT = 5000, 5001, 5002, 5003, 5004
 RALLY_POINT = 5100
 """MAV_CMD of fences and rally points."""
-_PLACED = {WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LAND, TAKE_OFF}
+PLACED = {WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LAND, TAKE_OFF}
+"""Items of missions that lead to a place."""
 _KNOWN = {
-    MISSION: _PLACED
+    MISSION: PLACED
     | {RETURN_TO_LAUNCH, DELAY, CONDITION_DELAY, CONDITION_YAW, JUMP, CHANGE_SPEED, SET_HOME},
     FENCE: {RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT},
     RALLY: {RALLY_POINT},
 }
+NEED_NO_PLACE = {DELAY, CONDITION_DELAY, CONDITION_YAW, JUMP, CHANGE_SPEED, SET_HOME}
+"""What may stand before a take-off."""
 AMSL, MISSION_FRAME, ABOVE_HOME = (0, 5), (2,), (3, 6, 10, 11)
 """MAV_FRAME: GLOBAL(_INT); MISSION; GLOBAL_RELATIVE_ALT(_INT), and TERRAIN_ALT(_INT), which counts
 from home: no terrain is known on board."""
@@ -80,7 +83,7 @@ def fault_of(item: Item, kind: int, count: int) -> int:  # noqa: PLR0911
         return ACCEPTED if math.isfinite(item.params[1]) else INVALID_PARAM1 + 1
     if item.command == CONDITION_YAW:
         return ACCEPTED if math.isfinite(item.params[0]) else INVALID_PARAM1
-    if kind == MISSION and item.command not in (*_PLACED, SET_HOME):
+    if kind == MISSION and item.command not in (*PLACED, SET_HOME):
         return ACCEPTED
     return _fault_of_place(item, kind)
 
@@ -120,7 +123,7 @@ def polygons_are_whole(items: list[Item]) -> bool:
 
 def flies_for_ever(items: list[Item]) -> bool:
     """Whether jumps can go round without any item that is flown or waits."""
-    busy = {*_PLACED, DELAY, CONDITION_DELAY, CONDITION_YAW, RETURN_TO_LAUNCH}
+    busy = {*PLACED, DELAY, CONDITION_DELAY, CONDITION_YAW, RETURN_TO_LAUNCH}
     for start, item in enumerate(items):
         if item.command != JUMP:
             continue

@@ -13,6 +13,7 @@ reset of the simulation all are sent away, because none can go back in time.
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable
 
 from volery.core.errors import BridgeError
@@ -24,6 +25,7 @@ from volery.mavlink.meetings import PATIENCE, Patience, uavs_with
 from volery.mavlink.party import why_not
 
 PORT = 4560
+_log = logging.getLogger(__name__)
 
 
 class Px4Door:
@@ -52,6 +54,10 @@ class Px4Door:
     def connected(self) -> tuple[str, ...]:
         """UAVs whose PX4 is there."""
         return tuple(seat.uav for seat in self._seats if seat.taken)
+
+    def address(self, number: int) -> str:
+        """Where instance `number` is to connect."""
+        return f"{self._host}:{self._port + number}"
 
     async def start(self, gateway: Gateway) -> None:
         """Begin to listen. `BridgeError` where a port is taken, or a UAV lacks an IMU."""
@@ -109,6 +115,8 @@ class _Connection(asyncio.Protocol):
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         if self._seat.taken:
+            uav = self._seat.uav
+            _log.warning("%s: its PX4 is connected already; another connection is ended", uav)
             transport.abort()
             return
         tend(transport.get_extra_info("socket"))

@@ -129,6 +129,11 @@ class Px4Instances:
         if self._kept is None and self._folder.name:
             shutil.rmtree(self._folder, ignore_errors=True)
 
+    def words_of(self, number: int) -> str:
+        """What an instance said last, indented lines; empty for one that there is not."""
+        found = [one for one in self._instances if one.number == number]
+        return "".join(f"\n  {line}" for one in found for line in one.lines())
+
     def wait(self, timeout_s: float) -> bool:
         """Wait a while; whether one has failed, or they were stopped."""
         return self._ended.wait(timeout_s)
@@ -198,10 +203,16 @@ class _Instance:
     def last_words(self) -> str:
         """How it ended and what it said last."""
         code = None if self._process is None else self._process.returncode
-        with contextlib.suppress(OSError):
-            lines = self._output.read_text(errors="replace").splitlines()[-_LINES_TOLD:]
-            return "\n  ".join([f"PX4 {self.number} ended with code {code}; it said:", *lines])
-        return f"PX4 {self.number} ended with code {code}"
+        lines = self.lines()
+        head = f"PX4 {self.number} ended with code {code}"
+        return "\n  ".join([f"{head}; it said:", *lines]) if lines else head
+
+    def lines(self) -> list[str]:
+        """Its last lines of output."""
+        try:
+            return self._output.read_text(errors="replace").splitlines()[-_LINES_TOLD:]
+        except OSError:
+            return []
 
     def ask_to_end(self) -> None:
         """Tell it to end."""

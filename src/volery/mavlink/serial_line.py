@@ -36,7 +36,7 @@ class SerialLine:
             termios.tcsetattr(self._file, termios.TCSANOW, settings)
         except termios.error as error:
             os.close(self._file)
-            raise BridgeError(f"{path} is no serial line: {error}") from None
+            raise BridgeError(f"{path} is no serial line: {error.args[-1]}") from None
         self.number = self._file
         """Unlike that of any other open line."""
         self._loop.add_reader(self._file, self._read)

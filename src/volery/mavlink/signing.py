@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import logging
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -28,12 +29,13 @@ _STAMP_AND_HASH, _HASH = 12, 6
 """Last bytes of a frame."""
 _SECOND = 0xFD
 """Start of a frame of MAVLink 2."""
+_log = logging.getLogger(__name__)
 
 
 def key_of(path: Path) -> bytes:
     """The key that a file's text stands for: its SHA-256, as ground stations make it.
 
-    Blanks around the text do not count. `BridgeError` where there is none.
+    Blanks and line ends around the text do not count. `BridgeError` where there is none.
     """
     try:
         text = path.read_text(encoding="utf-8").strip()
@@ -58,6 +60,7 @@ class Signing:
         self._clock = clock
         self._stamp = 0
         self._newest: dict[tuple[int, int, int], int] = {}
+        self._told: set[tuple[int, int, str]] = set()
 
     @property
     def has_key(self) -> bool:
@@ -80,17 +83,27 @@ class Signing:
             return True
         data = frame.data
         if data[0] != _SECOND or not data[2] & SIGNED:
-            return False
+            return self._refuse(frame, "it does not sign")
         if not hmac.compare_digest(_hash(self._key, data[:-_HASH]), data[-_HASH:]):
-            return False
+            return self._refuse(frame, "its signature does not match the key")
         stamp = int.from_bytes(data[-_STAMP_AND_HASH:-_HASH], "little")
         stream = (frame.system, frame.component, data[-_STAMP_AND_HASH - 1])
         before = self._newest.get(stream, self._now() - _FRESH - 1)
         if stamp <= before:
-            return False
+            if stream in self._newest:  # it came twice, or late
+                return False
+            return self._refuse(frame, "its clock is more than a minute behind")
         self._newest[stream] = stamp
         self._stamp = max(self._stamp, stamp)
         return True
+
+    def _refuse(self, frame: Frame, why: str) -> bool:
+        """Say why a sender is not heard, once each; False."""
+        source = (frame.system, frame.component, why)
+        if source not in self._told:
+            self._told.add(source)
+            _log.warning("MAVLink: system %d, component %d is not heard: %s", *source)
+        return False
 
     def _signed(self, frame: bytes, key: bytes) -> bytes:
         end = len(frame) - 2

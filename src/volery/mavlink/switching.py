@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from volery.mavlink import arming, plans
+from volery.mavlink import arming, feasibility, plans
 from volery.mavlink.memory import Leg
 from volery.mavlink.modes import Mode
 
@@ -57,7 +57,7 @@ def go_to(pilot: Autopilot, place: Vector, yaw: float | None) -> None:
     pilot.memory.leg = Leg(place, yaw, cruise(pilot))
 
 
-def obstacle_to(pilot: Autopilot, mode: Mode) -> str:  # noqa: PLR0911
+def obstacle_to(pilot: Autopilot, mode: Mode) -> str:
     """Why a mode cannot be entered now; empty where it can."""
     memory = pilot.memory
     if pilot.state.crashed:
@@ -69,22 +69,8 @@ def obstacle_to(pilot: Autopilot, mode: Mode) -> str:  # noqa: PLR0911
     if mode is Mode.OFFBOARD and not offboard_is_fresh(pilot):
         return "no offboard signal"
     if mode is Mode.MISSION:
-        items = memory.plans[plans.MISSION]
-        if not items:
-            return "no valid mission"
-        if any(outside(pilot, item) for item in items):
-            return "the mission leaves the geofence"
+        return feasibility.trouble(pilot) if memory.plans[plans.MISSION] else "no valid mission"
     return ""
-
-
-def outside(pilot: Autopilot, item: plans.Item) -> bool:
-    """Whether a mission's item lies beyond the fence."""
-    from volery.mavlink.fence import breach
-    from volery.mavlink.mission_flight import place_of
-
-    if not item.placed:
-        return False
-    return bool(breach(pilot, place_of(pilot, item)))
 
 
 def offboard_is_fresh(pilot: Autopilot) -> bool:

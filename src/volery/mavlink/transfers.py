@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from volery.mavlink import plans
+from volery.mavlink import feasibility, plans
 from volery.mavlink.codec import dialect
 from volery.mavlink.memory import Mission, Transfer
 
@@ -162,6 +162,8 @@ def _end(pilot: Autopilot, transfer: Transfer, result: int) -> None:
 def _take_over(pilot: Autopilot, transfer: Transfer) -> None:
     _replace(pilot, transfer.kind, transfer.items)
     _end(pilot, transfer, plans.ACCEPTED)
+    if transfer.kind in (plans.MISSION, plans.FENCE):
+        feasibility.look(pilot)
 
 
 def _replace(pilot: Autopilot, kind: int, items: list[plans.Item]) -> None:

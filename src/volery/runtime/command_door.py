@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -28,8 +29,11 @@ _TRIGGER = "std_srvs/srv/Trigger"
 _SPEEDS = "std_msgs/msg/Float32MultiArray"
 _POSITION_TARGET = "mavros_msgs/msg/PositionTarget"
 _ATTITUDE_TARGET = "mavros_msgs/msg/AttitudeTarget"
+_DOWN = (FlightMode.LANDED, FlightMode.CRASHED)
 _BUSY = (FlightMode.TAKE_OFF, FlightMode.LAND, FlightMode.RETURN)
 """Modes that no topic ends: who asks for a landing gets it while a stream of Twists goes on."""
+
+_log = logging.getLogger(__name__)
 
 
 def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Close]:
@@ -40,11 +44,11 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
     something outside moves, `pose_command`: where it stands from the next step on.
 
     A Twist is taken in the level heading frame, a pose and a trajectory in the map. On the ground,
-    during take-off, landing and return they are ignored, and so are those that are none: a refused
-    command on a topic has nobody to tell. A Twist that is taken comes out again on
-    `cmd_vel/applied`, stamped with the simulated time from which it is in force, by which clients
-    measure round trips. The services take_off, hold, land and return_home answer with `success` and
-    a reason. What is returned ends all that.
+    during take-off, landing and return they are ignored. One that is none, with nan in it or in
+    another frame, is not flown: whoever sent it cannot be told, so a warning is logged, once a
+    topic. A Twist that is taken comes out again on `cmd_vel/applied`, stamped with the simulated
+    time from which it is in force, by which clients measure round trips. The services take_off,
+    hold, land and return_home answer with `success` and a reason. What is returned ends all that.
     """
     applied = graph.advertise(f"/{uav.name}/cmd_vel/applied", TwistStamped)
 
@@ -67,7 +71,7 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
     closes: list[Close] = [applied.cancel]
     for name, (message_class, take) in topics.items():
         topic = f"/{uav.name}/{name}"
-        closes.append(graph.subscribe(topic, _careful(uav, take), message_class).cancel)
+        closes.append(graph.subscribe(topic, _careful(uav, take, topic), message_class).cancel)
     actions: dict[str, Callable[[], None]] = {
         "take_off": uav.take_off,
         "hold": uav.hold,
@@ -103,14 +107,19 @@ def stand_at_message(uav: Uav, message: Any) -> None:
     uav.command_pose([place.x, place.y, place.z], [turn.x, turn.y, turn.z, turn.w])
 
 
-def _careful(uav: Uav, take: Callable[[Any], None]) -> Callable[[Published], None]:
+def _careful(uav: Uav, take: Callable[[Any], None], topic: str) -> Callable[[Published], None]:
+    told = False
+
     def receive(published: Published) -> None:
+        nonlocal told
         if uav.mode in _BUSY:
             return
         try:
             take(published.message)
-        except (CommandError, AttributeError):
-            return
+        except (CommandError, AttributeError) as error:
+            if not told and uav.mode not in _DOWN:
+                told = True
+                _log.warning("%s: a command is not obeyed: %s", topic, error)
 
     return receive
 

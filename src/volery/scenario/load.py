@@ -78,6 +78,8 @@ def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
     one_table = fault["type"] == "tuple_type" and isinstance(fault.get("input"), dict)
     if one_table and _names_tables(model, fault["loc"]):
         return f"key '{key}': there may be several of them; write [[{key}]], not [{key}]"
+    if fault["type"] == "tuple_type":
+        message = "a list is needed, in brackets"
     found = fault.get("input")
     shown = f" (found {found!r})" if isinstance(found, str | int | float | bool) else ""
     return f"key '{key}': {message}{shown}"

@@ -15,6 +15,7 @@ from volery.bridges.ros2.client import Ros2Client
 from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
 from volery.bridges.ros2.parameter_values import parameter_message, plain_of
+from volery.cli.topics import list_topics
 from volery.core.errors import GraphError
 from volery.graph.link import call_and_wait
 from volery.graph.messages import Clock, String, Time, message_type
@@ -138,6 +139,31 @@ def test_its_parameters_are_those_of_a_ros2_node(node, other):
 
 def test_its_services_are_called(node, other):
     assert other.call("/uav1/do", TRIGGER).message in ("polly", "coco")
+
+
+def test_a_link_finds_topics_that_are_only_subscribed(simulated, link, other):
+    other.hear("/wanted", STRING)
+    until(lambda: link.topic_types().get("/wanted") == STRING)
+
+
+def test_a_list_leaves_out_hidden_topics_and_says_who_was_asked(monkeypatch, capsys):
+    class Found:
+        where = "DDS domain 7 (this machine)"
+        topics = {"/b": STRING, "/a/_action/status": STRING}  # noqa: RUF012
+
+        def topic_types(self):
+            return self.topics
+
+        def close(self):
+            pass
+
+    monkeypatch.setattr("volery.cli.topics.open_link", lambda *_: Found())
+    list_topics("ros2://7", types=False)
+    assert capsys.readouterr().out == "/b\n"
+    Found.topics = {}
+    list_topics("ros2://7", types=False)
+    told = capsys.readouterr()
+    assert (told.out, told.err) == ("", f"nobody was heard there: {Found.where}\n")
 
 
 def test_a_link_finds_topics_and_services(simulated, link):

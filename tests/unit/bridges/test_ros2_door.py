@@ -25,7 +25,7 @@ from volery.bridges.ros2.dds.records import TYPE as RECORD
 from volery.bridges.ros2.dds.records import record_message
 from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms, join_ros2
-from volery.bridges.ros2.middleware import Profile
+from volery.bridges.ros2.middleware import Profile, ServiceSpec
 from volery.bridges.ros2.names import NodeName
 from volery.bridges.ros2.parameter_values import parameter_message, plain_of
 from volery.bridges.rosbridge.beside import WithRosApi
@@ -235,7 +235,9 @@ def _confined():
 
 
 def test_interfaces_that_there_are_not_are_told():
-    with pytest.raises(BridgeError, match=rf"cannot join DDS domain {DOMAIN + 3}"):
+    with pytest.raises(
+        BridgeError, match="there is no network interface 'no_such_interface'; there are "
+    ):
         join_ros2(Ros2Terms(domain_id=DOMAIN + 3, interfaces=("no_such_interface",)))
 
 
@@ -413,6 +415,31 @@ def test_a_door_without_a_name_of_ros2_does_not_open(world):
     with pytest.raises(BridgeError, match="does not allow"):
         doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN), "/my-node"))
     doors.close()
+
+
+def test_a_client_of_another_type_is_told_of(world, other, caplog):
+    spec = ServiceSpec(other.node, "/broken", "std_srvs/srv/Empty")
+    caller = other.participant.caller(spec)
+    until(lambda: "a client of std_srvs/srv/Empty is not answered" in caplog.text)
+    caller.close()
+
+
+def test_a_domain_is_joined_once_as_one_node(world):
+    doors = Doors(world.gateway)
+    with pytest.raises(BridgeError, match=rf"domain {DOMAIN} is joined already over dds"):
+        doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN)))
+    doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN + 4)))
+    doors.close()
+    doors = Doors(world.gateway)
+    doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN + 4)))  # free again
+    doors.close()
+
+
+def test_nothing_is_written_into_the_present_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    participant = join_ros2(Ros2Terms(domain_id=DOMAIN + 4))
+    participant.close()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_everything_is_given_back():

@@ -86,6 +86,7 @@ class FakeSimulation:
                         time_s=self.time_s,
                         duration_s=self.scenario.duration_s,
                         wall_s=now - start,
+                        before_s=0.0,
                         real_time_factor=self.time_s / (now - start),
                     )
                 )

@@ -218,7 +218,7 @@ def test_broken_definitions_name_file_and_line(
     ("files", "text"),
     [
         ({"farm__srv__S": "int8 a\n"}, "1 line"),
-        ({"farm__srv__S": "---\n---\n"}, r"S\.srv:2: .*1 lines '---'"),
+        ({"farm__srv__S": "---\n---\n"}, r"S\.srv:2: .*1 line '---', and this is one more"),
         ({"farm__action__A": "---\n"}, "2 line"),
         ({"farm__msg__A": "B b\n", "farm__msg__B": "A[] a\n"}, "contains itself"),
         ({"std_msgs__msg__String": "int8 data\n"}, "known already with other fields"),

@@ -86,7 +86,14 @@ class Station:
 
     @property
     def texts(self):
-        return [message.text for message in self.of("STATUSTEXT")]
+        """STATUSTEXTs, those in pieces put together."""
+        whole = []
+        for message in self.of("STATUSTEXT"):
+            if message.chunk_seq:
+                whole[-1] += message.text
+            else:
+                whole.append(message.text)
+        return whole
 
     def command(self, number, *params):
         """Result of a COMMAND_LONG; params that are left out are nan."""

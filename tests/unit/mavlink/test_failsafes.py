@@ -6,7 +6,7 @@ import pytest
 from flying_bench import fly
 
 HOLD, RETURN, LAND = (4, 3), (4, 5), (4, 6)
-ACCEPTED = 0
+ACCEPTED, DENIED = 0, 2
 
 
 @pytest.fixture
@@ -39,13 +39,67 @@ def test_the_fence_is_acted_on(flight, action, mode):
     assert simulation.uavs["uav1"].position_map[1] < 7.0
 
 
+DEGREE = math.degrees(1.0 / 6.37e6)
+
+
+def reposition(station, north, height=2.0):
+    """Result of COMMAND_INT 192 to a place `north` of home."""
+    x, y = round((47.397742 + north * DEGREE) * 1e7), round(8.545594 * 1e7)
+    before = len(station.of("COMMAND_ACK"))
+    fields = (1, 1, 6, 192, 0, 0, -1.0, 1.0, 0.0, math.nan, x, y, height)
+    station.send("command_int", *fields)
+    (ack,) = station.of("COMMAND_ACK")[before:]
+    return ack.result
+
+
+def test_a_hold_by_failsafe_ends_the_way_to_a_place(flight):
+    simulation, station = flight
+    station.up(2.0)
+    assert reposition(station, 60.0) == ACCEPTED
+    station.seconds(3.0)
+    station.set("GF_MAX_HOR_DIST", 5.0)  # a fence that comes when it is on its way beyond
+    station.seconds(4.0)
+    assert "Geofence violation: maximum distance from home" in station.texts
+    stopped = simulation.uavs["uav1"].position_map[1]
+    station.seconds(2.0)
+    assert simulation.uavs["uav1"].position_map[1] == pytest.approx(stopped, abs=0.3)
+    assert stopped < 30.0
+    assert reposition(station, 2.0) == ACCEPTED  # back inside
+
+
+def test_a_hold_for_a_lost_ground_station_ends_the_way_to_a_place(flight):
+    simulation, station = flight
+    station.set("NAV_DLL_ACT", 1)
+    station.set("COM_DL_LOSS_T", 5)
+    station.up(2.0)
+    station.send("heartbeat", 6, 8, 0, 0, 4, 3)
+    assert reposition(station, 200.0) == ACCEPTED
+    station.seconds(8.5)
+    stopped = simulation.uavs["uav1"].position_map[1]
+    station.seconds(2.0)
+    assert simulation.uavs["uav1"].position_map[1] == pytest.approx(stopped, abs=0.3)
+
+
+def test_a_place_beyond_the_fence_is_refused(flight):
+    simulation, station = flight
+    circle = (5003, 0, (20.0, 0.0, 0.0, 0.0), 47.397742, 8.545594, 0.0)
+    assert station.upload([circle], 1) == ACCEPTED
+    station.up(2.0)
+    assert reposition(station, 60.0) == DENIED
+    assert "Reposition is outside geofence" in station.texts
+    station.seconds(1.0)
+    assert abs(simulation.uavs["uav1"].position_map[1]) < 0.5
+    assert reposition(station, 10.0) == ACCEPTED
+    station.set("GF_ACTION", 1)  # a fence that only tells
+    assert reposition(station, 60.0) == ACCEPTED
+
+
 def test_a_polygon_to_stay_in_and_a_circle_to_stay_out(flight):
     _, station = flight
-    degree = math.degrees(1.0 / 6.37e6)
-    stretch = degree / math.cos(math.radians(47.397742))
+    stretch = DEGREE / math.cos(math.radians(47.397742))
 
     def corner(command, first, north, east):
-        place = (47.397742 + north * degree, 8.545594 + east * stretch)
+        place = (47.397742 + north * DEGREE, 8.545594 + east * stretch)
         return command, 0, (first, 0.0, 0.0, 0.0), *place, 0.0
 
     box = [corner(5001, 4.0, n, e) for n, e in ((-5, -5), (5, -5), (5, 5), (-5, 5))]

@@ -74,7 +74,7 @@ def test_an_offboard_program_takes_off_and_flies(prefix):
         assert (program.state.mode, program.state.armed) == ("AUTO.LOITER", False)
 
 
-def test_its_commands_are_those_of_mavlink():
+def test_its_commands_are_those_of_mavlink(caplog):
     simulation, _ = fly()
     with simulation:
         simulation.run(0.1)
@@ -93,3 +93,5 @@ def test_its_commands_are_those_of_mavlink():
         simulation.run(0.1)
         sent = program.call("set_mode", "mavros_msgs/srv/SetMode", custom_mode="OFFBOARD")
         assert not sent.mode_sent  # a setpoint of no numbers is none
+        assert "/mavros: mode 'X': there is no such mode" in caplog.messages
+        assert "/mavros: mode 'OFFBOARD': no offboard signal" in caplog.messages

@@ -177,6 +177,56 @@ def test_a_mission_that_leaves_the_fence_is_not_begun(flight):
     assert station.upload([at(0, 0, 3, TAKE_OFF), at(50, 0, 3)]) == ACCEPTED
     station.set("GF_MAX_HOR_DIST", 20.0)
     assert station.command(300, 0.0, 0.0) == REJECTED
-    assert any("geofence" in text for text in station.texts)
+    assert any("Geofence violation for waypoint 2" in text for text in station.texts)
     station.set("GF_MAX_HOR_DIST", 0.0)
     assert station.command(300, 0.0, 0.0) == ACCEPTED
+
+
+@pytest.mark.parametrize(
+    ("items", "text"),
+    [
+        ([at(0, 0, 0, LAND), at(5, 0, 3)], "Mission rejected: starts with landing"),
+        (
+            [at(5, 0, 3), at(0, 0, 3, TAKE_OFF), at(5, 5, 3)],
+            "Mission rejected: takeoff not first waypoint item",
+        ),
+        ([at(0, 0, -1, TAKE_OFF)], "Mission rejected: Takeoff altitude below home altitude!"),
+    ],
+)
+def test_missions_that_cannot_be_flown_are_told_of_and_not_begun(flight, items, text):
+    _, station = flight
+    assert station.upload(items) == ACCEPTED  # as PX4, which keeps them
+    assert text in station.texts
+    station.heard.clear()
+    assert station.command(300, 0.0, 0.0) == REJECTED
+    assert any(text in said for said in station.texts)
+    station.command(512, 0.0)
+    assert not station.armed
+
+
+def test_a_far_first_waypoint_is_told_of_and_may_be_flown(flight):
+    _, station = flight
+    assert station.upload([at(0, 0, 3, TAKE_OFF), at(50, 0, 3)]) == ACCEPTED
+    assert not [text for text in station.texts if "far away" in text]
+    station.set("MIS_DIST_1WP", 100.0)
+    assert station.upload([at(300, 0, 3)]) == ACCEPTED
+    assert "First waypoint far away from home: 300m. Correct mission loaded?" in station.texts
+    assert station.mode(4, 4) == ACCEPTED
+
+
+def test_a_plan_that_comes_in_flight_is_looked_at_too(flight):
+    simulation, station = flight
+    station.set("GF_MAX_HOR_DIST", 20.0)
+    assert station.upload([at(0, 0, 3, TAKE_OFF), at(15, 0, 3)]) == ACCEPTED
+    assert station.command(300, 0.0, 0.0) == ACCEPTED
+    station.seconds(5.0)
+    assert station.upload([at(0, 0, 3, TAKE_OFF), at(50, 0, 3)]) == ACCEPTED
+    assert "Geofence violation for waypoint 2" in station.texts
+    assert station.present_mode == (4, 3)
+    station.seconds(6.0)
+    assert simulation.uavs["uav1"].position_map[1] < 20.0
+    assert station.upload([at(0, 0, 3, TAKE_OFF), at(15, 0, 3)]) == ACCEPTED
+    assert station.mode(4, 4) == ACCEPTED
+    circle = (5004, 0, (4.0, 0.0, 0.0, 0.0), at(15, 0, 0)[3], LONGITUDE, 0.0)
+    assert station.upload([circle], 1) == ACCEPTED  # a fence about the goal
+    assert station.present_mode == (4, 3)

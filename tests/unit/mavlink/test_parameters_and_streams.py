@@ -39,9 +39,12 @@ def test_the_whole_list_comes_and_single_ones(station):
     station.send("param_request_read", 1, 1, b"NO_SUCH", -1)
     station.send("param_request_read", 1, 1, b"", 9999)
     assert len(station.of("PARAM_VALUE")) == count
+    faults = [(m.param_id, m.param_index, m.error) for m in station.of("PARAM_ERROR")]
+    assert faults == [("NO_SUCH", -1, 1), ("", 9999, 1)]
 
 
 def test_setting_checks_type_and_range(station):
+    station.heard.clear()
     assert station.set("MIS_TAKEOFF_ALT", 7.5) == 7.5
     assert station.set("MIS_TAKEOFF_ALT", 500.0) == 7.5
     assert station.set("MIS_TAKEOFF_ALT", NAN) == 7.5
@@ -52,6 +55,8 @@ def test_setting_checks_type_and_range(station):
     assert station.set("NO_SUCH", 1.0) is None
     assert "unknown param: NO_SUCH" in station.texts
     assert station.set("NAV_DLL_ACT", 0) == 0
+    faults = [message.error for message in station.of("PARAM_ERROR")]
+    assert faults == [2, 2, 7, 2, 5, 1]
 
 
 def test_every_default_is_allowed():

@@ -1,5 +1,6 @@
 """The server for real PX4s against a strict stand-in, and its frames against the physics."""
 
+import contextlib
 import logging
 import socket
 import time
@@ -68,6 +69,24 @@ def test_a_vehicle_flies_in_lock_step(opened):
     assert at_rest.zacc == pytest.approx(-9.81, abs=0.4)
     assert climbing.zacc < -10.0
     assert simulation.uavs["uav1"].position_map[2] > 0.3
+
+
+def test_who_speaks_no_mavlink_and_who_comes_second_are_told_of(opened, caplog):
+    simulation, door = opened()
+    with socket.create_connection(("127.0.0.1", door._port)) as stranger:
+        meet(simulation, door, 1)
+        for _ in range(5):
+            stranger.sendall(b"GET / HTTP/1.1\r\nHost: somewhere\r\n\r\n")
+        with socket.create_connection(("127.0.0.1", door._port)) as second:
+            second.settimeout(20.0)
+            with contextlib.suppress(ConnectionResetError):
+                assert second.recv(1) == b""
+        end = time.monotonic() + 20.0
+        while "does not speak" not in caplog.text and time.monotonic() < end:
+            time.sleep(0.01)
+    told = [text for text in caplog.messages if "does not speak MAVLink" in text]
+    assert told == ["uav1: what is connected does not speak MAVLink: no PX4?"]
+    assert "uav1: its PX4 is connected already; another connection is ended" in caplog.messages
 
 
 def test_several_vehicles_share_one_clock(opened):

@@ -3,10 +3,15 @@
 import socket
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
+from autopilot_bench import free_port
 
+from volery.cli.doors import _px4_instances
+from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
+from volery.mavlink.px4_door import Px4Door
 from volery.mavlink.px4_processes import FIRST_PORT, Px4Instances, established_ports, find_px4
 
 NUMBER = 187
@@ -106,3 +111,25 @@ def test_numbers_beyond_mavlinks_ids_are_refused(tmp_path, first, count):
     make_px4(tmp_path, FAILS)
     with pytest.raises(BridgeError, match="0 to 253 can be"):
         Px4Instances(find_px4(tmp_path), count, first=first)
+
+
+HANGS = """
+import time
+print("INFO [init] waiting for something", flush=True)
+time.sleep(1000)
+"""
+
+
+def test_one_that_never_connects_is_told_with_its_last_words(tmp_path, monkeypatch):
+    make_px4(tmp_path, HANGS)
+    monkeypatch.setattr("volery.cli.doors._LONGEST_START_S", 1.0)
+    simulation = SimpleNamespace(uav_names=["uav1"])
+    options = RunOptions("hover", px4_dir=tmp_path)
+    with (
+        pytest.raises(BridgeError) as error,
+        _px4_instances(simulation, [Px4Door(port=free_port())], options),
+    ):
+        pass
+    said = str(error.value)
+    assert said.startswith("uav1: PX4 0 has not connected to 127.0.0.1:")
+    assert "within 1 s; it said last:\n  INFO [init] waiting for something" in said

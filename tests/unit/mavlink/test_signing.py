@@ -68,12 +68,19 @@ def test_what_pymavlink_signs_is_accepted_once():
 
 
 @pytest.mark.parametrize(
-    "mav",
-    [station(None), station(bytes(32)), station(stamp=STAMP - 6_100_000)],
+    ("mav", "why"),
+    [
+        (station(None), "it does not sign"),
+        (station(bytes(32)), "its signature does not match the key"),
+        (station(stamp=STAMP - 6_100_000), "its clock is more than a minute behind"),
+    ],
     ids=["unsigned", "another key", "more than a minute old"],
 )
-def test_strangers_are_refused(mav):
-    assert not ours().accepts(frame_of(mav))
+def test_strangers_are_refused_and_told_of_once(mav, why, caplog):
+    signing = ours()
+    for _ in range(3):
+        assert not signing.accepts(frame_of(mav))
+    assert caplog.messages == [f"MAVLink: system 255, component 190 is not heard: {why}"]
 
 
 def test_a_changed_frame_is_refused():

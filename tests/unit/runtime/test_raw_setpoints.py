@@ -34,6 +34,24 @@ def target(mask, frame=1, **fields):
     return message
 
 
+def test_commands_that_are_none_are_told_of_once_a_topic(simulation, caplog):
+    graph = simulation.graph
+    twist = zero_message("geometry_msgs/msg/Twist")
+    twist.linear.x = math.nan
+    pose = zero_message("geometry_msgs/msg/PoseStamped")
+    pose.header.frame_id = "moon"
+    for name, message in (("cmd_vel", twist), ("goal_pose", pose)):
+        publisher = graph.advertise(f"/uav1/{name}", type(message))
+        for _ in range(3):
+            publisher.publish(message)
+            graph.deliver()
+        publisher.cancel()
+    told = [text for text in caplog.messages if "is not obeyed" in text]
+    assert len(told) == 2
+    assert told[0].startswith("/uav1/cmd_vel: ")
+    assert told[1] == "/uav1/goal_pose: a command is not obeyed: goals are in 'map', not in 'moon'"
+
+
 def test_masks_say_what_counts(simulation):
     uav = simulation.uavs["uav1"]
     message = target(7 | 7 << 6 | 2048, yaw=math.pi / 2)

@@ -71,7 +71,10 @@ def broken(path, value):
             broken(["types", "t", "nodes"], {"node": "a:B"}),
             ["key 'types.t.nodes'", "write [[types.t.nodes]], not [types.t.nodes]"],
         ),
-        (broken(["uavs", 0, "position_m"], {"x": 1}), ["key 'uavs[0].position_m'", "tuple"]),
+        (
+            broken(["uavs", 0, "position_m"], {"x": 1}),
+            ["key 'uavs[0].position_m'", "a list is needed"],
+        ),
         (
             broken(["types", "t", "sensors"], [{"kind": "imu", "name": "cmd_vel"}]),
             ["types.t", "'cmd_vel' is no name", "joint_states"],

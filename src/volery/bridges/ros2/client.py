@@ -74,6 +74,11 @@ class Ros2Client:
         self._closed = False
         self._participant.when_changed(lambda: self._worker.post(self._adapt))
 
+    @property
+    def where(self) -> str:
+        """Middleware and domain, for people."""
+        return self._participant.where
+
     def host_node(self, name: str, parameters: Parameters, post: Callable[[Any], Any]) -> None:
         """Be the ROS 2 node of this name, with its parameters, which are set through `post`."""
         check_name(name)
@@ -106,9 +111,9 @@ class Ros2Client:
     # ------------------------------------------------------------------------------------ topics
 
     def topic_types(self) -> dict[str, str]:
-        """Topics that others publish, and their types."""
+        """Topics that others publish or subscribe to, and their types."""
         self._look_around()
-        return {p.topic: p.msgtype for p in self._participant.publishers()}
+        return dict(self._participant.topic_types())
 
     def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
         """Announce that messages will be published on `topic`. `GraphError` for a wrong type."""

@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from volery.bridges.ros2.actions import ActionServers
-from volery.bridges.ros2.environment import Ros2Terms, join_ros2
+from volery.bridges.ros2.environment import Ros2Terms, domain_of, join_ros2
 from volery.bridges.ros2.middleware import Participant
 from volery.bridges.ros2.names import NodeName, check_name
 from volery.bridges.ros2.parameters import ParameterServices
@@ -37,6 +37,11 @@ _BREATH_S = 0.02
 """Between two surveys, however many others come and go."""
 NODE = "/volery"
 _SET = "rosapi_msgs/srv/SetParam"
+
+_taken: set[tuple[str, int, str]] = set()
+"""Middlewares, domains and node names of the open doors of this process: two of one would take
+every command twice."""
+_places = threading.Lock()
 
 _log = logging.getLogger(__name__)
 
@@ -79,6 +84,7 @@ class Ros2Door:
         self._remote = dict(remote_services or {})
         self._shared: _Shared | None = None
         self._steward: threading.Thread | None = None
+        self._place: tuple[str, int, str] | None = None
         self._stopping = False
         self._news = threading.Event()
 
@@ -100,7 +106,15 @@ class Ros2Door:
             check_name(self._node_name)
         except GraphError as error:
             raise BridgeError(str(error)) from None
-        participant = join_ros2(self._terms)
+        place = (self._terms.middleware, domain_of(self._terms.domain_id), self._node_name)
+        with _places:
+            if place in _taken:
+                raise BridgeError(
+                    f"ROS 2 domain {place[1]} is joined already over {place[0]}, as {place[2]}"
+                )
+            participant = join_ros2(self._terms)
+            _taken.add(place)
+        self._place = place
         self.name = f"ROS 2 node {self._node_name}, {participant.where}"
         node = NodeName.of(self._node_name)
         session = gateway.open(self.name)
@@ -121,6 +135,9 @@ class Ros2Door:
         if self._shared is not None:
             self._shared.close()
             self._shared = None
+        if self._place is not None:
+            _taken.discard(self._place)
+            self._place = None
 
     def _watch(self) -> None:
         """Share what appears, take back what goes, here and there."""

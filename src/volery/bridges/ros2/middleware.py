@@ -123,6 +123,9 @@ class Participant(Protocol):
     def publishers(self) -> list[RemotePublisher]:
         """Publishers of others."""
 
+    def topic_types(self) -> Mapping[str, str]:
+        """Topics that others publish or subscribe to, and their types."""
+
     def service_types(self) -> Mapping[str, str]:
         """Services that others offer, and their types."""
 

@@ -70,6 +70,24 @@ class Discovery:
             if topic
         ]
 
+    def topic_types(self) -> dict[str, str]:
+        """Topics that others publish or subscribe to; publishers' types count first."""
+        with self._lock:
+            endpoints = (*self._readers.values(), *self._writers.values())
+        named = ((topic_of(e.dds_topic), e.msgtype) for e in endpoints)
+        return {topic: msgtype for topic, msgtype in named if topic}
+
+    def asked_types(self) -> set[tuple[str, str]]:
+        """Services that others ask, and the types that they take them for."""
+        with self._lock:
+            writers = tuple(self._writers.values())
+        named = ((service_of(w.dds_topic), w.msgtype) for w in writers)
+        return {
+            (service, msgtype[: -len(_REQUEST)])
+            for service, msgtype in named
+            if service and msgtype.endswith(_REQUEST)
+        }
+
     def service_types(self) -> dict[str, str]:
         """Services that others offer."""
         with self._lock:

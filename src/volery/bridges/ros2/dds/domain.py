@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import socket
 import threading
 from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
@@ -52,19 +54,35 @@ def configuration(interfaces: Sequence[str] = (), lease_s: float = 10.0) -> str:
         f"<General><Interfaces>{chosen}</Interfaces>{how}</General>"
         f"<Discovery>{lease}{peers}</Discovery>"
         f'<Internal><SocketReceiveBufferSize max="{_RECEIVE_BUFFER}"/></Internal>'
-        # Else each malformed packet of whoever sends some would be printed on stderr.
-        "<Tracing><Verbosity>severe</Verbosity></Tracing>"
+        # Else each malformed packet of whoever sends some would be printed on stderr, or, where
+        # that alone is turned down, in a file cyclonedds.log of the present folder.
+        "<Tracing><Verbosity>severe</Verbosity>"
+        f"<OutputFile>{os.devnull}</OutputFile></Tracing>"
         "</Domain></CycloneDDS>"
     )
 
 
+def _is_address(interface: str) -> bool:
+    return interface.replace(".", "").isdecimal() or ":" in interface
+
+
+def _check_there(interfaces: Sequence[str]) -> None:
+    there = [name for _number, name in socket.if_nameindex()]
+    for name in interfaces:
+        if not _is_address(name) and name not in there:
+            raise BridgeError(
+                f"there is no network interface '{name}'; there are {', '.join(there)}"
+            )
+
+
 def _called(interface: str) -> str:
-    key = "address" if interface.replace(".", "").isdecimal() or ":" in interface else "name"
+    key = "address" if _is_address(interface) else "name"
     return f"{key}={quoteattr(interface)}"
 
 
 def join_domain(domain_id: int, interfaces: Sequence[str]) -> DomainParticipant:
     """A new participant. `BridgeError` where the domain cannot be joined like this."""
+    _check_there(interfaces)
     config = configuration(interfaces)
     with _lock:
         known = _domains.get(domain_id)

@@ -96,7 +96,7 @@ class DdsServer:
         self._half = _Half(place, spec.node)
         qos = qos_of(SERVICES, _identity(SERVER))
         self._writer = self._half.writer(replies, qos)
-        self._name = spec.service
+        self._name, self._srvtype = spec.service, spec.srvtype
         self._take = take
         self._missed = (0, 0)
         self._complaints = Complaints()
@@ -114,6 +114,13 @@ class DdsServer:
         """
         if self._name in foreign:
             self._complaints.tell(self._name, f"a client is not answered: it {FOREIGN}")
+
+    def look_at_types(self, asked: set[tuple[str, str]]) -> None:
+        """Warn of those who take it for a service of another type, and wait in vain."""
+        for name, srvtype in asked:
+            if name == self._name and srvtype != self._srvtype:
+                text = f"is a {self._srvtype}; a client of {srvtype} is not answered"
+                self._complaints.tell(name, text)
 
     def _on_request(self, data: bytes, client: int) -> None:
         if not self._clients.understands(client):

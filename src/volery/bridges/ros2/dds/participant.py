@@ -74,6 +74,7 @@ class DdsParticipant:
         with self._lock:
             self._servers.add(server)
         server.look_at(self._discovery.foreign_clients())
+        server.look_at_types(self._discovery.asked_types())
         return server
 
     def caller(self, spec: ServiceSpec) -> DdsCaller:
@@ -86,6 +87,10 @@ class DdsParticipant:
     def publishers(self) -> list[RemotePublisher]:
         """Publishers of others."""
         return self._discovery.publishers()
+
+    def topic_types(self) -> Mapping[str, str]:
+        """Topics that others publish or subscribe to, and their types."""
+        return self._discovery.topic_types()
 
     def service_types(self) -> Mapping[str, str]:
         """Services that others offer, and their types."""
@@ -103,12 +108,13 @@ class DdsParticipant:
             leave_domain(self._domain_id, self._participant)
 
     def _check_clients(self) -> None:
-        foreign = self._discovery.foreign_clients()
-        if foreign:
+        foreign, asked = self._discovery.foreign_clients(), self._discovery.asked_types()
+        if asked:
             with self._lock:
                 servers = tuple(self._servers)
             for server in servers:
                 server.look_at(foreign)
+                server.look_at_types(asked)
 
     def _check_callers(self) -> None:
         with self._lock:

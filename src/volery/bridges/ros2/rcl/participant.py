@@ -105,6 +105,13 @@ class RclParticipant:
             if NodeName(info.node_namespace, info.node_name) not in own
         ]
 
+    def topic_types(self) -> Mapping[str, str]:
+        """Topics that are published or subscribed to, and their types."""
+        with self._lock:
+            eye = next(iter(self._nodes.values()), None)
+        found = [] if eye is None else eye.get_topic_names_and_types()
+        return {name: types[0] for name, types in found if types}
+
     def service_types(self) -> Mapping[str, str]:
         """Services that are offered, and their types."""
         with self._lock:

@@ -30,6 +30,7 @@ from volery.bridges.ros2.zenoh.names import (
     PUBLISHER,
     SERVER,
     SPACE,
+    SUBSCRIPTION,
     Endpoint,
     node_token,
     read_token,
@@ -108,6 +109,11 @@ class ZenohParticipant:
             RemotePublisher(e.name, e.msgtype, e.profile, e.type_hash)
             for e in self._of_kind(PUBLISHER)
         ]
+
+    def topic_types(self) -> Mapping[str, str]:
+        """Topics that others publish or subscribe to, and their types."""
+        found = (*self._of_kind(SUBSCRIPTION), *self._of_kind(PUBLISHER))
+        return {e.name: e.msgtype for e in found}
 
     def service_types(self) -> Mapping[str, str]:
         """Services that others offer, and their types."""

@@ -1,0 +1,70 @@
+"""Which doors go together, and which options need which door: told before anything is built."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from volery.core.errors import BridgeError
+
+if TYPE_CHECKING:
+    from volery.cli.flight import RunOptions
+    from volery.scenario.schema import Scenario
+
+_OUTSIDE = ("px4", "px4-serial", "ardupilot")
+"""Doors whose autopilots fly the UAVs."""
+_EVERY = ("px4", "ardupilot")
+"""Those of them that take all UAVs."""
+
+_ROS2 = ("ros2", "ros2-zenoh")
+
+
+def check_doors(options: RunOptions) -> None:
+    """`BridgeError` for doors that would fight over UAVs, and options that nothing would heed."""
+    names = _names(options)
+    _check_autopilots(names)
+    if options.mavlink_key is not None and not any(name.startswith("mavlink") for name in names):
+        raise BridgeError("--mavlink-key signs MAVLink, and no such door is open: --door mavlink")
+    domains = [text for text in options.doors if text.partition("=")[0] in _ROS2]
+    if options.domain_id is not None and all(text.startswith("ros2=") for text in domains):
+        said = (
+            f"{', '.join(domains)} has its own" if domains else "no door to ROS 2 is open: --ros2"
+        )
+        raise BridgeError(f"--domain-id {options.domain_id}: {said}")
+    if options.interfaces and "ros2" not in names:
+        raise BridgeError(
+            "--ros2-interface is for ROS 2 over DDS, and no such door is open: --ros2"
+        )
+
+
+def check_autopilots(scenario: Scenario, options: RunOptions) -> None:
+    """`BridgeError` where a scenario brings autopilots for UAVs that doors bring others for."""
+    from volery.mavlink.outfit import NODE
+
+    outside = [name for name in _names(options) if name in _OUTSIDE]
+    used = {group.type for group in scenario.uavs}
+    for name, uav_type in scenario.types.items():
+        if outside and name in used and any(entry.node == NODE for entry in uav_type.nodes):
+            raise BridgeError(
+                f"scenario '{scenario.name}', type '{name}': has an autopilot of its own "
+                f"({NODE}); --door {outside[0]} would bring a second one"
+            )
+
+
+def _check_autopilots(names: list[str]) -> None:
+    built_in = next((name for name in names if name.startswith("mavlink")), None)
+    outside = [name for name in names if name in _OUTSIDE]
+    if built_in is not None and outside:
+        raise BridgeError(
+            f"--door {built_in} and --door {outside[0]} would give each UAV two autopilots; "
+            f"the one at {outside[0]} speaks MAVLink by itself, at its own ports"
+        )
+    every = next((name for name in outside if name in _EVERY), None)
+    if every is not None and len(outside) > 1:
+        raise BridgeError(
+            f"--door {' and --door '.join(outside)} would give UAVs two autopilots: "
+            f"{every} serves all of them"
+        )
+
+
+def _names(options: RunOptions) -> list[str]:
+    return [text.partition("=")[0] for text in options.doors]
