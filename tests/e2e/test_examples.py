@@ -10,6 +10,7 @@ NEEDS_A_RUN = {
     "06_fly_from_outside",
     "09_bring_your_own_planner",
     "09_bring_your_own_planner_ros_tcp",
+    "13_mavros_offboard",
 }
 """They join a simulation that runs already: test_run_with_doors.py flies them."""
 EXAMPLES = sorted(

@@ -249,6 +249,25 @@ def test_a_planner_from_outside_gets_the_map_and_sends_waypoints(door):
     assert "import volery" not in program.read_text()
 
 
+def test_a_program_for_mavros_flies_unchanged():
+    program = ROOT / "examples/13_mavros_offboard.py"
+    run = Run("rosbridge", "mavlink-tcp", scenario="plug_in", seconds=300, more=("--uavs", "1"))
+    try:
+        done = subprocess.run(
+            [sys.executable, "-I", program, str(run.ports[0])],
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=100,
+        )
+    finally:
+        run.close()
+    assert done.returncode == 0, done.stderr
+    assert "OFFBOARD, 2.0 m up" in done.stdout
+    assert float(re.search(r"([\d.]+) m ahead", done.stdout)[1]) == pytest.approx(3.0, abs=0.3)
+    assert "landed and disarmed" in done.stdout
+
+
 @pytest.mark.parametrize(
     ("words", "reason"),
     [

@@ -1,0 +1,54 @@
+"""An offboard program for MAVROS, over rosbridge: nothing in it is of Volery.
+
+volery run plug_in --uavs 1 --door mavlink --door rosbridge
+python examples/13_mavros_offboard.py            # pip install roslibpy
+"""
+
+import sys
+import time
+
+import roslibpy
+
+ros = roslibpy.Ros("127.0.0.1", int(sys.argv[1]) if len(sys.argv) > 1 else 9090)
+ros.run()
+heard = {}
+for name, kind in {
+    "state": "mavros_msgs/State",
+    "local_position/pose": "geometry_msgs/PoseStamped",
+}.items():
+    topic = roslibpy.Topic(ros, f"/mavros/{name}", kind)
+    topic.subscribe(lambda message, name=name: heard.update({name: message}))
+setpoints = roslibpy.Topic(ros, "/mavros/setpoint_position/local", "geometry_msgs/PoseStamped")
+
+
+def call(name, kind, **fields):
+    return roslibpy.Service(ros, f"/mavros/{name}", kind).call(roslibpy.ServiceRequest(fields))
+
+
+def place():
+    return [heard["local_position/pose"]["pose"]["position"][axis] for axis in "xyz"]
+
+
+def stream(goal, seconds):
+    """Tell the setpoint 20 times a second, as offboard flight needs it."""
+    x, y, z = goal
+    for _ in range(round(20 * seconds)):
+        setpoints.publish(roslibpy.Message({"pose": {"position": {"x": x, "y": y, "z": z}}}))
+        time.sleep(0.05)
+
+
+while not heard.get("state", {}).get("connected") or "local_position/pose" not in heard:
+    time.sleep(0.1)
+x, y, z = place()
+stream((x, y, z + 2.0), 1.0)
+call("set_mode", "mavros_msgs/SetMode", base_mode=0, custom_mode="OFFBOARD")
+call("cmd/arming", "mavros_msgs/CommandBool", value=True)
+stream((x, y, z + 2.0), 6.0)
+print(f"{heard['state']['mode']}, {place()[2] - z:.1f} m up")
+stream((x + 3.0, y, z + 2.0), 5.0)
+print(f"{place()[0] - x:.1f} m ahead")
+call("set_mode", "mavros_msgs/SetMode", base_mode=0, custom_mode="AUTO.LAND")
+while heard["state"]["armed"]:
+    time.sleep(0.1)
+print("landed and disarmed")
+ros.terminate()
