@@ -97,7 +97,6 @@ For the beams of a scan this halves the time with 16 lanes; scattered rays are b
 _P, _SIZE, _INT, _UINT = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_uint
 _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "rtcNewDevice": (_P, (ctypes.c_char_p,)),
-    "rtcReleaseDevice": (None, (_P,)),
     "rtcGetDeviceError": (_INT, (_P,)),
     "rtcGetDeviceLastErrorMessage": (ctypes.c_char_p, (_P,)),
     "rtcGetDeviceProperty": (ctypes.c_ssize_t, (_P, _INT)),
@@ -165,33 +164,42 @@ def load() -> ctypes.CDLL:
     return library
 
 
-def _release(library: ctypes.CDLL, device: int, scenes: list[int]) -> None:
-    """Give every handle back; run once, by `Device.close` or when the device is collected."""
+@cache
+def _device() -> int:
+    """The one device of this process, which is never released.
+
+    With its last device Embree ends its limit of one thread. After that TBB has a worker which
+    spins as long as the process lives: half a core in a flight, all of one at rest.
+    """
+    library = load()
+    device = library.rtcNewDevice(_CONFIG.encode())
+    if not device:
+        code = library.rtcGetDeviceError(None)
+        reason = library.rtcGetDeviceLastErrorMessage(None) or b""
+        raise EmbreeUnavailableError(
+            f"Embree makes no device (error {code}): {reason.decode() or 'no reason given'}"
+        )
+    return int(device)
+
+
+def _release(library: ctypes.CDLL, scenes: list[int]) -> None:
+    """Give every scene back; run once, by `Device.close` or when the device is collected."""
     while scenes:
         library.rtcReleaseScene(scenes.pop())
-    library.rtcReleaseDevice(device)
 
 
 class Device:
-    """An Embree device: makes scenes, owns them, checks every call, gives all back in `close`.
+    """Makes scenes on Embree's device, owns them, checks every call, gives all back in `close`.
 
     Built with one thread, so that the same input gives the same tree, and the same hits, each time.
     """
 
-    def __init__(self, config: str = _CONFIG) -> None:
-        library = load()
-        device = library.rtcNewDevice(config.encode())
-        if not device:
-            code = library.rtcGetDeviceError(None)
-            reason = library.rtcGetDeviceLastErrorMessage(None) or b""
-            raise EmbreeUnavailableError(
-                f"Embree makes no device (error {code}): {reason.decode() or 'no reason given'}"
-            )
-        self._library = library
-        self._device: int = device
+    def __init__(self) -> None:
+        self._library = load()
+        self._device = _device()
         self._scenes: list[int] = []
         self._buffers: list[NDArray[Any]] = []
-        self._finalizer = weakref.finalize(self, _release, library, device, self._scenes)
+        self._finalizer = weakref.finalize(self, _release, self._library, self._scenes)
         version = (self._property(_PROPERTY_VERSION_MAJOR), self._property(_PROPERTY_VERSION_MINOR))
         if version != SUPPORTED_MAJOR_MINOR:
             self.close()
@@ -201,7 +209,7 @@ class Device:
             )
 
     def close(self) -> None:
-        """Release all scenes and the device; no handle may be used afterwards."""
+        """Release all scenes; no handle may be used afterwards."""
         self._finalizer()
         self._buffers.clear()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scene_samples import cylinder, drone_shape, small_forest, unit, wall
@@ -231,6 +233,19 @@ def test_embree_errors_become_exceptions():
         device.attach_mesh([scene], 3, mesh)  # the number is taken
     device.close()
     device.close()  # closing twice is fine
+
+
+def test_scenes_leave_no_thread_behind():
+    """A worker of Embree's that spins would take half a core from all that follows."""
+    threads = Path("/proc/self/task")
+    wall_before = Solid(wall(3.0), Material.WALL, "wall")
+    Scene(None, None, solids=[wall_before], backend="embree").close()
+    before = len(list(threads.iterdir()))
+    for _ in range(3):
+        scene = Scene(None, None, solids=[wall_before], backend="embree")
+        scene.cast([[0, 0, 0]], [[1, 0, 0]], 10.0)
+        scene.close()
+        assert len(list(threads.iterdir())) == before
 
 
 def test_an_empty_scene_answers_nothing():
