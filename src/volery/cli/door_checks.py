@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
 
 if TYPE_CHECKING:
-    from volery.cli.flight import RunOptions
     from volery.scenario.schema import Scenario
 
 _OUTSIDE = ("px4", "px4-serial", "ardupilot")
@@ -24,6 +24,13 @@ def check_doors(options: RunOptions) -> None:
     _check_autopilots(names)
     if options.mavlink_key is not None and not any(name.startswith("mavlink") for name in names):
         raise BridgeError("--mavlink-key signs MAVLink, and no such door is open: --door mavlink")
+    heeds_silence = any(name in _OUTSIDE for name in names)
+    waits_otherwise = options.autopilot_timeout_s != RunOptions.autopilot_timeout_s
+    if (options.drop_silent or waits_otherwise) and not heeds_silence:
+        raise BridgeError(
+            "--autopilot-timeout and --drop-silent are about autopilots outside, and none of their "
+            f"doors is open: --door {', '.join(_OUTSIDE)}"
+        )
     domains = [text for text in options.doors if text.partition("=")[0] in _ROS2]
     if options.domain_id is not None and all(text.startswith("ros2=") for text in domains):
         said = (
