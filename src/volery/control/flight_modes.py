@@ -78,11 +78,15 @@ _STOPPED_M_S = 0.3
 """Speed below which braking ends and the place is locked."""
 _RETURN_LOW_M = 3.0
 """Height above home at which a return becomes a landing."""
+_CARRIED_THRUST, _FALLING_THRUST = 0.7, 0.5
+"""Shares of the weight: with less thrust than the first a UAV that lands is carried by the ground,
+with less than the second it would fall."""
 _GROUND_THRUST = 0.8
 """Share of the weight: less thrust than this without sinking means that the ground carries ..."""
 _GROUND_M_S = 0.15
-_GROUND_S = 0.3
-"""... when it lasts so long."""
+_GROUND_S, _SURE, _LIKELY = 0.3, 10, 3
+"""... when it lasts so long. Thrust with which it would fall counts three tenths of that, whatever
+the estimate of its speed."""
 
 CLIMBING, CROSSING, DESCENDING = 0, 1, 2
 
@@ -103,6 +107,7 @@ def guide(pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: floa
         pilot, estimate, gains, not by_velocity, not (by_velocity or pilot.mode == LAND), fx, fy, fz
     )
     if pilot.mode == LAND:
+        _settle(pilot, gains)
         _feel_ground(pilot, gains, estimate.velocity_map[2])
 
 
@@ -224,11 +229,29 @@ def _change_mode(pilot: Any, estimate: Any) -> None:
 
 
 @inner_kernel
+def _settle(pilot: Any, gains: Any) -> None:
+    """Stay level while the ground carries it.
+
+    The shock of the touch-down leaves estimates of the speed off by a metre a second, and who leans
+    against that tips over.
+    """
+    if pilot.thrust < _CARRIED_THRUST * gains.weight:
+        half = 0.5 * math.atan2(pilot.heading[1], pilot.heading[0])
+        pilot.attitude[0] = pilot.attitude[1] = 0.0
+        pilot.attitude[2], pilot.attitude[3] = math.sin(half), math.cos(half)
+
+
+@inner_kernel
 def _feel_ground(pilot: Any, gains: Any, vz: float) -> None:
     """Stop the rotors once the ground has carried part of the weight for a while."""
     carried = pilot.thrust < _GROUND_THRUST * gains.weight and abs(vz) < _GROUND_M_S
-    pilot.calm_ticks = pilot.calm_ticks + 1 if carried else 0
-    if pilot.calm_ticks * gains.tick >= _GROUND_S:
+    if carried:
+        pilot.calm_ticks += _SURE
+    elif pilot.thrust < _FALLING_THRUST * gains.weight:
+        pilot.calm_ticks += _LIKELY
+    else:
+        pilot.calm_ticks = 0
+    if pilot.calm_ticks * gains.tick >= _SURE * _GROUND_S:
         stop(pilot)
         pilot.mode = LANDED
 

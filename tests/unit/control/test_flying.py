@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from flights import F450, FLAT, LEVEL, in_air, on_ground, ring, track
 
+from volery.control.estimator.errors import EstimationError
 from volery.control.fleet import Fleet
 from volery.control.fleet_events import FleetEventKind
 from volery.control.flight_modes import FlightMode
@@ -121,6 +122,23 @@ def test_lands_on_slopes(degrees):
     track(fleet, 12.0, ground)
     assert fleet.mode(0) is FlightMode.LANDED
     assert fleet.state.asleep[0]
+    assert [k for k, _ in kinds(fleet)] == ["touch_down", "mode"]
+
+
+@pytest.mark.parametrize("error", [(1.1, 0.4, 1.7), (0.8, -0.8, 0.0)])
+def test_a_touch_down_that_shakes_the_estimate_is_a_landing(error):
+    """The shock of it leaves speeds off by a metre a second, as long as nobody tells better."""
+    ground = slope(8)
+    fleet = in_air((3, 2, float(ground.height(3, 2)) + 4.0))
+    fleet.land(0)
+    while not fleet.state.on_ground[0]:
+        fleet.advance(1, ground.grid)
+    zero = np.zeros((1, 3))
+    shaken = EstimationError(zero, np.array([error]), np.array([LEVEL]), zero)
+    fleet.set_estimation_error(np.array([0]), shaken)
+    _, _, tilt = track(fleet, 8.0, ground)
+    assert np.degrees(tilt.max()) < 20.0
+    assert fleet.mode(0) is FlightMode.LANDED
     assert [k for k, _ in kinds(fleet)] == ["touch_down", "mode"]
 
 
