@@ -230,6 +230,23 @@ def test_after_a_gap_in_the_imu_it_finds_its_place_and_speed_again(flown, gap_s,
     assert told.state() == "tracking"
 
 
+def test_a_shock_does_not_leave_it_with_a_wrong_speed(flown):
+    """A reading of 200 m/s^2 is another 1 m/s; the next sweeps tell better."""
+    hit = [(when, topic, shaken(m) if topic == "imu" and when == 7 * S else m)
+           for when, topic, m in flown]  # fmt: skip
+    told = Listening().hear(hit)
+    speeds = [(m.twist.twist.linear.z, np.hypot(m.twist.twist.linear.x, m.twist.twist.linear.y))
+              for m in told.odom if stamp_ns(m) > 7.2 * S]  # fmt: skip
+    assert np.abs(np.array(speeds) - [0.0, 2.0]).max() < 0.2
+
+
+def shaken(imu):
+    force = imu.linear_acceleration
+    return dataclasses.replace(
+        imu, linear_acceleration=dataclasses.replace(force, x=100.0, z=200.0)
+    )
+
+
 def stamp_ns(message):
     return message.header.stamp.sec * S + message.header.stamp.nanosec
 

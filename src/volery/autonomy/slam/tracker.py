@@ -55,7 +55,10 @@ _SETTLING = 2_000
 """Readings over which a turn before it stands still is followed: 10 s at 200 Hz."""
 _STILL_GYRO, _STILL_ACCEL = 0.02, 0.25
 """Most standard deviation of readings at rest, rad/s, m/s^2: four times the ADIS16448's."""
-_STANDING_M_S = 0.3
+_STANDING_M_S, _STANDING_NS = 0.3, 2 * NS_PER_S
+"""Who believes to be slower, or is near the ground for so long, and is quiet, stands."""
+_SHOCK_M_S2 = 30.0
+"""Beyond this it hits something: a reading then may be as far off as it is large."""
 _LOW_M = 0.35
 """What the sonar says at most where the vehicle stands."""
 _DRAWN_M = 0.1
@@ -141,8 +144,8 @@ class Tracker:
     _STATE = (
         "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "standing_height",
         "travelled_m", "recovery", "_times", "_states", "_imu", "_waiting", "_maps", "_inserted",
-        "_still", "settling", "_turns", "_broad", "_near_ground_ns", "_range", "_standing_ns",
-        "_is_high", "refused",
+        "_still", "settling", "_turns", "_broad", "_near_ground_ns", "_low_since_ns", "_range",
+        "_standing_ns", "_is_high", "refused",
     )  # fmt: skip
 
     def __init__(
@@ -172,6 +175,7 @@ class Tracker:
         """How it turned on its feet from the first reading on, (4,) in its own axes."""
         self._broad = np.zeros(6)
         self._near_ground_ns: int | None = None
+        self._low_since_ns: int | None = None
         self._range: tuple[int, float] | None = None
         self._standing_ns = 0
         self._is_high = False
@@ -238,7 +242,10 @@ class Tracker:
         self._is_high = distance >= _LOW_M
         if distance < _LOW_M:
             self._near_ground_ns = time_ns
-        elif math.isfinite(distance) and self.is_ready and self.has_flown:
+            self._low_since_ns = self._low_since_ns or time_ns
+            return
+        self._low_since_ns = None
+        if math.isfinite(distance) and self.is_ready and self.has_flown:
             self._near_ground_ns = None
             self._range = time_ns, distance
             self._seed_below(distance)
@@ -251,6 +258,9 @@ class Tracker:
         mean_gyro, mean_accel = 0.5 * (before[1] + gyro), 0.5 * (before[2] + accel)
         known = min(dt, GAP_S)
         move(self.state, self.covariance, mean_gyro, mean_accel, known, self._noise)
+        shock = math.hypot(*accel)
+        if shock > _SHOCK_M_S2:
+            self.covariance[np.arange(3, 6), np.arange(3, 6)] += (shock * known) ** 2
         if dt > known:
             span = before[0], time_ns
             self.recovery.coast(self.state, self.covariance, span, dt - known, self._noise)
@@ -325,9 +335,10 @@ class Tracker:
         if time_ns - self._standing_ns < NS_PER_S // 10:
             return
         self._standing_ns = time_ns
+        long = self._low_since_ns is not None and time_ns - self._low_since_ns > _STANDING_NS
         low = not self.has_flown or (
             self._near_ground_ns is not None
-            and float(np.linalg.norm(self.state[V : V + 3])) < _STANDING_M_S
+            and (long or float(np.linalg.norm(self.state[V : V + 3])) < _STANDING_M_S)
         )
         self.is_standing = low and self._is_quiet()
         if not self.is_standing:
@@ -429,7 +440,7 @@ class Tracker:
         self._imu = None
         self._waiting.clear()
         self._still.clear()
-        self._near_ground_ns = self._range = None
+        self._near_ground_ns = self._low_since_ns = self._range = None
         self._standing_ns = time_ns
         self.recovery = Recovery()
         self._times[:] = time_ns - np.arange(_KEPT)[::-1] * 1_000_000
