@@ -214,18 +214,23 @@ def test_a_node_runs_beside(run, tmp_path, way):
         node.stderr.close()
 
 
-def test_the_example_flies_a_square(run):
-    volery(run, "service", "call", "/uav1/hold")
+def output_of(program, *words, timeout_s):
+    """What a program prints that is run apart from the tests' folders."""
     done = subprocess.run(
-        [sys.executable, ROOT / "examples/06_fly_from_outside.py", str(run.ports[0]), "1.5"],
+        [sys.executable, "-I", program, *map(str, words)],
         check=False,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=timeout_s,
     )
     assert done.returncode == 0, done.stderr
-    width = float(re.search(r"([\d.]+) m wide", done.stdout)[1])
-    assert 0.8 < width < 2.5
+    return done.stdout
+
+
+def test_the_example_flies_a_square(run):
+    volery(run, "service", "call", "/uav1/hold")
+    said = output_of(ROOT / "examples/06_fly_from_outside.py", run.ports[0], 1.5, timeout_s=60)
+    assert 0.8 < float(re.search(r"([\d.]+) m wide", said)[1]) < 2.5
 
 
 @pytest.mark.parametrize("door", ["rosbridge", "ros-tcp"])
@@ -234,38 +239,23 @@ def test_a_planner_from_outside_gets_the_map_and_sends_waypoints(door):
     program = ROOT / f"examples/09_bring_your_own_planner{name}.py"
     run = Run(door, scenario="plug_in", seconds=300)
     try:
-        done = subprocess.run(
-            [sys.executable, "-I", program, str(run.ports[0]), "3"],
-            check=False,
-            capture_output=True,
-            text=True,
-            timeout=200,
-        )
+        said = output_of(program, run.ports[0], 3, timeout_s=200)
     finally:
         run.close()
-    assert done.returncode == 0, done.stderr
-    assert "map of 32 x 32 cells, 922 free" in done.stdout
-    assert done.stdout.count("reached row") == 3
+    assert "map of 32 x 32 cells, 922 free" in said
+    assert said.count("reached row") == 3
     assert "import volery" not in program.read_text()
 
 
 def test_a_program_for_mavros_flies_unchanged():
-    program = ROOT / "examples/13_mavros_offboard.py"
     run = Run("rosbridge", "mavlink-tcp", scenario="plug_in", seconds=300, more=("--uavs", "1"))
     try:
-        done = subprocess.run(
-            [sys.executable, "-I", program, str(run.ports[0])],
-            check=False,
-            capture_output=True,
-            text=True,
-            timeout=100,
-        )
+        said = output_of(ROOT / "examples/13_mavros_offboard.py", run.ports[0], timeout_s=100)
     finally:
         run.close()
-    assert done.returncode == 0, done.stderr
-    assert "OFFBOARD, 2.0 m up" in done.stdout
-    assert float(re.search(r"([\d.]+) m ahead", done.stdout)[1]) == pytest.approx(3.0, abs=0.3)
-    assert "landed and disarmed" in done.stdout
+    assert "OFFBOARD, 2.0 m up" in said
+    assert float(re.search(r"([\d.]+) m ahead", said)[1]) == pytest.approx(3.0, abs=0.3)
+    assert "landed and disarmed" in said
 
 
 @pytest.mark.parametrize(
