@@ -5,8 +5,9 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
-from volery.core import part_compiler
+from volery.core import compiled, part_compiler
 from volery.core.compiled import inner_kernel, kernel
 
 _TWO_KERNELS = """
@@ -33,26 +34,30 @@ print({"first": first, "second": second}[sys.argv[1]](2.0), len(lift_twice.stats
 """
 
 
-@inner_kernel
-def _mean(values):
-    total = 0.0
-    for k in range(values.shape[0]):
-        total += values[k]
-    return total / values.shape[0]
-
-
-@kernel
-def _spread(values):
-    mean, total = _mean(values), 0.0
-    for k in range(values.shape[0]):
-        total += (values[k] - mean) ** 2
-    return total / values.shape[0]
+@pytest.fixture(autouse=True)
+def _nothing_compiled_before(tmp_path, monkeypatch):
+    """A kernel that is found in the cache asks for none of its parts."""
+    monkeypatch.setattr(compiled, "cache_dir", lambda: tmp_path)
 
 
 def test_a_kernel_takes_its_part_in_without_machine_code_of_the_part():
+    @inner_kernel
+    def mean_of(values):
+        total = 0.0
+        for k in range(values.shape[0]):
+            total += values[k]
+        return total / values.shape[0]
+
+    @kernel
+    def spread_of(values):
+        mean, total = mean_of(values), 0.0
+        for k in range(values.shape[0]):
+            total += (values[k] - mean) ** 2
+        return total / values.shape[0]
+
     values = np.array([1.0, 4.0, -2.5, 8.0])
-    assert np.isclose(_spread(values), values.var(), rtol=1e-15)
-    (part,), (whole,) = _mean.overloads.values(), _spread.overloads.values()
+    assert np.isclose(spread_of(values), values.var(), rtol=1e-15)
+    (part,), (whole,) = mean_of.overloads.values(), spread_of.overloads.values()
     name = part.fndesc.llvm_func_name
     assert name in part.library.get_llvm_str()
     assert name.encode() not in part.library._get_compiled_object()
