@@ -17,6 +17,7 @@ from volery.autonomy.search.team import CAN_COME, GOING_HOME, ON_THE_WAY, RISING
 from volery.autonomy.search.team_flight import TeamFlight
 from volery.core import rng
 from volery.core.clock import NS_PER_S
+from volery.core.vectors import norm
 from volery.graph.messages import (
     CameraInfo,
     Image,
@@ -158,7 +159,7 @@ class CooperativeSearch(TeamFlight):
         self.claim = Claim(stamp_ns, self.settings.name, _plain(place))
         low, high = np.reshape(self._inner, (2, 2))
         self._look_from, self._looks = self.in_layer(np.clip(place[:2], low, high)), []
-        way = float(np.linalg.norm(self._look_from - self.pose.position))
+        way = norm(self._look_from - self.pose.position)
         self._look_s = _LOOK_S + way / self.settings.speed_m_s
         self.enter(Phase.LOOK)
 
@@ -199,7 +200,7 @@ class CooperativeSearch(TeamFlight):
             return
         goal = self.in_layer(random_waypoint(self._inner, self._key, self._waypoint))
         self.fly_to(goal)
-        if float(np.linalg.norm(goal[:2] - pose.position[:2])) < _NEAR_M:
+        if norm(goal[:2] - pose.position[:2]) < _NEAR_M:
             self._waypoint += 1
 
     def _look(self) -> None:

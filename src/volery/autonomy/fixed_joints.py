@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.vectors import norm
 from volery.graph.messages import TFMessage
 
 Array = NDArray[np.float64]
@@ -37,7 +38,7 @@ class FixedJoints:
         for found in message.transforms:
             p, q = found.transform.translation, found.transform.rotation
             turn = np.array([q.x, q.y, q.z, q.w])
-            if np.isfinite([p.x, p.y, p.z, *turn]).all() and np.linalg.norm(turn) > 0.5:
+            if np.isfinite([p.x, p.y, p.z, *turn]).all() and norm(turn) > 0.5:
                 mount = Mount(np.array([p.x, p.y, p.z]), rotations.normalize(turn))
                 self.joints[found.child_frame_id] = found.header.frame_id, mount
 

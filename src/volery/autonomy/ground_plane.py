@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.compiled import kernel
+from volery.core.compiled import brief_kernel
 
 Array = NDArray[np.float64]
 
@@ -30,25 +30,25 @@ class GroundPlane:
         self._seen_ns = np.full((_CELLS, _CELLS), -(1 << 60), dtype=np.int64)
         self.anchor = np.zeros(2)
         self.height = 0.0
-        self.slope = np.zeros(2)
+        self.slope: Array = np.zeros(2)
 
     def height_at(self, xy: Array) -> Array:
         """Height of the plane below points (..., 2), m."""
         return np.asarray(self.height + (xy - self.anchor) @ self.slope)
 
-    def add(self, points: Array, time_ns: int) -> None:
-        """Take in points (K, 3), m in a fixed frame."""
-        _keep_lowest(points, time_ns, self._keep_ns, self._low, self._seen_ns)
+    def add(self, points: Array, time_ns: int, hits: NDArray[np.bool_] | None = None) -> None:
+        """Take in points (K, 3), m in a fixed frame; where `hits` (K,) is False nothing was met."""
+        if hits is None:
+            hits = np.ones(len(points), np.bool_)
+        _keep_lowest(points, hits, time_ns, self._keep_ns, self._low, self._seen_ns)
 
     def fit(self, position: Array, height_below: float | None, time_ns: int) -> None:
         """Refit around `position` (3,); `height_below` is the ground's height there if known.
 
         Where it is not, the returns tell that, too.
         """
-        fresh = self._low[time_ns - self._seen_ns <= self._keep_ns]
-        offset = fresh[:, :2] - position[:2]
-        near = np.hypot(offset[:, 0], offset[:, 1]) < _RADIUS_M
-        offset, z = offset[near], fresh[near, 2]
+        near = _near(self._low, self._seen_ns, time_ns - self._keep_ns, position)
+        offset, z = near[:, :2].copy(), near[:, 2].copy()
         base = height_below if height_below is not None else float(self.height_at(position[:2]))
         low = z < position[2] - _BELOW_M
         is_told = height_below is not None or low.sum() < _ENOUGH
@@ -58,7 +58,9 @@ class GroundPlane:
             # Points well above the plane are trunks and leaves, not ground.
             weight = 1.0 / (1.0 + (np.maximum(residual, 0.0) / 0.4) ** 2 + (residual / 2.0) ** 2)
             normal = (offset * weight[:, None]).T @ offset + _RIDGE * np.eye(2)
-            slope = np.linalg.solve(normal, (offset * weight[:, None]).T @ (z - base))
+            slope = np.linalg.solve(normal, (offset * weight[:, None]).T @ (z - base)).astype(
+                np.float64
+            )
             if not is_told:
                 left = (z - base - offset @ slope)[low]
                 base += float(weight[low] @ left / weight[low].sum())
@@ -68,11 +70,29 @@ class GroundPlane:
         self.height = base
 
 
-@kernel
+@brief_kernel
+def _near(low: Array, seen_ns: NDArray[np.int64], since_ns: int, position: Array) -> Array:
+    """(K, 3): points seen since then, their x and y from `position`."""
+    out, count = np.empty((low.shape[0] * low.shape[1], 3)), 0
+    for i in range(low.shape[0]):
+        for j in range(low.shape[1]):
+            x, y = low[i, j, 0] - position[0], low[i, j, 1] - position[1]
+            if seen_ns[i, j] >= since_ns and math.hypot(x, y) < _RADIUS_M:
+                out[count, 0], out[count, 1], out[count, 2] = x, y, low[i, j, 2]
+                count += 1
+    return out[:count]
+
+
+@brief_kernel
 def _keep_lowest(
-    points: Array, time_ns: int, keep_ns: int, low: Array, seen_ns: NDArray[np.int64]
+    points: Array,
+    hits: NDArray[np.bool_],
+    time_ns: int,
+    keep_ns: int,
+    low: Array,
+    seen_ns: NDArray[np.int64],
 ) -> None:
-    for k in range(points.shape[0]):
+    for k in np.flatnonzero(hits):
         x, y, z = points[k, 0], points[k, 1], points[k, 2]
         i, j = math.floor(x / _CELL_M) % _CELLS, math.floor(y / _CELL_M) % _CELLS
         stale = time_ns - seen_ns[i, j] > keep_ns

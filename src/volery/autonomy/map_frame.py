@@ -15,6 +15,8 @@ from volery.autonomy.motion_history import Placement
 from volery.autonomy.scan_points import Pose
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
+from volery.core.rotation_kernels import moved_points
+from volery.core.vectors import norm
 from volery.graph.messages import Odometry, TFMessage, stamp_of
 
 Array = NDArray[np.float64]
@@ -46,7 +48,7 @@ class MapFrame:
                 continue
             p, q = stamped.transform.translation, stamped.transform.rotation
             position, attitude = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
-            length = float(np.linalg.norm(attitude))
+            length = norm(attitude)
             if np.isfinite(position).all() and 0.9 < length < 1.1:
                 self._known[stamped.child_frame_id] = Placement(position, attitude / length)
                 self._told_ns[stamped.child_frame_id] = stamp_of(stamped)
@@ -67,7 +69,8 @@ class MapFrame:
         at = self.map_from_odom
         if at is None:
             return points_odom
-        return np.asarray(rotations.rotate(at.attitude, points_odom) + at.position)
+        flat = np.ascontiguousarray(points_odom, np.float64).reshape(-1, 3)
+        return moved_points(flat, at.attitude, at.position).reshape(np.shape(points_odom))
 
     def to_odom(self, points_map: Array) -> Array:
         """Points (..., 3) of the map in the odometry frame."""

@@ -12,6 +12,7 @@ from volery.autonomy.scan_points import Pose
 from volery.autonomy.stuck_sensors import is_stuck
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
+from volery.core.vectors import norm
 
 Array = NDArray[np.float64]
 
@@ -45,7 +46,7 @@ class MotionHistory:
         """Remember a pose; False where it cannot be used. A clock set back starts anew."""
         values = (pose.position, pose.attitude, pose.velocity, pose.omega_body)
         finite = all(np.isfinite(value).all() for value in values)
-        if not finite or abs(float(np.linalg.norm(pose.attitude)) - 1.0) > 0.01:
+        if not finite or abs(norm(pose.attitude) - 1.0) > 0.01:
             self.refused += 1
             return False
         if self._times and pose.time_ns < self._times[-1] - _JUMP_BACK_NS:

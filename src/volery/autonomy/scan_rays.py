@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.motion_history import MotionHistory, NodHistory, Placement
 from volery.core.clock import ns_from_s
-from volery.core.compiled import kernel
+from volery.core.compiled import brief_kernel, kernel
 from volery.core.rotation_kernels import rotate_vector
 from volery.graph.messages import LaserScan, stamp_of
 
@@ -108,6 +108,19 @@ def is_usable(scan: LaserScan) -> bool:
     """Whether a scan has beams and finite angles."""
     numbers = (scan.angle_min, scan.angle_increment, scan.time_increment, scan.range_max)
     return len(scan.ranges) > 0 and all(math.isfinite(number) for number in numbers)
+
+
+def has_return(scan: LaserScan) -> bool:
+    """Whether any beam of a scan has met something."""
+    return bool(_is_any_finite(np.asarray(scan.ranges, np.float32)))
+
+
+@brief_kernel
+def _is_any_finite(ranges: NDArray[np.float32]) -> bool:
+    for distance in ranges:  # noqa: SIM110  numba knows no generators here
+        if math.isfinite(distance):
+            return True
+    return False
 
 
 @kernel

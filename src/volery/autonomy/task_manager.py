@@ -24,6 +24,7 @@ from volery.autonomy.team.reports import ALOFT, Phase
 from volery.autonomy.team.sectors import Coverage
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
+from volery.core.vectors import norm
 from volery.graph.client import Client
 from volery.graph.messages import (
     Bool,
@@ -262,7 +263,7 @@ class TaskManager(TeamMember):
 
     def _has_come_down(self, pose: Pose, now: int) -> bool:
         """Whether it has stood on the ground for a while, by its sonar."""
-        if self._low_ns is None or float(np.linalg.norm(pose.velocity)) >= _STILL_M_S:
+        if self._low_ns is None or norm(pose.velocity) >= _STILL_M_S:
             return False
         return now - self._low_ns > _GROUND_S * NS_PER_S
 
@@ -323,7 +324,7 @@ class TaskManager(TeamMember):
         if self._coverage.seen.any() or self._pose is None:
             return round(self.settings.stuck_s * NS_PER_S)
         middle = self.settings.sectors.centres()[self.sector]
-        way = float(np.linalg.norm(middle - self._pose.position[:2]))
+        way = norm(middle - self._pose.position[:2])
         return round((self.settings.stuck_s + 2.0 * way) * NS_PER_S)
 
     def _drop(self, now: int) -> None:
@@ -367,7 +368,7 @@ class TaskManager(TeamMember):
     def _return(self, pose: Pose, now: int) -> None:
         if now - self._asked_ns >= _REPEAT_S * NS_PER_S:
             self._send_home(now)  # a goal that the explorer chose before may have come since
-        away = float(np.linalg.norm(pose.position[:2] - self._home[:2]))
+        away = norm(pose.position[:2] - self._home[:2])
         if away < self._nearest_m - _NEARER_M:
             self._nearest_m, self._news_ns = away, now
         if away < _HOME_M or now - self._news_ns > _RETURN_STUCK_S * NS_PER_S:
@@ -375,7 +376,7 @@ class TaskManager(TeamMember):
 
     def _sink(self, pose: Pose) -> None:
         self._highest_m = max(self._highest_m, float(pose.position[2]))
-        still = float(np.linalg.norm(pose.velocity)) < _STILL_M_S
+        still = norm(pose.velocity) < _STILL_M_S
         if still and pose.position[2] < self._highest_m - _SUNK_M:
             self._enter(Phase.DONE)
         else:

@@ -38,6 +38,7 @@ from volery.control.setpoints import (
 from volery.control.step import EVENT, EVENTS_A_STEP, UAV, advance_fleet
 from volery.core.clock import NS_PER_S, s_from_ns
 from volery.core.errors import CommandError
+from volery.core.rows import Rows
 from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe, hover_thrusts
 from volery.vehicle.contact import steepest_cosine
@@ -270,7 +271,7 @@ class Fleet(FleetCommands):
         fit_rotors(self._bodies[i], self._models["plant"][self._uavs["model"][i]], health)
         self._bodies["ground_budget"][i] = 0.0
 
-    def set_estimation_error(self, rows: NDArray[np.int64], error: EstimationError) -> None:
+    def set_estimation_error(self, rows: Rows | slice, error: EstimationError) -> None:
         """Let the controllers of the UAVs `rows` fly on estimates that are off by `error`."""
         belief = self._uavs["belief"]
         belief["position_error"][rows] = error.position_map

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from volery.control.setpoints import checked
 from volery.core import rotations
+from volery.core.vectors import norm
 from volery.vehicle.airframe import Airframe
 from volery.vehicle.fleet import FleetState
 
@@ -32,7 +33,7 @@ def collide(
     Coulomb's. Nothing happens, and 0 is returned, when the two part already.
     """
     normal = checked("normal", normal_map, (3,), 1.1)
-    normal = normal / np.linalg.norm(normal)
+    normal = normal / norm(normal)
     sides = [(i, 1.0)] if j is None else [(i, 1.0), (j, -1.0)]
     velocity = np.zeros(3)
     softness = np.zeros((3, 3))
@@ -55,7 +56,7 @@ def collide(
     push = (1.0 + restitution) * closing / float(normal @ softness @ normal)
     impulse = push * normal
     across = velocity + closing * normal
-    slide = float(np.linalg.norm(across))
+    slide = norm(across)
     if slide > 1e-9:
         along = across / slide
         hold = min(friction * push, slide / float(along @ softness @ along))
@@ -64,4 +65,4 @@ def collide(
         mass = airframes[row].body.mass_kg
         state.velocity_map[row] += sign * impulse / mass
         state.omega_body[row] += sign * (spin @ impulse)
-    return float(np.linalg.norm(impulse))
+    return norm(impulse)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -134,7 +135,7 @@ class Trajectory:
 
     def at(self, time: float) -> TrajectoryPoint:
         """Where it is at `time` s; before its begin and after its end as at these."""
-        row = int(np.searchsorted(self.segments[:, BEGIN], time, side="right")) - 1
+        row = bisect_right(self.segments[:, BEGIN], time) - 1
         return self._in_segment(max(row, 0), min(max(time, self.begin_s), self.end_s))
 
     def led_in_from(self, position: Array, velocity: Array, yaw: float) -> Trajectory:

@@ -101,9 +101,18 @@ def kernel(function: F, **options: Any) -> F:
     return _decorate(function, **options)
 
 
+def brief_kernel(function: F) -> F:
+    """Compile a kernel of some microseconds, which keeps Python's lock.
+
+    Where other threads want the lock, to give it up and to get it back takes longer than such a
+    kernel, for all of them.
+    """
+    return _decorate(function, nogil=False)
+
+
 def inline_kernel(function: F) -> F:
     """Compile a small helper that both kernels and Python call; LLVM inlines it."""
-    return _decorate(function)
+    return brief_kernel(function)
 
 
 def inner_kernel(function: F, **options: Any) -> F:

@@ -16,7 +16,7 @@ import hashlib
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.compiled import inline_kernel, kernel
+from volery.core.compiled import brief_kernel, inline_kernel, kernel
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
@@ -107,7 +107,7 @@ def fill_normal(keys: NDArray[np.uint64], counter: int, out: NDArray[np.float64]
             out[i, j] = normal(keys[i], counter + j)
 
 
-@kernel
+@brief_kernel
 def fill_normal_rows(
     keys: NDArray[np.uint64], counters: NDArray[np.int64], out: NDArray[np.float64]
 ) -> None:

@@ -1,9 +1,16 @@
-"""Rotations of single vectors inside compiled kernels; `core.rotations` is the same for arrays."""
+"""Rotations in compiled kernels: of single vectors inside others, of the points of a scan.
+
+`core.rotations` is the same for arrays of any shape.
+"""
 
 from __future__ import annotations
 
-from volery.core.compiled import inner_kernel
+import numpy as np
+from numpy.typing import NDArray
 
+from volery.core.compiled import brief_kernel, inner_kernel
+
+Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 
@@ -26,3 +33,14 @@ def rotate_vector(
 def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Vector:
     """Cross product a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@brief_kernel
+def moved_points(points: Array, attitude: Array, position: Array) -> Array:
+    """Points (K, 3) turned by `attitude` (4,) and shifted by `position` (3,): those of a scan."""
+    x, y, z, w = attitude[0], attitude[1], attitude[2], attitude[3]
+    out = np.empty((len(points), 3))
+    for k in range(len(points)):
+        px, py, pz = rotate_vector(x, y, z, w, points[k, 0], points[k, 1], points[k, 2])
+        out[k, 0], out[k, 1], out[k, 2] = px + position[0], py + position[1], pz + position[2]
+    return out

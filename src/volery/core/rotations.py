@@ -5,6 +5,10 @@ Functions take arrays whose last axis is the quaternion or vector and broadcast 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -14,23 +18,31 @@ IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 IDENTITY.flags.writeable = False
 
 
-def _components(array: ArrayLike) -> tuple[Array, ...]:
+def _components(array: ArrayLike) -> Sequence[Any]:
+    """Along the last axis; plain numbers of a single one, with which Python is faster."""
     array = np.asarray(array, dtype=np.float64)
-    return tuple(array[..., k] for k in range(array.shape[-1]))
+    if array.ndim == 1:
+        numbers: list[float] = array.tolist()
+        return numbers
+    return [array[..., k] for k in range(array.shape[-1])]
+
+
+def _together(*components: Any) -> Array:
+    """Arrays or numbers along a new last axis."""
+    if all(type(component) is float for component in components):
+        return np.array(components)
+    return np.stack(components, axis=-1)
 
 
 def multiply(p: ArrayLike, q: ArrayLike) -> Array:
     """Composition: `rotate(multiply(p, q), v) == rotate(p, rotate(q, v))`. Shapes (..., 4)."""
     px, py, pz, pw = _components(p)
     qx, qy, qz, qw = _components(q)
-    return np.stack(
-        [
-            pw * qx + px * qw + py * qz - pz * qy,
-            pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw,
-            pw * qw - px * qx - py * qy - pz * qz,
-        ],
-        axis=-1,
+    return _together(
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+        pw * qw - px * qx - py * qy - pz * qz,
     )
 
 
@@ -50,13 +62,10 @@ def rotate(q: ArrayLike, v: ArrayLike) -> Array:
     x, y, z, w = _components(q)
     vx, vy, vz = _components(v)
     tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
-    return np.stack(
-        [
-            vx + w * tx + y * tz - z * ty,
-            vy + w * ty + z * tx - x * tz,
-            vz + w * tz + x * ty - y * tx,
-        ],
-        axis=-1,
+    return _together(
+        vx + w * tx + y * tz - z * ty,
+        vy + w * ty + z * tx - x * tz,
+        vz + w * tz + x * ty - y * tx,
     )
 
 
@@ -136,6 +145,11 @@ def yaw_of(q: ArrayLike) -> Array:
 def exponential(rotation_vector: ArrayLike) -> Array:
     """Quaternion of a rotation vector (..., 3), rad."""
     v = np.asarray(rotation_vector, dtype=np.float64)
+    if v.ndim == 1:
+        x, y, z = v.tolist()
+        half = 0.5 * math.sqrt(x * x + y * y + z * z)
+        share = 0.5 * float(np.sinc(half / np.pi))
+        return np.array([x * share, y * share, z * share, float(np.cos(half))])
     angle = np.linalg.norm(v, axis=-1, keepdims=True)
     half = angle / 2.0
     # sin(a/2)/a without a division by zero: numpy's sinc is sin(pi x)/(pi x)

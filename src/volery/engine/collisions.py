@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
+from volery.core.vectors import norm
 from volery.engine.events import Event, EventKind
 from volery.engine.thing_contacts import ThingContacts, ThingLooks
 from volery.world.scene import Scene
@@ -243,5 +244,5 @@ class Collisions:
 
 
 def _unit(vector: Array) -> Array:
-    length = float(np.linalg.norm(vector))
+    length = norm(vector)
     return vector / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from volery.control.estimator.settings import StartSigmas
 from volery.control.estimator.start import drawn_start
 from volery.control.fleet import Fleet
 from volery.core import atmosphere
+from volery.core.rows import Rows, in_one_piece
 from volery.sensors.samples import (
     GnssReadings,
     ImuReadings,
@@ -26,7 +27,7 @@ from volery.sensors.samples import (
 )
 
 Array = NDArray[np.float64]
-Rows = NDArray[np.int64]
+T = TypeVar("T", bound=np.generic)
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,9 @@ class Estimation:
         self.estimator = estimator
         self.setup = setup
         self._fleet = fleet
-        self._known: dict[int, tuple[tuple[SensorId, ...], Rows, Rows]] = {}
+        self._known: dict[int, tuple[tuple[SensorId, ...], Rows | slice, Rows]] = {}
+        flying = np.flatnonzero(setup.flies)
+        self._flying = in_one_piece(flying), in_one_piece(setup.uavs[flying])
         self._pose_ns = np.full(len(estimator), _NEVER_NS)
 
     @property
@@ -95,8 +98,8 @@ class Estimation:
                 self.estimator.predict(
                     rows,
                     samples.stamp_ns,
-                    samples.angular_velocity[heard],
-                    samples.specific_force[heard],
+                    _heard(samples.angular_velocity, heard),
+                    _heard(samples.specific_force, heard),
                 )
             self._tell_fleet()
         elif not len(rows):
@@ -107,13 +110,13 @@ class Estimation:
             self._take_pressures(samples, heard, rows)
         elif isinstance(samples, MagneticReadings):
             self.estimator.fuse_magnetic(
-                rows, samples.stamp_ns, samples.field[heard], samples.field_variance
+                rows, samples.stamp_ns, _heard(samples.field, heard), samples.field_variance
             )
         elif isinstance(samples, RangeReadings) and self.setup.ground_height_m is not None:
             self.estimator.fuse_range(
                 rows,
                 samples.stamp_ns,
-                samples.ranges[heard],
+                _heard(samples.ranges, heard),
                 samples.variance,
                 self.setup.ground_height_m,
             )
@@ -189,20 +192,22 @@ class Estimation:
         self.estimator.set_state(state)
         self._pose_ns[:] = state["pose_ns"]
 
-    def _take_fixes(self, samples: GnssReadings, heard: Rows, rows: Rows) -> None:
+    def _take_fixes(self, samples: GnssReadings, heard: Rows | slice, rows: Rows) -> None:
         drift = self.setup.gnss_drift_variance[rows]
-        noise = np.maximum(samples.position_variance[heard] - drift, _LEAST_VARIANCE)
+        noise = np.maximum(_heard(samples.position_variance, heard) - drift, _LEAST_VARIANCE)
         self.estimator.fuse_gnss(
             rows,
             samples.stamp_ns,
-            samples.position_map[heard],
-            samples.velocity_map[heard],
-            np.hstack([noise, np.maximum(samples.velocity_variance[heard], _LEAST_VARIANCE)]),
-            samples.has_fix[heard],
+            _heard(samples.position_map, heard),
+            _heard(samples.velocity_map, heard),
+            np.hstack(
+                [noise, np.maximum(_heard(samples.velocity_variance, heard), _LEAST_VARIANCE)]
+            ),
+            _heard(samples.has_fix, heard),
         )
 
-    def _take_pressures(self, samples: PressureReadings, heard: Rows, rows: Rows) -> None:
-        pressure = samples.pressure[heard]
+    def _take_pressures(self, samples: PressureReadings, heard: Rows | slice, rows: Rows) -> None:
+        pressure = _heard(samples.pressure, heard)
         height = atmosphere.altitude(pressure) - self.setup.origin_altitude_m
         slope = atmosphere.altitude(pressure + 1.0) - atmosphere.altitude(pressure)
         variance = np.maximum(slope**2 * samples.pressure_variance, _LEAST_VARIANCE)
@@ -210,30 +215,29 @@ class Estimation:
 
     def _tell_fleet(self, rows: Rows | None = None) -> None:
         """Tell the controllers how far what they fly on is from the truth; `rows` (E,), or all."""
-        flies = self.setup.flies
-        flying = np.flatnonzero(flies) if rows is None else rows[flies[rows]]
-        if not len(flying):
-            return
-        uavs = self.setup.uavs[flying]
+        flying, uavs = self._flying
+        if rows is not None:
+            flying = rows[self.setup.flies[rows]]
+            uavs = self.setup.uavs[flying]
         error = estimation_error(
             _rows_of(self.estimator.state, flying), _rows_of(self._fleet.state, uavs)
         )
         self._fleet.set_estimation_error(uavs, error)
 
-    def _listeners(self, sensors: tuple[SensorId, ...]) -> tuple[Rows, Rows]:
+    def _listeners(self, sensors: tuple[SensorId, ...]) -> tuple[Rows | slice, Rows]:
         found = self._known.get(id(sensors))
         if found is not None and found[0] is sensors:
             return found[1], found[2]
         return self._look_up(sensors)
 
-    def _look_up(self, sensors: Sequence[SensorId]) -> tuple[Rows, Rows]:
+    def _look_up(self, sensors: Sequence[SensorId]) -> tuple[Rows | slice, Rows]:
         """Places in a bank's arrays that are listened to, and the estimators that do."""
         listens = self.setup.listens
         pairs = [
             (k, listens[s.uav, s.name]) for k, s in enumerate(sensors) if (s.uav, s.name) in listens
         ]
         table = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-        return table[:, 0], table[:, 1]
+        return in_one_piece(table[:, 0]), table[:, 1]
 
 
 _NEVER_NS = -(10**18)
@@ -252,7 +256,12 @@ class _Motions:
     omega_body: Array
 
 
-def _rows_of(states: Any, rows: Rows) -> _Motions:
+def _heard(values: NDArray[T], heard: Rows | slice) -> NDArray[T]:
+    """What is listened to, as an array of its own: kernels are compiled for ones to write to."""
+    return np.array(values[heard])
+
+
+def _rows_of(states: Any, rows: Rows | slice) -> _Motions:
     return _Motions(
         states.position_map[rows],
         states.velocity_map[rows],

@@ -11,6 +11,7 @@ import numpy as np
 from volery.control.flight_modes import FlightMode
 from volery.core import rotations
 from volery.core.errors import CommandError
+from volery.core.vectors import norm
 from volery.graph.graph import Graph
 from volery.graph.messages import (
     MultiDOFJointTrajectory,
@@ -95,7 +96,7 @@ def go_to_message(uav: Uav, message: Any) -> None:
     q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=np.float64)
     if not np.isfinite(q).all():
         raise CommandError("the rotation of a goal must be finite")
-    yaw = float(rotations.yaw_of(q)) if float(np.linalg.norm(q)) > 0.5 else None
+    yaw = float(rotations.yaw_of(q)) if norm(q) > 0.5 else None
     uav.go_to([place.x, place.y, place.z], yaw)
 
 

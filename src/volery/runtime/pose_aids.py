@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from volery.control.flight_modes import FlightMode
 from volery.core.clock import NS_PER_S
+from volery.core.vectors import norm
 from volery.engine.engine import Engine
 from volery.engine.events import EventKind
 from volery.graph.graph import Graph
@@ -82,7 +83,7 @@ def _taker(engine: Engine, uav_name: str, aid: PoseAid) -> Callable[[Published],
 
         stamp_ns = stamp_of(published.message)
         place, turn = _read(published.message)
-        readable = np.isfinite(place).all() and 0.9 < float(np.linalg.norm(turn)) < 1.1
+        readable = np.isfinite(place).all() and 0.9 < norm(turn) < 1.1
         if not readable or stamp_ns > engine.time_ns or engine.estimation is None:
             return
         pose = Pose(stamp_ns, place, turn, aid.sigma_m, sigma_rad)

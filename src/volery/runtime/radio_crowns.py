@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.vectors import norm
 from volery.world.forest import Forest
 from volery.world.trees.model import TreeModel
 
@@ -44,7 +45,7 @@ class Crowns:
         half = np.sqrt(root[met])
         enter = np.clip((-b[met] - half) / a[met], 0.0, 1.0)
         leave = np.clip((-b[met] + half) / a[met], 0.0, 1.0)
-        return float(np.linalg.norm(end - start)) * _length_of_union(enter, leave)
+        return norm(end - start) * _length_of_union(enter, leave)
 
 
 def _shape(model: TreeModel) -> tuple[float, float, float]:

@@ -10,6 +10,7 @@ from volery.control.estimator.estimator import Estimator
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.clock import Schedule
+from volery.core.rows import in_one_piece
 from volery.sensors.bank import Memoryless
 from volery.sensors.samples import OdometryReadings, SensorId, owned
 
@@ -38,21 +39,22 @@ class EstimateBank(Memoryless):
         self.sensors = sensors
         self._estimator = estimator
         self._rows = rows
+        self._taken = in_one_piece(rows)
         self._gyro_variance = gyro_variance
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometryReadings:  # noqa: ARG002
         """What is believed now."""
-        state, rows = self._estimator.state, self._rows
-        velocity, attitude = state.velocity_map[rows], state.attitude[rows]
-        covariance = self._estimator.covariance(rows)
+        state, rows = self._estimator.state, self._taken
+        velocity, attitude = state.velocity_map[rows], state.attitude[rows].copy()
+        covariance = self._estimator.covariance(self._rows)
         twist = twist_covariance(covariance, velocity, attitude, self._gyro_variance)
         return OdometryReadings(
             self.sensors,
             time_ns,
-            owned(state.position_map[rows]),
+            owned(state.position_map[rows].copy()),
             owned(attitude),
             owned(rotations.rotate(rotations.conjugate(attitude), velocity)),
-            owned(state.omega_body[rows]),
+            owned(state.omega_body[rows].copy()),
             owned(np.diagonal(pose_covariance(covariance), axis1=1, axis2=2).copy()),
             owned(np.diagonal(twist, axis1=1, axis2=2).copy()),
             is_ground_truth=False,

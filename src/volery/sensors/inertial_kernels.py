@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.compiled import kernel
+from volery.core.compiled import brief_kernel
 from volery.core.rotation_kernels import cross, rotate_vector
 
 Array = NDArray[np.float64]
@@ -14,7 +14,7 @@ GRAVITY = 9.80665
 """Standard gravity, m/s^2 (ISO 80000-3)."""
 
 
-@kernel
+@brief_kernel
 def feel_motion(
     rows: NDArray[np.int64],
     attitude: Array,
@@ -53,7 +53,7 @@ def feel_motion(
         )
 
 
-@kernel
+@brief_kernel
 def body_twists(
     rows: NDArray[np.int64], attitude: Array, velocity_map: Array, omega_body: Array, out: Array
 ) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from volery.core.compiled import inner_kernel, kernel
+from volery.core.compiled import brief_kernel, inner_kernel
 
 _NS = 1e-9
 _TWO_PI = 2.0 * math.pi
@@ -92,7 +92,7 @@ def nodded(
     return x * c - z * s, y * c + w * s, z * c + x * s, w * c - y * s
 
 
-@kernel
+@brief_kernel
 def nodding_angle_at(mount: Mount, time_ns: int) -> float:
     """`nodding_angle` for callers in Python."""
     return nodding_angle(

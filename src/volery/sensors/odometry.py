@@ -12,6 +12,7 @@ from pydantic import NonNegativeFloat
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.clock import Schedule
+from volery.core.rows import in_one_piece
 from volery.sensors.bank import Memoryless, rows_of, uav_rows
 from volery.sensors.inertial_kernels import body_twists
 from volery.sensors.model import SensorModel, load_model
@@ -62,6 +63,7 @@ class OdometryBank:
         self.schedule = schedule
         self.sensors = sensors
         self._rows = uav_rows(sensors)
+        self._taken = in_one_piece(self._rows)
         self._fleet = fleet
         self._noise = NoiseStreams(keys, len(sensors), per_measurement=_NUMBERS_A_SAMPLE)
         horizontal, vertical = model.horizontal_drift_m_sqrt_m, model.vertical_drift_m_sqrt_m
@@ -74,8 +76,8 @@ class OdometryBank:
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometryReadings:
         """Reading number k (counted from 0) of all sources of the bank."""
-        position = fleet.state.position_map[self._rows]
-        attitude = fleet.state.attitude[self._rows]
+        position = fleet.state.position_map[self._taken]
+        attitude = fleet.state.attitude[self._taken]
         way = position - self._last_position
         moved = np.sqrt((way * way).sum(axis=1))
         self._last_position = position.copy()
@@ -145,6 +147,7 @@ class GroundTruthBank(Memoryless):
         self.schedule = schedule
         self.sensors = sensors
         self._rows = uav_rows(sensors)
+        self._taken = in_one_piece(self._rows)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometryReadings:  # noqa: ARG002
         """The present state of all UAVs of the bank."""
@@ -153,8 +156,8 @@ class GroundTruthBank(Memoryless):
         return OdometryReadings(
             self.sensors,
             time_ns,
-            owned(fleet.state.position_map[self._rows].copy()),
-            owned(fleet.state.attitude[self._rows].copy()),
+            owned(fleet.state.position_map[self._taken].copy()),
+            owned(fleet.state.attitude[self._taken].copy()),
             owned(twist[:, :3].copy()),
             owned(twist[:, 3:].copy()),
             owned(zero),

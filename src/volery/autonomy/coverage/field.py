@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from volery.autonomy.coverage.cells import Mask
 from volery.core import rotations
 from volery.core.errors import PlanError
+from volery.core.vectors import norm
 
 Array = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ class Field:
             raise PlanError("origin and resolution of a map must be finite, resolution above 0")
         turn = info.origin.orientation
         q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=np.float64)
-        yaw = float(rotations.yaw_of(q)) if float(np.linalg.norm(q)) > 0.5 else 0.0
+        yaw = float(rotations.yaw_of(q)) if norm(q) > 0.5 else 0.0
         free = ((data >= 0) & (data < BLOCKED_FROM)).reshape(rows, columns)
         return cls(free, float(info.resolution), (float(corner.x), float(corner.y)), yaw)
 

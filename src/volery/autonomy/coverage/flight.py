@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.coverage.waypoints import Waypoints
+from volery.core.vectors import norm
 
 Array = NDArray[np.float64]
 
@@ -90,7 +91,7 @@ class Flight:
         assert self.waypoints is not None
         while self.following < len(self.waypoints.places):
             place: Array = self.waypoints.places[self.following]
-            away = float(np.linalg.norm(place - self.position_map))
+            away = norm(place - self.position_map)
             if away > arrival_m:
                 if away < self.nearest_m - _PROGRESS_M:
                     self.nearest_m, self.since_ns = away, now_ns

@@ -165,7 +165,7 @@ class Mapping(Node):
         )
         self._octree.insert(rays, self._reach)
         now, place = self.get_clock().now_ns(), rays.starts[len(rays.starts) // 2]
-        self._ground.add(rays.ends[rays.hits], now)
+        self._ground.add(rays.ends, now, rays.hits)
         self._ground.fit(place, self._ground_below(float(place[2])), now)
         if place[2] - self._ground.height < _LEAST_HEIGHT_M:
             return

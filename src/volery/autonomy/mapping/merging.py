@@ -13,6 +13,7 @@ from volery.autonomy.motion_history import Placement
 from volery.core import rotations
 from volery.core.compiled import kernel
 from volery.core.errors import PlanError
+from volery.core.vectors import norm
 
 Bytes = NDArray[np.uint8]
 Codes = NDArray[np.int64]
@@ -113,8 +114,8 @@ def _placed(
 
 
 def _is_none(placement: Placement, resolution_m: float) -> bool:
-    turn = float(np.linalg.norm(rotations.logarithm(placement.attitude)))
-    way = float(np.linalg.norm(placement.position)) / resolution_m
+    turn = norm(rotations.logarithm(placement.attitude))
+    way = norm(placement.position) / resolution_m
     return turn < _LEVEL_RAD and way < _LEVEL_CELLS
 
 

@@ -14,6 +14,7 @@ from volery.autonomy.mapping.reports import OCTOMAP, octomap_message, voxels_of
 from volery.autonomy.motion_history import Placement
 from volery.core.errors import DataFileError, PlanError
 from volery.core.kept import keep, put_back
+from volery.core.vectors import norm
 from volery.graph.messages import String, TFMessage
 from volery.graph.node import Node
 
@@ -80,7 +81,7 @@ class MapMerging(Node):
                 continue
             p, q = stamped.transform.translation, stamped.transform.rotation
             position, attitude = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
-            if np.isfinite(position).all() and abs(float(np.linalg.norm(attitude)) - 1.0) < 0.01:
+            if np.isfinite(position).all() and abs(norm(attitude) - 1.0) < 0.01:
                 self._placements[stamped.child_frame_id] = Placement(position, attitude)
 
     def _on_timer(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from volery.autonomy.mapping.octomap_stream import Voxels, binary_from_full, decode_full
 from volery.autonomy.mapping.octomap_trimming import trimmed
 from volery.autonomy.scan_rays import Rays
+from volery.core.compiled import brief_kernel
 from volery.core.errors import NodeError
 
 Array = NDArray[np.float64]
@@ -53,16 +55,10 @@ class Octree:
         if len(rays.hits) == 0:
             return
         origin = rays.starts[len(rays.starts) // 2].copy()
-        way = rays.ends - origin
-        length = np.sqrt((way * way).sum(axis=1))
-        level = np.abs(way[:, 2]) <= above_m
-        ahead = np.abs(way[:, 2]) <= _FREE_ABOVE_M
-        free = ahead & ~rays.hits & (length > reach_m - 0.5)
-        taken = free | (level & rays.hits)
-        ends, stretched = rays.ends[taken], free[taken]
-        ends[stretched] = origin + (way[free] / length[free, None]) * (reach_m + 0.5)
-        if len(ends):
-            self._tree.insertPointCloud(np.ascontiguousarray(ends), origin, reach_m, True, False)
+        ends = np.empty_like(rays.ends)
+        count = _choose(rays.ends, rays.hits, origin, reach_m, above_m, ends)
+        if count:
+            self._tree.insertPointCloud(ends[:count], origin, reach_m, True, False)
         if self.nodes > self._max_nodes:
             self._forget(origin)
 
@@ -126,3 +122,26 @@ def new_tree(resolution_m: float) -> Any:
     except ImportError:
         raise NodeError('mapping needs pyoctomap: pip install "volery[autonomy]"') from None
     return pyoctomap.OcTree(resolution_m)
+
+
+@brief_kernel
+def _choose(
+    ends: Array, hits: NDArray[np.bool_], origin: Array, reach: float, above: float, chosen: Array
+) -> int:
+    """Fill `chosen` with the ends that `Octree.insert` takes in; returns how many."""
+    count = 0
+    for k in range(len(ends)):
+        x, y, z = ends[k, 0] - origin[0], ends[k, 1] - origin[1], ends[k, 2] - origin[2]
+        length = math.sqrt(x * x + y * y + z * z)
+        if hits[k]:
+            if not abs(z) <= above:
+                continue
+            chosen[count] = ends[k]
+        elif abs(z) <= _FREE_ABOVE_M and length > reach - 0.5:
+            chosen[count, 0] = origin[0] + (x / length) * (reach + 0.5)
+            chosen[count, 1] = origin[1] + (y / length) * (reach + 0.5)
+            chosen[count, 2] = origin[2] + (z / length) * (reach + 0.5)
+        else:
+            continue
+        count += 1
+    return count

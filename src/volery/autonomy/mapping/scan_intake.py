@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections import Counter, deque
 
-import numpy as np
-
 from volery.autonomy.motion_history import MotionHistory, NodHistory
-from volery.autonomy.scan_rays import RayMaker, Rays, is_usable, scan_times
+from volery.autonomy.scan_rays import RayMaker, Rays, has_return, is_usable, scan_times
 from volery.autonomy.stuck_sensors import ScanRepeats
 from volery.core.clock import NS_PER_S
 from volery.graph.messages import LaserScan, stamp_of
@@ -57,7 +55,7 @@ class ScanIntake:
         if not is_usable(scan):
             self.counts["unusable"] += 1
             return
-        if np.isfinite(scan.ranges).any():
+        if has_return(scan):
             self.seen_ns = stamp
         self._last_taken_ns = stamp
         self.stuck = self._repeats.are_told_by(scan)

@@ -14,6 +14,7 @@ from volery.autonomy.scan_points import Pose
 from volery.autonomy.stuck_sensors import is_stuck
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.kept import keep, put_back
+from volery.core.vectors import norm
 from volery.graph.messages import (
     Bool,
     MultiDOFJointTrajectory,
@@ -125,7 +126,7 @@ class TrajectoryFollower(Node):
         place, _ = plan.at(now)
         _, velocity = plan.at(now + self._lead_ns)
         off = place - here
-        if float(np.linalg.norm(off)) > _OFF_M:
+        if norm(off) > _OFF_M:
             self._tell("stopped", "too far from the plan")
             velocity, off = np.zeros(3), np.zeros(3)
         else:

@@ -33,6 +33,7 @@ from volery.autonomy.planning.reciprocal_avoidance import HalfPlane, violation
 from volery.autonomy.planning.surface import Surface
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back
+from volery.core.vectors import norm
 
 Array = NDArray[np.float64]
 
@@ -129,7 +130,7 @@ class LocalPlanning:
         It begins anew, from the present motion, where the vehicle is far from its plan.
         """
         planned = self.state_at(now_ns)
-        if planned is None or np.linalg.norm(planned.position - present.position) > _LOST_M:
+        if planned is None or norm(planned.position - present.position) > _LOST_M:
             steady = State(present.position, present.velocity, np.zeros(3))
             self._path, self._began_ns = braking(steady, self.policy.limits), now_ns
             self.yaw = yaw
@@ -144,7 +145,7 @@ class LocalPlanning:
     def hold(self, start: State, then_ns: int) -> Path:
         """Stop, by the shortest way."""
         self.doing = Doing.HOLDING
-        moves = float(np.linalg.norm(start.velocity)) > 0.05
+        moves = norm(start.velocity) > 0.05
         return self._commit(
             braking(start, self.policy.limits) if moves else at_rest(start.position), then_ns
         )

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.clock import NS_PER_S
+from volery.core.vectors import norm
 
 Array = NDArray[np.float64]
 
@@ -90,7 +91,7 @@ def _half_plane(
     too_near = square <= radius * radius
     horizon = separation.step_s if too_near else separation.horizon_s
     from_centre = relative - way / horizon
-    length = float(np.linalg.norm(from_centre))
+    length = norm(from_centre)
     ahead = float(from_centre @ way)
     cut_off = ahead < 0.0 and ahead * ahead > radius * radius * length * length
     if too_near or cut_off:  # nearest to the round end of the cone
@@ -138,10 +139,10 @@ def avoiding_velocity(planes: Sequence[HalfPlane], preferred: Array, top_speed: 
             if abs(across) > 1e-9:
                 share = float((other.point - plane.point) @ other.normal) / across
                 tries.append(plane.point + _along(plane) * share)
-    speed = float(np.linalg.norm(preferred))
+    speed = norm(preferred)
     if speed > 1e-9:
         tries.append(preferred * min(1.0, top_speed / speed))
-    velocities = np.array([v for v in tries if np.linalg.norm(v) <= top_speed + 1e-9])
+    velocities = np.array([v for v in tries if norm(v) <= top_speed + 1e-9])
     worst = np.maximum(violation(planes, velocities), 1e-9)
     away = np.linalg.norm(velocities - preferred, axis=1)
     return np.asarray(velocities[np.lexsort((away, np.round(worst, 9)))[0]])

@@ -118,7 +118,7 @@ class Surroundings:
         self._grid.move_to(newest.position)
         # What is thin is seen in few of a nodding LIDAR's scans: the hits of all count.
         self._grid.add(rays, clears=is_due)
-        self._ground.add(rays.ends[rays.hits], now_ns)
+        self._ground.add(rays.ends, now_ns, rays.hits)
 
     def problems(self, now_ns: int) -> list[str]:
         """Why nothing can be planned, in words; none where all is well."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,7 +46,7 @@ class Samples(NamedTuple):
         """Position and velocity (3,): before the begin as there, after the end at rest there."""
         if time_ns >= self.time_ns[-1]:
             return self.position[-1], np.zeros(3)
-        row = max(int(np.searchsorted(self.time_ns, time_ns, side="right")) - 1, 0)
+        row = max(bisect_right(self.time_ns, time_ns) - 1, 0)
         if time_ns <= self.time_ns[0]:
             back = (int(self.time_ns[0]) - time_ns) / NS_PER_S
             return self.position[0] - back * self.velocity[0], self.velocity[0]

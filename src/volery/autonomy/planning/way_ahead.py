@@ -35,10 +35,10 @@ class WayAhead:
         It has come to the nearest place of the next `search_m`.
         """
         steps = np.arange(self.passed_m, min(self.passed_m + search_m, self._along[-1]) + 0.25, 0.5)
-        near = np.array([self._at(step) for step in steps])
-        away = np.hypot(*(near - place[:2]).T)
+        away = np.hypot(*(self._at(steps) - place[:2, None]))
         self.passed_m = float(min(steps[int(np.argmin(away))], self._along[-1]))
         return self._at(min(self.passed_m + ahead_m, self._along[-1]))
 
-    def _at(self, along: float) -> Array:
+    def _at(self, along: float | Array) -> Array:
+        """(2, ...) so far along."""
         return np.array([np.interp(along, self._along, self.places[:, axis]) for axis in range(2)])

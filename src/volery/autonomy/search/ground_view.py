@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from volery.autonomy.scan_points import Pose
 from volery.core import rotations
 from volery.core.errors import GraphError
+from volery.core.vectors import norm
 from volery.graph.messages import CameraInfo
 
 Array = NDArray[np.float64]
@@ -61,7 +62,7 @@ class GroundView:
         """
         optical = np.array([(u - self._k.cx) / self._k.fx, (v - self._k.cy) / self._k.fy, 1.0])
         ray = rotations.rotate(pose.attitude, self._body_from_optical @ optical)
-        if ray[2] > -_STEEP * np.linalg.norm(ray):
+        if ray[2] > -_STEEP * norm(ray):
             return None
         eye = pose.position + rotations.rotate(pose.attitude, self._mount)
         place: Array = eye + (plane_z - eye[2]) / ray[2] * ray

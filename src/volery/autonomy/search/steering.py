@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.scan_points import Pose
+from volery.core.vectors import norm
 from volery.graph.messages import Twist, Vector3
 
 Array = NDArray[np.float64]
@@ -34,5 +35,5 @@ def towards(pose: Pose, place: Array, speed_m_s: float) -> Twist:
 
 def is_at(pose: Pose, place: Array, within_m: float, still_m_s: float) -> bool:
     """Whether a UAV is at a place and no faster than `still_m_s`."""
-    away = float(np.linalg.norm(place - pose.position))
-    return away <= within_m and float(np.linalg.norm(pose.velocity)) <= still_m_s
+    away = norm(place - pose.position)
+    return away <= within_m and norm(pose.velocity) <= still_m_s

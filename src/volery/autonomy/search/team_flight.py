@@ -17,6 +17,7 @@ from volery.autonomy.search.team import ALOFT, GOING_HOME, RISING, UNDER_WAY, Ph
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
 from volery.core.kept import keep, put_back
+from volery.core.vectors import norm
 from volery.graph.client import Answer, Client
 from volery.graph.messages import Odometry, Point, Twist, header, message_type
 from volery.graph.node import Node
@@ -217,9 +218,7 @@ class TeamFlight(Node):
             self.ask(self._take_off, request(float(height)))
 
     def _sink(self, pose: Pose) -> None:
-        if pose.position[2] < self._home[2] + _LANDED_M and (
-            float(np.linalg.norm(pose.velocity)) < _STILL_M_S
-        ):
+        if pose.position[2] < self._home[2] + _LANDED_M and (norm(pose.velocity) < _STILL_M_S):
             self.enter(Phase.DONE)
         elif self._may_ask():
             self.ask(self._land)

@@ -18,7 +18,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.compiled import inner_kernel, kernel
+from volery.core.compiled import brief_kernel, inner_kernel
 from volery.core.rotation_kernels import rotate_vector
 
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ def rotation_matrix(state: Array, matrix: Array) -> None:
     matrix[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@kernel
+@brief_kernel
 def move(
     state: Array, covariance: Array, gyro: Array, accel: Array, dt: float, noise: Array
 ) -> None:
@@ -142,7 +142,18 @@ def add_error(state: Array, error: Array) -> None:
     state[G], state[G + 1], state[G + 2] = keep * nx, keep * ny, keep * nz
 
 
-@kernel
+@brief_kernel
+def remember(times: NDArray[np.int64], states: Array, time_ns: int, state: Array) -> None:
+    """Let times (M,) and states (M, 19) end with a new one, without the oldest."""
+    last = len(times) - 1
+    for k in range(last):
+        times[k] = times[k + 1]
+        states[k] = states[k + 1]
+    times[last] = time_ns
+    states[last] = state
+
+
+@brief_kernel
 def observe(
     state: Array, covariance: Array, row: Array, innovation: float, variance: float
 ) -> float:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.slam.matching_kernels import GROUND, UPRIGHT
 from volery.core import rotations
+from volery.core.vectors import norm
 
 Array = NDArray[np.float64]
 
@@ -44,12 +45,12 @@ class Level(NamedTuple):
 
 def levelling(gravity: Array) -> Array:
     """The smallest turn (4,) after which `gravity` (3,) points straight down."""
-    up = -gravity / np.linalg.norm(gravity)
-    axis = np.cross(up, [0.0, 0.0, 1.0])
-    sine = float(np.linalg.norm(axis))
+    x, y, z = (-gravity / norm(gravity)).tolist()
+    axis = np.array([y, -x, 0.0])
+    sine = norm(axis)
     if sine < 1e-12:
         return np.array([0.0, 0.0, 0.0, 1.0])
-    return rotations.exponential(axis / sine * math.atan2(sine, float(up[2])))
+    return rotations.exponential(axis / sine * math.atan2(sine, z))
 
 
 def level_of(gravity: Array, attitude: Array) -> Level:

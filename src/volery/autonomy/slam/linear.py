@@ -1,11 +1,11 @@
-"""Small dense linear algebra inside kernels."""
+"""Small dense linear algebra, most of it inside kernels."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.compiled import inner_kernel
+from volery.core.compiled import brief_kernel, inner_kernel
 
 Array = NDArray[np.float64]
 
@@ -52,3 +52,13 @@ def eliminate(matrix: Array, right: Array) -> bool:
                 rest -= matrix[i, j] * right[j, k]
             right[i, k] = rest / matrix[i, i]
     return True
+
+
+@brief_kernel
+def block(matrix: Array, rows: NDArray[np.int64]) -> Array:
+    """The square part (K, K) of a matrix that lies in rows and columns `rows` (K,)."""
+    out = np.empty((len(rows), len(rows)))
+    for i in range(len(rows)):
+        for k in range(len(rows)):
+            out[i, k] = matrix[rows[i], rows[k]]
+    return out

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.autonomy.slam.linear import block
 from volery.core import rotations
 from volery.graph.messages import (
     Odometry,
@@ -28,6 +29,7 @@ from volery.graph.messages import (
 )
 
 Array = NDArray[np.float64]
+_OF_POSE = np.array([0, 1, 2, 6, 7, 8])
 POSE = message_type("geometry_msgs/msg/PoseWithCovarianceStamped")
 
 
@@ -50,7 +52,7 @@ def odometry(
     `covariance` (9, 9) is of position, velocity and attitude, about the frame's axes.
     """
     position, attitude, velocity, omega = state
-    of_pose = covariance[np.ix_([0, 1, 2, 6, 7, 8], [0, 1, 2, 6, 7, 8])]
+    of_pose = block(covariance, _OF_POSE)
     turn = rotations.matrix(attitude).T
     of_twist = np.zeros((6, 6))
     of_twist[:3, :3] = turn @ covariance[3:6, 3:6] @ turn.T

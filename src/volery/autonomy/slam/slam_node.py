@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.motion_history import NodHistory
-from volery.autonomy.scan_rays import is_usable, scan_times
+from volery.autonomy.scan_rays import has_return, is_usable, scan_times
 from volery.autonomy.slam import reports
 from volery.autonomy.slam.health import Health
 from volery.autonomy.slam.inertial_kernels import BG, G, V
@@ -179,7 +179,7 @@ class Slam(Node):
         if not is_usable(scan) or first <= self._taken_ns.get(name, -1):
             self._refused += 1
             return
-        if np.isfinite(np.asarray(scan.ranges)).any():
+        if has_return(scan):
             self._health.heard[f"{name} LIDAR"] = self.get_clock().now_ns()
         if first - self._taken_ns.get(name, -(1 << 60)) < self._sweep_ns:
             return

@@ -26,6 +26,7 @@ from volery.autonomy.slam.inertial_kernels import (
     V,
     move,
     observe,
+    remember,
 )
 from volery.autonomy.slam.keyframes import Level, turn_of_heading
 from volery.autonomy.slam.matching_kernels import (
@@ -43,6 +44,8 @@ from volery.autonomy.slam.upright_kernels import CELLS, LAYERS
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back
+from volery.core.rotation_kernels import moved_points
+from volery.core.vectors import norm
 
 Array = NDArray[np.float64]
 
@@ -266,11 +269,7 @@ class Tracker:
             self.recovery.coast(self.state, self.covariance, span, dt - known, self._noise)
         self.recovery.keep_upright(self.state, self.covariance, time_ns)
         self.travelled_m += float(np.hypot(*(self.state[:2] - here[:2])))
-        self._remember(time_ns)
-
-    def _remember(self, time_ns: int) -> None:
-        self._times[:-1], self._states[:-1] = self._times[1:], self._states[1:]
-        self._times[-1], self._states[-1] = time_ns, self.state
+        remember(self._times, self._states, time_ns, self.state)
 
     # ---------------------------------------------------------------------------------- standing
 
@@ -338,7 +337,7 @@ class Tracker:
         long = self._low_since_ns is not None and time_ns - self._low_since_ns > _STANDING_NS
         low = not self.has_flown or (
             self._near_ground_ns is not None
-            and (long or float(np.linalg.norm(self.state[V : V + 3])) < _STANDING_M_S)
+            and (long or norm(self.state[V : V + 3]) < _STANDING_M_S)
         )
         self.is_standing = low and self._is_quiet()
         if not self.is_standing:
@@ -387,7 +386,7 @@ class Tracker:
         carry_along(self._states, before, self.state)
         self.match[sweep.name] = self._judged(sweep.name, told)
         is_drawn = self._draw(sweep, points, kinds)
-        turned = rotations.rotate(self.state[Q : Q + 4], points) + self.state[:3]
+        turned = moved_points(points, self.state[Q : Q + 4], self.state[:3])
         return Seen(turned, kinds, is_drawn)
 
     def _classify(self, points: Array, kinds: NDArray[np.int8], planes: Array, known: int) -> None:
@@ -412,7 +411,7 @@ class Tracker:
         last = self._inserted.get(sweep.name)
         is_new = (
             last is None
-            or float(np.linalg.norm(self.state[:3] - last[1])) > m.insert_m
+            or norm(self.state[:3] - last[1]) > m.insert_m
             or abs(math.remainder(yaw - last[2], math.tau)) > m.insert_rad
             or self.time_ns - last[0] > m.insert_s * NS_PER_S
         )

@@ -23,6 +23,7 @@ from volery.autonomy.slam.tracker import Seen, Tracker
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back
+from volery.core.vectors import norm
 
 Array = NDArray[np.float64]
 
@@ -126,7 +127,7 @@ class Way:
         last, state = self.frames[-1], tracker.state
         turn = rotations.multiply(state[Q : Q + 4], rotations.conjugate(last.attitude))
         return bool(
-            np.linalg.norm(state[:3] - last.position) > _STEP_M
+            norm(state[:3] - last.position) > _STEP_M
             or abs(float(rotations.yaw_of(turn))) > _STEP_RAD
             or tracker.time_ns - last.time_ns > _STEP_S * NS_PER_S
         )
@@ -143,7 +144,7 @@ class Way:
         sigmas = _ASTRAY
         if not is_new:
             step = step_between(self.frames[row - 1], frame.position, frame.attitude, gravity)
-            moved = float(np.linalg.norm(frame.position - self.frames[row - 1].position))
+            moved = norm(frame.position - self.frames[row - 1].position)
             sigmas = _PER_ROOT_M * math.sqrt(max(moved, 0.1))
         self.edges.append(Edge(row - 1, row, step, sigmas))
         self.poses.append(compose(self.poses[row - 1], step))

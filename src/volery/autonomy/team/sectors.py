@@ -58,11 +58,16 @@ class Coverage:
     cell_m: float
     seen: Mask = field(init=False)
     """(rows, columns)"""
+    _middles: tuple[Array, Array] = field(init=False, repr=False, compare=False)
+    """(columns,) x and (rows,) y of the cells' middles, m."""
 
     def __post_init__(self) -> None:
         wide, deep = self._size
-        self.seen = np.zeros(
-            (max(math.ceil(deep / self.cell_m), 1), max(math.ceil(wide / self.cell_m), 1)), np.bool_
+        rows, columns = (max(math.ceil(side / self.cell_m), 1) for side in (deep, wide))
+        self.seen = np.zeros((rows, columns), np.bool_)
+        self._middles = (
+            self.sector.x_min + (np.arange(columns) + 0.5) * wide / columns,
+            self.sector.y_min + (np.arange(rows) + 0.5) * deep / rows,
         )
 
     @property
@@ -72,10 +77,7 @@ class Coverage:
 
     def look(self, place: Array, sight_m: float) -> int:
         """See what lies within `sight_m` of `place` (2,); returns how many cells are new."""
-        wide, deep = self._size
-        rows, columns = self.seen.shape
-        x = self.sector.x_min + (np.arange(columns) + 0.5) * wide / columns
-        y = self.sector.y_min + (np.arange(rows) + 0.5) * deep / rows
+        x, y = self._middles
         near = np.hypot(x[None, :] - place[0], y[:, None] - place[1]) <= sight_m
         new = int((near & ~self.seen).sum())
         self.seen |= near

@@ -12,6 +12,8 @@ from volery.core import rotations
 
 Array = NDArray[np.float64]
 
+_OF_POSE = np.r_[POSITION : POSITION + 3, ROTATION : ROTATION + 3]
+
 
 class MotionState(Protocol):
     """Rows of motion: an `Estimate`, or a fleet's true state."""
@@ -62,8 +64,7 @@ def pose_covariance(covariance: Array) -> Array:
 
     covariance: (S, STATES, STATES), of `Estimator.covariance`.
     """
-    pick = np.r_[POSITION : POSITION + 3, ROTATION : ROTATION + 3]
-    return np.asarray(covariance[:, pick[:, None], pick])
+    return np.asarray(covariance[:, _OF_POSE[:, None], _OF_POSE])
 
 
 def twist_covariance(
