@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 NS_PER_S = 1_000_000_000
@@ -29,6 +29,12 @@ class Schedule:
 
     rate_hz: Fraction
     phase_ns: int = 0
+    _ratio: tuple[int, int] = field(init=False, repr=False, compare=False)
+    """Twice the period in ns, as two integers."""
+
+    def __post_init__(self) -> None:
+        ratio = 2 * NS_PER_S * self.rate_hz.denominator, self.rate_hz.numerator
+        object.__setattr__(self, "_ratio", ratio)
 
     @classmethod
     def from_hz(cls, rate_hz: float, phase_ns: int = 0) -> Schedule:
@@ -42,8 +48,6 @@ class Schedule:
 
     def instant_ns(self, k: int) -> int:
         """Time of the k-th firing."""
-        rate = self.rate_hz
         # Integers throughout, rounded half up: this runs once for every measurement.
-        return self.phase_ns + (2 * k * NS_PER_S * rate.denominator + rate.numerator) // (
-            2 * rate.numerator
-        )
+        above, below = self._ratio
+        return self.phase_ns + (k * above + below) // (2 * below)

@@ -30,6 +30,19 @@ def rotate_vector(
 
 
 @inner_kernel
+def quaternion_product(
+    px: float, py: float, pz: float, pw: float, qx: float, qy: float, qz: float, qw: float
+) -> tuple[float, float, float, float]:
+    """Composition: first q, then p."""
+    return (
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+        pw * qw - px * qx - py * qy - pz * qz,
+    )
+
+
+@inner_kernel
 def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Vector:
     """Cross product a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

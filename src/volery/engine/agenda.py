@@ -68,6 +68,8 @@ class Agenda(Generic[What]):
 
     def next_step(self) -> int | None:
         """Step of the next firing, None when the agenda is empty."""
+        if self._heap and ((first := self._heap[0]).wanted is None or first.wanted()):
+            return first.due_step
         steps = (e.due_step for e in self._heap if e.wanted is None or e.wanted())
         return min(steps, default=None)
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
+from volery.core.compiled import brief_kernel
 from volery.core.vectors import norm
 from volery.engine.events import Event, EventKind
 from volery.engine.thing_contacts import ThingContacts, ThingLooks
@@ -88,6 +89,8 @@ class Collisions:
     def resolve(self, time_ns: int) -> None:
         """Look around every UAV whose budget is used up; strike, report, and refill."""
         state = self._fleet.state
+        if self._things is None and not _is_used_up(state.contact_budget, state.separation_budget):
+            return
         used_up = np.flatnonzero(state.contact_budget <= 0.0)
         if len(used_up):
             self._resolve_solids(used_up, time_ns)
@@ -246,3 +249,12 @@ class Collisions:
 def _unit(vector: Array) -> Array:
     length = norm(vector)
     return vector / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+
+
+@brief_kernel
+def _is_used_up(contact_budget: Array, separation_budget: Array) -> bool:
+    """Whether any UAV's budget (N,) is."""
+    for i in range(len(contact_budget)):
+        if contact_budget[i] <= 0.0 or separation_budget[i] <= 0.0:
+            return True
+    return False

@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 
 
 class Way(Protocol):
-    """What carries bytes to a PX4."""
+    """What carries bytes to a PX4; where the seat tells `at_once`, from any thread."""
 
     def send(self, data: bytes) -> None:
         """Send frames."""
@@ -34,7 +34,13 @@ class HilSeat:
     """
 
     def __init__(
-        self, gateway: Gateway, uav: str, system: int, patience: Patience, *, kind: str = "px4"
+        self,
+        gateway: Gateway,
+        uav: str,
+        system: int,
+        patience: Patience,
+        *,
+        at_once: bool = False,
     ) -> None:
         self.uav = uav
         self._system = system
@@ -43,7 +49,14 @@ class HilSeat:
         self._noise, self._told = 0, False
         self._sensing = Sensing()
         self._meetings = Meetings(
-            gateway, uav, kind, self, period_ns=PERIOD_NS, topics=TOPICS, patience=patience
+            gateway,
+            uav,
+            "px4",
+            self,
+            period_ns=PERIOD_NS,
+            topics=TOPICS,
+            patience=patience,
+            at_once=at_once,
         )
 
     @property
@@ -53,9 +66,10 @@ class HilSeat:
 
     def take(self, way: Way) -> Callable[[bytes], None]:
         """Let a new PX4 sit down; what it sends is to be given to the result."""
-        self._way = way
-        self._link = HilLink(self._system)
-        self._noise, self._told = 0, False
+        with self._meetings.lock:
+            self._way = way
+            self._link = HilLink(self._system)
+            self._noise, self._told = 0, False
         return self._hear
 
     def heartbeat(self) -> bytes:
@@ -64,15 +78,17 @@ class HilSeat:
 
     def leave(self, why: str) -> None:
         """The connection has ended; the rotors stop."""
-        if self._way is None:
-            return
-        self._way = None
-        _log.warning("%s: %s", self.uav, why)
-        self._meetings.go_on(_STILL)
+        with self._meetings.lock:
+            if self._way is None:
+                return
+            self._way = None
+            _log.warning("%s: %s", self.uav, why)
+            self._meetings.go_on(_STILL)
 
     def close(self) -> None:
         """Give everything back; a second time nothing happens."""
-        way, self._way = self._way, None
+        with self._meetings.lock:
+            way, self._way = self._way, None
         if way is not None:
             self._meetings.turn_rotors(_STILL)
             way.end()
@@ -103,6 +119,10 @@ class HilSeat:
             self.leave(why)
 
     def _hear(self, data: bytes) -> None:
+        with self._meetings.lock:
+            self._take_in(data)
+
+    def _take_in(self, data: bytes) -> None:
         answers = self._link.feed(data)
         if not self._link.spoken:
             self._noise += len(data)

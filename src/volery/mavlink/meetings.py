@@ -10,7 +10,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -63,6 +64,8 @@ class Meetings:
     """Joins the lock step for `uav` at once; `close` leaves it.
 
     kind: `px4` or another word for names. topics: message types by topic below the UAV's name.
+    at_once: the pilot is told in the simulation's own thread, which need not wake the loop's for
+    that; all other calls are the loop's, and `lock` is for both.
     """
 
     def __init__(
@@ -75,7 +78,11 @@ class Meetings:
         period_ns: int,
         topics: Mapping[str, str],
         patience: Patience,
+        at_once: bool = False,
     ) -> None:
+        self.lock = threading.RLock()
+        """Held while the pilot is told."""
+        self._at_once = at_once
         self._uav, self._pilot, self._patience = uav, pilot, patience
         self._loop = asyncio.get_running_loop()
         self._session: Session = gateway.open(f"{kind} of {uav}")
@@ -139,26 +146,45 @@ class Meetings:
         self._session.call("/volery/join_lock_step", request, Reply(_answered, _answered))
 
     def _wake(self) -> None:
+        if self._at_once:
+            self._meet()
+        else:
+            self._soon(self._meet)
+
+    def _soon(self, work: Callable[[], None]) -> None:
         with contextlib.suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(self._meet)
+            self._loop.call_soon_threadsafe(work)
 
     def _meet(self) -> None:
-        for published in self._go.take():
-            clock = published.message.clock
-            time_ns = clock.sec * NS_PER_S + clock.nanosec
-            if time_ns <= self._time_ns:
-                self._pilot.begin_anew()
-            self._time_ns, self._pending = time_ns, True
-            if not self._pilot.tell(time_ns, self._news()):
-                self.go_on()
-            elif self._pending and self._patience.drops:
-                self._alarm = self._loop.call_later(self._patience.timeout_s, self._give_up)
+        with self.lock:
+            for published in self._go.take():
+                clock = published.message.clock
+                self._meet_at(clock.sec * NS_PER_S + clock.nanosec)
+
+    def _meet_at(self, time_ns: int) -> None:
+        if time_ns <= self._time_ns:
+            self._pilot.begin_anew()
+        self._time_ns, self._pending = time_ns, True
+        if not self._pilot.tell(time_ns, self._news()):
+            self.go_on()
+        elif self._pending and self._patience.drops:
+            self._soon(self._set_alarm)
+
+    def _set_alarm(self) -> None:
+        if self._pending and self._alarm is None:
+            self._alarm = self._loop.call_later(self._patience.timeout_s, self._give_up)
 
     def _news(self) -> News:
         found = {name: box.take() for name, box in self._boxes.items()}
         return {name: published[-1].message for name, published in found.items() if published}
 
     def _give_up(self) -> None:
+        with self.lock:
+            self._alarm = None
+            if self._pending:
+                self._drop()
+
+    def _drop(self) -> None:
         _log.warning(
             "%s: its autopilot has been silent for %g s; it is not waited for",
             self._uav,

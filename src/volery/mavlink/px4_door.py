@@ -13,7 +13,9 @@ reset of the simulation all are sent away, because none can go back in time.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
+import socket
 from collections.abc import Callable
 
 from volery.core.errors import BridgeError
@@ -25,6 +27,7 @@ from volery.mavlink.meetings import PATIENCE, Patience, uavs_with
 from volery.mavlink.party import why_not
 
 PORT = 4560
+_MOST_UNSENT_BYTES = 1 << 16
 _log = logging.getLogger(__name__)
 
 
@@ -67,7 +70,7 @@ class Px4Door:
         if not uavs:
             raise BridgeError("no UAV has the IMU that a PX4 needs")
         for k, uav in enumerate(uavs):
-            seat = HilSeat(gateway, uav, k + 1, self._patience)
+            seat = HilSeat(gateway, uav, k + 1, self._patience, at_once=True)
             self._seats.append(seat)
             await self._listen(seat, self._port + k)
 
@@ -79,7 +82,8 @@ class Px4Door:
             seat.close()
         self._servers.clear()
         self._seats.clear()
-        await asyncio.sleep(0)
+        for _ in range(2):  # for connections to be aborted, and to be told so
+            await asyncio.sleep(0)
 
     async def _listen(self, seat: HilSeat, port: int) -> None:
         loop = asyncio.get_running_loop()
@@ -93,22 +97,34 @@ class Px4Door:
 
 
 class _Connection(asyncio.Protocol):
-    """One PX4's connection; a second one at the same port is sent away."""
+    """One PX4's connection; a second one at the same port is sent away.
+
+    The loop reads. The simulation's thread writes, by a socket of its own on the same connection:
+    it would only wait for the loop to wake up.
+    """
 
     _transport: asyncio.Transport
+    _out: socket.socket | None = None
 
     def __init__(self, seat: HilSeat) -> None:
         self._seat = seat
+        self._loop = asyncio.get_running_loop()
+        self._unsent = bytearray()
         self._hear: Callable[[bytes], None] = _ignore
 
     def send(self, data: bytes) -> None:
-        """As of `Way`."""
-        self._transport.write(data)
+        """As of `Way`; frames are lost for a PX4 that does not read."""
+        if self._out is None or len(self._unsent) + len(data) > _MOST_UNSENT_BYTES:
+            return
+        self._unsent += data
+        with contextlib.suppress(OSError):  # no room now; or it has left, which the loop will tell
+            del self._unsent[: self._out.send(self._unsent)]
 
     def end(self) -> None:
         """As of `Way`."""
         self._hear = _ignore
-        self._transport.abort()
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self._transport.abort)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """As of asyncio."""
@@ -120,6 +136,7 @@ class _Connection(asyncio.Protocol):
             transport.abort()
             return
         tend(transport.get_extra_info("socket"))
+        self._out = transport.get_extra_info("socket").dup()
         self._hear = self._seat.take(self)
 
     def data_received(self, data: bytes) -> None:
@@ -130,6 +147,8 @@ class _Connection(asyncio.Protocol):
         """As of asyncio."""
         if self._hear is not _ignore:
             self._seat.leave("its PX4 has left")
+        if self._out is not None:
+            self._out.close()
 
 
 def _ignore(_data: bytes) -> None:

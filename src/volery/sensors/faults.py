@@ -50,8 +50,10 @@ class FaultTable:
         self._bias = np.zeros((len(sensors), sum(measured.values())))
         self._known = np.zeros(len(sensors), np.bool_)
         """Whether a sensor has measured since its start."""
-        self._last: Arrays = {}
-        """What left the table last, by name of the quantity; rows are sensors."""
+        self._last: Arrays | Samples = {}
+        """What left the table last, or its arrays by name of the quantity; rows are sensors."""
+        self._is_quiet = False
+        """Whether nobody fails and all are known, as nearly always."""
 
     def set(self, row: int, kind: FaultKind | str, value: ArrayLike | None = None) -> None:
         """Let sensor `row` of the bank fail from its next measurement on.
@@ -67,6 +69,7 @@ class FaultTable:
             raise CommandError(f"fault {fault.name.lower()}: a value belongs to biased, only there")
         self._bias[row] = 0.0 if value is None else self._checked(value)
         self._kind[row] = fault
+        self._is_quiet = False
 
     def clear(self, row: int) -> None:
         """Let sensor `row` work again."""
@@ -78,14 +81,19 @@ class FaultTable:
 
     def apply(self, samples: Samples) -> Samples:
         """What the sensors send of what they measured."""
-        arrays = {n: v for n, v in vars(samples).items() if isinstance(v, np.ndarray)}
-        if self._kind.any():
+        if self._is_quiet:
+            self._last = samples
+            return samples
+        arrays = _arrays_of(samples)
+        failing = bool(self._kind.any())
+        if failing:
             changed = self._bias_of(arrays)
             changed |= self._repeat({**arrays, **changed})
             arrays |= changed
             samples = replace(samples, **changed)
         self._last = arrays
         self._known[:] = True
+        self._is_quiet = not failing
         dropped = self._kind == FaultKind.DROPPED
         return _without(samples, arrays, dropped) if dropped.any() else samples
 
@@ -95,7 +103,7 @@ class FaultTable:
             "kind": self._kind.copy(),
             "bias": self._bias.copy(),
             "known": self._known.copy(),
-            "last": {name: array.copy() for name, array in self._last.items()},
+            "last": {name: array.copy() for name, array in _arrays_of(self._last).items()},
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
@@ -104,12 +112,14 @@ class FaultTable:
         self._bias = np.array(state["bias"])
         self._known = np.array(state["known"])
         self._last = {name: owned(np.array(array)) for name, array in state["last"].items()}
+        self._is_quiet = False
 
     def reset(self, rows: NDArray[np.int64]) -> None:
         """Mend the sensors `rows` and forget what they sent."""
         self._kind[rows] = FaultKind.NONE
         self._bias[rows] = 0.0
         self._known[rows] = False
+        self._is_quiet = False
 
     def _checked(self, value: ArrayLike) -> Array:
         try:
@@ -145,10 +155,11 @@ class FaultTable:
         """All quantities with the stuck sensors' last ones; empty without a stuck sensor."""
         rows = np.flatnonzero((self._kind == FaultKind.STUCK) & self._known)
         changed: Arrays = {}
+        last = _arrays_of(self._last)
         for name, array in arrays.items():
-            if len(rows) and self._last[name].shape == array.shape:
+            if len(rows) and last[name].shape == array.shape:
                 mixed = array.copy()
-                mixed[rows] = self._last[name][rows]
+                mixed[rows] = last[name][rows]
                 changed[name] = owned(mixed)
         return changed
 
@@ -208,6 +219,13 @@ class FaultableBank:
         """Put the sensors of some UAVs back to their start, without faults; see `Bank.reset`."""
         self.bank.reset(uavs, keys, time_ns, k)
         self.faults.reset(rows_of(uav_rows(self.sensors), uavs))
+
+
+def _arrays_of(samples: Arrays | Samples) -> Arrays:
+    """The arrays by name of the quantity."""
+    if isinstance(samples, dict):
+        return samples
+    return {n: v for n, v in vars(samples).items() if isinstance(v, np.ndarray)}
 
 
 def _kind_of(kind: FaultKind | str) -> FaultKind:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.compiled import brief_kernel
-from volery.core.rotation_kernels import cross, rotate_vector
+from volery.core.rotation_kernels import cross, quaternion_product, rotate_vector
 
 Array = NDArray[np.float64]
 
@@ -64,3 +64,16 @@ def body_twists(
         out[s, 0], out[s, 1], out[s, 2] = rotate_vector(-q[0], -q[1], -q[2], q[3], v[0], v[1], v[2])
         for k in range(3):
             out[s, 3 + k] = omega_body[i, k]
+
+
+@brief_kernel
+def feel_vector(
+    rows: NDArray[np.int64], attitude: Array, body_from_sensor: Array, vector_map: Array, out: Array
+) -> None:
+    """A vector (3,) of the map in each sensor's frame: out (S, 3)."""
+    for s in range(len(rows)):
+        p, q = attitude[rows[s]], body_from_sensor[s]
+        x, y, z, w = quaternion_product(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3])
+        out[s, 0], out[s, 1], out[s, 2] = rotate_vector(
+            -x, -y, -z, w, vector_map[0], vector_map[1], vector_map[2]
+        )

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
-from volery.core import rotations
 from volery.core.clock import NS_PER_S, Schedule
 from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.inertial_kernels import feel_vector
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import NoiseStreams, gauss_markov
 from volery.sensors.samples import MagneticReadings, SensorId, owned
@@ -74,9 +74,10 @@ class MagnetometerBank:
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> MagneticReadings:
         """Reading number k (counted from 0) of all sensors of the bank."""
-        attitude = fleet.state.attitude[self._rows]
-        map_from_sensor = rotations.multiply(attitude, self._body_from_sensor)
-        outer = rotations.rotate(rotations.conjugate(map_from_sensor), self._field_map)
+        outer = np.empty((len(self._rows), 3))
+        feel_vector(
+            self._rows, fleet.state.attitude, self._body_from_sensor, self._field_map, outer
+        )
         field = outer @ self._soft_iron.T + self._hard_iron
         noise = self._noise.measurement(k)
         field += self._bias + self._white * noise[:, :3]
