@@ -146,6 +146,9 @@ class _Seat(asyncio.DatagramProtocol):
 
     # --------------------------------------------------------------------------------- of meetings
 
+    is_in_step = False
+    """As of `Pilot`: asyncio's transport is the loop's."""
+
     def tell(self, time_ns: int, news: News) -> bool:
         """As of `Pilot`."""
         self._slow.update({name: news[name] for name in _SLOW if name in news})

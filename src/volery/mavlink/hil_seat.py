@@ -18,7 +18,10 @@ _log = logging.getLogger(__name__)
 
 
 class Way(Protocol):
-    """What carries bytes to a PX4; where the seat tells `at_once`, from any thread."""
+    """What carries bytes to a PX4."""
+
+    is_for_any_thread: bool
+    """Whether `send` and `end` may be called by any."""
 
     def send(self, data: bytes) -> None:
         """Send frames."""
@@ -39,8 +42,6 @@ class HilSeat:
         uav: str,
         system: int,
         patience: Patience,
-        *,
-        at_once: bool = False,
     ) -> None:
         self.uav = uav
         self._system = system
@@ -56,7 +57,6 @@ class HilSeat:
             period_ns=PERIOD_NS,
             topics=TOPICS,
             patience=patience,
-            at_once=at_once,
         )
 
     @property
@@ -95,6 +95,12 @@ class HilSeat:
         self._meetings.close()
 
     # --------------------------------------------------------------------------------- of meetings
+
+    @property
+    def is_in_step(self) -> bool:
+        """As of `Pilot`."""
+        way = self._way
+        return way is not None and way.is_for_any_thread and self._link.locked
 
     def tell(self, time_ns: int, news: News) -> bool:
         """As of `Pilot`."""

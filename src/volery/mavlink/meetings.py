@@ -50,6 +50,10 @@ PATIENCE = Patience()
 class Pilot(Protocol):
     """The autopilot's side."""
 
+    @property
+    def is_in_step(self) -> bool:
+        """Whether it answers each meeting, and may be told by any thread."""
+
     def tell(self, time_ns: int, news: News) -> bool:
         """Tell it of a meeting; whether its answer is waited for: it calls `go_on`."""
 
@@ -64,8 +68,8 @@ class Meetings:
     """Joins the lock step for `uav` at once; `close` leaves it.
 
     kind: `px4` or another word for names. topics: message types by topic below the UAV's name.
-    at_once: the pilot is told in the simulation's own thread, which need not wake the loop's for
-    that; all other calls are the loop's, and `lock` is for both.
+    The pilot is told in the loop's thread, or, once it `is_in_step`, by the simulation's own, which
+    need not wake another for that; all other calls are the loop's, and `lock` is for both.
     """
 
     def __init__(
@@ -78,11 +82,9 @@ class Meetings:
         period_ns: int,
         topics: Mapping[str, str],
         patience: Patience,
-        at_once: bool = False,
     ) -> None:
         self.lock = threading.RLock()
         """Held while the pilot is told."""
-        self._at_once = at_once
         self._uav, self._pilot, self._patience = uav, pilot, patience
         self._loop = asyncio.get_running_loop()
         self._session: Session = gateway.open(f"{kind} of {uav}")
@@ -146,7 +148,7 @@ class Meetings:
         self._session.call("/volery/join_lock_step", request, Reply(_answered, _answered))
 
     def _wake(self) -> None:
-        if self._at_once:
+        if self._pilot.is_in_step:
             self._meet()
         else:
             self._soon(self._meet)

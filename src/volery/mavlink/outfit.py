@@ -11,6 +11,7 @@ from volery.scenario.load import parse_scenario
 from volery.scenario.schema import Scenario
 
 NODE = "volery.mavlink.node:Autopilot"
+_CALIBRATED_IMU = "iim42653"
 
 
 def with_autopilots(scenario: Scenario) -> Scenario:
@@ -32,10 +33,12 @@ def with_px4(scenario: Scenario) -> Scenario:
     """The scenario for real PX4s: every type has the sensors that they need, none starts by itself.
 
     An IMU at 250 Hz, so that each step has a reading; magnetometer, barometer and GNSS where a type
-    has none.
+    has none. An IMU of no model that was chosen is a calibrated one: beyond a bias of 0.3 m/s^2 PX4
+    does not arm.
     """
     dialect()
-    return _with_sensors(scenario, {"imu": 250.0}, ("magnetometer", "barometer", "gnss"))
+    others = ("magnetometer", "barometer", "gnss")
+    return _with_sensors(scenario, {"imu": 250.0}, others, {"imu": _CALIBRATED_IMU})
 
 
 def with_ardupilot(scenario: Scenario) -> Scenario:
@@ -54,9 +57,15 @@ def with_ardupilot(scenario: Scenario) -> Scenario:
 
 
 def _with_sensors(
-    scenario: Scenario, rates: Mapping[str, float], others: Sequence[str]
+    scenario: Scenario,
+    rates: Mapping[str, float],
+    others: Sequence[str],
+    models: Mapping[str, str] | None = None,
 ) -> Scenario:
-    """Every type with these sensors, some of them at a rate; the UAVs wait on the ground."""
+    """Every type with these sensors; the UAVs wait on the ground.
+
+    rates: of some sensors, by kind. models: of those whose model the scenario does not choose.
+    """
     data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
     for name, uav_type in scenario.types.items():
         sensors = [sensor.model_dump(exclude_unset=True) for sensor in uav_type.sensors]
@@ -65,6 +74,8 @@ def _with_sensors(
         for sensor in sensors:
             if sensor["kind"] in rates:
                 sensor["rate_hz"] = rates[sensor["kind"]]
+            if models and sensor["kind"] in models:
+                sensor.setdefault("model", models[sensor["kind"]])
         data["types"][name] = {**data["types"][name], "sensors": sensors}
     data["uavs"] = [{**group, "on_start": "wait"} for group in data["uavs"]]
     return _parsed_like(scenario, data)

@@ -70,7 +70,7 @@ class Px4Door:
         if not uavs:
             raise BridgeError("no UAV has the IMU that a PX4 needs")
         for k, uav in enumerate(uavs):
-            seat = HilSeat(gateway, uav, k + 1, self._patience, at_once=True)
+            seat = HilSeat(gateway, uav, k + 1, self._patience)
             self._seats.append(seat)
             await self._listen(seat, self._port + k)
 
@@ -103,6 +103,7 @@ class _Connection(asyncio.Protocol):
     it would only wait for the loop to wake up.
     """
 
+    is_for_any_thread = True
     _transport: asyncio.Transport
     _out: socket.socket | None = None
 

@@ -29,6 +29,8 @@ class Px4Serial:
     path: of the device. baud: its speed.
     """
 
+    is_for_any_thread = False
+
     def __init__(self, path: str, baud: int = BAUD, *, patience: Patience = PATIENCE) -> None:
         self._path, self._baud = path, baud
         self._patience = patience

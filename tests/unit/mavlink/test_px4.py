@@ -16,6 +16,7 @@ from volery.mavlink.outfit import with_px4
 from volery.mavlink.px4_door import Px4Door
 from volery.mavlink.px4_serial_door import Px4Serial
 from volery.runtime import Simulation
+from volery.scenario.load import parse_scenario
 
 CLIMB = 0.78
 """Share of full speed; 0.73 carries an iris: the root of its share of thrust."""
@@ -215,3 +216,24 @@ def test_a_port_that_is_taken_is_told():
             assert str(told.value) == (
                 f"uav1: cannot listen on 127.0.0.1:{port}: the port is taken"
             )
+
+
+def test_an_imu_that_nobody_chose_is_a_calibrated_one():
+    chosen = {"kind": "imu", "model": "adis16448"}
+    data = {
+        "name": "three_types",
+        "types": {
+            "plain": {"airframe": "iris", "sensors": [{"kind": "imu"}]},
+            "own": {"airframe": "iris", "sensors": [chosen]},
+            "bare": {"airframe": "iris"},
+        },
+        "uavs": [{"type": name, "position_m": [3.0 * k, 0.0]} for k, name in enumerate(
+            ("plain", "own", "bare"))],
+    }  # fmt: skip
+    types = with_px4(parse_scenario(data, where="test")).types
+    imus = {name: [s for s in t.sensors if s.kind == "imu"] for name, t in types.items()}
+    assert {name: [(s.model, s.rate_hz) for s in found] for name, found in imus.items()} == {
+        "plain": [("iim42653", 250.0)],
+        "own": [("adis16448", 250.0)],
+        "bare": [("iim42653", 250.0)],
+    }
