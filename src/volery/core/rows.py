@@ -1,7 +1,7 @@
 """Rows of arrays: their numbers, or a slice where they lie in one piece.
 
 numpy gives up Python's lock for each array that is indexed by numbers, and threads hand it to each
-other for nothing; a slice costs a tenth, too. What a slice takes is a view.
+other for nothing; a slice costs a tenth, too. What a slice takes is a view: copy what is kept.
 """
 
 from __future__ import annotations

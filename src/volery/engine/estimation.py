@@ -74,6 +74,7 @@ class Estimation:
         self._fleet = fleet
         self._known: dict[int, tuple[tuple[SensorId, ...], Rows | slice, Rows]] = {}
         flying = np.flatnonzero(setup.flies)
+        self._anyone_flies = len(flying) > 0
         self._flying = in_one_piece(flying), in_one_piece(setup.uavs[flying])
         self._pose_ns = np.full(len(estimator), _NEVER_NS)
 
@@ -215,6 +216,8 @@ class Estimation:
 
     def _tell_fleet(self, rows: Rows | None = None) -> None:
         """Tell the controllers how far what they fly on is from the truth; `rows` (E,), or all."""
+        if not self._anyone_flies:
+            return
         flying, uavs = self._flying
         if rows is not None:
             flying = rows[self.setup.flies[rows]]

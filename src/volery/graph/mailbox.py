@@ -16,7 +16,7 @@ from volery.graph.qos import MOST_DEPTH
 from volery.graph.rows import Rows
 
 Wake = Callable[[], None]
-"""Tells a door's thread, from the simulation's, that there is something to take; must not block."""
+"""Called in the simulation's thread when there is something to take; must not block."""
 
 MOST_RELIABLE_BYTES = 256 * 1024 * 1024
 """What may wait for a reliable subscriber, in arrays; beyond, its subscription ends."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Protocol
 
 from volery.graph.session import Gateway
@@ -21,10 +22,10 @@ class Way(Protocol):
     """What carries bytes to a PX4."""
 
     is_for_any_thread: bool
-    """Whether `send` and `end` may be called by any."""
+    """Whether `send` and `end` may be called by any, one at a time."""
 
-    def send(self, data: bytes) -> None:
-        """Send frames."""
+    def send(self, data: bytes) -> bool:
+        """Send frames; whether all of them are under way."""
 
     def end(self) -> None:
         """End the connection."""
@@ -36,13 +37,7 @@ class HilSeat:
     An answer releases the meeting only if it was made after it, as its time says.
     """
 
-    def __init__(
-        self,
-        gateway: Gateway,
-        uav: str,
-        system: int,
-        patience: Patience,
-    ) -> None:
+    def __init__(self, gateway: Gateway, uav: str, system: int, patience: Patience) -> None:
         self.uav = uav
         self._system = system
         self._way: Way | None = None
@@ -50,13 +45,7 @@ class HilSeat:
         self._noise, self._told = 0, False
         self._sensing = Sensing()
         self._meetings = Meetings(
-            gateway,
-            uav,
-            "px4",
-            self,
-            period_ns=PERIOD_NS,
-            topics=TOPICS,
-            patience=patience,
+            gateway, uav, "px4", self, period_ns=PERIOD_NS, topics=TOPICS, patience=patience
         )
 
     @property
@@ -70,7 +59,7 @@ class HilSeat:
             self._way = way
             self._link = HilLink(self._system)
             self._noise, self._told = 0, False
-        return self._hear
+        return partial(self._hear, way)
 
     def heartbeat(self) -> bytes:
         """A frame that says who is there."""
@@ -107,8 +96,8 @@ class HilSeat:
         sensed = self._sensing.read(news)
         if self._way is None or sensed is None:
             return False
-        self._way.send(self._link.tell(time_ns, sensed))
-        return self._link.locked and self.taken
+        is_sent = self._way.send(self._link.tell(time_ns, sensed))
+        return is_sent and self._link.locked and self.taken
 
     def begin_anew(self) -> None:
         """As of `Pilot`: a PX4 cannot go back in time."""
@@ -124,9 +113,10 @@ class HilSeat:
             way.end()
             self.leave(why)
 
-    def _hear(self, data: bytes) -> None:
+    def _hear(self, way: Way, data: bytes) -> None:
         with self._meetings.lock:
-            self._take_in(data)
+            if way is self._way:  # it was not let go meanwhile
+                self._take_in(data)
 
     def _take_in(self, data: bytes) -> None:
         answers = self._link.feed(data)

@@ -10,8 +10,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import struct
 import threading
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -69,7 +71,8 @@ class Meetings:
 
     kind: `px4` or another word for names. topics: message types by topic below the UAV's name.
     The pilot is told in the loop's thread, or, once it `is_in_step`, by the simulation's own, which
-    need not wake another for that; all other calls are the loop's, and `lock` is for both.
+    need not wake another for that. Both hold `lock` when they tell it or have it begin anew, and so
+    must who reads or changes what these do. All other calls are the loop's.
     """
 
     def __init__(
@@ -84,7 +87,6 @@ class Meetings:
         patience: Patience,
     ) -> None:
         self.lock = threading.RLock()
-        """Held while the pilot is told."""
         self._uav, self._pilot, self._patience = uav, pilot, patience
         self._loop = asyncio.get_running_loop()
         self._session: Session = gateway.open(f"{kind} of {uav}")
@@ -92,7 +94,13 @@ class Meetings:
         meeting = f"/volery/lock_step/{kind}_of_{uav}"
         self._done = f"{meeting}/done"
         self._pending = False
-        self._alarm: asyncio.TimerHandle | None = None
+        self._since_s = 0.0
+        """Wall time at which the present meeting began."""
+        self._is_unsayable = False
+        """Whether it has been said that the pilot cannot be told something."""
+        self._watch: asyncio.Task[None] | None = None
+        if patience.drops:
+            self._watch = self._loop.create_task(self._watch_silence())
         self._time_ns = -1
         self._boxes: dict[str, Mailbox] = {
             name: self._session.subscribe(f"/{uav}/{name}", msgtype, depth=1, wake=_nothing)
@@ -122,9 +130,6 @@ class Meetings:
 
     def go_on(self, shares: Sequence[float] | None = None) -> None:
         """End the meeting, `shares` as of `turn_rotors`; without a meeting only those are asked."""
-        if self._alarm is not None:
-            self._alarm.cancel()
-            self._alarm = None
         messages = [] if shares is None else [(self._rotors, self._asked(shares))]
         if self._pending:
             self._pending = False
@@ -133,8 +138,10 @@ class Meetings:
 
     def close(self) -> None:
         """Leave the lock step and the graph; a second time nothing happens."""
-        if self._alarm is not None:
-            self._alarm.cancel()
+        with self.lock:
+            self._pending = False
+        if self._watch is not None:
+            self._watch.cancel()
         self._session.close()
 
     def _join(self, name: str, period_ns: int) -> None:
@@ -150,12 +157,9 @@ class Meetings:
     def _wake(self) -> None:
         if self._pilot.is_in_step:
             self._meet()
-        else:
-            self._soon(self._meet)
-
-    def _soon(self, work: Callable[[], None]) -> None:
+            return
         with contextlib.suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(work)
+            self._loop.call_soon_threadsafe(self._meet)
 
     def _meet(self) -> None:
         with self.lock:
@@ -166,27 +170,35 @@ class Meetings:
     def _meet_at(self, time_ns: int) -> None:
         if time_ns <= self._time_ns:
             self._pilot.begin_anew()
-        self._time_ns, self._pending = time_ns, True
-        if not self._pilot.tell(time_ns, self._news()):
+        self._time_ns, self._since_s, self._pending = time_ns, time.monotonic(), True
+        if not self._tell(time_ns):
             self.go_on()
-        elif self._pending and self._patience.drops:
-            self._soon(self._set_alarm)
 
-    def _set_alarm(self) -> None:
-        if self._pending and self._alarm is None:
-            self._alarm = self._loop.call_later(self._patience.timeout_s, self._give_up)
+    def _tell(self, time_ns: int) -> bool:
+        try:
+            return self._pilot.tell(time_ns, self._news())
+        except (ArithmeticError, ValueError, struct.error) as error:  # as of an infinite fix
+            if not self._is_unsayable:
+                self._is_unsayable = True
+                _log.warning(
+                    "%s: its autopilot cannot be told what is sensed: %s", self._uav, error
+                )
+            return False
 
     def _news(self) -> News:
         found = {name: box.take() for name, box in self._boxes.items()}
         return {name: published[-1].message for name, published in found.items() if published}
 
-    def _give_up(self) -> None:
-        with self.lock:
-            self._alarm = None
-            if self._pending:
-                self._drop()
+    async def _watch_silence(self) -> None:
+        """Give up an autopilot that is silent for too long."""
+        while True:
+            await asyncio.sleep(min(0.1, 0.2 * self._patience.timeout_s))
+            with self.lock:
+                silent_s = time.monotonic() - self._since_s if self._pending else 0.0
+                if silent_s >= self._patience.timeout_s:
+                    self._give_up()
 
-    def _drop(self) -> None:
+    def _give_up(self) -> None:
         _log.warning(
             "%s: its autopilot has been silent for %g s; it is not waited for",
             self._uav,

@@ -33,8 +33,8 @@ def with_px4(scenario: Scenario) -> Scenario:
     """The scenario for real PX4s: every type has the sensors that they need, none starts by itself.
 
     An IMU at 250 Hz, so that each step has a reading; magnetometer, barometer and GNSS where a type
-    has none. An IMU of no model that was chosen is a calibrated one: beyond a bias of 0.3 m/s^2 PX4
-    does not arm.
+    has none. Where the scenario chooses no model of an IMU it is a calibrated one: beyond a bias of
+    0.3 m/s^2 PX4 does not arm.
     """
     dialect()
     others = ("magnetometer", "barometer", "gnss")

@@ -28,6 +28,7 @@ from volery.mavlink.party import why_not
 
 PORT = 4560
 _MOST_UNSENT_BYTES = 1 << 16
+"""What may wait for a PX4 that does not read, beside what the kernel holds."""
 _log = logging.getLogger(__name__)
 
 
@@ -113,13 +114,19 @@ class _Connection(asyncio.Protocol):
         self._unsent = bytearray()
         self._hear: Callable[[bytes], None] = _ignore
 
-    def send(self, data: bytes) -> None:
-        """As of `Way`; frames are lost for a PX4 that does not read."""
-        if self._out is None or len(self._unsent) + len(data) > _MOST_UNSENT_BYTES:
-            return
+    def send(self, data: bytes) -> bool:
+        """As of `Way`; frames are lost, whole, for a PX4 that does not read."""
+        self._flush()
+        if len(self._unsent) + len(data) > _MOST_UNSENT_BYTES:
+            return False
         self._unsent += data
+        self._flush()
+        return not self._unsent
+
+    def _flush(self) -> None:
         with contextlib.suppress(OSError):  # no room now; or it has left, which the loop will tell
-            del self._unsent[: self._out.send(self._unsent)]
+            if self._unsent and self._out is not None:
+                del self._unsent[: self._out.send(self._unsent)]
 
     def end(self) -> None:
         """As of `Way`."""

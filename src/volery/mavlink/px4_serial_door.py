@@ -75,10 +75,11 @@ class Px4Serial:
             self._seat = None
         self.end()
 
-    def send(self, data: bytes) -> None:
-        """As of `Way`."""
+    def send(self, data: bytes) -> bool:
+        """As of `Way`: what does not fit on the line now follows, or is lost."""
         if self._line is not None:
             self._line.send(data)
+        return True
 
     def end(self) -> None:
         """As of `Way`."""

@@ -26,11 +26,13 @@ from volery.core.clock import Schedule
 from volery.core.compiled import cache_dir
 from volery.core.geodesy import LocalFrame
 from volery.core.quick_typing import remembered_types
+from volery.engine.collisions import BOUNCE, Collisions
 from volery.sensors.gnss import GnssBank, load_gnss_model
 from volery.sensors.imu import ImuBank, load_imu_model
 from volery.sensors.joints import JointBank
 from volery.sensors.lidar_bank import LidarBank
 from volery.sensors.lidar_model import load_lidar
+from volery.sensors.magnetometer import MagnetometerBank, load_magnetometer_model
 from volery.sensors.mount import make_mount
 from volery.sensors.odometry import GroundTruthBank
 from volery.sensors.point_cloud import PointMaker
@@ -109,7 +111,9 @@ def compile_guidance() -> None:
     with _quicker():
         Terrain.flat(extent_m=10.0).height([0.0], [0.0])
         points = ScanProjector([0.0, 0.0, 0.0]).points(scan, pose)
-        GroundPlane().add(points, 0)
+        ground = GroundPlane()
+        ground.add(points, 0)
+        ground.fit(origin, None, 0)
         obstacles = ObstacleMemory()
         obstacles.add(points, 0)
         obstacles.around(origin, 0, 1.0)
@@ -156,6 +160,8 @@ def _look_and_measure() -> None:
         JointBank(sensors, mounts),
     ):
         bank.sample(0, 0, fleet)
+    names = tuple(sensor.uav_name for sensor in sensors)
+    Collisions(fleet, scene, names, BOUNCE, lambda _event: None).resolve(0)
     scene.close()
 
 
@@ -171,6 +177,11 @@ def compile_the_rest() -> None:
     clouds.sample(0, 0, fleet)
     gnss = load_gnss_model("gnss_m8")
     GnssBank(gnss, schedule, sensors, place, keys, LocalFrame(0, 0, 0)).sample(0, 0, fleet)
+    compass, level = (
+        load_magnetometer_model("magnetometer_px4"),
+        np.tile(rotations.IDENTITY, (2, 1)),
+    )
+    MagnetometerBank(compass, schedule, sensors, level, keys, np.zeros(3)).sample(0, 0, fleet)
     scene.close()
     _compile_estimators()
     _fleet(Kinematic()).advance(0, Terrain.flat(extent_m=10.0).grid)

@@ -1,8 +1,10 @@
 """The server for real PX4s against a strict stand-in, and its frames against the physics."""
 
+import asyncio
 import contextlib
 import logging
 import socket
+import threading
 import time
 
 import pytest
@@ -11,9 +13,12 @@ from px4_stand_in import StandIn, Terminal
 
 from volery.bridges.doors import Doors
 from volery.core.errors import BridgeError, PartnerError
+from volery.mavlink.codec import Codec, dialect
+from volery.mavlink.hil import HilLink
+from volery.mavlink.hil_seat import HilSeat
 from volery.mavlink.meetings import PATIENCE, Patience
 from volery.mavlink.outfit import with_px4
-from volery.mavlink.px4_door import Px4Door
+from volery.mavlink.px4_door import Px4Door, _Connection
 from volery.mavlink.px4_serial_door import Px4Serial
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
@@ -237,3 +242,110 @@ def test_an_imu_that_nobody_chose_is_a_calibrated_one():
         "own": [("adis16448", 250.0)],
         "bare": [("iim42653", 250.0)],
     }
+
+
+def test_in_step_the_simulation_tells_and_nobody_is_woken_for_it(opened, monkeypatch):
+    simulation, door = opened()
+    tellers = []
+    tell = HilSeat.tell
+
+    def told(seat, time_ns, news):
+        if seat.taken:
+            tellers.append((threading.get_ident(), seat._link.locked))
+        return tell(seat, time_ns, news)
+
+    monkeypatch.setattr(HilSeat, "tell", told)
+    pilot = StandIn(door._port, 50)
+    meet(simulation, door, 1)
+    pilot.start()
+    simulation.run(1.0)
+    assert pilot.done.wait(20.0)
+    assert pilot.fault is None
+    in_step = [thread for thread, locked in tellers if locked]
+    assert len(in_step) > 30
+    assert set(in_step[2:]) == {threading.get_ident()}  # the first was on its way to the loop
+    assert threading.get_ident() not in {thread for thread, locked in tellers if not locked}
+
+
+def test_what_cannot_be_said_is_told_of_and_the_run_goes_on(opened, monkeypatch, caplog):
+    simulation, door = opened()
+
+    def refuse(_link, _time_ns, _sensed):
+        raise OverflowError("infinity is no integer")
+
+    pilot = StandIn(door._port, 50)
+    meet(simulation, door, 1)
+    monkeypatch.setattr(HilLink, "tell", refuse)
+    simulation.run(0.1)
+    assert simulation.time_s == pytest.approx(0.1)
+    pilot.close()
+    told = [text for text in caplog.messages if "cannot be told" in text]
+    assert told == ["uav1: its autopilot cannot be told what is sensed: infinity is no integer"]
+
+
+def test_who_was_let_go_is_not_obeyed(opened):
+    simulation, door = opened()
+    pilot = StandIn(door._port, 50)
+    meet(simulation, door, 1)
+    (seat,) = door._seats
+    asked = []
+    seat._meetings.turn_rotors = seat._meetings.go_on = lambda shares=None: asked.append(shares)
+    late = _Way()
+    hear = seat.take(late)
+    answer = Codec(1, 1).pack(
+        dialect().MAVLink_hil_actuator_controls_message(10**9, [0.7] * 16, 129, 1), 0
+    )
+    hear(answer)
+    assert [len(shares) for shares in asked] == [16]
+    seat.leave("it went")
+    asked.clear()
+    hear(answer)
+    assert asked == []
+    pilot.close()
+
+
+class _Way:
+    """Carries nothing."""
+
+    is_for_any_thread = True
+
+    def send(self, _data):
+        return True
+
+    def end(self):
+        """Nothing is there to be ended."""
+
+
+def test_a_px4_that_does_not_read_for_long_hears_whole_frames_again():
+    ours, theirs = socket.socketpair()
+    ours.setblocking(False)
+    frame = bytes(range(64))
+
+    async def made():
+        return _Connection(None)
+
+    connection = asyncio.run(made())
+    connection._out = ours
+    sent = 0
+    while connection.send(frame):
+        sent += 1
+    assert not connection.send(frame)
+    for _ in range(3000):  # more than may wait: lost, whole
+        connection.send(frame)
+    heard = _drained(theirs)
+    assert connection.send(frame)
+    heard += _drained(theirs)
+    assert len(heard) % 64 == 0
+    assert heard == frame * (len(heard) // 64)
+    assert sent < len(heard) // 64 < sent + 3000
+    ours.close()
+    theirs.close()
+
+
+def _drained(line):
+    line.setblocking(False)
+    heard = b""
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            heard += line.recv(1 << 16)
+    return heard

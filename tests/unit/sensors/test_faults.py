@@ -110,3 +110,20 @@ def test_wrong_faults_are_refused(row, kind, value, said):
 def test_a_bias_of_an_imu_needs_all_its_numbers():
     with pytest.raises(CommandError, match="6 finite numbers"):
         FaultTable(SENSORS, ImuReadings.MEASURED).set(0, "biased", 0.1)
+
+
+def test_who_has_worked_for_long_gets_stuck_and_is_mended_also_after_a_snapshot():
+    faults = table()
+    for k in range(3):
+        faults.apply(ranges(k))
+    kept = faults.get_state()
+    last = ranges(2)
+    faults.set(1, FaultKind.STUCK)
+    stuck = faults.apply(ranges(3))
+    assert stuck.ranges[1] == last.ranges[1]
+    assert stuck.ranges[0] == ranges(3).ranges[0]
+    faults.clear(1)
+    assert faults.apply(ranges(4)).ranges.tolist() == ranges(4).ranges.tolist()
+    faults.set_state(kept)
+    faults.set(0, FaultKind.STUCK)
+    assert faults.apply(ranges(5)).ranges[0] == last.ranges[0]
