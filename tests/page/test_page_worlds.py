@@ -168,9 +168,11 @@ def trees(served):
 
 
 def test_blocks_grow_by_their_sliders(page, served):
+    before = standing(page)
     start(page, served, "blocks")
     panel = open_panel(page, "Environment")
     panel.get_by_role("slider", name="Height", exact=True).wait_for()
+    wait_until(page, lambda page: abs(standing(page) - before) > 0.005)  # the other world is gone
     wait_for_frames(page, 5)
     low = wait_until(page, standing)
     set_slider(page, "Height", "ArrowRight", 10)
