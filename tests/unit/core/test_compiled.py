@@ -36,3 +36,13 @@ def test_old_caches_are_swept(tmp_path):
     keep.mkdir()
     compiled._sweep(tmp_path, keep)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["now", "old4", "old5"]
+
+
+def test_only_a_brief_kernel_keeps_pythons_lock():
+    def twice(x):
+        return 2.0 * x
+
+    kept, given = compiled.brief_kernel(twice), compiled.kernel(twice)
+    assert kept(1.5) == given(1.5) == 3.0
+    assert not kept.targetoptions["nogil"]
+    assert given.targetoptions["nogil"]
