@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.vehicle.compiled import inner_kernel
-from volery.vehicle.rigid import four, three
+from volery.vehicle.rigid import four, product, three
 
 Array = NDArray[np.float64]
 
@@ -63,12 +63,7 @@ def believe_attitude(belief: Any, body: Any, errs: bool) -> None:
     x, y, z, w = four(body.attitude)
     if errs:
         ex, ey, ez, ew = four(belief.rotation_error)
-        x, y, z, w = (
-            ew * x + ex * w + ey * z - ez * y,
-            ew * y - ex * z + ey * w + ez * x,
-            ew * z + ex * y - ey * x + ez * w,
-            ew * w - ex * x - ey * y - ez * z,
-        )
+        x, y, z, w = product(ex, ey, ez, ew, x, y, z, w)
     attitude = belief.attitude
     attitude[0], attitude[1], attitude[2], attitude[3] = x, y, z, w
 

@@ -12,6 +12,7 @@ from volery.core.compiled import brief_kernel, inner_kernel
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 
 
 @inner_kernel
@@ -32,13 +33,23 @@ def rotate_vector(
 @inner_kernel
 def quaternion_product(
     px: float, py: float, pz: float, pw: float, qx: float, qy: float, qz: float, qw: float
-) -> tuple[float, float, float, float]:
+) -> Quaternion:
     """Composition: first q, then p."""
     return (
         pw * qx + px * qw + py * qz - pz * qy,
         pw * qy - px * qz + py * qw + pz * qx,
         pw * qz + px * qy - py * qx + pz * qw,
         pw * qw - px * qx - py * qy - pz * qz,
+    )
+
+
+@inner_kernel
+def matrix_rows(x: float, y: float, z: float, w: float) -> tuple[Vector, Vector, Vector]:
+    """Rows of the unit quaternion's rotation matrix."""
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
+        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
+        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.compiled import inner_kernel, kernel
+from volery.core.rotation_kernels import matrix_rows, quaternion_product, rotate_vector
 from volery.sensors.beam_table import TABLE_ROWS, BeamTable
 from volery.sensors.mount import nodded, nodding_angle
 from volery.vehicle.pose_history import PoseHistory, pose_at
@@ -65,33 +66,10 @@ def sensor_frame(batch: LidarBatch, scan: int, history: PoseHistory, time_ns: in
     x, y, z, px, py, pz, pw = pose_at(history, batch.uav[scan], time_ns)
     angle = nodding_angle(nods[row, 0], nods[row, 1], nods[row, 2], nods[row, 3], time_ns)
     qx, qy, qz, qw = nodded(base[row, 0], base[row, 1], base[row, 2], base[row, 3], angle)
-    # The mount's position, turned into the map.
-    mx, my, mz = place[row, 0], place[row, 1], place[row, 2]
-    tx = 2.0 * (py * mz - pz * my)
-    ty = 2.0 * (pz * mx - px * mz)
-    tz = 2.0 * (px * my - py * mx)
-    x += mx + pw * tx + py * tz - pz * ty
-    y += my + pw * ty + pz * tx - px * tz
-    z += mz + pw * tz + px * ty - py * tx
-    # Map from sensor.
-    ax = pw * qx + px * qw + py * qz - pz * qy
-    ay = pw * qy - px * qz + py * qw + pz * qx
-    az = pw * qz + px * qy - py * qx + pz * qw
-    aw = pw * qw - px * qx - py * qy - pz * qz
-    return (
-        x,
-        y,
-        z,
-        1.0 - 2.0 * (ay * ay + az * az),
-        2.0 * (ax * ay + az * aw),
-        2.0 * (ax * az - ay * aw),
-        2.0 * (ax * ay - az * aw),
-        1.0 - 2.0 * (ax * ax + az * az),
-        2.0 * (ay * az + ax * aw),
-        2.0 * (ax * az + ay * aw),
-        2.0 * (ay * az - ax * aw),
-        1.0 - 2.0 * (ax * ax + ay * ay),
-    )
+    mx, my, mz = rotate_vector(px, py, pz, pw, place[row, 0], place[row, 1], place[row, 2])
+    ax, ay, az, aw = quaternion_product(px, py, pz, pw, qx, qy, qz, qw)
+    a, b, c = matrix_rows(ax, ay, az, aw)  # whose columns are the sensor's axes
+    return x + mx, y + my, z + mz, a[0], b[0], c[0], a[1], b[1], c[1], a[2], b[2], c[2]
 
 
 @inner_kernel

@@ -44,6 +44,19 @@ def matrix_of(
 
 
 @inner_kernel
+def product(
+    px: float, py: float, pz: float, pw: float, qx: float, qy: float, qz: float, qw: float
+) -> tuple[float, float, float, float]:
+    """Composition: first q, then p; `core.rotation_kernels` has it without fused multiply-add."""
+    return (
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+        pw * qw - px * qx - py * qy - pz * qz,
+    )
+
+
+@inner_kernel
 def nudged(
     qx: float, qy: float, qz: float, qw: float, hx: float, hy: float, hz: float
 ) -> tuple[float, float, float, float]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.compiled import inner_kernel
+from volery.core.rotation_kernels import matrix_rows
 from volery.world.embree import (
     DIRECTION,
     FAR,
@@ -131,18 +132,6 @@ def _may_touch(
 
 
 @inner_kernel
-def _rotation(
-    qx: float, qy: float, qz: float, qw: float
-) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
-    """Rows of the rotation matrix."""
-    return (
-        (1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qz * qw), 2 * (qx * qz + qy * qw)),
-        (2 * (qx * qy + qz * qw), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz - qx * qw)),
-        (2 * (qx * qz - qy * qw), 2 * (qy * qz + qx * qw), 1 - 2 * (qx * qx + qy * qy)),
-    )
-
-
-@inner_kernel
 def _sees(bodies: BodyTable, uav: int, row: int) -> bool:
     """Whether rays of `uav` (-1: of nobody) may meet body `row`."""
     is_thing = row >= bodies.scene.shape[0] - bodies.things
@@ -156,7 +145,7 @@ def _into_body(
 ) -> None:
     """Fill the body-frame packet; lanes that do not see this body stay masked."""
     x, y, z, qx, qy, qz, qw = pose
-    a, b, c = _rotation(qx, qy, qz, qw)
+    a, b, c = matrix_rows(qx, qy, qz, qw)
     rays, out = block.rays[p], block.body_rays
     for k in range(LANES):
         ox, oy, oz = rays[ORIGIN, k] - x, rays[ORIGIN + 1, k] - y, rays[ORIGIN + 2, k] - z
@@ -217,7 +206,7 @@ def cast_at_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: i
     _into_body(scene.bodies, block, p, lanes, row, pose)
     found = block.body_rays
     _cast_in_body(bodies, block, p, row)
-    a, b, c = _rotation(pose[3], pose[4], pose[5], pose[6])
+    a, b, c = matrix_rows(pose[3], pose[4], pose[5], pose[6])
     for k in range(lanes):
         part = block.body_words[GEOMETRY, k]
         if part == _INVALID or block.body_valid[k] == 0:

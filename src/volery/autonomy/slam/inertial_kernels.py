@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.compiled import brief_kernel, inner_kernel
-from volery.core.rotation_kernels import rotate_vector
+from volery.core.rotation_kernels import matrix_rows, quaternion_product, rotate_vector
 
 Array = NDArray[np.float64]
 
@@ -43,10 +43,7 @@ def _product(state: Array, x: float, y: float, z: float, left: bool) -> None:
     bx, by, bz, bw = state[Q], state[Q + 1], state[Q + 2], state[Q + 3]
     if not left:
         ax, ay, az, aw, bx, by, bz, bw = bx, by, bz, bw, ax, ay, az, aw
-    qx = aw * bx + ax * bw + ay * bz - az * by
-    qy = aw * by - ax * bz + ay * bw + az * bx
-    qz = aw * bz + ax * by - ay * bx + az * bw
-    qw = aw * bw - ax * bx - ay * by - az * bz
+    qx, qy, qz, qw = quaternion_product(ax, ay, az, aw, bx, by, bz, bw)
     norm = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
     state[Q], state[Q + 1], state[Q + 2], state[Q + 3] = qx * norm, qy * norm, qz * norm, qw * norm
 
@@ -54,16 +51,9 @@ def _product(state: Array, x: float, y: float, z: float, left: bool) -> None:
 @inner_kernel
 def rotation_matrix(state: Array, matrix: Array) -> None:
     """Fill `matrix` (3, 3), world from body."""
-    x, y, z, w = state[Q], state[Q + 1], state[Q + 2], state[Q + 3]
-    matrix[0, 0] = 1.0 - 2.0 * (y * y + z * z)
-    matrix[0, 1] = 2.0 * (x * y - z * w)
-    matrix[0, 2] = 2.0 * (x * z + y * w)
-    matrix[1, 0] = 2.0 * (x * y + z * w)
-    matrix[1, 1] = 1.0 - 2.0 * (x * x + z * z)
-    matrix[1, 2] = 2.0 * (y * z - x * w)
-    matrix[2, 0] = 2.0 * (x * z - y * w)
-    matrix[2, 1] = 2.0 * (y * z + x * w)
-    matrix[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+    rows = matrix_rows(state[Q], state[Q + 1], state[Q + 2], state[Q + 3])
+    for i in range(3):
+        matrix[i, 0], matrix[i, 1], matrix[i, 2] = rows[i]
 
 
 @brief_kernel

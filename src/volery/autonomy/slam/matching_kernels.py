@@ -17,7 +17,7 @@ from volery.autonomy.slam.inertial_kernels import STATES, P, Q, add_error, rotat
 from volery.autonomy.slam.linear import eliminate
 from volery.autonomy.slam.upright_kernels import Cells, add_upright, nearest_upright
 from volery.core.compiled import inner_kernel, kernel, owning_kernel
-from volery.core.rotation_kernels import rotate_vector
+from volery.core.rotation_kernels import quaternion_product, rotate_vector
 
 Array = NDArray[np.float64]
 Kinds = NDArray[np.int8]
@@ -301,17 +301,11 @@ def carry_along(states: Array, before: Array, after: Array) -> None:
     """Correct earlier states (M, 19) rigidly, as the newest one was: from `before` to `after`."""
     bx, by, bz, bw = -before[Q], -before[Q + 1], -before[Q + 2], before[Q + 3]
     ax, ay, az, aw = after[Q], after[Q + 1], after[Q + 2], after[Q + 3]
-    tx = aw * bx + ax * bw + ay * bz - az * by
-    ty = aw * by - ax * bz + ay * bw + az * bx
-    tz = aw * bz + ax * by - ay * bx + az * bw
-    tw = aw * bw - ax * bx - ay * by - az * bz
+    tx, ty, tz, tw = quaternion_product(ax, ay, az, aw, bx, by, bz, bw)
     for m in range(states.shape[0]):
         s = states[m]
         px, py, pz = s[P] - before[P], s[P + 1] - before[P + 1], s[P + 2] - before[P + 2]
         px, py, pz = rotate_vector(tx, ty, tz, tw, px, py, pz)
         s[P], s[P + 1], s[P + 2] = after[P] + px, after[P + 1] + py, after[P + 2] + pz
         qx, qy, qz, qw = s[Q], s[Q + 1], s[Q + 2], s[Q + 3]
-        s[Q] = tw * qx + tx * qw + ty * qz - tz * qy
-        s[Q + 1] = tw * qy - tx * qz + ty * qw + tz * qx
-        s[Q + 2] = tw * qz + tx * qy - ty * qx + tz * qw
-        s[Q + 3] = tw * qw - tx * qx - ty * qy - tz * qz
+        s[Q], s[Q + 1], s[Q + 2], s[Q + 3] = quaternion_product(tx, ty, tz, tw, qx, qy, qz, qw)

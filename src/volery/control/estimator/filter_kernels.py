@@ -43,7 +43,7 @@ from volery.control.estimator.records import (
 )
 from volery.core.rotation_kernels import rotate_vector
 from volery.vehicle.compiled import fused_kernel, inner_kernel
-from volery.vehicle.rigid import four, three
+from volery.vehicle.rigid import four, product, three
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -256,10 +256,7 @@ def take_over(state: Any, error: Array) -> None:
     # exp(error) * rotation
     ex, ey, ez, ew = scale * rx, scale * ry, scale * rz, np.cos(half)
     x, y, z, w = four(state.rotation)
-    qx = ew * x + ex * w + ey * z - ez * y
-    qy = ew * y - ex * z + ey * w + ez * x
-    qz = ew * z + ex * y - ey * x + ez * w
-    qw = ew * w - ex * x - ey * y - ez * z
+    qx, qy, qz, qw = product(ex, ey, ez, ew, x, y, z, w)
     length = np.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
     state.rotation[0], state.rotation[1] = qx / length, qy / length
     state.rotation[2], state.rotation[3] = qz / length, qw / length
