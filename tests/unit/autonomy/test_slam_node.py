@@ -21,8 +21,8 @@ from slam_bench import (
 )  # fmt: skip
 
 from volery.autonomy.slam.health import Health
+from volery.autonomy.slam.match import Match
 from volery.autonomy.slam.slam_node import Slam
-from volery.autonomy.slam.tracker import Match
 from volery.core.errors import NodeError
 
 WOODS = trunks()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from volery.autonomy.slam.tracker import MANY, MISFIT, Tracker
+from volery.autonomy.slam.match import MANY, MISFIT
+from volery.autonomy.slam.tracker import Tracker
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.keyframes import Keyframe
+from volery.autonomy.slam.local_maps import Maps
 from volery.autonomy.slam.matching_kernels import UPRIGHT
 from volery.autonomy.slam.pose_graph import Edge, between, compose
 from volery.autonomy.slam.relocation_kernels import draw, draw_maps, refine, search
 from volery.autonomy.slam.settings import Matching
-from volery.autonomy.slam.tracker import Maps
 
 Array = NDArray[np.float64]
 

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import BA, BG, STATES, G, P, Q, V, move, observe
+from volery.autonomy.slam.local_maps import Maps
 from volery.autonomy.slam.matching_kernels import carry_along
 from volery.autonomy.slam.recovery_kernels import find_attitude, find_place
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-
-if TYPE_CHECKING:
-    from volery.autonomy.slam.tracker import Maps
 
 Array = NDArray[np.float64]
 

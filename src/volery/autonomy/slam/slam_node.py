@@ -16,7 +16,8 @@ from volery.autonomy.slam.inertial_kernels import BG, G, V
 from volery.autonomy.slam.keyframes import levelling
 from volery.autonomy.slam.level_odometry import LevelOdometry
 from volery.autonomy.slam.settings import ImuNoise, Matching
-from volery.autonomy.slam.tracker import Sweep, Tracker
+from volery.autonomy.slam.sweep import Sweep
+from volery.autonomy.slam.tracker import Tracker
 from volery.autonomy.slam.way import Way
 from volery.core import rotations
 from volery.core.clock import NS_PER_S

@@ -1,8 +1,9 @@
-"""From a sweep's ranges to points in the body as it is now, each beam from where it was cast."""
+"""Sweeps of a LIDAR: their returns in the body as it is now, each beam from where it was cast."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,45 @@ from volery.core.rotation_kernels import rotate_vector
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]
+
+
+class Sweep(NamedTuple):
+    """One scan of a planar LIDAR, and how its mount nods."""
+
+    name: str
+    first_ns: int
+    beam_ns: float
+    angle_min: float
+    angle_step: float
+    ranges: NDArray[np.float32]
+    mount: Array
+    nod: float = 0.0
+    last_nod: float = 0.0
+
+    @property
+    def last_ns(self) -> int:
+        """When the last beam was cast."""
+        return self.first_ns + round(self.beam_ns * (len(self.ranges) - 1))
+
+    def points(self, nearest_m: float, reach_m: float, times: Times, states: Array) -> Array:
+        """Returns (K, 3) between two distances, m in the body at the newest state; see `unskew`."""
+        points = np.empty((len(self.ranges), 3))
+        count = unskew(
+            self.ranges, nearest_m, reach_m, self.angle_min, self.angle_step, self.first_ns,
+            self.beam_ns, self.nod, self.last_nod, self.mount, times, states, points,
+        )  # fmt: skip
+        return points[:count]
+
+
+class Seen(NamedTuple):
+    """Returns of a sweep as the filter has taken them in."""
+
+    points: Array
+    """(K, 3) m in the frame of the odometry."""
+    kinds: NDArray[np.int8]
+    """(K,) what they are of; see `matching_kernels`."""
+    is_drawn: bool
+    """Whether it was from a new place, and what stood there entered the map."""
 
 
 @kernel

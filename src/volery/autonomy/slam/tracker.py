@@ -8,27 +8,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.slam.ground_kernels import GROUND_CELLS
-from volery.autonomy.slam.inertial_kernels import (
-    BG,
-    STATE_NUMBERS,
-    STATES,
-    G,
-    P,
-    Q,
-    V,
-    move,
-    observe,
-    remember,
-)
-from volery.autonomy.slam.keyframes import Level, turn_of_heading
+from volery.autonomy.slam.inertial_kernels import STATE_NUMBERS, STATES, P, Q, V, move, remember
+from volery.autonomy.slam.local_maps import Maps
+from volery.autonomy.slam.match import Match, judged
 from volery.autonomy.slam.matching_kernels import (
     broad_plane,
     carry_along,
@@ -38,9 +25,9 @@ from volery.autonomy.slam.matching_kernels import (
     update,
 )
 from volery.autonomy.slam.recovery import GAP_S, Recovery
-from volery.autonomy.slam.settings import GRAVITY_M_S2, ImuNoise, Matching
-from volery.autonomy.slam.sweep import unskew
-from volery.autonomy.slam.upright_kernels import CELLS, LAYERS
+from volery.autonomy.slam.settings import ImuNoise, Matching
+from volery.autonomy.slam.standing import Rest, first_covariance, first_state, hold_still
+from volery.autonomy.slam.sweep import Seen, Sweep
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back
@@ -51,13 +38,6 @@ Array = NDArray[np.float64]
 
 _KEPT = 64
 """IMU readings by whose states beams are placed: 0.3 s at 200 Hz."""
-_STILL = 100
-"""Readings over which standing still is judged: 0.5 s at 200 Hz."""
-IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
-_SETTLING = 2_000
-"""Readings over which a turn before it stands still is followed: 10 s at 200 Hz."""
-_STILL_GYRO, _STILL_ACCEL = 0.02, 0.25
-"""Most standard deviation of readings at rest, rad/s, m/s^2: four times the ADIS16448's."""
 _STANDING_M_S, _STANDING_NS = 0.3, 2 * NS_PER_S
 """Who believes to be slower, or is near the ground for so long, and is quiet, stands."""
 _SHOCK_M_S2 = 30.0
@@ -68,73 +48,6 @@ _DRAWN_M = 0.1
 """What stands is drawn from places that are known so well."""
 _RECENT_NS = NS_PER_S
 """A reading of the sonar that is younger tells where the ground is."""
-MANY, MISFIT = 15.0, 0.25
-"""Returns from which on their share says something, and how far below the usual one is too low.
-
-Where much comes into sight for the first time the share falls to half of the usual one, where
-nothing is as it was to a twentieth (recorded flights).
-"""
-_USUAL_S = 10.0
-"""Time over which what is usual changes (modelling choices)."""
-
-
-class Sweep(NamedTuple):
-    """One scan of a planar LIDAR, and how its mount nods."""
-
-    name: str
-    first_ns: int
-    beam_ns: float
-    angle_min: float
-    angle_step: float
-    ranges: NDArray[np.float32]
-    mount: Array
-    nod: float = 0.0
-    last_nod: float = 0.0
-
-    @property
-    def last_ns(self) -> int:
-        """When the last beam was cast."""
-        return self.first_ns + round(self.beam_ns * (len(self.ranges) - 1))
-
-
-class Seen(NamedTuple):
-    """Returns of a sweep as the filter has taken them in."""
-
-    points: Array
-    """(K, 3) m in the frame of the odometry."""
-    kinds: NDArray[np.int8]
-    """(K,) what they are of; see `matching_kernels`."""
-    is_drawn: bool
-    """Whether it was from a new place, and what stood there entered the map."""
-
-
-@dataclass
-class Match:
-    """What the newest sweep of a LIDAR said."""
-
-    time_ns: int = 0
-    met: float = 0.0
-    """Uprights of the map that were met again, each by how well."""
-    seen: float = 0.0
-    """Returns that should have met one."""
-    ground: float = 0.0
-    usual: float = 0.0
-    """Share of the returns that lately met something again."""
-
-    @property
-    def fits(self) -> bool:
-        """Whether about as much is met again as is usual."""
-        return self.seen < MANY or self.met >= MISFIT * self.usual * self.seen
-
-
-class Maps:
-    """What has been seen around the vehicle: uprights, and the ground."""
-
-    def __init__(self) -> None:
-        self.upright_keys = np.full((CELLS, CELLS, LAYERS), -1, np.int64)
-        self.cells = np.zeros((CELLS, CELLS, LAYERS, 6), np.float32)
-        self.ground_keys = np.full((GROUND_CELLS, GROUND_CELLS), -1, np.int64)
-        self.sums = np.zeros((GROUND_CELLS, GROUND_CELLS, 9))
 
 
 class Tracker:
@@ -147,7 +60,7 @@ class Tracker:
     _STATE = (
         "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "standing_height",
         "travelled_m", "recovery", "_times", "_states", "_imu", "_waiting", "_maps", "_inserted",
-        "_still", "settling", "_turns", "_broad", "_near_ground_ns", "_low_since_ns", "_range",
+        "_rest", "settling", "_broad", "_near_ground_ns", "_low_since_ns", "_range",
         "_standing_ns", "_is_high", "refused",
     )  # fmt: skip
 
@@ -171,10 +84,8 @@ class Tracker:
         self._waiting: deque[Sweep] = deque()
         self._maps = Maps()
         self._inserted: dict[str, tuple[int, Array, float]] = {}
-        self._still: deque[tuple[Array, Array]] = deque(maxlen=_STILL)
-        self._turns: deque[tuple[int, Array]] = deque(maxlen=_SETTLING)
-        """Times and rates of turn before it has begun."""
-        self.settling = IDENTITY.copy()
+        self._rest = Rest()
+        self.settling = rotations.IDENTITY.copy()
         """How it turned on its feet from the first reading on, (4,) in its own axes."""
         self._broad = np.zeros(6)
         self._near_ground_ns: int | None = None
@@ -216,9 +127,9 @@ class Tracker:
             self.refused += 1
             return []
         before, self._imu = self._imu, (time_ns, gyro, accel)
-        self._still.append((gyro, accel))
+        self._rest.add(gyro, accel)
         if not self.is_ready:
-            self._turns.append((time_ns, gyro))
+            self._rest.add_turn(time_ns, gyro)
             self._try_to_begin(time_ns)
             return []
         if before is not None:
@@ -273,61 +184,25 @@ class Tracker:
 
     # ---------------------------------------------------------------------------------- standing
 
-    def _is_quiet(self) -> bool:
-        if len(self._still) < _STILL:
-            return False
-        gyro = np.array([reading[0] for reading in self._still])
-        accel = np.array([reading[1] for reading in self._still])
-        return bool(
-            gyro.std(axis=0).max() < _STILL_GYRO
-            and accel.std(axis=0).max() < _STILL_ACCEL
-            and abs(np.linalg.norm(accel.mean(axis=0)) - GRAVITY_M_S2) < 1.0
-            and np.linalg.norm(gyro.mean(axis=0)) < 0.1
-        )
-
     def _try_to_begin(self, time_ns: int) -> None:
-        if self._is_high or not self._is_quiet():
+        if self._is_high or not self._rest.is_quiet():
             return
-        up = np.mean([reading[1] for reading in self._still], axis=0)
-        roll = math.atan2(up[1], up[2])
-        pitch = math.atan2(-up[0], math.hypot(up[1], up[2]))
-        attitude = rotations.from_rpy(roll, pitch, 0.0)
-        self.settling = self._turned_before()
-        heading = turn_of_heading(Level(IDENTITY, 0.0), attitude, self.settling)
-        attitude = rotations.from_rpy(roll, pitch, float(self.start[3]) + heading)
-        self.state[:] = 0.0
-        self.state[:3], self.state[Q : Q + 4] = self.start[:3], attitude
-        self.state[G + 2] = -GRAVITY_M_S2
-        n = self.imu_noise
-        sigma = np.array(
-            [1e-3] * 3 + [0.01] * 3 + [1e-4] * 3
-            + [n.gyro_turn_on_rad_s] * 3 + [n.accel_turn_on_m_s2] * 3 + [2e-3] * 2
-        )  # fmt: skip
-        mixing, turn = np.eye(STATES), rotations.matrix(attitude)
-        mixing[15, 12:15] = turn[1] / GRAVITY_M_S2  # a bias looks like a tilt
-        mixing[16, 12:15] = -turn[0] / GRAVITY_M_S2
-        spread = mixing * sigma
-        self.covariance[:] = spread @ spread.T
-        self._times[:] = time_ns - np.arange(_KEPT)[::-1] * 1_000_000
-        self._states[:] = self.state
+        self.settling = self._rest.turned_before()
+        self.state[:] = first_state(self.start, self._rest.mean_accel(), self.settling)
+        turn = rotations.matrix(self.state[Q : Q + 4])
+        self.covariance[:] = first_covariance(self.imu_noise, turn)
+        self._stay(time_ns)
         self.is_ready = self.is_standing = True
-        self._standing_ns = time_ns
         normal = turn[:, 2]
         x, y, z = self.start[:3] - self.standing_height * normal
         self._broad[:] = (z, -normal[0] / normal[2], -normal[1] / normal[2], x, y, z)
         seed_ground(self._maps.ground_keys, self._maps.sums, float(x), float(y), float(z))
 
-    def _turned_before(self) -> Array:
-        """How it has turned since the first reading, (4,) in its own axes."""
-        if len(self._turns) == _SETTLING:
-            return IDENTITY.copy()
-        bias = np.mean([reading[0] for reading in list(self._still)[_STILL // 2 :]], axis=0)
-        turned = IDENTITY.copy()
-        for (before, first), (after, last) in pairwise(self._turns):
-            turn = (0.5 * (first + last) - bias) * ((after - before) / NS_PER_S)
-            turned = rotations.multiply(turned, rotations.exponential(turn))
-        self._turns.clear()
-        return turned
+    def _stay(self, time_ns: int) -> None:
+        """Let it have been here for all the time that states are kept."""
+        self._standing_ns = time_ns
+        self._times[:] = time_ns - np.arange(_KEPT)[::-1] * 1_000_000
+        self._states[:] = self.state
 
     def _keep_still(self, time_ns: int) -> None:
         """While it stands its velocity is zero, and the gyroscope tells its bias."""
@@ -339,20 +214,11 @@ class Tracker:
             self._near_ground_ns is not None
             and (long or norm(self.state[V : V + 3]) < _STANDING_M_S)
         )
-        self.is_standing = low and self._is_quiet()
-        if not self.is_standing:
+        self.is_standing = low and self._rest.is_quiet()
+        if self.is_standing:
+            hold_still(self.state, self.covariance, self._rest.mean_gyro(), self.imu_noise)
+        else:
             self.has_flown = True
-            return
-        gyro = np.mean([reading[0] for reading in self._still], axis=0)
-        n = self.imu_noise
-        for i in range(3):
-            row = np.zeros(STATES)
-            row[3 + i] = 1.0
-            observe(self.state, self.covariance, row, -float(self.state[V + i]), 0.01**2)
-            row = np.zeros(STATES)
-            row[9 + i] = 1.0
-            innovation = float(gyro[i] - self.state[BG + i])
-            observe(self.state, self.covariance, row, innovation, 10.0 * n.gyro_rad_s_sqrt_hz**2)
 
     # ------------------------------------------------------------------------------------ sweeps
 
@@ -362,20 +228,14 @@ class Tracker:
         if sweep.first_ns < self._times[0] or in_gap:
             self.refused += 1
             return None
-        points = np.empty((len(sweep.ranges), 3))
-        count = unskew(
-            sweep.ranges, m.nearest_m, m.reach_m, sweep.angle_min, sweep.angle_step,
-            sweep.first_ns, sweep.beam_ns, sweep.nod, sweep.last_nod, sweep.mount,
-            self._times, self._states, points,
-        )  # fmt: skip
-        points = points[:count]
+        points = sweep.points(m.nearest_m, m.reach_m, self._times, self._states)
         if self.is_astray and not self.recovery.find(
             self.state, self.covariance, self._states, self._maps, points
         ):
             return None
         maps, slope = self._maps, self._broad[1:3].copy()
         known = broad_plane(self.state, maps.ground_keys, maps.sums, 6, slope, self._broad)
-        kinds, planes = np.empty(count, np.int8), np.zeros((count, 3))
+        kinds, planes = np.empty(len(points), np.int8), np.zeros((len(points), 3))
         self._classify(points, kinds, planes, known)
         told, information = np.zeros(4), np.zeros((6, 6))
         before = self.state.copy()
@@ -384,7 +244,7 @@ class Tracker:
             m.upright_sigma_m**2, m.ground_sigma_m**2, m.trust, m.rounds, information, told,
         )  # fmt: skip
         carry_along(self._states, before, self.state)
-        self.match[sweep.name] = self._judged(sweep.name, told)
+        self.match[sweep.name] = judged(told, self.match.get(sweep.name), self.time_ns)
         is_drawn = self._draw(sweep, points, kinds)
         turned = moved_points(points, self.state[Q : Q + 4], self.state[:3])
         return Seen(turned, kinds, is_drawn)
@@ -392,18 +252,6 @@ class Tracker:
     def _classify(self, points: Array, kinds: NDArray[np.int8], planes: Array, known: int) -> None:
         maps = self._maps
         classify(points, self.state, maps.ground_keys, maps.sums, self._broad, known, kinds, planes)
-
-    def _judged(self, name: str, told: Array) -> Match:
-        """What a sweep said, beside what it usually says."""
-        before = self.match.get(name)
-        found = Match(self.time_ns, float(told[0]), float(told[1]), float(told[2]))
-        if before is not None:
-            found.usual = before.usual
-            if found.seen >= MANY and found.fits:
-                passed = (self.time_ns - before.time_ns) / NS_PER_S
-                share = found.met / found.seen
-                found.usual += min(passed / _USUAL_S, 1.0) * (share - found.usual)
-        return found
 
     def _draw(self, sweep: Sweep, points: Array, kinds: NDArray[np.int8]) -> bool:
         """Let returns enter the map; uprights only of sweeps from a new place, or after a while."""
@@ -438,12 +286,10 @@ class Tracker:
         """Go on from here at another time; what waits is given up."""
         self._imu = None
         self._waiting.clear()
-        self._still.clear()
+        self._rest.forget()
         self._near_ground_ns = self._low_since_ns = self._range = None
-        self._standing_ns = time_ns
         self.recovery = Recovery()
-        self._times[:] = time_ns - np.arange(_KEPT)[::-1] * 1_000_000
-        self._states[:] = self.state
+        self._stay(time_ns)
 
     def begin_anew(self, speed_sigma: float, turn_sigma: float) -> None:
         """Forget the maps, and follow the motion in new ones.

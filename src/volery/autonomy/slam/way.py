@@ -19,7 +19,8 @@ from volery.autonomy.slam.keyframes import (
 from volery.autonomy.slam.loop_closing import LoopCloser
 from volery.autonomy.slam.pose_graph import Edge, compose, load_gtsam, optimised
 from volery.autonomy.slam.settings import Matching
-from volery.autonomy.slam.tracker import Seen, Tracker
+from volery.autonomy.slam.sweep import Seen
+from volery.autonomy.slam.tracker import Tracker
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back

@@ -1,0 +1,120 @@
+"""Standing still: how the IMU tells of it, and what its readings tell then."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.inertial_kernels import BG, STATE_NUMBERS, STATES, G, P, Q, V, observe
+from volery.autonomy.slam.keyframes import Level, turn_of_heading
+from volery.autonomy.slam.settings import GRAVITY_M_S2, ImuNoise
+from volery.core import rotations
+from volery.core.clock import NS_PER_S
+
+Array = NDArray[np.float64]
+
+_STILL = 100
+"""Readings over which standing still is judged: 0.5 s at 200 Hz."""
+_SETTLING = 2_000
+"""Readings over which a turn before it stands still is followed: 10 s at 200 Hz."""
+_STILL_GYRO, _STILL_ACCEL = 0.02, 0.25
+"""Most standard deviation of readings at rest, rad/s, m/s^2: four times the ADIS16448's."""
+
+
+class Rest:
+    """The newest readings of the IMU, and how it turned before it first stood still."""
+
+    def __init__(self) -> None:
+        self._newest: deque[tuple[Array, Array]] = deque(maxlen=_STILL)
+        self._turns: deque[tuple[int, Array]] = deque(maxlen=_SETTLING)
+        """Times and rates of turn before it has begun."""
+
+    def add(self, gyro: Array, accel: Array) -> None:
+        """Take in a reading, rad/s and m/s^2, body axes."""
+        self._newest.append((gyro, accel))
+
+    def add_turn(self, time_ns: int, gyro: Array) -> None:
+        """Take in a rate of turn for `turned_before`."""
+        self._turns.append((time_ns, gyro))
+
+    def forget(self) -> None:
+        """Judge by later readings alone."""
+        self._newest.clear()
+
+    def is_quiet(self) -> bool:
+        """Whether the newest readings are those of something that stands, or hovers."""
+        if len(self._newest) < _STILL:
+            return False
+        gyro = np.array([reading[0] for reading in self._newest])
+        accel = np.array([reading[1] for reading in self._newest])
+        return bool(
+            gyro.std(axis=0).max() < _STILL_GYRO
+            and accel.std(axis=0).max() < _STILL_ACCEL
+            and abs(np.linalg.norm(accel.mean(axis=0)) - GRAVITY_M_S2) < 1.0
+            and np.linalg.norm(gyro.mean(axis=0)) < 0.1
+        )
+
+    def mean_gyro(self) -> Array:
+        """Mean rate of turn (3,), rad/s."""
+        return np.asarray(np.mean([reading[0] for reading in self._newest], axis=0))
+
+    def mean_accel(self) -> Array:
+        """Mean specific force (3,), m/s^2, which is up."""
+        return np.asarray(np.mean([reading[1] for reading in self._newest], axis=0))
+
+    def turned_before(self) -> Array:
+        """How it has turned since the first reading, (4,) in its own axes."""
+        if len(self._turns) == _SETTLING:
+            return rotations.IDENTITY.copy()
+        bias = np.mean([reading[0] for reading in list(self._newest)[_STILL // 2 :]], axis=0)
+        turned = rotations.IDENTITY.copy()
+        for (before, first), (after, last) in pairwise(self._turns):
+            turn = (0.5 * (first + last) - bias) * ((after - before) / NS_PER_S)
+            turned = rotations.multiply(turned, rotations.exponential(turn))
+        self._turns.clear()
+        return turned
+
+
+def first_state(start: Array, up: Array, settling: Array) -> Array:
+    """State (19,) of who stands at `start` (4,) and feels the force `up` (3,).
+
+    `settling` (4,): how it has turned, in its own axes, since its yaw was that of `start`.
+    """
+    roll = math.atan2(up[1], up[2])
+    pitch = math.atan2(-up[0], math.hypot(up[1], up[2]))
+    attitude = rotations.from_rpy(roll, pitch, 0.0)
+    heading = turn_of_heading(Level(rotations.IDENTITY, 0.0), attitude, settling)
+    state = np.zeros(STATE_NUMBERS)
+    state[P : P + 3] = start[:3]
+    state[Q : Q + 4] = rotations.from_rpy(roll, pitch, float(start[3]) + heading)
+    state[G + 2] = -GRAVITY_M_S2
+    return state
+
+
+def first_covariance(noise: ImuNoise, turn: Array) -> Array:
+    """Covariance (17, 17) of a `first_state`; `turn` (3, 3) is the matrix of its attitude."""
+    sigma = np.array(
+        [1e-3] * 3 + [0.01] * 3 + [1e-4] * 3
+        + [noise.gyro_turn_on_rad_s] * 3 + [noise.accel_turn_on_m_s2] * 3 + [2e-3] * 2
+    )  # fmt: skip
+    mixing = np.eye(STATES)
+    mixing[15, 12:15] = turn[1] / GRAVITY_M_S2  # a bias looks like a tilt
+    mixing[16, 12:15] = -turn[0] / GRAVITY_M_S2
+    spread = mixing * sigma
+    return np.asarray(spread @ spread.T)
+
+
+def hold_still(state: Array, covariance: Array, gyro: Array, noise: ImuNoise) -> None:
+    """Of who stands the velocity is zero, and the mean rate `gyro` (3,) is the bias."""
+    for i in range(3):
+        row = np.zeros(STATES)
+        row[3 + i] = 1.0
+        observe(state, covariance, row, -float(state[V + i]), 0.01**2)
+        row = np.zeros(STATES)
+        row[9 + i] = 1.0
+        innovation = float(gyro[i] - state[BG + i])
+        observe(state, covariance, row, innovation, 10.0 * noise.gyro_rad_s_sqrt_hz**2)
