@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.control import impulses
-from volery.control.belief import new_beliefs
 from volery.control.commands import FleetCommands
 from volery.control.estimator.errors import EstimationError
 from volery.control.fleet_events import FleetEvent, event_of
+from volery.control.fleet_rows import begun_anew, checked_modes, checked_plants, new_uavs, one_each
 from volery.control.flight_modes import FlightMode
 from volery.control.gains import STANDARD_RATES, ControlRates
 from volery.control.model_table import (
@@ -33,9 +33,8 @@ from volery.control.setpoints import (
     checked,
     checked_attitude,
     checked_within,
-    new_pilots,
 )
-from volery.control.step import EVENT, EVENTS_A_STEP, UAV, advance_fleet
+from volery.control.step import EVENT, EVENTS_A_STEP, advance_fleet
 from volery.core.clock import NS_PER_S, s_from_ns
 from volery.core.errors import CommandError
 from volery.core.rows import Rows
@@ -44,12 +43,10 @@ from volery.vehicle.airframe import Airframe, hover_thrusts
 from volery.vehicle.contact import steepest_cosine
 from volery.vehicle.downwash import new_jets
 from volery.vehicle.fleet import (
-    NEVER,
     FleetState,
     RotorTurns,
     charge_battery,
     fit_rotors,
-    new_bodies,
     state_of,
 )
 from volery.vehicle.plants import RIGID_BODY, Plant, RigidBody
@@ -109,34 +106,24 @@ class Fleet(FleetCommands):
         position = checked("position_map", position_map, (count, 3), MAX_COORDINATE)
         attitude = checked("attitude", attitude, (count, 4), 1.1)
         attitude = np.array([checked_attitude(q) for q in attitude])
-        modes = _checked_modes(mode, count)
-        plants = _checked_plants(plants, count)
+        modes = checked_modes(mode, count)
+        plants = checked_plants(plants, count)
 
         names = tuple(names or (f"UAV {i}" for i in range(count)))
         worn = checked_wear(names, airframes, wear)
-        charge = checked_within("battery_charge", _each(battery_charge, count), (count,), 1.0)
-        models, rows = model_table(airframes, plants, worn, dt_ns / NS_PER_S, control)
-        uavs = np.zeros(count, UAV)
-        uavs["body"] = new_bodies(position, attitude)
-        uavs["pilot"] = new_pilots(attitude)
-        uavs["model"] = rows
-        uavs["copy"] = checked("copies", _each(copies, count), (count,), 2**31)
-        uavs["belief"] = new_beliefs(count)
-        uavs["turbulence"] = new_turbulence(seed, names)
-        super().__init__(tuple(airframes), plants, names, uavs, dt_ns / NS_PER_S)
-        self._models = models
+        charge = checked_within("battery_charge", one_each(battery_charge, count), (count,), 1.0)
+        dt = dt_ns / NS_PER_S
+        self._models, rows = model_table(airframes, plants, worn, dt, control)
+        uavs = new_uavs(position, attitude, rows, copies, seed, names)
+        super().__init__(tuple(airframes), plants, names, uavs, dt)
         self._jets = new_jets(count)
-        self._fit_out(worn, charge)
-        weight = np.array([airframe.weight for airframe in airframes])
-        flying = np.array([start is FlightMode.HOLD for start in modes])
-        self._references = new_references(models, attitude, weight * flying)
-        self._all_rigid = bool((models["kind"] == RIGID_BODY).all())
+        self._all_rigid = bool((self._models["kind"] == RIGID_BODY).all())
         self._dt_ns = int(dt_ns)
         self._bounce = on_contact == "bounce"
         self._periods = (
-            control.guidance_steps(self._dt),
-            control.attitude_steps(self._dt),
-            control.air_steps(self._dt),
+            control.guidance_steps(dt),
+            control.attitude_steps(dt),
+            control.air_steps(dt),
         )
         self._events = np.zeros(max(256, 2 * EVENTS_A_STEP * count), EVENT)
         self._drained: list[FleetEvent] = []
@@ -147,13 +134,9 @@ class Fleet(FleetCommands):
         self._air_nodes = nodes_of(weather.field)
         self.state: FleetState = state_of(self._bodies)
         self.history: PoseHistory = new_history(position, attitude, self._dt_ns)
-        self._pilots["home"] = position
         self.set_command_timeout(DEFAULT_TIMEOUT_S)
-        for i, start in enumerate(modes):
-            if start is FlightMode.HOLD:
-                self._start_in_air(i)
-            else:
-                self._bodies["last_contact_step"][i] = 0
+        self._fit_out(worn, charge)
+        self._begin(modes)
 
     @property
     def dt_ns(self) -> int:
@@ -401,14 +384,10 @@ class Fleet(FleetCommands):
         otherwise there.
         """
         start_rows = rows if start_rows is None else start_rows
-        fresh = start["uavs"][start_rows].copy()
+        air_tick = self.step // self._periods[2]
+        fresh = begun_anew(start["uavs"][start_rows], self.step, air_tick)
         fresh["model"] = self._uavs["model"][rows]
         fresh["turbulence"]["key"] = self._uavs["turbulence"]["key"][rows]
-        fresh["turbulence"]["first_tick"] = self.step // self._periods[2]
-        for part, name in (("pilot", "deadline_step"), ("pilot", "start_step")):
-            fresh[part][name] += self.step
-        touched = fresh["body"]["last_contact_step"] > NEVER
-        fresh["body"]["last_contact_step"][touched] += self.step
         self._uavs[rows] = fresh
         self.history.position[:, rows] = start["position"][0, start_rows]
         self.history.attitude[:, rows] = start["attitude"][0, start_rows]
@@ -446,6 +425,17 @@ class Fleet(FleetCommands):
             charge_battery(self._bodies[i], plant, float(charge[i]))
             self._pilots["full_thrust"][i] = self.airframes[i].max_rotor_thrust
 
+    def _begin(self, modes: Sequence[FlightMode]) -> None:
+        """Let UAVs be in their first modes where they are, which is their home."""
+        flying = np.array([mode is FlightMode.HOLD for mode in modes])
+        weight = np.array([airframe.weight for airframe in self.airframes])
+        attitude = self._bodies["attitude"]
+        self._references = new_references(self._models, attitude, weight * flying)
+        self._pilots["home"] = self._bodies["position_map"]
+        self._bodies["last_contact_step"][~flying] = 0
+        for i in np.flatnonzero(flying):
+            self._start_in_air(int(i))
+
     def _begin_anew(self, i: int, in_air: bool) -> None:
         """Let the controllers of UAV `i` begin from its present motion."""
         self._wake(i)
@@ -474,22 +464,3 @@ class Fleet(FleetCommands):
             for row in (i,) if j is None else (i, j):
                 self._wake(row)
         return size
-
-
-def _each(value: ArrayLike, count: int) -> ArrayLike:
-    """One value a UAV, where one stands for all."""
-    return value if np.ndim(value) else np.full(count, value)
-
-
-def _checked_modes(mode: FlightMode | Sequence[FlightMode], count: int) -> list[FlightMode]:
-    modes = [mode] * count if isinstance(mode, FlightMode) else list(mode)
-    if len(modes) != count or not set(modes) <= {FlightMode.HOLD, FlightMode.LANDED}:
-        raise CommandError("a UAV starts in HOLD or LANDED, one mode for all or one for each")
-    return modes
-
-
-def _checked_plants(plants: Plant | Sequence[Plant], count: int) -> tuple[Plant, ...]:
-    plants = tuple(plants) if isinstance(plants, Sequence) else (plants,) * count
-    if len(plants) != count:
-        raise CommandError(f"there are {len(plants)} plants for {count} UAVs")
-    return plants
