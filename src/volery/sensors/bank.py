@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
+from volery.sensors.noise import NoiseStreams
 from volery.sensors.samples import Samples, SensorId
 
 
@@ -80,6 +81,59 @@ class Memoryless:
         k: int,
     ) -> None:
         """Nothing to put back."""
+
+
+class NoisyBank:
+    """A bank whose sensors have noise streams, and may remember something between measurements.
+
+    `keys` (S,) are the streams, or None for sensors without noise; `NoiseStreams` explains
+    `at_start` and `per_measurement`. What the sensors remember is arrays (S, ...), attributes that
+    a bank names in `_KEPT` and puts back in `_switch_on`: keeping, restoring and resetting follow.
+    """
+
+    _KEPT: ClassVar[tuple[str, ...]] = ()
+
+    def __init__(
+        self,
+        schedule: Schedule,
+        sensors: tuple[SensorId, ...],
+        keys: NDArray[np.uint64] | None,
+        *,
+        at_start: int = 0,
+        per_measurement: int = 0,
+    ) -> None:
+        self.schedule = schedule
+        self.sensors = sensors
+        self._rows = uav_rows(sensors)
+        self._noise = NoiseStreams(
+            keys, len(sensors), at_start=at_start, per_measurement=per_measurement
+        )
+
+    def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:
+        """Put what the sensors `rows` remember back to what it is at their start, `time_ns`."""
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps: noise streams, and copies of what the sensors remember."""
+        kept = {name.lstrip("_"): getattr(self, name).copy() for name in self._KEPT}
+        return {"noise": self._noise.get_state(), **kept}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._noise.set_state(state["noise"])
+        for name in self._KEPT:
+            setattr(self, name, np.array(state[name.lstrip("_")]))
+
+    def reset(
+        self,
+        uavs: NDArray[np.int64] | None,
+        keys: NDArray[np.uint64] | None,
+        time_ns: int,
+        k: int,
+    ) -> None:
+        """Give the sensors of some UAVs fresh noise and switch them on; see `Bank.reset`."""
+        rows = rows_of(self._rows, uavs)
+        self._noise.restart(rows, keys, k)
+        self._switch_on(rows, time_ns)
 
 
 def uav_rows(sensors: Sequence[SensorId]) -> NDArray[np.int64]:

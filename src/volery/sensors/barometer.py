@@ -7,7 +7,6 @@ of the scenario's origin plus z.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +15,9 @@ from pydantic import NonNegativeFloat, PositiveFloat
 from volery.control.fleet import Fleet
 from volery.core import atmosphere, rotations
 from volery.core.clock import NS_PER_S, Schedule
-from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.bank import NoisyBank
 from volery.sensors.model import SensorModel, load_model
-from volery.sensors.noise import NoiseStreams, gauss_markov_of_sigma
+from volery.sensors.noise import gauss_markov_of_sigma
 from volery.sensors.samples import PressureReadings, SensorId, owned
 
 Array = NDArray[np.float64]
@@ -39,7 +38,7 @@ def load_barometer_model(name: str, folder: Path | None = None) -> BarometerMode
     return load_model(BarometerModel, "barometer", name, folder)
 
 
-class BarometerBank:
+class BarometerBank(NoisyBank):
     """All barometers of one model, rate and phase.
 
     `position_body` (S, 3) m places each sensor in its body (FLU); `keys` (S,) are the noise
@@ -49,6 +48,7 @@ class BarometerBank:
 
     name = "barometer"
     lag_ns = 0
+    _KEPT = ("_drift",)
 
     def __init__(
         self,
@@ -59,13 +59,10 @@ class BarometerBank:
         keys: NDArray[np.uint64] | None,
         origin_altitude_m: float,
     ) -> None:
-        self.schedule = schedule
-        self.sensors = sensors
+        super().__init__(schedule, sensors, keys, at_start=1, per_measurement=2)
         self._model = model
-        self._rows = uav_rows(sensors)
         self._position_body = position_body
         self._origin_altitude = origin_altitude_m
-        self._noise = NoiseStreams(keys, len(sensors), at_start=1, per_measurement=2)
         self._wander = gauss_markov_of_sigma(
             model.drift_pa, model.drift_correlation_s, schedule.period_ns / NS_PER_S
         )
@@ -87,23 +84,6 @@ class BarometerBank:
             self._model.noise_pa**2 if self._noise.enabled else 0.0,
         )
 
-    def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
-        return {"noise": self._noise.get_state(), "drift": self._drift.copy()}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
-        self._noise.set_state(state["noise"])
-        self._drift = np.array(state["drift"])
-
-    def reset(
-        self,
-        uavs: NDArray[np.int64] | None,
-        keys: NDArray[np.uint64] | None,
-        time_ns: int,  # noqa: ARG002
-        k: int,
-    ) -> None:
-        """Give the sensors of some UAVs fresh noise and drift; see `Bank.reset`."""
-        rows = rows_of(self._rows, uavs)
-        self._noise.restart(rows, keys, k)
+    def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:  # noqa: ARG002
+        """With a drift drawn afresh."""
         self._drift[rows] = self._wander.sigma * self._noise.start()[rows, 0]

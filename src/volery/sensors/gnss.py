@@ -7,7 +7,6 @@ PX4's Gazebo classic. The drift goes on while a fix is lost.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +17,10 @@ from volery.core import rotations
 from volery.core.clock import NS_PER_S, Schedule, ns_from_s
 from volery.core.errors import CommandError, DataFileError
 from volery.core.geodesy import LocalFrame
-from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.bank import NoisyBank, rows_of
 from volery.sensors.denial import NOWHERE, Denial
 from volery.sensors.model import SensorModel, load_model
-from volery.sensors.noise import NoiseStreams, gauss_markov_of_sigma
+from volery.sensors.noise import gauss_markov_of_sigma
 from volery.sensors.samples import GnssReadings, SensorId, owned
 from volery.vehicle.pose_history import KEPT_NS, PoseHistory, pose_at
 
@@ -54,7 +53,7 @@ def load_gnss_model(name: str, folder: Path | None = None) -> GnssModel:
     return load_model(GnssModel, "GNSS", name, folder)
 
 
-class GnssBank:
+class GnssBank(NoisyBank):
     """All receivers of one model, rate and phase.
 
     `position_body` (S, 3) m places each antenna in its body (FLU); `keys` (S,) are the noise
@@ -63,6 +62,7 @@ class GnssBank:
     """
 
     name = "gnss"
+    _KEPT = ("_drift", "_fix_from_ns", "_denied_from_ns", "_denied_until_ns")
 
     def __init__(
         self,
@@ -74,8 +74,7 @@ class GnssBank:
         frame: LocalFrame,
         denial: Denial = NOWHERE,
     ) -> None:
-        self.schedule = schedule
-        self.sensors = sensors
+        super().__init__(schedule, sensors, keys, at_start=3, per_measurement=9)
         self.lag_ns = ns_from_s(model.delay_s)
         if self.lag_ns > _LONGEST_DELAY_NS:
             raise DataFileError(
@@ -84,10 +83,8 @@ class GnssBank:
             )
         self._frame = frame
         self._denial = denial
-        self._rows = uav_rows(sensors)
         self._lever_body = position_body
         self._reacquisition_ns = ns_from_s(model.reacquisition_s)
-        self._noise = NoiseStreams(keys, len(sensors), at_start=3, per_measurement=9)
         self._white = _east_north_up(model.horizontal_noise_m, model.vertical_noise_m)
         self._velocity_noise = _east_north_up(
             model.horizontal_velocity_noise_m_s, model.vertical_velocity_noise_m_s
@@ -139,34 +136,8 @@ class GnssBank:
         self._denied_from_ns[rows] = since_ns
         self._denied_until_ns[rows] = until_ns
 
-    def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
-        return {
-            "noise": self._noise.get_state(),
-            "drift": self._drift.copy(),
-            "fix_from_ns": self._fix_from_ns.copy(),
-            "denied_from_ns": self._denied_from_ns.copy(),
-            "denied_until_ns": self._denied_until_ns.copy(),
-        }
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
-        self._noise.set_state(state["noise"])
-        self._drift = np.array(state["drift"])
-        self._fix_from_ns = np.array(state["fix_from_ns"])
-        self._denied_from_ns = np.array(state["denied_from_ns"])
-        self._denied_until_ns = np.array(state["denied_until_ns"])
-
-    def reset(
-        self,
-        uavs: NDArray[np.int64] | None,
-        keys: NDArray[np.uint64] | None,
-        time_ns: int,  # noqa: ARG002
-        k: int,
-    ) -> None:
-        """Start the receivers of some UAVs anew, with a fix at once; see `Bank.reset`."""
-        rows = rows_of(self._rows, uavs)
-        self._noise.restart(rows, keys, k)
+    def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:  # noqa: ARG002
+        """With fresh drift and a fix at once."""
         self._drift[rows] = (self._wander.sigma * self._noise.start())[rows]
         self._fix_from_ns[rows] = 0
         self._denied_from_ns[rows] = FOREVER_NS

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +16,10 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core.clock import NS_PER_S, Schedule
-from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.bank import NoisyBank
 from volery.sensors.inertial_kernels import feel_motion
 from volery.sensors.model import SensorModel, load_model
-from volery.sensors.noise import NoiseStreams, gauss_markov
+from volery.sensors.noise import gauss_markov
 from volery.sensors.samples import ImuReadings, SensorId, owned
 
 Array = NDArray[np.float64]
@@ -49,7 +48,7 @@ def load_imu_model(name: str, folder: Path | None = None) -> ImuModel:
     return load_model(ImuModel, "IMU", name, folder)
 
 
-class ImuBank:
+class ImuBank(NoisyBank):
     """All IMUs of one model, rate and phase.
 
     `position_body` (S, 3) m and `attitude_body` (S, 4) place each sensor frame in its body (FLU);
@@ -58,6 +57,7 @@ class ImuBank:
 
     name = "imu"
     lag_ns = 0
+    _KEPT = ("_bias", "_turn_on_bias", "_warm_up_bias", "_start_ns")
 
     def __init__(
         self,
@@ -68,13 +68,9 @@ class ImuBank:
         attitude_body: Array,
         keys: NDArray[np.uint64] | None,
     ) -> None:
-        self.schedule = schedule
-        self.sensors = sensors
-        self._model = model
-        self._rows = uav_rows(sensors)
+        super().__init__(schedule, sensors, keys, at_start=12, per_measurement=12)
         self._position_body = position_body
         self._body_from_sensor = attitude_body
-        self._noise = NoiseStreams(keys, len(sensors), at_start=12, per_measurement=12)
         dt = schedule.period_ns / NS_PER_S
         self._white = _axes(
             model.gyro_noise_density_rad_s_sqrt_hz, model.accel_noise_density_m_s2_sqrt_hz
@@ -122,36 +118,6 @@ class ImuBank:
             float(self._white[0] ** 2),
             float(self._white[3] ** 2),
         )
-
-    def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
-        return {
-            "noise": self._noise.get_state(),
-            "bias": self._bias.copy(),
-            "turn_on_bias": self._turn_on_bias.copy(),
-            "warm_up_bias": self._warm_up_bias.copy(),
-            "start_ns": self._start_ns.copy(),
-        }
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
-        self._noise.set_state(state["noise"])
-        self._bias = np.array(state["bias"])
-        self._turn_on_bias = np.array(state["turn_on_bias"])
-        self._warm_up_bias = np.array(state["warm_up_bias"])
-        self._start_ns = np.array(state["start_ns"])
-
-    def reset(
-        self,
-        uavs: NDArray[np.int64] | None,
-        keys: NDArray[np.uint64] | None,
-        time_ns: int,
-        k: int,
-    ) -> None:
-        """Switch the sensors of some UAVs off and on again; see `Bank.reset`."""
-        rows = rows_of(self._rows, uavs)
-        self._noise.restart(rows, keys, k)
-        self._switch_on(rows, time_ns)
 
     def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:
         drawn = self._noise.start()[rows]

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
 from volery.core.errors import DataFileError
-from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.bank import NoisyBank
 from volery.sensors.lidar import make_batch, sample_echoes, stack_mounts
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
@@ -23,7 +21,7 @@ from volery.world.weather import CLEAR_AIR, Particles
 _LONGEST_SWEEP_NS = KEPT_NS - 10_000_000
 
 
-class LidarBank:
+class LidarBank(NoisyBank):
     """One batch of rays for all LIDARs that are due; `keys` (S,) are their noise streams, or None.
 
     A scan is known when its sweep has ended: it is sampled `lag_ns` after its first beam, from the
@@ -49,25 +47,20 @@ class LidarBank:
                 f"LIDAR model '{model.name}': a sweep may take "
                 f"{_LONGEST_SWEEP_NS / 1e9} s at most, not {model.sweep_duration_ns / 1e9}"
             )
-        self.schedule = schedule
-        self.sensors = sensors
+        super().__init__(schedule, sensors, keys)
         self.lag_ns = model.sweep_duration_ns
         self._model = model if keys is not None else model.without_noise()
-        self._has_noise = keys is not None
-        self._keys = np.zeros(len(sensors), np.uint64) if keys is None else keys.copy()
         self._scene = scene
         self._intensities = intensities
-        self._rows = uav_rows(sensors)
-        self._first_scan = np.zeros(len(sensors), np.int64)
         self._mounts = stack_mounts(mounts)
         self._particles: Particles = CLEAR_AIR
         self._air: ParticleTable | None = None
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> LidarScans:
         """Scan number k of all LIDARs of the bank; `time_ns` is that of the first beam."""
-        numbers = k - self._first_scan if self._model.scan.is_fixed else k
+        numbers = k - self._noise.first_k if self._model.scan.is_fixed else k
         batch = make_batch(
-            self._rows, np.arange(len(self._rows)), time_ns, self._keys, numbers, self._mounts
+            self._rows, np.arange(len(self._rows)), time_ns, self._noise.keys, numbers, self._mounts
         )
         echoes = sample_echoes(
             self._scene,
@@ -93,25 +86,3 @@ class LidarBank:
             self._air = None if clear else particle_table(self._model, particles)
             self._particles = particles
         return self._air
-
-    def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
-        return {"keys": self._keys.copy(), "first_scan": self._first_scan.copy()}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
-        self._keys = np.array(state["keys"])
-        self._first_scan = np.array(state["first_scan"])
-
-    def reset(
-        self,
-        uavs: NDArray[np.int64] | None,
-        keys: NDArray[np.uint64] | None,
-        time_ns: int,  # noqa: ARG002
-        k: int,
-    ) -> None:
-        """Let the LIDARs of some UAVs begin anew with scan number `k`; see `Bank.reset`."""
-        rows = rows_of(self._rows, uavs)
-        self._first_scan[rows] = k
-        if keys is not None and self._has_noise:
-            self._keys[rows] = keys

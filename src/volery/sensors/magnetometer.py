@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +11,10 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core.clock import NS_PER_S, Schedule
-from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.bank import NoisyBank
 from volery.sensors.inertial_kernels import feel_vector
 from volery.sensors.model import SensorModel, load_model
-from volery.sensors.noise import NoiseStreams, gauss_markov
+from volery.sensors.noise import gauss_markov
 from volery.sensors.samples import MagneticReadings, SensorId, owned
 
 Array = NDArray[np.float64]
@@ -40,7 +39,7 @@ def load_magnetometer_model(name: str, folder: Path | None = None) -> Magnetomet
     return load_model(MagnetometerModel, "magnetometer", name, folder)
 
 
-class MagnetometerBank:
+class MagnetometerBank(NoisyBank):
     """All magnetometers of one model, rate and phase.
 
     `attitude_body` (S, 4) turns each sensor frame against its body (FLU); `keys` (S,) are the noise
@@ -49,6 +48,7 @@ class MagnetometerBank:
 
     name = "magnetometer"
     lag_ns = 0
+    _KEPT = ("_bias",)
 
     def __init__(
         self,
@@ -59,14 +59,11 @@ class MagnetometerBank:
         keys: NDArray[np.uint64] | None,
         field_map: Array,
     ) -> None:
-        self.schedule = schedule
-        self.sensors = sensors
-        self._rows = uav_rows(sensors)
+        super().__init__(schedule, sensors, keys, per_measurement=6)
         self._body_from_sensor = attitude_body
         self._field_map = field_map
         self._hard_iron = np.array(model.hard_iron_t)
         self._soft_iron = np.array(model.soft_iron)
-        self._noise = NoiseStreams(keys, len(sensors), per_measurement=6)
         dt = schedule.period_ns / NS_PER_S
         self._white = model.noise_density_t_sqrt_hz / math.sqrt(dt)
         self._wander = gauss_markov(model.random_walk_t_s_sqrt_hz, model.bias_correlation_s, dt)
@@ -89,23 +86,6 @@ class MagnetometerBank:
             self._white**2 if self._noise.enabled else 0.0,
         )
 
-    def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
-        return {"noise": self._noise.get_state(), "bias": self._bias.copy()}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
-        self._noise.set_state(state["noise"])
-        self._bias = np.array(state["bias"])
-
-    def reset(
-        self,
-        uavs: NDArray[np.int64] | None,
-        keys: NDArray[np.uint64] | None,
-        time_ns: int,  # noqa: ARG002
-        k: int,
-    ) -> None:
-        """Give the sensors of some UAVs fresh noise, without a bias; see `Bank.reset`."""
-        rows = rows_of(self._rows, uavs)
-        self._noise.restart(rows, keys, k)
+    def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:  # noqa: ARG002
+        """Without a bias."""
         self._bias[rows] = 0.0

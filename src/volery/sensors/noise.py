@@ -19,7 +19,9 @@ class NoiseStreams:
     Row i draws from stream `keys[i]`: first `at_start` numbers for what is settled when the sensor
     is switched on, then `per_measurement` for each measurement. What measurement k draws follows
     from its key and from how many measurements lie between it and the sensor's start, not from
-    other rows or earlier calls. Without `keys` all numbers are zero.
+    other rows or earlier calls. Without `keys` all numbers are zero. Kernels that draw by
+    themselves, those of LIDARs and cameras, take `keys` (S,) and what is counted from `first_k`
+    (S,), the number of each sensor's first measurement.
     """
 
     def __init__(
@@ -28,21 +30,21 @@ class NoiseStreams:
         sensors: int,
         *,
         at_start: int = 0,
-        per_measurement: int,
+        per_measurement: int = 0,
     ) -> None:
         self.enabled = keys is not None
-        self._keys = np.zeros(sensors, np.uint64) if keys is None else np.array(keys, np.uint64)
-        self._first_k = np.zeros(sensors, np.int64)
+        self.keys = np.zeros(sensors, np.uint64) if keys is None else np.array(keys, np.uint64)
+        self.first_k = np.zeros(sensors, np.int64)
         self._at_start = at_start
         self._per_measurement = per_measurement
 
     def start(self) -> Array:
         """Numbers settled at the start, (S, at_start)."""
-        return self._draw(np.zeros_like(self._first_k), self._at_start)
+        return self._draw(np.zeros_like(self.first_k), self._at_start)
 
     def measurement(self, k: int) -> Array:
         """Numbers of measurement k, (S, per_measurement)."""
-        since_start = k - self._first_k
+        since_start = k - self.first_k
         return self._draw(
             self._at_start + self._per_measurement * since_start, self._per_measurement
         )
@@ -50,25 +52,26 @@ class NoiseStreams:
     def restart(self, rows: NDArray[np.int64], keys: NDArray[np.uint64] | None, k: int) -> None:
         """Let `rows` (R,) draw at measurement k as a fresh sensor does at its first one.
 
-        `keys` (R,) are their streams from now on; None keeps the present ones.
+        `keys` (R,) are their streams from now on; None keeps the present ones, and sensors without
+        noise ignore them.
         """
-        self._first_k[rows] = k
-        if keys is not None:
-            self._keys[rows] = keys
+        self.first_k[rows] = k
+        if keys is not None and self.enabled:
+            self.keys[rows] = keys
 
     def get_state(self) -> dict[str, Any]:
         """Keys and starts."""
-        return {"keys": self._keys.copy(), "first_k": self._first_k.copy()}
+        return {"keys": self.keys.copy(), "first_k": self.first_k.copy()}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Go back to a kept state."""
-        self._keys = np.array(state["keys"], np.uint64)
-        self._first_k = np.array(state["first_k"], np.int64)
+        self.keys = np.array(state["keys"], np.uint64)
+        self.first_k = np.array(state["first_k"], np.int64)
 
     def _draw(self, counters: NDArray[np.int64], numbers: int) -> Array:
-        out = np.zeros((len(self._keys), numbers))
+        out = np.zeros((len(self.keys), numbers))
         if self.enabled:
-            rng.fill_normal_rows(self._keys, counters, out)
+            rng.fill_normal_rows(self.keys, counters, out)
         return out
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +12,9 @@ from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.clock import Schedule
 from volery.core.rows import in_one_piece
-from volery.sensors.bank import Memoryless, rows_of, uav_rows
+from volery.sensors.bank import Memoryless, NoisyBank, uav_rows
 from volery.sensors.inertial_kernels import body_twists
 from volery.sensors.model import SensorModel, load_model
-from volery.sensors.noise import NoiseStreams
 from volery.sensors.samples import OdometryReadings, SensorId, owned
 
 Array = NDArray[np.float64]
@@ -39,7 +37,7 @@ def load_odometry_model(name: str, folder: Path | None = None) -> OdometryModel:
     return load_model(OdometryModel, "odometry", name, folder)
 
 
-class OdometryBank:
+class OdometryBank(NoisyBank):
     """All odometry sources of one model, rate and phase.
 
     Each step of the way is added as the source sees it: turned by its yaw error so far, plus a
@@ -60,12 +58,9 @@ class OdometryBank:
         keys: NDArray[np.uint64] | None,
         fleet: Fleet,
     ) -> None:
-        self.schedule = schedule
-        self.sensors = sensors
-        self._rows = uav_rows(sensors)
+        super().__init__(schedule, sensors, keys, per_measurement=_NUMBERS_A_SAMPLE)
         self._taken = in_one_piece(self._rows)
         self._fleet = fleet
-        self._noise = NoiseStreams(keys, len(sensors), per_measurement=_NUMBERS_A_SAMPLE)
         horizontal, vertical = model.horizontal_drift_m_sqrt_m, model.vertical_drift_m_sqrt_m
         self._drift = np.array([horizontal, horizontal, vertical, model.yaw_drift_rad_sqrt_m])
         self._twist_noise = np.repeat([model.velocity_noise_m_s, model.rate_noise_rad_s], 3)
@@ -106,27 +101,8 @@ class OdometryBank:
             is_ground_truth=False,
         )
 
-    def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
-        kept = {name.lstrip("_"): getattr(self, name).copy() for name in self._KEPT}
-        return {"noise": self._noise.get_state(), **kept}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
-        self._noise.set_state(state["noise"])
-        for name in self._KEPT:
-            setattr(self, name, np.array(state[name.lstrip("_")]))
-
-    def reset(
-        self,
-        uavs: NDArray[np.int64] | None,
-        keys: NDArray[np.uint64] | None,
-        time_ns: int,  # noqa: ARG002
-        k: int,
-    ) -> None:
-        """Let the odometry of some UAVs begin where they are now; see `Bank.reset`."""
-        rows = rows_of(self._rows, uavs)
-        self._noise.restart(rows, keys, k)
+    def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:  # noqa: ARG002
+        """Where their UAVs are now."""
         self._yaw_error[rows] = 0.0
         self._flown[rows] = 0.0
         self._position_odom[rows] = self._fleet.state.position_map[self._rows[rows]]

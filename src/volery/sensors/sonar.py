@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,8 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.clock import Schedule
-from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.bank import NoisyBank
 from volery.sensors.model import SensorModel, load_model
-from volery.sensors.noise import NoiseStreams
 from volery.sensors.samples import RangeReadings, SensorId, owned
 from volery.world.scene import Scene
 
@@ -40,7 +38,7 @@ def load_sonar_model(name: str, folder: Path | None = None) -> SonarModel:
     return load_model(SonarModel, "sonar", name, folder)
 
 
-class SonarBank:
+class SonarBank(NoisyBank):
     """All sonars of one model, rate and phase; they look along their frame's x axis.
 
     `position_body` (S, 3) m and `attitude_body` (S, 4) place each sensor frame in its body (FLU);
@@ -60,14 +58,11 @@ class SonarBank:
         keys: NDArray[np.uint64] | None,
         scene: Scene,
     ) -> None:
-        self.schedule = schedule
-        self.sensors = sensors
+        super().__init__(schedule, sensors, keys, per_measurement=1)
         self._model = model
         self._scene = scene
-        self._rows = uav_rows(sensors)
         self._position_body = position_body
         self._body_from_sensor = attitude_body
-        self._noise = NoiseStreams(keys, len(sensors), per_measurement=1)
         rounding = model.resolution_m**2 / 12.0
         self._variance = model.noise_m**2 + rounding if self._noise.enabled else 0.0
         self._cone = _cone_directions(math.radians(model.field_of_view_deg) / 2.0)
@@ -103,24 +98,6 @@ class SonarBank:
             self._model.range_max_m,
             self._variance,
         )
-
-    def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
-        return {"noise": self._noise.get_state()}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
-        self._noise.set_state(state["noise"])
-
-    def reset(
-        self,
-        uavs: NDArray[np.int64] | None,
-        keys: NDArray[np.uint64] | None,
-        time_ns: int,  # noqa: ARG002
-        k: int,
-    ) -> None:
-        """Give the sensors of some UAVs fresh noise; see `Bank.reset`."""
-        self._noise.restart(rows_of(self._rows, uavs), keys, k)
 
 
 def _cone_directions(half_angle: float) -> Array:

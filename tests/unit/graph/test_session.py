@@ -203,12 +203,12 @@ def test_what_cannot_be_is_refused(bench, attempt, words):
 
 def test_nothing_is_lost_or_doubled_while_clients_come_and_go(bench):
     publisher = bench.graph.advertise("/out", STRING, latched=True)
-    stop, trouble = threading.Event(), []
+    stop, trouble, most = threading.Event(), [], 3000
 
     def visit():
         while not stop.is_set():
             session = bench.gateway.open("visitor")
-            mailbox = session.subscribe("/out", STRING, depth=1000, wake=quiet)
+            mailbox = session.subscribe("/out", STRING, depth=most, wake=quiet)
             numbers = [int(text) for text in texts(mailbox)]
             session.close()
             numbers += [int(text) for text in texts(mailbox)]
@@ -218,7 +218,7 @@ def test_nothing_is_lost_or_doubled_while_clients_come_and_go(bench):
     threads = [threading.Thread(target=visit) for _ in range(3)]
     for thread in threads:
         thread.start()
-    for k in range(3000):
+    for k in range(most):
         publisher.publish(String(str(k)))
         bench.graph.deliver()
     stop.set()

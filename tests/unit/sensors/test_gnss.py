@@ -169,6 +169,13 @@ def test_a_denial_reaches_no_other_uav():
     np.testing.assert_array_equal(bank.sample(0, 0, fleet).has_fix, [True, False])
 
 
+def test_receivers_without_noise_ignore_new_streams():
+    bank = gnss_bank(2)
+    fresh = bank.get_state()
+    bank.reset(None, keys_of(2), 0, 0)
+    np.testing.assert_equal(bank.get_state(), fresh)
+
+
 def test_noise_is_the_same_after_a_loss():
     fleet = fleet_of()
     free, denied = gnss_bank(noise=True), gnss_bank(noise=True)

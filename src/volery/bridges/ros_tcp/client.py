@@ -13,13 +13,11 @@ from __future__ import annotations
 
 import asyncio
 import socket
-import threading
 from collections import deque
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import Any
 
 from volery.bridges.doors import wake_of
+from volery.bridges.remote_client import RemoteClient
 from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.client_line import Line
 from volery.bridges.ros_tcp.client_services import ClientServices
@@ -28,18 +26,17 @@ from volery.bridges.ros_tcp.dial import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUS
 from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.wire import Frame, FrameParser, Generation, number_field
-from volery.core.errors import BridgeError, GraphError, UnreachableError
-from volery.graph.mailbox import Mailbox, Wake
-from volery.graph.qos import DEFAULT_DEPTH
+from volery.core.errors import BridgeError, GraphError
 from volery.graph.reply import Reply
-from volery.graph.session import Handler, SessionInfo
+from volery.graph.session import SessionInfo
 
 MOST_COMPLAINTS = 100
-_LIST_TIMEOUT_S = 5.0
 
 
-class RosTcpClient:
+class RosTcpClient(RemoteClient):
     """One program's part in a remote graph. All methods may be called by any thread.
+
+    `close` sends what waits before it leaves.
 
     Parameters
     ----------
@@ -61,6 +58,12 @@ class RosTcpClient:
 
     """
 
+    _PROTOCOL = "ROS-TCP"
+    _SERVER = "endpoint"
+
+    _topics: ClientTopics
+    _services: ClientServices
+
     def __init__(
         self,
         host: str = "127.0.0.1",
@@ -74,47 +77,17 @@ class RosTcpClient:
         if not 1 <= port <= 65535:
             raise BridgeError(f"ROS-TCP: port must be 1 to 65535, not {port}")
         payloads_of(generation)
-        self.name = name
+        super().__init__(name, f"[{host}]:{port}" if ":" in host else f"{host}:{port}")
         self._address = (host, port)
         self._generation: Generation = generation
         self._handshake_s = handshake_s
-        self._loop = asyncio.new_event_loop()
         self._line = Line(wake_of(self._loop, self._flush))
         self._topics = ClientTopics(self._line)
         self._services = ClientServices(self._line)
         self._body: tuple[str, int] | None = None
         self._pipe: Pipe | None = None
         self._complaints: deque[str] = deque(maxlen=MOST_COMPLAINTS)
-        self._connected = threading.Event()
-        self._why = "no answer"
-        self._connections = 0
-        self._closed = False
-        self._main = self._loop.create_task(self._keep_connected())
-        self._thread = threading.Thread(target=self._run, name=f"{name}-ros-tcp", daemon=True)
-        self._thread.start()
-        if connect_timeout_s:
-            try:
-                self.wait_until_connected(connect_timeout_s)
-            except BridgeError:
-                self.close()
-                raise
-
-    # --------------------------------------------------------------------------------- connection
-
-    @property
-    def connected(self) -> bool:
-        """Whether the endpoint is there at the moment."""
-        return self._connected.is_set()
-
-    @property
-    def connections(self) -> int:
-        """How often it has been connected."""
-        return self._connections
-
-    def wait_until_connected(self, timeout_s: float) -> None:
-        """Wait for the endpoint. `BridgeError` where it does not answer in time."""
-        if not self._connected.wait(timeout_s):
-            raise UnreachableError(f"nobody speaks ROS-TCP at {self._where}: {self._why}")
+        self._start(connect_timeout_s)
 
     @property
     def trouble(self) -> tuple[str, ...]:
@@ -126,124 +99,28 @@ class RosTcpClient:
         """Publications that found no connection, or too slow a one."""
         return self._line.dropped
 
-    # ------------------------------------------------------------------------------------ topics
-
-    def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
-        """Announce that messages will be published on `topic`. `GraphError` for a wrong type."""
-        self._check_open()
-        self._topics.advertise(topic, msgtype, latched)
-
-    def unadvertise(self, topic: str) -> None:
-        """Publish on `topic` no more. `GraphError` if it did not."""
-        self._topics.unadvertise(topic, self.name)
-
-    def published_type(self, topic: str) -> str | None:
-        """Type that was announced for `topic`; None if it was not."""
-        return self._topics.published_type(topic)
-
-    def publish(self, topic: str, message: Any) -> None:
-        """Publish a message of the announced type.
-
-        Without a connection it is dropped; of what the network is too slow for, the oldest.
-        """
-        self._check_open()
-        self._topics.publish(topic, message, self.name)
-
-    def subscribe(
-        self,
-        topic: str,
-        msgtype: str | None = None,
-        *,
-        depth: int = DEFAULT_DEPTH,
-        reliable: bool = False,
-        wake: Wake,
-    ) -> Mailbox:
-        """Begin to receive `topic`; without a type the endpoint is asked for it.
-
-        `wake` is called from the client's thread when a message comes to an empty mailbox.
-        """
-        self._check_open()
-        if msgtype is None:
-            msgtype = self.topic_types().get(topic)
-            if msgtype is None:
-                raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
-        return self._topics.subscribe(topic, msgtype, depth, reliable, wake)
-
-    def unsubscribe(self, mailbox: Mailbox) -> None:
-        """Receive no more; what waits can still be taken."""
-        self._topics.unsubscribe(mailbox)
-
-    def topic_types(self) -> dict[str, str]:
-        """Topics of the graph and their types, by name. `GraphError` where no answer comes."""
-        if threading.current_thread() is self._thread:
-            raise GraphError("give a type: the client's own thread cannot wait for the endpoint")
-        found: Future[dict[str, str]] = Future()
-        self._topics.ask_list(Reply(found.set_result, found.set_exception))
-        try:
-            return found.result(_LIST_TIMEOUT_S)
-        except FutureTimeoutError:
-            raise GraphError(f"the endpoint at {self._where} tells no topics") from None
-
-    # ---------------------------------------------------------------------------------- services
-
-    def call(self, service: str, request: Any | None, reply: Reply) -> None:
-        """Call a service; `reply` gets the response or a `GraphError` in the client's thread.
-
-        Calls that are open when the connection breaks fail.
-        """
-        self._check_open()
-        self._services.call(service, request, reply)
-
-    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
-        """Offer a service; `handler(request, reply)` is called in the client's thread."""
-        self._check_open()
-        self._services.offer(service, srvtype, handler)
-
-    def withdraw(self, service: str) -> None:
-        """Offer a service no more. `GraphError` if it was not offered."""
-        self._services.withdraw(service, self.name)
-
-    # --------------------------------------------------------------------------------------- end
-
-    def close(self) -> None:
-        """Leave, once what waits is sent; a second time nothing happens."""
-        if self._closed:
-            return
-        self._closed = True
-        self._loop.call_soon_threadsafe(self._leave)
-        if threading.current_thread() is not self._thread:
-            self._thread.join()
-
     @property
     def info(self) -> SessionInfo:
         """What the client does at present."""
-        publishes, mailboxes = self._topics.info
+        with self._line.lock:
+            publishes, mailboxes = self._topics.announced, self._topics.mailboxes
         return SessionInfo(self.name, publishes, mailboxes, self._services.offered)
 
-    @property
-    def _where(self) -> str:
-        host, port = self._address
-        return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    def topic_types(self) -> dict[str, str]:
+        """Topics of the graph and their types, by name. `GraphError` where no answer comes."""
+        return self._ask(
+            lambda found: self._topics.ask_list(Reply(found.set_result, found.set_exception)),
+            f"the endpoint at {self._where} tells no topics",
+        )
 
-    def _check_open(self) -> None:
-        if self._closed:
-            raise GraphError(f"{self.name} has left")
+    def _type_of(self, topic: str) -> str | None:
+        return self.topic_types().get(topic)
 
     # ------------------------------------------------------------------------------- its thread
 
-    def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        try:
-            self._loop.run_until_complete(self._main)
-        except asyncio.CancelledError:
-            pass
-        finally:
-            self._lose(f"{self.name} has left")
-            self._loop.close()
-
     def _leave(self) -> None:
         if self._pipe is None:
-            self._main.cancel()
+            super()._leave()
         else:
             self._pipe.finish()
 
@@ -310,13 +187,11 @@ class RosTcpClient:
         """The endpoint can be spoken to: ask for everything."""
         with self._line.lock:
             self._line.begin(generation, features)
-            self._topics.repeat()
+            self._topics.repeat_topics()
             self._services.repeat()
-        self._connections += 1
-        self._connected.set()
+        self._joined()
 
-    def _lose(self, why: str) -> None:
-        self._connected.clear()
+    def _drop(self, why: str) -> None:
         self._line.lose()
         self._topics.lose(why)
         self._services.lose(why)

@@ -14,6 +14,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any
 
+from volery.bridges.remote_topics import RemoteTopics, Subscription
 from volery.bridges.rosbridge.cbor_form import encode_cbor
 from volery.bridges.rosbridge.forms import Generation
 from volery.bridges.rosbridge.fragments import Assembly
@@ -28,9 +29,8 @@ from volery.bridges.rosbridge.wire import (
 from volery.core.errors import GraphError, VoleryError
 from volery.graph.json_decoding import decode_plain
 from volery.graph.json_form import JsonForm
-from volery.graph.mailbox import Mailbox, Wake
-from volery.graph.messages import Published, stamp_of, typestore
-from volery.graph.qos import check_depth
+from volery.graph.mailbox import Wake
+from volery.graph.messages import typestore
 from volery.graph.reply import Reply
 from volery.graph.ros1_names import ros1_name, ros2_name
 from volery.graph.session import Handler, SessionInfo
@@ -39,14 +39,6 @@ MOST_WAITING = 1000
 """Publications that may wait for the network."""
 MOST_WAITING_BYTES = 64 * 1024 * 1024
 MOST_COMPLAINTS = 100
-
-
-@dataclass
-class _Topic:
-    msgtype: str
-    mailboxes: list[Mailbox] = field(default_factory=list)
-    depth: int = 1
-    reliable: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,7 +55,7 @@ class _Call:
     """Makes the response of its plain form."""
 
 
-class ClientState:
+class ClientState(RemoteTopics):
     """What a client wants of the server, and what is on its way.
 
     Parameters
@@ -76,11 +68,11 @@ class ClientState:
     """
 
     def __init__(self, token: str | None, wake: Wake, generation: Generation = "ros2") -> None:
+        super().__init__(threading.RLock(), _check_type)
         self.complaints: deque[str] = deque(maxlen=MOST_COMPLAINTS)
         self.dropped = 0
         self._token = token
         self._wake = wake
-        self._lock = threading.RLock()
         self._connected = False
         self._cbor = False
         self._ros1 = generation == "ros1"
@@ -88,8 +80,6 @@ class ClientState:
         self._typed = JsonForm(
             non_finite_as_null=False, ros1_names=self._ros1, arrays=lambda values, _type: values
         )
-        self._announced: dict[str, tuple[str, bool]] = {}
-        self._topics: dict[str, _Topic] = {}
         self._offers: dict[str, _Offer] = {}
         self._calls: dict[str, _Call] = {}
         self._orders: deque[Frame] = deque()
@@ -108,10 +98,7 @@ class ClientState:
             self._assembly = Assembly(MOST_MESSAGE_BYTES)
             if self._token is not None:
                 self._order({"op": "auth", "token": self._token})
-            for topic, (msgtype, latched) in self._announced.items():
-                self._order(self._advertisement(topic, msgtype, latched))
-            for name, topic_ in self._topics.items():
-                self._order(self._subscription(name, topic_))
+            self.repeat_topics()
             for service, offer in self._offers.items():
                 self._order(self._offering(service, offer.srvtype))
 
@@ -143,89 +130,13 @@ class ClientState:
     def info(self, name: str) -> SessionInfo:
         """What the client does at present."""
         with self._lock:
-            mailboxes = [m.info for topic in self._topics.values() for m in topic.mailboxes]
-            return SessionInfo(name, tuple(self._announced), tuple(mailboxes), tuple(self._offers))
+            return SessionInfo(name, self.announced, self.mailboxes, tuple(self._offers))
 
     def _order(self, operation: Operation) -> None:
         """Queue an operation if there is a connection; `begin` repeats what lasts."""
         if self._connected:
             self._orders.append(encode_json(operation))
             self._wake()
-
-    # ------------------------------------------------------------------------------------ topics
-
-    def advertise(self, topic: str, msgtype: str, latched: bool) -> None:
-        """Announce a topic."""
-        _check_type(msgtype)
-        with self._lock:
-            if self._announced.get(topic) != (msgtype, latched):
-                self._announced[topic] = (msgtype, latched)
-                self._order(self._advertisement(topic, msgtype, latched))
-
-    def unadvertise(self, topic: str, who: str) -> None:
-        """Take an announcement back."""
-        with self._lock:
-            if self._announced.pop(topic, None) is None:
-                raise GraphError(f"{who} does not publish '{topic}'")
-            self._order({"op": "unadvertise", "topic": topic})
-
-    def published_type(self, topic: str) -> str | None:
-        """Announced type of a topic."""
-        found = self._announced.get(topic)
-        return None if found is None else found[0]
-
-    def publish(self, topic: str, message: Any, who: str) -> None:
-        """Queue a publication."""
-        found = self._announced.get(topic)
-        if found is None:
-            raise GraphError(f"{who} has not advertised '{topic}'")
-        name = getattr(message, "__msgtype__", None)
-        if name != found[0]:
-            raise GraphError(f"topic '{topic}' carries {found[0]}, not {name}")
-        if not self._connected:
-            self.dropped += 1
-            return
-        form = self._typed if self._cbor else self._plain
-        operation = {"op": "publish", "topic": topic, "msg": form.encode(message, found[0])}
-        frame = encode_cbor(operation) if self._cbor else encode_json(operation)
-        with self._lock:
-            self._publications.append(frame)
-            self._publication_bytes += len(frame)
-            while (
-                len(self._publications) > MOST_WAITING
-                or self._publication_bytes > MOST_WAITING_BYTES
-            ):
-                self._publication_bytes -= len(self._publications.popleft())
-                self.dropped += 1
-        self._wake()
-
-    def subscribe(
-        self, topic: str, msgtype: str, depth: int, reliable: bool, wake: Wake
-    ) -> Mailbox:
-        """Begin to receive a topic."""
-        _check_type(msgtype)
-        check_depth(depth)
-        mailbox = Mailbox(topic, depth, wake, reliable=reliable)
-        with self._lock:
-            found = self._topics.setdefault(topic, _Topic(msgtype))
-            if found.msgtype != msgtype:
-                raise GraphError(f"topic '{topic}' carries {found.msgtype}, not {msgtype}")
-            found.mailboxes.append(mailbox)
-            found.depth = max(found.depth, depth)
-            found.reliable = found.reliable or reliable
-            self._order(self._subscription(topic, found))
-        return mailbox
-
-    def unsubscribe(self, mailbox: Mailbox) -> None:
-        """Receive no more."""
-        with self._lock:
-            found = self._topics.get(mailbox.topic)
-            if found is None or mailbox not in found.mailboxes:
-                return
-            found.mailboxes.remove(mailbox)
-            if not found.mailboxes:
-                del self._topics[mailbox.topic]
-                self._order({"op": "unsubscribe", "topic": mailbox.topic})
 
     # ---------------------------------------------------------------------------------- services
 
@@ -292,24 +203,48 @@ class ClientState:
     def _spelled(self, name: str) -> str:
         return ros1_name(name) if self._ros1 else name
 
-    def _advertisement(self, topic: str, msgtype: str, latched: bool) -> Operation:
-        spelled = self._spelled(msgtype)
-        return {"op": "advertise", "topic": topic, "type": spelled, "latch": latched}
-
     def _offering(self, service: str, srvtype: str) -> Operation:
         return {"op": "advertise_service", "service": service, "type": self._spelled(srvtype)}
 
-    def _subscription(self, name: str, topic: _Topic) -> Operation:
+    def _tell_advertised(self, topic: str, msgtype: str, latched: bool) -> None:
+        spelled = self._spelled(msgtype)
+        self._order({"op": "advertise", "topic": topic, "type": spelled, "latch": latched})
+
+    def _tell_unadvertised(self, topic: str) -> None:
+        self._order({"op": "unadvertise", "topic": topic})
+
+    def _tell_subscribed(self, topic: str, subscription: Subscription) -> None:
         operation: Operation = {
             "op": "subscribe",
-            "topic": name,
-            "type": self._spelled(topic.msgtype),
-            "queue_length": topic.depth,
+            "topic": topic,
+            "type": self._spelled(subscription.msgtype),
+            "queue_length": subscription.depth,
             "compression": "cbor",
         }
-        if topic.reliable:
+        if subscription.reliable:
             operation["qos"] = {"reliability": "reliable"}
-        return operation
+        self._order(operation)
+
+    def _tell_unsubscribed(self, topic: str) -> None:
+        self._order({"op": "unsubscribe", "topic": topic})
+
+    def _send(self, topic: str, message: Any, msgtype: str) -> None:
+        if not self._connected:
+            self.dropped += 1
+            return
+        form = self._typed if self._cbor else self._plain
+        operation = {"op": "publish", "topic": topic, "msg": form.encode(message, msgtype)}
+        frame = encode_cbor(operation) if self._cbor else encode_json(operation)
+        with self._lock:
+            self._publications.append(frame)
+            self._publication_bytes += len(frame)
+            while (
+                len(self._publications) > MOST_WAITING
+                or self._publication_bytes > MOST_WAITING_BYTES
+            ):
+                self._publication_bytes -= len(self._publications.popleft())
+                self.dropped += 1
+        self._wake()
 
     # ------------------------------------------------------------------------------------- input
 
@@ -323,7 +258,8 @@ class ClientState:
     def _handle(self, operation: Operation, now_s: float) -> None:
         op = operation["op"]
         if op == "publish":
-            self._deliver(operation)
+            topic = str(operation.get("topic"))
+            self._deliver(topic, lambda msgtype: decode_plain(operation.get("msg"), msgtype))
         elif op == "service_response":
             self._take_response(operation)
         elif op == "call_service":
@@ -336,17 +272,6 @@ class ClientState:
             self._handle(decode_png(operation, MOST_MESSAGE_BYTES), now_s)
         elif op == "status":
             self.complaints.append(str(operation.get("msg")))
-
-    def _deliver(self, operation: Operation) -> None:
-        with self._lock:
-            found = self._topics.get(str(operation.get("topic")))
-            mailboxes = tuple(found.mailboxes) if found else ()
-        if found is None:
-            return
-        message = decode_plain(operation.get("msg"), found.msgtype)
-        published = Published(str(operation["topic"]), found.msgtype, stamp_of(message), message)
-        for mailbox in mailboxes:
-            mailbox.put(published)
 
     def _take_response(self, operation: Operation) -> None:
         with self._lock:

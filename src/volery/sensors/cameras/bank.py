@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
 from volery.core.errors import DataFileError
-from volery.sensors.bank import rows_of, uav_rows
+from volery.sensors.bank import NoisyBank
 from volery.sensors.cameras.camera import EVERY_PART, Part, Pictures, take
 from volery.sensors.cameras.light import Light
 from volery.sensors.cameras.model import CameraModel
@@ -26,7 +26,7 @@ from volery.world.weather import Weather
 _LONGEST_READOUT_NS = KEPT_NS - 10_000_000
 
 
-class CameraBank:
+class CameraBank(NoisyBank):
     """Pictures of all cameras of the bank; `keys` (S,) are their noise streams, or None.
 
     A picture is known when its last row has been read out. Only what somebody wants is made, as
@@ -52,18 +52,13 @@ class CameraBank:
             )
         if not scene.compiled:
             raise DataFileError("cameras need Embree's library, which `volery doctor` looks for")
-        self.schedule = schedule
-        self.sensors = sensors
+        super().__init__(schedule, sensors, keys)
         self.lag_ns = model.readout_ns
         self.wants: Callable[[], Collection[Part]] = lambda: EVERY_PART
         """What of the pictures is wanted now."""
         self._model = model if keys is not None else model.without_noise()
-        self._has_noise = keys is not None
-        self._keys = np.zeros(len(sensors), np.uint64) if keys is None else keys.copy()
-        self._first = np.zeros(len(sensors), np.int64)
         self._scene = scene
         self._light_in = light_in
-        self._rows = uav_rows(sensors)
         self._mounts = stack_mounts(mounts)
 
     def is_wanted(self) -> bool:
@@ -76,8 +71,8 @@ class CameraBank:
             self._rows,
             np.arange(len(self._rows)),
             time_ns,
-            self._keys,
-            k - self._first,
+            self._noise.keys,
+            k - self._noise.first_k,
             self._mounts,
         )
         parts = self.wants() or EVERY_PART
@@ -93,28 +88,6 @@ class CameraBank:
             falling=falling_in(fleet.weather, light),
         )
         return CameraFrames(self.sensors, time_ns, self._model, **_arrays(pictures))
-
-    def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
-        return {"keys": self._keys.copy(), "first": self._first.copy()}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
-        self._keys = np.array(state["keys"])
-        self._first = np.array(state["first"])
-
-    def reset(
-        self,
-        uavs: NDArray[np.int64] | None,
-        keys: NDArray[np.uint64] | None,
-        time_ns: int,  # noqa: ARG002
-        k: int,
-    ) -> None:
-        """Let the cameras of some UAVs begin anew with picture number `k`; see `Bank.reset`."""
-        rows = rows_of(self._rows, uavs)
-        self._first[rows] = k
-        if keys is not None and self._has_noise:
-            self._keys[rows] = keys
 
 
 def _arrays(pictures: Pictures) -> dict[str, Any]:

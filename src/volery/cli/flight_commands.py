@@ -1,0 +1,279 @@
+"""Commands that fly: a scenario, one after the other for the page, a log, real autopilots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from volery.cli.guard import guarded
+from volery.cli.options import (
+    DomainOption,
+    DoorsOption,
+    DropOption,
+    InterfaceOption,
+    MavlinkKeyOption,
+    MiddlewareOption,
+    Px4DirOption,
+    RemoteOption,
+    Ros2Option,
+    SilenceOption,
+    ThreadsOption,
+    TokenOption,
+)
+from volery.core.errors import BridgeError
+
+
+@guarded
+def run(
+    scenario: Annotated[str, typer.Argument(help="Name from `volery list`, or a TOML file.")],
+    uavs: Annotated[int | None, typer.Option(help="Number of UAVs.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Simulated seconds to fly.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of everything random.")] = None,
+    no_nodes: Annotated[
+        bool,
+        typer.Option("--no-nodes", help="Without the scenario's nodes: they run elsewhere."),
+    ] = False,
+    speed: Annotated[
+        str | None,
+        typer.Option(help="Factor of real time, such as 1 or 2.5, or max; 1 where doors are open."),
+    ] = None,
+    threads: ThreadsOption = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Write a log: .mcap (ROS 2) or .bag (ROS 1).")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Write an illustrated report into this folder.")
+    ] = None,
+    door: DoorsOption = None,
+    allow_remote: RemoteOption = False,
+    token: TokenOption = None,
+    ros2: Ros2Option = False,
+    domain_id: DomainOption = None,
+    middleware: MiddlewareOption = "dds",
+    ros2_interface: InterfaceOption = None,
+    recordings: Annotated[
+        Path | None,
+        typer.Option(help="Folder in which clients may record: /volery/start_recording."),
+    ] = None,
+    replay_commands: Annotated[
+        Path | None,
+        typer.Option(help="Give every command again that clients gave in this recorded flight."),
+    ] = None,
+    digest: Annotated[
+        bool, typer.Option("--digest", help="Print the SHA-256 over all states and messages.")
+    ] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an existing log.")
+    ] = False,
+    page: Annotated[
+        str | None,
+        typer.Option(
+            metavar="[=HOST:PORT]",
+            help="Show the flight on a page in the browser; at 127.0.0.1:8080 unless said.",
+        ),
+    ] = None,
+    px4_dir: Px4DirOption = None,
+    autopilot_timeout: SilenceOption = 10.0,
+    drop_silent: DropOption = False,
+    mavlink_key: MavlinkKeyOption = None,
+) -> None:
+    """Fly a scenario.
+
+    Doors: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, ros2, ros2-zenoh,
+    sensor-link, comms, mavlink, mavlink-tcp, mavlink-serial, px4,
+    px4-serial, ardupilot.
+
+    At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
+    + and - double and halve the speed, m frees it. Ctrl-C ends the flight and still writes log and
+    report.
+    """
+    from volery.cli.run import RunOptions, fly, parse_speed
+
+    if middleware == "zenoh" and not ros2:
+        raise BridgeError("--middleware zenoh is of --ros2; without that, --door ros2-zenoh")
+    doors = (*(door or ()), *((("ros2" if middleware == "dds" else "ros2-zenoh"),) * ros2))
+    if px4_dir is not None and not any(text.partition("=")[0] == "px4" for text in doors):
+        doors = (*doors, "px4")
+    options = RunOptions(
+        scenario=scenario,
+        uavs=uavs,
+        seconds=seconds,
+        seed=seed,
+        nodes=not no_nodes,
+        speed=parse_speed(speed or ("1" if doors else "max")),
+        doors=doors,
+        domain_id=domain_id,
+        interfaces=tuple(ros2_interface or ()),
+        recordings=recordings,
+        allow_remote=allow_remote,
+        token=token,
+        threads=threads,
+        record=record,
+        report=report,
+        digest=digest,
+        overwrite=overwrite,
+        page=page,
+        replay_commands=replay_commands,
+        px4_dir=px4_dir,
+        autopilot_timeout_s=autopilot_timeout,
+        drop_silent=drop_silent,
+        mavlink_key=mavlink_key,
+    )
+    code = fly(options)
+    if code:
+        raise typer.Exit(code)
+
+
+@guarded
+def serve(
+    scenario: Annotated[
+        str | None,
+        typer.Argument(
+            help="Name from `volery list`, or a TOML file; hover for an hour unless given."
+        ),
+    ] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: a free one.")] = 8080,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    allow_remote: Annotated[
+        bool, typer.Option("--allow-remote", help="Listen beyond this machine.")
+    ] = False,
+    token: Annotated[
+        str | None,
+        typer.Option(
+            envvar="VOLERY_TOKEN", help="What pilots must show; needed with --allow-remote."
+        ),
+    ] = None,
+    viewer_token: Annotated[
+        str | None,
+        typer.Option(envvar="VOLERY_VIEWER_TOKEN", help="What those must show who only look on."),
+    ] = None,
+    origin: Annotated[
+        list[str] | None,
+        typer.Option(help="Let in pages of this origin too, such as that of a reverse proxy."),
+    ] = None,
+    recordings: Annotated[
+        Path, typer.Option(help="Folder for recordings; uploads go to its folder uploads.")
+    ] = Path("runs/recordings"),
+    uavs: Annotated[int | None, typer.Option(help="Number of UAVs of the first scenario.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Simulated seconds of the first scenario.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the first scenario.")] = None,
+    speed: Annotated[str, typer.Option(help="Factor of real time, or max.")] = "1",
+    threads: ThreadsOption = None,
+    door: DoorsOption = None,
+) -> None:
+    """Serve the page until Ctrl-C: one world after the other, as its visitors choose.
+
+    A scenario that ends stays there, paused at its end.
+    """
+    from volery.cli.run import RunOptions, parse_speed
+    from volery.cli.serve import ServeOptions, serve
+    from volery.server.rights import Tokens
+    from volery.server.settings import PageSettings
+
+    serve(
+        ServeOptions(
+            RunOptions(
+                scenario=scenario or "hover",
+                uavs=uavs,
+                seconds=3600.0 if scenario is None and seconds is None else seconds,
+                seed=seed,
+                speed=parse_speed(speed),
+                doors=tuple(door or ()),
+                recordings=recordings,
+                allow_remote=allow_remote,
+                token=token,
+                threads=threads,
+            ),
+            PageSettings(
+                host=host,
+                port=port,
+                tokens=Tokens(token, viewer_token),
+                anywhere=allow_remote,
+                origins=tuple(origin or ()),
+                recordings=recordings,
+                uploads=recordings / "uploads",
+            ),
+        )
+    )
+
+
+@guarded
+def play(
+    log: Annotated[Path, typer.Argument(help="A .mcap or .bag log.")],
+    speed: Annotated[str, typer.Option(help="Factor of real time, or max.")] = "1",
+    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
+    paused: Annotated[bool, typer.Option("--paused", help="Wait at the beginning.")] = False,
+    door: DoorsOption = None,
+    allow_remote: RemoteOption = False,
+    token: TokenOption = None,
+) -> None:
+    """Play a recorded log behind doors, rosbridge unless others are named, until Ctrl-C.
+
+    At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
+    + and - double and halve the speed, m frees it, comma and slash leap 5 s back and forward.
+    """
+    from volery.cli.playing import play as play_log
+    from volery.cli.run import RunOptions, parse_speed
+
+    options = RunOptions(
+        scenario="",
+        speed=parse_speed(speed),
+        doors=tuple(door or ()),
+        allow_remote=allow_remote,
+        token=token,
+    )
+    play_log(log, options, loop=loop, paused=paused)
+
+
+@guarded
+def list_scenarios() -> None:
+    """List the scenarios that ship."""
+    from volery.cli.listing import show_scenarios
+
+    show_scenarios()
+
+
+@guarded
+def px4(
+    px4_dir: Annotated[
+        Path, typer.Option(help="Of PX4-Autopilot, in which `make px4_sitl_default` was run.")
+    ],
+    count: Annotated[int, typer.Option(min=1, help="Instances, one for each UAV.")] = 1,
+    first: Annotated[int, typer.Option(min=0, help="Number of the first one.")] = 0,
+    host: Annotated[str, typer.Option(help="Where the simulation runs.")] = "127.0.0.1",
+    folder: Annotated[
+        Path | None, typer.Option(help="For parameters and logs, which else are not kept.")
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(min=0.01, help="Factor of real time, for PX4's time-outs.")
+    ] = None,
+) -> None:
+    """Run PX4s for a simulation with `--door px4`, until Ctrl-C.
+
+    Instance i flies the i-th UAV, counted from 0. After a reset of the simulation, and when a run
+    has ended, they begin anew and wait for it.
+    """
+    from volery.cli.px4 import run_px4
+
+    run_px4(px4_dir, count, first=first, host=host, folder=folder, speed=speed)
+
+
+@guarded
+def launch(
+    profile: Annotated[Path, typer.Argument(help="A .toml profile with \\[\\[launch]] in it.")],
+    via: Annotated[
+        str | None, typer.Option(help="Way into the graph, as of `volery node`.")
+    ] = None,
+    namespace: Annotated[str | None, typer.Option(help="Of the nodes, such as /uav1.")] = None,
+    lock_step: Annotated[
+        float | None, typer.Option(help="The simulation waits for them each so many seconds.")
+    ] = None,
+) -> None:
+    """Run the nodes of a launch profile in a process of their own."""
+    from volery.cli.launching import launch_profile
+
+    launch_profile(profile, via=via, namespace=namespace, lock_step_s=lock_step)

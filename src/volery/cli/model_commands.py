@@ -1,0 +1,51 @@
+"""Commands that write files for others: data of an airframe, a world, message types."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from volery.cli.guard import guarded
+
+
+@guarded
+def identify(
+    airframe: Annotated[str, typer.Argument(help="A shipped airframe, or a TOML file.")],
+    out: Annotated[Path, typer.Option(help="The data file to write.")],
+    order: Annotated[int, typer.Option(min=1, max=2, help="Of the roll and pitch loops.")] = 2,
+) -> None:
+    """Fit the identified plant to an airframe's rigid body and write it as a data file."""
+    from volery.cli.identifying import identify_and_write
+
+    identify_and_write(airframe, out, order)
+
+
+@guarded
+def export(
+    scenario: Annotated[str, typer.Argument(help="Name from `volery list`, or a TOML file.")],
+    file: Annotated[Path, typer.Argument(help="The .glb file to write (glTF 2.0, binary).")],
+    detail: Annotated[
+        str, typer.Option(help="Of the trees: visual, sensing or coarse.")
+    ] = "sensing",
+) -> None:
+    """Write the world of a scenario as glTF: ground, trees, buildings."""
+    from volery.cli.exporting import export_and_tell
+
+    export_and_tell(scenario, file, detail)
+
+
+@guarded
+def interfaces(
+    folder: Annotated[Path, typer.Argument(help="To write into: src of a colcon workspace.")],
+    package: Annotated[
+        list[str] | None,
+        typer.Option(help="Package to write, repeatable; volery_interfaces unless said."),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace older ones.")] = False,
+) -> None:
+    """Write Volery's message types as ROS 2 packages, which colcon builds for ros2cli and rclpy."""
+    from volery.cli.interfaces import write_and_tell
+
+    write_and_tell(folder, package or [], overwrite=overwrite)
