@@ -23,6 +23,8 @@ UNSUPPORTED_FRAME = 8
 DO_SET_MODE = 176
 _FENCE_TELLS = (0, 1)
 """GF_ACTION of fences that keep nobody from flying there."""
+_CHANGE_MODE = 1
+"""MAV_DO_REPOSITION_FLAGS."""
 _ABOVE_HOME = (3, 6, 10, 11)
 _RETIRED_REQUESTS = {410: 242, 519: 300, 520: 148}
 """MAV_CMD that MAV_CMD_REQUEST_MESSAGE replaced, and the message that each asked for."""
@@ -110,11 +112,15 @@ def _switch(pilot: Autopilot, mode: Mode) -> int:
 
 
 def _reposition(pilot: Autopilot, _source: Source, command: Command) -> int:
-    """DO_REPOSITION: fly somewhere, hold there; what is nan stays as it is."""
-    speed, _, _, yaw, latitude, longitude, altitude = command.params
+    """DO_REPOSITION: fly somewhere, hold there; what is nan stays as it is.
+
+    Only its flag to change the mode takes a UAV out of another mode than hold, as in PX4.
+    """
+    speed, flags, _, yaw, latitude, longitude, altitude = command.params
     if any(math.isinf(param) for param in command.params):
         return DENIED
-    if not switching.flies(pilot):
+    changes_mode = math.isfinite(flags) and bool(int(flags) & _CHANGE_MODE)
+    if not switching.flies(pilot) or not (changes_mode or pilot.memory.mode is Mode.HOLD):
         return DENIED
     x, y, z = pilot.state.position
     if math.isfinite(latitude) and math.isfinite(longitude):

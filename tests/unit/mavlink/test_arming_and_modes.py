@@ -109,6 +109,22 @@ def test_repositions_above_sea_and_keeps_what_is_nan(flight):
     assert uav.position_map == pytest.approx([before[0], 6.0, 6.0], abs=0.3)
 
 
+@pytest.mark.parametrize("flags", [0.0, 2.0, NAN])
+def test_a_reposition_without_its_flag_does_not_leave_another_mode(flight, flags):
+    _, station = flight
+    station.up(3.0)
+    place = (47.397742 + math.degrees(20.0 / 6.37e6), 8.545594, 488.0 + 6.0)
+    assert station.command(RETURN) == ACCEPTED
+    assert station.command(REPOSITION, -1.0, flags, 0.0, NAN, *place) == DENIED
+    station.seconds(1.0)
+    assert station.present_mode == (4, 5)
+    assert station.mode(4, 3) == ACCEPTED
+    assert station.command(REPOSITION, -1.0, flags, 0.0, NAN, *place) == ACCEPTED
+    assert station.command(RETURN) == ACCEPTED
+    assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, *place) == ACCEPTED
+    assert station.present_mode == (4, 3)
+
+
 def test_returns_at_the_height_that_is_set(flight):
     simulation, station = flight
     station.set("RTL_RETURN_ALT", 9.0)
