@@ -135,6 +135,8 @@ class Memory:
     plans: dict[int, list[Item]] = field(default_factory=lambda: {0: [], 1: [], 2: []})
     """By MAV_MISSION_TYPE: mission, fence, rally."""
     transfers: dict[int, Transfer] = field(default_factory=dict)
+    last_items: dict[int, tuple[Source, int]] = field(default_factory=dict)
+    """By MAV_MISSION_TYPE: whose upload came through last, and the number of its last item."""
     mission: Mission = field(default_factory=Mission)
     leg: Leg | None = None
     way_home: Return | None = None

@@ -127,7 +127,7 @@ def test_contradictory_plans_are_refused_with_the_reason(flight, items, kind, re
     assert station.last("MISSION_COUNT").count == 1  # what was there is there still
 
 
-def test_too_many_items_wrong_order_and_strangers(flight):
+def test_too_many_items_and_strangers(flight):
     simulation, station = flight
     station.send("mission_count", 1, 1, 501, 0)
     assert station.last("MISSION_ACK").type == 4
@@ -136,10 +136,29 @@ def test_too_many_items_wrong_order_and_strangers(flight):
     other.send("mission_count", 1, 1, 1, 0)
     assert other.last("MISSION_ACK").type == 14
     other.item(0, at(0, 0, 3))  # nobody asked it
-    station.item(0, at(0, 0, 3))
-    station.item(0, at(0, 0, 3))  # comes twice: passed over
-    station.item(2, at(0, 0, 3))
-    assert station.last("MISSION_ACK").type == 13
+    assert station.last("MISSION_REQUEST_INT").seq == 0
+
+
+def test_items_may_come_early_and_twice(flight):
+    _, station = flight
+    items = [at(0, 0, 3), at(0, 0, 4), at(0, 0, 5)]
+    station.send("mission_count", 1, 1, 3, 0)
+    for sequence in (1, 2, 0, 2, 0):
+        station.item(sequence, items[sequence])
+    assert not station.of("MISSION_ACK")
+    station.heard.clear()
+    station.seconds(0.4)
+    assert station.last("MISSION_REQUEST_INT").seq == 1  # what is awaited is asked for again
+    for sequence in (1, 1, 2):
+        station.item(sequence, items[sequence])
+    assert [ack.type for ack in station.of("MISSION_ACK")] == [ACCEPTED]
+    station.item(2, items[2])  # the ACK was lost
+    assert [ack.type for ack in station.of("MISSION_ACK")] == [ACCEPTED, ACCEPTED]
+    station.item(1, items[1])
+    assert station.last("MISSION_ACK").type == 1  # no transfer is under way
+    for sequence, (*_, height) in enumerate(items):
+        station.send("mission_request_int", 1, 1, sequence, 0)
+        assert station.last("MISSION_ITEM_INT").z == height
 
 
 def test_items_that_are_lost_are_asked_for_again_and_given_up(flight):
