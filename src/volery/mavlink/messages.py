@@ -82,7 +82,7 @@ HANDLERS: dict[str, Callable[[Autopilot, Source, Any], None]] = {
     "MISSION_REQUEST_LIST": transfers.begin_download,
     "MISSION_REQUEST_INT": transfers.send_item,
     "MISSION_REQUEST": transfers.send_item,
-    "MISSION_ACK": transfers.end_download,
+    "MISSION_ACK": transfers.take_ack,
     "MISSION_CLEAR_ALL": transfers.clear,
     "MISSION_SET_CURRENT": transfers.set_current,
 }

@@ -104,8 +104,14 @@ def send_item(pilot: Autopilot, source: Source, message: Any) -> None:
     pilot.send(message_class(*head, *item.params, x, y, item.altitude, kind), link)
 
 
-def end_download(_pilot: Autopilot, _source: Source, _message: Any) -> None:
-    """Take note that the other side has everything: nothing is kept of it."""
+def take_ack(pilot: Autopilot, source: Source, message: Any) -> None:
+    """End an upload that its sender cancels; of downloads nothing is kept that could end."""
+    kind = int(message.mission_type)
+    transfer = pilot.memory.transfers.get(kind)
+    if transfer is None or not transfer.upload or transfer.source != source:
+        return
+    if int(message.type) == plans.CANCELLED:
+        del pilot.memory.transfers[kind]
 
 
 def clear(pilot: Autopilot, source: Source, message: Any) -> None:

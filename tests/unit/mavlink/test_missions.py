@@ -161,6 +161,25 @@ def test_items_may_come_early_and_twice(flight):
         assert station.last("MISSION_ITEM_INT").z == height
 
 
+def test_an_upload_that_its_sender_cancels_ends_at_once(flight):
+    simulation, station = flight
+    assert station.upload([at(0, 0, 5)]) == ACCEPTED
+    station.send("mission_count", 1, 1, 3, 0)
+    other = Station(simulation, system=200, link=9)
+    other.send("mission_ack", 1, 1, 15, 0)  # not his to cancel
+    assert other.upload([at(0, 0, 3)]) == 14
+    station.send("mission_ack", 1, 1, 15, 1)  # of another kind of plan
+    station.send("mission_ack", 1, 1, 1, 0)  # not a cancellation
+    assert other.upload([at(0, 0, 3)]) == 14
+    station.send("mission_ack", 1, 1, 15, 0)
+    station.heard.clear()
+    station.seconds(1.0)
+    assert not station.of("MISSION_REQUEST_INT")
+    station.send("mission_request_int", 1, 1, 0, 0)
+    assert station.last("MISSION_ITEM_INT").z == 5.0  # what was there is there still
+    assert other.upload([at(0, 0, 4)]) == ACCEPTED
+
+
 def test_items_that_are_lost_are_asked_for_again_and_given_up(flight):
     _, station = flight
     station.send("mission_count", 1, 1, 2, 0)
