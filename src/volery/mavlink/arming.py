@@ -24,6 +24,8 @@ def troubles(pilot: Autopilot) -> list[str]:
     found = []
     if state.crashed:
         found.append("the vehicle has crashed")
+    if memory.mode in (Mode.RETURN, Mode.LAND) and not memory.armed:
+        found.append("mode not suitable for arming")
     if memory.fix_lost and not pilot.parameter("COM_ARM_WO_GPS"):
         found.append("no satellite fix")
     if math.isfinite(state.charge) and state.charge < float(pilot.parameter("BAT_LOW_THR")):
@@ -33,6 +35,8 @@ def troubles(pilot: Autopilot) -> list[str]:
         found.append("the vehicle lies on its side")
     if memory.mode.by_sticks and not sticks_are_there(pilot):
         found.append("no manual control input")
+    if int(pilot.parameter("NAV_DLL_ACT")) and not ground_is_there(pilot):
+        found.append("no connection to the ground control station")
     return found
 
 
@@ -42,15 +46,20 @@ def sticks_are_there(pilot: Autopilot) -> bool:
     return age_ns <= float(pilot.parameter("COM_RC_LOSS_T")) * 1e9
 
 
-def arm(pilot: Autopilot, *, forced: bool) -> str:
-    """Arm; why not, empty where it is armed."""
+def ground_is_there(pilot: Autopilot) -> bool:
+    """Whether a ground station's heartbeat has come within COM_DL_LOSS_T."""
+    heard_ns = pilot.memory.ground_heard_ns
+    limit_ns = int(pilot.parameter("COM_DL_LOSS_T")) * 1_000_000_000
+    return heard_ns >= 0 and pilot.memory.now_ns - heard_ns <= limit_ns
+
+
+def arm(pilot: Autopilot) -> str:
+    """Arm; why not, empty where it is armed. Nobody can force it: PX4 checks for all outside."""
     memory = pilot.memory
     if memory.armed:
         return ""
-    if memory.mode in (Mode.RETURN, Mode.LAND):
-        memory.mode = Mode.HOLD
     found = troubles(pilot)
-    if pilot.state.crashed or (found and not forced):
+    if found:
         return found[0]
     memory.armed, memory.armed_ns = True, memory.now_ns
     memory.airborne, memory.failsafe = False, False

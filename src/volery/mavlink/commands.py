@@ -65,7 +65,7 @@ def _arm(pilot: Autopilot, _source: Source, command: Command) -> int:
     forced = round(force) == 21196 if math.isfinite(force) else False  # PX4's magic number
     if wanted not in (0.0, 1.0):
         return DENIED
-    why = arming.arm(pilot, forced=forced) if wanted else arming.disarm(pilot, forced=forced)
+    why = arming.arm(pilot) if wanted else arming.disarm(pilot, forced=forced)
     if why:
         pilot.say(2, f"{'Arming' if wanted else 'Disarming'} denied: {why}")
     return TEMPORARILY_REJECTED if why else ACCEPTED
@@ -176,7 +176,7 @@ def _start_mission(pilot: Autopilot, _source: Source, command: Command) -> int:
         transfers.jump_to(pilot, 0)
     result = _switch(pilot, Mode.MISSION)
     if result == ACCEPTED and not pilot.memory.armed:
-        why = arming.arm(pilot, forced=False)
+        why = arming.arm(pilot)
         if why:
             pilot.say(2, f"Arming denied: {why}")
             return TEMPORARILY_REJECTED

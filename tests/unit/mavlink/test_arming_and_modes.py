@@ -80,6 +80,22 @@ def test_disarming_in_the_air_takes_force_and_lets_it_fall(flight):
     assert "Arming denied: the vehicle has crashed" in station.texts
 
 
+@pytest.mark.parametrize(("command", "mode"), [(RETURN, (4, 5)), (LAND, (4, 6))])
+def test_is_not_armed_in_modes_that_only_come_down(flight, command, mode):
+    _, station = flight
+    assert station.command(command) == ACCEPTED
+    for force in (0.0, 21196.0):  # which PX4 hears from nobody outside
+        assert station.command(ARM, 1.0, force) == REJECTED
+    assert "Arming denied: mode not suitable for arming" in station.texts
+    assert station.present_mode == mode
+    assert not station.armed
+    assert station.mode(4, 3) == ACCEPTED
+    station.up(2.0)
+    assert station.command(command) == ACCEPTED
+    station.command(512, 1.0)
+    assert station.last("SYS_STATUS").onboard_control_sensors_health & 1 << 28  # it may fly so
+
+
 def test_modes_that_need_something_are_refused_without_it(flight):
     _, station = flight
     assert station.mode(6) == REJECTED  # no setpoint has come
