@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from volery.mavlink import home
 from volery.mavlink.modes import Mode
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot import Autopilot
-    from volery.mavlink.vehicle import Vector
 
 
 def troubles(pilot: Autopilot) -> list[str]:
@@ -64,7 +64,7 @@ def arm(pilot: Autopilot) -> str:
     memory.armed, memory.armed_ns = True, memory.now_ns
     memory.airborne, memory.failsafe = False, False
     memory.warned.clear()
-    set_home(pilot, pilot.state.position)
+    home.set_on_arming(pilot)
     pilot.say(6, "Armed by external command")
     pilot.announce()
     return ""
@@ -97,13 +97,3 @@ def finish(pilot: Autopilot, text: str) -> None:
         memory.mode = Mode.HOLD
     pilot.say(6, text)
     pilot.announce()
-
-
-def set_home(pilot: Autopilot, place: Vector) -> None:
-    """Let home be a place in the map."""
-    from volery.mavlink.telemetry import BUILDERS, HOME_POSITION
-
-    pilot.memory.home = place
-    message = BUILDERS[HOME_POSITION](pilot)
-    if message is not None:
-        pilot.send(message)

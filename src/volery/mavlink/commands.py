@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 from volery.core.errors import CommandError
-from volery.mavlink import arming, plans, streams, switching, telemetry, transfers
+from volery.mavlink import arming, home, plans, streams, switching, telemetry, transfers
 from volery.mavlink.codec import dialect
 from volery.mavlink.fence import breach
 from volery.mavlink.modes import Mode, mode_of
@@ -157,15 +157,15 @@ def _change_speed(pilot: Autopilot, _source: Source, command: Command) -> int:
 
 def _set_home(pilot: Autopilot, _source: Source, command: Command) -> int:
     latitude, longitude, altitude = command.params[4:7]
-    if command.params[0] == 1.0:
-        arming.set_home(pilot, pilot.state.position)
+    if command.params[0] > 0.5:
+        home.set_here(pilot)
         return ACCEPTED
-    finite = math.isfinite(latitude) and math.isfinite(longitude) and math.isfinite(altitude)
-    if not finite or abs(latitude) > 90.0 or abs(longitude) > 180.0:
+    if not all(map(math.isfinite, (latitude, longitude, altitude))):
         return DENIED
-    x, y, _ = pilot.earth.place(latitude, longitude, pilot.build.origin[2])
-    arming.set_home(pilot, (x, y, _height_in_map(pilot, altitude, command.frame)))
-    return ACCEPTED
+    why = home.choose(pilot, latitude, longitude, _height_in_map(pilot, altitude, command.frame))
+    if why:
+        pilot.say(4, why)
+    return DENIED if why else ACCEPTED
 
 
 def _start_mission(pilot: Autopilot, _source: Source, command: Command) -> int:
@@ -240,9 +240,9 @@ def _reboot(pilot: Autopilot, _source: Source, _command: Command) -> int:
 
 def _height_in_map(pilot: Autopilot, altitude: float, frame: int | None) -> float:
     """Z in the map of an altitude: above home in frames that say so, else above the sea."""
-    home: Vector = pilot.memory.home or pilot.memory.origin
+    base: Vector = pilot.memory.home or pilot.memory.origin
     if frame is not None and frame in _ABOVE_HOME:
-        return home[2] + altitude
+        return base[2] + altitude
     return altitude - pilot.build.origin[2]
 
 

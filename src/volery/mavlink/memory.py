@@ -127,6 +127,8 @@ class Memory:
     target: Setpoint | None = None
     """What is flown, for who watches."""
     home: Vector | None = None
+    chosen_home: Vector | None = None
+    """Latitude and longitude in degrees and altitude of a home that somebody chose, as he did."""
     origin: Vector = (0.0, 0.0, 0.0)
     """m, map: where the local frame begins, the place at the start."""
     cruise: float = math.nan

@@ -5,7 +5,7 @@ import math
 import pytest
 from flying_bench import NAN, Station, fly
 
-ARM, TAKE_OFF, LAND, RETURN, REPOSITION = 400, 22, 21, 20, 192
+ARM, TAKE_OFF, LAND, RETURN, REPOSITION, SET_HOME = 400, 22, 21, 20, 192, 179
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 
 
@@ -162,6 +162,44 @@ def test_returns_at_the_height_that_is_set(flight):
     assert highest == pytest.approx(9.1, abs=0.4)
     assert not station.armed
     assert simulation.uavs["uav1"].position_map[:2] == pytest.approx([0.0, 0.0], abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("north", "place"), [(0.0, (473977420, 85455940)), (60_000.0, (479373904, 85455940))]
+)
+def test_home_is_told_as_it_was_set_and_arming_keeps_it(flight, north, place):
+    _, station = flight
+    station.send("command_int", 1, 1, 0, SET_HOME, 0, 0, 0.0, NAN, NAN, NAN, *place, 500.0)
+    assert station.last("COMMAND_ACK").result == ACCEPTED
+    for _ in range(2):
+        home = station.last("HOME_POSITION")
+        assert (home.latitude, home.longitude, home.altitude) == (*place, 500_000)
+        assert home.z == pytest.approx(-12.0, abs=0.2)
+        assert home.x == pytest.approx(north, rel=2e-3, abs=0.1)
+        assert station.command(ARM, 1.0) == ACCEPTED
+        station.seconds(3.0)
+    assert station.command(SET_HOME, 1.0) == ACCEPTED
+    assert station.last("HOME_POSITION").altitude == pytest.approx(488_100, abs=50)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        (0.0, 0.0, 0.0),
+        (-47.397742, -171.454406, 488.0),  # on the other side of the earth
+        (47.4, 8.5, 1e9),
+        (47.4, NAN, 488.0),
+        (95.0, 8.5, 488.0),
+    ],
+)
+def test_a_home_that_the_map_cannot_hold_is_denied(flight, place):
+    _, station = flight
+    station.command(512, 242.0)
+    before = station.last("HOME_POSITION")
+    assert station.command(SET_HOME, 0.0, NAN, NAN, NAN, *place) == DENIED
+    station.command(512, 242.0)
+    after = station.last("HOME_POSITION")
+    assert (after.latitude, after.altitude) == (before.latitude, before.altitude)
 
 
 def test_cruising_speed_is_that_of_the_parameter(flight):
