@@ -46,7 +46,9 @@ def _reach(pilot: Autopilot, mission: Mission) -> None:
     _advance(mission, items)
     if mission.complete:
         mission.speed = math.nan
-        pilot.say(6, "Mission finished, loitering")
+        if pilot.memory.mode is Mode.MISSION:  # else its last item was the way home
+            landed = pilot.state.mode == "LANDED"
+            pilot.say(6, f"Mission finished, {'landed' if landed else 'loitering'}")
 
 
 def _advance(mission: Mission, items: list[plans.Item]) -> None:

@@ -62,9 +62,23 @@ def test_a_mission_of_ten_items_is_flown_and_ends_where_it_began(flight):
     assert reached == [0, 1, 2, 3, 4, 5, 6, 3, 4, 5, 6, 7, 8, 9]  # the jump goes back once
     assert fastest < 4.3
     assert corner < 0.5
-    assert "Mission finished, loitering" in station.texts
+    assert "Mission finished, landed" in station.texts
     assert uav.position_map[:2] == pytest.approx([0.0, 0.0], abs=0.5)
     assert not station.armed
+
+
+@pytest.mark.parametrize(
+    ("last", "mode", "told"),
+    [([], (4, 4), ["Mission finished, loitering"]), ([do(RETURN)], (4, 5), [])],
+)
+def test_its_end_in_the_air_is_told_where_it_stays_there(flight, last, mode, told):
+    _, station = flight
+    assert station.upload([at(0, 0, 3, TAKE_OFF), at(4, 0, 3), *last]) == ACCEPTED
+    assert station.command(300, 0.0, 0.0) == ACCEPTED
+    station.seconds(9.0)
+    assert station.last("MISSION_ITEM_REACHED").seq == 1 + len(last)
+    assert [text for text in station.texts if text.startswith("Mission finished")] == told
+    assert station.present_mode == mode
 
 
 def test_plans_come_back_as_they_went(flight):
