@@ -43,7 +43,8 @@ def take(pilot: Autopilot, source: Source, command: Command) -> None:
     link, system, component = source
     result = do(pilot, source, command)
     ack = dialect().MAVLink_command_ack_message
-    pilot.send(ack(command.number, result, 255, 0, system, component), link)
+    progress = 0  # PX4's, where the protocol would have 255
+    pilot.send(ack(command.number, result, progress, 0, system, component), link)
 
 
 def do(pilot: Autopilot, source: Source, command: Command) -> int:

@@ -106,6 +106,16 @@ def test_modes_that_need_something_are_refused_without_it(flight):
     assert station.present_mode == (4, 3)
 
 
+def test_the_old_message_for_modes_is_answered_as_the_command(flight):
+    _, station = flight
+    for mode, result in ((4 << 16 | 5 << 24, ACCEPTED), (1 << 16, UNSUPPORTED)):
+        station.send("set_mode", 1, 1, mode)
+        ack = station.last("COMMAND_ACK")
+        assert (ack.command, ack.result, ack.progress) == (176, result, 0)
+        assert (ack.target_system, ack.target_component) == (255, 190)
+    assert station.present_mode == (4, 5)
+
+
 def test_repositions_above_sea_and_keeps_what_is_nan(flight):
     simulation, station = flight
     station.up(4.0)
