@@ -7,7 +7,16 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 from volery.core.errors import CommandError
-from volery.mavlink import arming, home, plans, streams, switching, telemetry, transfers
+from volery.mavlink import (
+    arming,
+    feasibility,
+    home,
+    plans,
+    streams,
+    switching,
+    telemetry,
+    transfers,
+)
 from volery.mavlink.codec import dialect
 from volery.mavlink.fence import breach
 from volery.mavlink.modes import Mode, mode_of
@@ -170,11 +179,18 @@ def _set_home(pilot: Autopilot, _source: Source, command: Command) -> int:
 
 
 def _start_mission(pilot: Autopilot, _source: Source, command: Command) -> int:
-    first = command.params[0]
-    if math.isfinite(first) and first > 0.0 and not transfers.jump_to(pilot, int(first)):
+    """MISSION_START: arm, and fly it from an item on; -1: from where it was."""
+    why = feasibility.obstacle(pilot)
+    if why:
+        pilot.say(2, f"Mission start denied: {why}")
         return DENIED
-    if pilot.memory.mission.complete:
-        transfers.jump_to(pilot, 0)
+    first, mission = command.params[0], pilot.memory.mission
+    if not -1.0 <= first < len(pilot.memory.plans[plans.MISSION]):
+        return DENIED
+    if first < 0.0:
+        first = 0.0 if mission.complete else mission.current
+    if mission.complete or int(first) != mission.current:
+        transfers.jump_to(pilot, int(first))
     result = _switch(pilot, Mode.MISSION)
     if result == ACCEPTED and not pilot.memory.armed:
         why = arming.arm(pilot)

@@ -18,6 +18,11 @@ if TYPE_CHECKING:
     from volery.mavlink.vehicle import Vector
 
 
+def obstacle(pilot: Autopilot) -> str:
+    """What keeps a mission from being begun; empty where one is there that can be flown."""
+    return trouble(pilot) if pilot.memory.plans[plans.MISSION] else "no valid mission"
+
+
 def trouble(pilot: Autopilot) -> str:
     """Why the mission on board cannot be flown now; empty where it can, or where there is none."""
     items = pilot.memory.plans[plans.MISSION]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from volery.mavlink import arming, feasibility, plans
+from volery.mavlink import arming, feasibility
 from volery.mavlink.memory import Leg
 from volery.mavlink.modes import Mode
 
@@ -69,7 +69,7 @@ def obstacle_to(pilot: Autopilot, mode: Mode) -> str:
     if mode is Mode.OFFBOARD and not offboard_is_fresh(pilot):
         return "no offboard signal"
     if mode is Mode.MISSION:
-        return feasibility.trouble(pilot) if memory.plans[plans.MISSION] else "no valid mission"
+        return feasibility.obstacle(pilot)
     return ""
 
 

@@ -5,7 +5,7 @@ import math
 import pytest
 from flying_bench import NAN, Station, fly
 
-ACCEPTED, REJECTED = 0, 1
+ACCEPTED, DENIED = 0, 2
 WAYPOINT, LOITER, RETURN, LAND, TAKE_OFF, DELAY, YAW, JUMP, SPEED = (
     *(16, 19, 20, 21, 22, 93, 115, 177, 178),
 )
@@ -224,11 +224,32 @@ def test_pausing_setting_the_item_and_going_on(flight):
     assert [m.seq for m in station.of("MISSION_ITEM_REACHED")][-1] == 2
 
 
+def test_what_cannot_be_started_is_denied(flight):
+    _, station = flight
+    assert station.command(300, 0.0, 0.0) == DENIED
+    assert "Mission start denied: no valid mission" in station.texts
+    assert station.upload([at(0, 0, 3, TAKE_OFF), at(4, 0, 3), at(0, 0, 3)]) == ACCEPTED
+    for first in (3.0, -2.0, NAN, math.inf):
+        assert station.command(300, first, 0.0) == DENIED
+    assert not station.armed
+
+
+def test_a_mission_is_started_from_the_item_that_is_asked_for(flight):
+    _, station = flight
+    assert station.upload([at(0, 0, 3, TAKE_OFF), at(4, 0, 3), at(0, 0, 3)]) == ACCEPTED
+    for first, current in ((2.0, 2), (-1.0, 2), (0.0, 0)):
+        assert station.command(300, first, 0.0) == ACCEPTED
+        station.command(512, 42.0)
+        assert station.last("MISSION_CURRENT").seq == current
+    assert station.armed
+    assert station.present_mode == (4, 4)
+
+
 def test_a_mission_that_leaves_the_fence_is_not_begun(flight):
     _, station = flight
     assert station.upload([at(0, 0, 3, TAKE_OFF), at(50, 0, 3)]) == ACCEPTED
     station.set("GF_MAX_HOR_DIST", 20.0)
-    assert station.command(300, 0.0, 0.0) == REJECTED
+    assert station.command(300, 0.0, 0.0) == DENIED
     assert any("Geofence violation for waypoint 2" in text for text in station.texts)
     station.set("GF_MAX_HOR_DIST", 0.0)
     assert station.command(300, 0.0, 0.0) == ACCEPTED
@@ -250,7 +271,7 @@ def test_missions_that_cannot_be_flown_are_told_of_and_not_begun(flight, items, 
     assert station.upload(items) == ACCEPTED  # as PX4, which keeps them
     assert text in station.texts
     station.heard.clear()
-    assert station.command(300, 0.0, 0.0) == REJECTED
+    assert station.command(300, 0.0, 0.0) == DENIED
     assert any(text in said for said in station.texts)
     station.command(512, 0.0)
     assert not station.armed
