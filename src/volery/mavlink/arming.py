@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from volery.mavlink import home
+from volery.mavlink import feasibility, home, requirements
 from volery.mavlink.modes import Mode
 
 if TYPE_CHECKING:
@@ -33,24 +33,19 @@ def troubles(pilot: Autopilot) -> list[str]:
     tilt = 1.0 - 2.0 * (state.attitude[0] ** 2 + state.attitude[1] ** 2)
     if not state.airborne and tilt < 0.7:  # PX4 refuses beyond about 45 deg
         found.append("the vehicle lies on its side")
-    if memory.mode.by_sticks and not sticks_are_there(pilot):
-        found.append("no manual control input")
-    if int(pilot.parameter("NAV_DLL_ACT")) and not ground_is_there(pilot):
+    lacks = requirements.missing(pilot, memory.mode)
+    found += [lacks] if lacks else []
+    if int(pilot.parameter("NAV_DLL_ACT")) and not requirements.ground_is_there(pilot):
         found.append("no connection to the ground control station")
     return found
 
 
-def sticks_are_there(pilot: Autopilot) -> bool:
-    """Whether MANUAL_CONTROL has come within COM_RC_LOSS_T."""
-    age_ns = pilot.memory.now_ns - pilot.memory.sticks.time_ns
-    return age_ns <= float(pilot.parameter("COM_RC_LOSS_T")) * 1e9
-
-
-def ground_is_there(pilot: Autopilot) -> bool:
-    """Whether a ground station's heartbeat has come within COM_DL_LOSS_T."""
-    heard_ns = pilot.memory.ground_heard_ns
-    limit_ns = int(pilot.parameter("COM_DL_LOSS_T")) * 1_000_000_000
-    return heard_ns >= 0 and pilot.memory.now_ns - heard_ns <= limit_ns
+def obstacle(pilot: Autopilot) -> str:
+    """The first trouble, or what is wrong with the mission that it would begin; empty: none."""
+    found = troubles(pilot)
+    if not found and pilot.memory.mode is Mode.MISSION:
+        return feasibility.trouble(pilot)
+    return found[0] if found else ""
 
 
 def arm(pilot: Autopilot) -> str:
@@ -58,9 +53,9 @@ def arm(pilot: Autopilot) -> str:
     memory = pilot.memory
     if memory.armed:
         return ""
-    found = troubles(pilot)
-    if found:
-        return found[0]
+    why = obstacle(pilot)
+    if why:
+        return why
     memory.armed, memory.armed_ns = True, memory.now_ns
     memory.airborne, memory.failsafe = False, False
     memory.warned.clear()

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from volery.mavlink import arming, switching
+from volery.mavlink import arming, requirements, switching
 from volery.mavlink.fence import breach
 from volery.mavlink.modes import Mode
 
@@ -93,7 +93,7 @@ def _fence(pilot: Autopilot, state: FlightState) -> tuple[str, Mode | None] | No
 def _link(pilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
     """As in PX4 one that was never heard counts as lost, and who lands already goes on landing."""
     action = int(pilot.parameter("NAV_DLL_ACT"))
-    if not action or arming.ground_is_there(pilot):
+    if not action or requirements.ground_is_there(pilot):
         return None
     if pilot.memory.mode is Mode.LAND and "link" not in pilot.memory.warned:
         return None
@@ -102,7 +102,7 @@ def _link(pilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | No
 
 
 def _sticks(pilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
-    if not pilot.memory.mode.by_sticks or arming.sticks_are_there(pilot):
+    if not pilot.memory.mode.by_sticks or requirements.sticks_are_there(pilot):
         return None
     mode = {1: Mode.HOLD, 3: Mode.LAND}.get(int(pilot.parameter("NAV_RCL_ACT")), Mode.RETURN)
     return "Failsafe: manual control lost", mode

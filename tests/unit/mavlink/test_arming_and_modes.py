@@ -96,11 +96,31 @@ def test_is_not_armed_in_modes_that_only_come_down(flight, command, mode):
     assert station.last("SYS_STATUS").onboard_control_sensors_health & 1 << 28  # it may fly so
 
 
-def test_modes_that_need_something_are_refused_without_it(flight):
+@pytest.mark.parametrize(
+    ("mode", "why"),
+    [
+        ((6, 0), "no offboard signal"),
+        ((4, 4), "no valid mission"),
+        ((3, 0), "no manual control input"),
+        ((2, 0), "no manual control input"),
+    ],
+)
+def test_modes_that_need_something_are_refused_without_it_and_before_arming(flight, mode, why):
     _, station = flight
-    assert station.mode(6) == REJECTED  # no setpoint has come
-    assert station.mode(4, 4) == REJECTED  # no mission
-    assert station.mode(3) == REJECTED  # no sticks
+    assert station.mode(*mode) == ACCEPTED  # as PX4, which looks at arming
+    assert station.present_mode == mode
+    assert station.command(ARM, 1.0) == REJECTED
+    assert f"Arming denied: {why}" in station.texts
+    assert not station.armed
+    assert station.mode(4, 3) == ACCEPTED
+    station.up(2.0)
+    assert station.mode(*mode) == REJECTED
+    assert any(text.endswith(f"not possible: {why}") for text in station.texts)
+    assert station.present_mode == (4, 3)
+
+
+def test_modes_that_are_none(flight):
+    _, station = flight
     assert station.mode(1) == UNSUPPORTED
     assert station.command(176, 0.0, 4.0, 3.0) == DENIED  # not PX4's kind of mode
     assert station.present_mode == (4, 3)

@@ -273,6 +273,10 @@ def test_missions_that_cannot_be_flown_are_told_of_and_not_begun(flight, items, 
     station.heard.clear()
     assert station.command(300, 0.0, 0.0) == DENIED
     assert any(text in said for said in station.texts)
+    station.heard.clear()
+    assert station.mode(4, 4) == ACCEPTED
+    assert station.command(400, 1.0) == 1
+    assert f"Arming denied: {text}" in station.texts
     station.command(512, 0.0)
     assert not station.armed
 
