@@ -148,6 +148,8 @@ class _Seat(asyncio.DatagramProtocol):
 
     is_in_step = False
     """As of `Pilot`: asyncio's transport is the loop's."""
+    may_sleep = False
+    """As of `Pilot`: it answers each state, and repeats its question where it heard none."""
 
     def tell(self, time_ns: int, news: News) -> bool:
         """As of `Pilot`."""
