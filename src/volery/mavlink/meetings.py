@@ -223,7 +223,7 @@ class Meetings:
         if not self._is_asleep:
             self._is_asleep = True
             _log.warning(
-                "%s: its autopilot is silent, disarmed; time goes on without it", self._uav
+                "%s: its autopilot is disarmed and silent; it is not waited for", self._uav
             )
         self.go_on()
 
