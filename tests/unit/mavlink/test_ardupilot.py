@@ -9,7 +9,7 @@ import threading
 import time
 
 import pytest
-from ardupilot_stand_in import ArdupilotStandIn
+from ardupilot_stand_in import ArdupilotStandIn, read
 from autopilot_bench import free_port, irises
 
 from volery.bridges.doors import Doors
@@ -193,16 +193,21 @@ def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, caplog):
 
 def test_a_frame_that_comes_late_begins_nothing_anew(opened):
     simulation, door = opened()
-    pilot = ArdupilotStandIn(door._port, 80, first=1000)
+    pilot = ArdupilotStandIn(door._port, 1)
     pilot.send(1000)
     meet(simulation, door, 1)
-    for number in (999, 990):
+    run = threading.Thread(target=simulation.run, args=(0.0047,))
+    run.start()
+    times = []
+    for number in (1001, 1002, 1003):
+        times += read(pilot.link.recv(65000).decode(), "", "timestamp", 1)
+        for late in (990, 999):
+            pilot.send(late)
         pilot.send(number)
-    pilot.start()
-    simulation.run(0.1)
-    finish(pilot)
-    assert pilot.states[0]["", "timestamp"] == pytest.approx([0.00125])
-    assert door._seats[0]._number >= 1080
+    run.join(20.0)
+    assert not run.is_alive()
+    assert times == pytest.approx([0.00125, 0.0025, 0.00375])
+    pilot.link.close()
 
 
 def test_frames_that_are_none():
