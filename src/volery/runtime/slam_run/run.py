@@ -19,6 +19,7 @@ from volery.core.errors import RecordingError
 from volery.graph.messages import LaserScan, stamp_of
 from volery.runtime.slam_run.channels import LEVEL, NODDING, Asked, Channels, choose
 from volery.runtime.slam_run.log_host import LogHost
+from volery.runtime.slam_run.mounts import frames_of, read_joints
 from volery.runtime.slam_run.sources import LogSource, TextSource
 from volery.runtime.slam_run.trajectory import Trajectory, corrected
 
@@ -82,6 +83,8 @@ class SlamRun:
         self._source, self._options = source, options
         self.channels = choose(source.path, source.topics, options.asked)
         self._joints = FixedJoints()
+        self._frames: dict[str, str] = {}
+        """Of the LIDARs, level and nodding, that the node hears."""
         self._host = LogHost()
         self._odometry: list[tuple[float, ...]] = []
         self._times: list[int] = []
@@ -101,8 +104,6 @@ class SlamRun:
     def run(self, tell: Callable[[int, float], None] | None = None) -> Outcome:
         """Go through the whole log; `tell` hears of scans and seconds of the log so far."""
         uav, host = self.channels.uav, self._host
-        if self.channels.has_imu:
-            self._read_joints()
         self._start_node()
         host.listen(f"/{uav}/slam/odom", self._on_odometry)
         host.listen(f"/{uav}/slam/status", self._on_status)
@@ -138,11 +139,6 @@ class SlamRun:
             self._next_nodding_ns = time_ns + _NODDING_NS
             self._nodding.append((len(self._times) - 1, message))
 
-    def _read_joints(self) -> None:
-        """Where the LIDARs sit must be known before the node begins."""
-        for _, _, message in self._source.messages({"/tf_static"}):
-            self._joints.add(message)
-
     def _start_node(self) -> None:
         o, uav = self._options, self.channels.uav
         parameters: dict[str, Any] = {"reach_m": o.reach_m, "loop_closures": o.loop_closures}
@@ -159,15 +155,27 @@ class SlamRun:
             return
         from volery.autonomy.slam.slam_node import Slam
 
-        parameters["level_mount"] = level or self._place_of(f"{uav}/laser_horizontal")
-        nodding = o.nodding_mount
-        parameters["nodding_mount"] = (
-            list(nodding) if nodding is not None else self._place_of(f"{uav}/laser_nodding")
-        )
+        self._find_mounts()
+        for name, frame in self._frames.items():
+            parameters[f"{name}_mount"] = [float(v) for v in self._mount(frame).position]
         Slam(**options, parameter_overrides=parameters)
 
-    def _place_of(self, frame: str) -> list[float]:
-        return [float(number) for number in self._joints.mount_of(frame).position]
+    def _find_mounts(self) -> None:
+        """Where the LIDARs sit must be known before the node begins."""
+        o, names, uav = self._options, self.channels.names, self.channels.uav
+        topics = {"level": f"/{uav}/{LEVEL}", "nodding": f"/{uav}/{NODDING}"}
+        self._frames = frames_of(
+            self._source, {name: names[topic] for name, topic in topics.items() if topic in names}
+        )
+        told = {"level": o.level_mount, "nodding": o.nodding_mount}
+        asked = {frame for name, frame in self._frames.items() if told[name] is None}
+        self._joints, unknown = read_joints(self._source, set(self._frames.values()))
+        for name, frame in self._frames.items():
+            if frame in unknown & asked:
+                raise RecordingError(
+                    f"{self._source.path}: nothing in it tells where {frame} sits in the body "
+                    f"(/tf_static, /tf, /volery/scenario): --{name}-mount X,Y,Z says it"
+                )
 
     # ------------------------------------------------------------------------------ what it tells
 
@@ -241,7 +249,7 @@ class SlamRun:
 
     def _mount(self, frame: str) -> Mount:
         o, found = self._options, self._joints.mount_of(frame)
-        place = o.nodding_mount if frame.endswith(_JOINT) else o.level_mount
+        place = o.nodding_mount if frame == self._frames.get("nodding") else o.level_mount
         return found if place is None else Mount(np.array(place), found.attitude)
 
 
