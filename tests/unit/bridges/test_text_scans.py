@@ -191,3 +191,21 @@ def test_a_clock_set_back_is_followed_and_disorder_is_not(tmp_path):
 def test_odometry_that_is_no_number_is_not_told(tmp_path):
     scans = walk(tmp_path, "1000000 nan 0 0 1 2 3\n")
     assert [one.topic for one in scans] == ["/tf_static", "/uav1/laser/horizontal/scan"]
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "value"),
+    [
+        ("ranges", "beams", "3"),
+        ("ranges", "first_column", True),
+        ("ranges", "range_max_m", "5.6"),
+        ("ranges", "no_echo", ["0"]),
+        ("odometry", "columns", [1, "2", 3]),
+        ("mount", "position_m", ["0", 0.0, 0.18]),
+        ("time", "unit_s", "1e-6"),
+    ],
+)
+def test_a_text_is_no_number_of_a_layout(table, key, value):
+    changed = {**LAYOUT, table: {**LAYOUT.get(table, {}), key: value}}
+    with pytest.raises(ValueError, match="numbers stand here"):
+        TextLayout.model_validate(changed)
