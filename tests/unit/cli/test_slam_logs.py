@@ -75,7 +75,7 @@ def test_a_text_log_becomes_map_path_and_summary(mapped, carried):
     assert told["way_m"] == pytest.approx(16.0, abs=0.3)
     assert "mapping " in said
     assert "m over ground (without IMU)" in said
-    assert f"1 lines left out; line {len(carried.time_s) + 1}: " in said
+    assert f"1 line left out; line {len(carried.time_s) + 1}: " in said
     assert "warning: " in said
     assert "error: " not in said
     path = tum_of(folder)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from contextlib import closing
 
 import numpy as np
@@ -72,7 +73,7 @@ class Flown:
             [(stamp_of(m) / S, p.x, p.y, p.z) for m, p in zip(said, places, strict=True)]
         )
 
-    def write(self, path, *, tells):
+    def write(self, path, *, tells, others=()):
         """A log in which `/tf_static`, `/tf`, the scenario or nothing tells of the nodding one."""
         with closing(open_log(path)) as log:
 
@@ -89,6 +90,8 @@ class Flown:
             if tells == "bracket":
                 fixed.append(joint(0, "uav1/bracket", NODDING_FRAME, (0.0, 0.0, 0.0)))
             put("/tf_static", 0, TFMessage(fixed))
+            for name in others:
+                put(f"/{name}/laser/horizontal/scan", 0, self.told[-1][2])
             for when, topic, message in self.told:
                 if topic == "joint_states":
                     moving = [own_motion(when)]
@@ -130,3 +133,28 @@ def test_a_mount_that_nothing_tells_is_asked_for(flown, tmp_path):
     assert not (tmp_path / "out").exists()
     told = slam(tmp_path / "flight.mcap", tmp_path / "out", "--nodding-mount", "0.1,0,-0.08")
     assert told.exit_code == 0, told.output
+
+
+def test_of_several_uavs_it_says_which_one_it_maps(flown, tmp_path):
+    flown.write(tmp_path / "flight.mcap", tells="moving", others=("uav2", "uav3"))
+    result = slam(tmp_path / "flight.mcap", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert "warning: uav1 is mapped; the log has uav2, uav3, too: --uav" in result.output
+    assert "heard     uav1: /uav1/laser/horizontal/scan, /uav1/imu, /uav1/laser/n" in result.output
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["uav"] == "uav1"
+    assert re.search(r"state     (starting 0\.\d s, )?tracking \d\.\d s", result.output)
+    assert "1 session, " in result.output
+    asked = slam(tmp_path / "flight.mcap", tmp_path / "out", "--overwrite", "--uav", "uav1")
+    assert asked.exit_code == 0, asked.output
+    assert "warning: " not in asked.output
+
+
+@pytest.mark.parametrize(("length", "told"), [(5, "in its first 5 bytes"), (100, "cut off")])
+def test_a_log_that_was_cut_off_at_its_beginning_says_so(length, told, flown, tmp_path):
+    flown.write(tmp_path / "flight.mcap", tells="moving")
+    log = tmp_path / "short.mcap"
+    log.write_bytes((tmp_path / "flight.mcap").read_bytes()[:length])
+    result = slam(log, tmp_path / "out")
+    assert result.exit_code == 2
+    assert "cut off" in result.output
+    assert told in result.output

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from volery.bridges.logs.bag import Log
 from volery.bridges.logs.text_layout import Place, TextLayout
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
+from volery.core.counting import counted
 from volery.core.errors import RecordingError
 from volery.graph.messages import (
     LaserScan,
@@ -57,10 +59,15 @@ class TextScans:
     left_out: int = 0
     clock_set: int = 0
     trouble: str = ""
+    _unit_ns: Decimal = field(init=False, repr=False)
+    """Of the times."""
     _newest_ns: int = field(default=-1, repr=False)
     _counters: tuple[float, float] | None = field(default=None, repr=False)
     _pose: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0), repr=False)
     """By the wheels: x, y in m, yaw in rad."""
+
+    def __post_init__(self) -> None:
+        self._unit_ns = Decimal(repr(self.layout.time.unit_s)) * NS_PER_S
 
     def __iter__(self) -> Iterator[Published]:
         """Messages in the order of the lines."""
@@ -84,8 +91,9 @@ class TextScans:
 
     def _messages(self, number: int, line: str) -> Iterator[Published]:
         try:
-            row = self._numbers(line)
-            time_ns = self._time_ns(row)
+            words = _APART.split(line.strip(" \t\r\n,;"))
+            row = self._numbers(words)
+            time_ns = self._time_ns(words[self.layout.time.column])
         except ValueError as error:
             self.left_out += 1
             self.trouble = self.trouble or f"line {number}: {error}"
@@ -102,21 +110,25 @@ class TextScans:
         scan = _scan(self.layout, time_ns, row)
         yield _published(f"{uav}/{self.layout.topic}", time_ns, scan)
 
-    def _numbers(self, line: str) -> NDArray[np.float64]:
-        words = _APART.split(line.strip(" \t\r\n,;"))
+    def _numbers(self, words: list[str]) -> NDArray[np.float64]:
         if len(words) < self.layout.columns:
-            raise ValueError(f"{len(words)} columns where the layout needs {self.layout.columns}")
+            found = counted(len(words), "column")
+            raise ValueError(f"{found} where the layout needs {self.layout.columns}")
         try:
             row = np.array(words[: self.layout.columns], dtype=np.float64)
         except ValueError:
             raise ValueError("a column holds no number") from None
         return row
 
-    def _time_ns(self, row: NDArray[np.float64]) -> int:
-        time_s = float(row[self.layout.time.column]) * self.layout.time.unit_s
+    def _time_ns(self, word: str) -> int:
+        """Exactly what the word says: a double of seconds would be off by 200 ns by now."""
+        time_s = float(word) * self.layout.time.unit_s
         if not 0.0 <= time_s < _LATEST_S:  # which NaN is not
             raise ValueError(f"{time_s:g} s is no time that a message can bear")
-        time_ns = round(time_s * 1e9)
+        try:
+            time_ns = int((Decimal(word) * self._unit_ns).to_integral_value())
+        except ArithmeticError:
+            raise ValueError(f"{word[:40]} is no time that can be told exactly") from None
         if self._newest_ns - _JUMP_NS <= time_ns <= self._newest_ns:
             raise ValueError(f"at {time_s:.6f} s, not after the line before it")
         return time_ns

@@ -12,6 +12,7 @@ from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.records import LogRecord, LogTopic, LogWalk, log_format
 from volery.bridges.logs.text_layout import TextLayout
 from volery.bridges.logs.text_scans import TextScans
+from volery.core.counting import counted
 from volery.core.errors import GraphError, RecordingError
 
 _ROS2_FORMS = {"msg": "ros2msg", "idl": "ros2idl"}
@@ -35,6 +36,8 @@ class LogSource:
     trouble: str = ""
     refused: int = 0
     """Messages that cannot be read."""
+    damage: str = ""
+    """What can be seen of the file without reading its messages."""
     _walk: Any = field(default=None, repr=False)
 
     def messages(self, wanted: set[str]) -> Iterator[Heard]:
@@ -63,6 +66,7 @@ class TextSource:
     trouble: str = ""
     refused: int = 0
     """Lines left out."""
+    damage: str = ""
 
     @property
     def topics(self) -> dict[str, str]:
@@ -84,7 +88,7 @@ class TextSource:
                 yield Heard(published.topic, published.time_ns, published.message)
         self.refused = scans.left_out
         if scans.left_out:
-            self.trouble = f"{scans.left_out:,} lines left out; {scans.trouble}"
+            self.trouble = f"{counted(scans.left_out, 'line')} left out; {scans.trouble}"
 
 
 def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | TextSource:
@@ -107,7 +111,8 @@ def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | Tex
             raise
         raise RecordingError(f"{error}; a scanner's text log needs --layout") from None
     summary = summarize(path)
-    return LogSource(path, {t.topic: t.msgtype for t in summary.topics}, _walk=LogWalk)
+    topics = {t.topic: t.msgtype for t in summary.topics}
+    return LogSource(path, topics, damage=summary.trouble, _walk=LogWalk)
 
 
 def _ros2_topics(path: Path) -> dict[str, str]:
