@@ -76,6 +76,8 @@ def convert_log(path: Path, out: Path, layout: Path, *, overwrite: bool) -> None
         made.unlink(missing_ok=True)
     if scans.left_out:
         warn(f"{path}: {counted(scans.left_out, 'line')} left out; {scans.trouble}")
+    for doubt in scans.doubts:
+        warn(f"{path}: {doubt}")
     typer.echo(
         f"{counted(scans.scans, 'scan')}, {counted(log.messages, 'message')} written to {out}"
     )

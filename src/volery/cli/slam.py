@@ -24,6 +24,8 @@ _MAPS = ("map.png", "map.pgm", "map.yaml")
 _NAMES = (*_MAPS, "path.tum", "summary.json")
 _PLAIN_PERIOD_S = 10.0
 """Between lines of progress where nobody watches a terminal."""
+_WAYS_TIMES, _WAYS_APART_M = 5.0, 5.0
+"""Ways by odometry and by scans that differ by so many times and metres are not of one flight."""
 _DEGRADED = 0.1
 """Share of the log's time from which on an IMU that was not used is worth a word."""
 
@@ -78,12 +80,15 @@ def map_log(asked: SlamAsked) -> None:
     typer.echo(f"mapping {asked.log}", err=True)
     if others and asked.uav is None and asked.scan is None:
         warn(f"{run.channels.uav} is mapped; the log has {', '.join(others)}, too: --uav")
-    outcome = run.run(_Progress().tell)
-    if source.trouble:
-        warn(f"{asked.log}: {source.trouble}")
+    try:
+        outcome = run.run(_Progress().tell)
+    finally:  # what is wrong with the log is often why nothing came of it
+        for trouble in filter(None, (source.trouble, *source.doubts)):
+            warn(f"{asked.log}: {trouble}")
     cell_m = _write(asked, outcome)
     _tell(asked.out, _summary(asked, outcome, source.refused, cell_m))
     _advise(outcome, source.topics)
+    _compare_ways(outcome)
 
 
 def _run(source: LogSource | TextSource, options: SlamOptions) -> SlamRun:
@@ -123,6 +128,18 @@ def _advise(outcome: Outcome, topics: dict[str, str]) -> None:
         warn(
             f"degraded or lost for {poor / total:.0%} of the time, in the plane; of a vehicle that "
             f"leans or flies the log's IMU ({', '.join(imus)}) may tell more: --imu"
+        )
+
+
+def _compare_ways(outcome: Outcome) -> None:
+    """Say that odometry and scans tell of ways that cannot both be right."""
+    wheels, seen = outcome.wheels_m, outcome.trajectory.length_m
+    if wheels is None or abs(wheels - seen) < _WAYS_APART_M:
+        return
+    if max(wheels, seen) > _WAYS_TIMES * min(wheels, seen):
+        warn(
+            f"by its odometry it went {wheels:.1f} m over ground, by what the scans saw "
+            f"{seen:.1f} m: are the units right? --no-odometry leaves it out"
         )
 
 

@@ -38,6 +38,8 @@ _COMMENTS = ("#", "%", "//")
 _LONGEST_LINE = 10_000_000
 _LATEST_S = 4.0e9
 """Stamps of messages end there: 32 bits of seconds."""
+_FEW = 0.01
+"""Share of the beams that meets something where units are wrong, or a scanner sees nothing."""
 _JUMP_NS = NS_PER_S // 2
 """A time so far before that of the line before is a clock that was set; less is disorder."""
 
@@ -59,6 +61,9 @@ class TextScans:
     left_out: int = 0
     clock_set: int = 0
     trouble: str = ""
+    _most_columns: int = field(default=0, repr=False)
+    _met: int = field(default=0, repr=False)
+    """Beams that have met something in the scanner's reach."""
     _unit_ns: Decimal = field(init=False, repr=False)
     """Of the times."""
     _newest_ns: int = field(default=-1, repr=False)
@@ -84,6 +89,24 @@ class TextScans:
             reason = self.trouble or "it is empty"
             raise RecordingError(f"{self.path}: holds no scan of this layout ({reason})")
 
+    @property
+    def doubts(self) -> list[str]:
+        """What may be wrong with the layout, a line each, once the log has been walked through."""
+        it, doubts = self.layout.ranges, []
+        unused = self._most_columns - self.layout.columns
+        if unused > 0:
+            doubts.append(
+                f"{counted(unused, 'column')} unused: a line has {self._most_columns:,}, the "
+                f"layout's last one is column {self.layout.columns - 1:,}, counted from 0"
+            )
+        share = self._met / max(self.scans * it.beams, 1)
+        if share < _FEW:
+            doubts.append(
+                f"{'hardly any' if self._met else 'no'} range lies between {it.range_min_m:g} and "
+                f"{it.range_max_m:g} m: is ranges.unit_m = {it.unit_m:g} right?"
+            )
+        return doubts
+
     def write_to(self, log: Log) -> None:
         """Put all messages into a log."""
         for published in self:
@@ -108,9 +131,11 @@ class TextScans:
         if pose is not None:
             yield _published(f"{uav}/odom", time_ns, _odometry(self.layout, time_ns, *pose))
         scan = _scan(self.layout, time_ns, row)
+        self._met += int(np.count_nonzero(np.isfinite(scan.ranges)))
         yield _published(f"{uav}/{self.layout.topic}", time_ns, scan)
 
     def _numbers(self, words: list[str]) -> NDArray[np.float64]:
+        self._most_columns = max(self._most_columns, len(words))
         if len(words) < self.layout.columns:
             found = counted(len(words), "column")
             raise ValueError(f"{found} where the layout needs {self.layout.columns}")

@@ -21,7 +21,7 @@ from volery.runtime.slam_run.channels import LEVEL, NODDING, Asked, Channels, ch
 from volery.runtime.slam_run.log_host import LogHost
 from volery.runtime.slam_run.mounts import frames_of, read_joints
 from volery.runtime.slam_run.sources import LogSource, TextSource
-from volery.runtime.slam_run.trajectory import Trajectory, corrected
+from volery.runtime.slam_run.trajectory import Trajectory, corrected, way_m
 
 Array = NDArray[np.float64]
 
@@ -74,6 +74,8 @@ class Outcome:
     """As `scans`, of the nodding LIDAR; empty where there is none."""
     nods: Array = field(default_factory=lambda: np.zeros((0, 2)))
     """(J, 2) times, s, and angles of its mount, rad, positive down; times rise."""
+    wheels_m: float | None = None
+    """Way over ground by the odometry that was heard; None: none was."""
 
 
 class SlamRun:
@@ -88,6 +90,8 @@ class SlamRun:
         self._host = LogHost()
         self._odometry: list[tuple[float, ...]] = []
         self._times: list[int] = []
+        self._wheels: list[tuple[float, float]] = []
+        """Places of the log's odometry."""
         self._scans: list[tuple[int, LaserScan]] = []
         self._nodding: list[tuple[int, LaserScan]] = []
         self._next_nodding_ns = 0
@@ -117,6 +121,9 @@ class SlamRun:
                 heard, self._newest = heard + 1, message
             if topic == "/tf_static":
                 self._joints.add(message)
+            if ours == f"/{uav}/odom":
+                place = message.pose.pose.position
+                self._wheels.append((place.x, place.y))
             self._keep_nodding(ours, time_ns, message)
             if first is not None:
                 lasted += max(time_ns - before, 0)
@@ -245,6 +252,7 @@ class SlamRun:
             self.channels, trajectory, self._scans, self._mount, heard, lasted_s, cpu_s,
             self._status, self._states, self._problems, self._nodding,
             np.array(sorted(self._nods)).reshape(-1, 2),
+            way_m(np.array(self._wheels)) if self._wheels else None,
         )  # fmt: skip
 
     def _mount(self, frame: str) -> Mount:

@@ -38,6 +38,7 @@ class LogSource:
     """Messages that cannot be read."""
     damage: str = ""
     """What can be seen of the file without reading its messages."""
+    doubts: tuple[str, ...] = ()
     _walk: Any = field(default=None, repr=False)
 
     def messages(self, wanted: set[str]) -> Iterator[Heard]:
@@ -67,6 +68,8 @@ class TextSource:
     refused: int = 0
     """Lines left out."""
     damage: str = ""
+    doubts: list[str] = field(default_factory=list)
+    """What may be wrong with the layout."""
 
     @property
     def topics(self) -> dict[str, str]:
@@ -86,7 +89,7 @@ class TextSource:
         for published in scans:
             if published.topic in wanted:
                 yield Heard(published.topic, published.time_ns, published.message)
-        self.refused = scans.left_out
+        self.refused, self.doubts = scans.left_out, scans.doubts
         if scans.left_out:
             self.trouble = f"{counted(scans.left_out, 'line')} left out; {scans.trouble}"
 
