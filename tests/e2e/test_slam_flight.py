@@ -14,7 +14,10 @@ from test_mapped_flights import FOREST
 from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.replay import Replay
+from volery.graph.messages import stamp_of
 from volery.runtime import Simulation
+from volery.runtime.slam_run.run import SlamOptions, SlamRun
+from volery.runtime.slam_run.sources import open_source
 from volery.scenario.load import parse_scenario
 
 SECONDS = 9.0
@@ -88,3 +91,19 @@ def test_it_follows_a_flight_and_says_the_same_on_its_log_in_another_process(tmp
         timeout=240,
     )
     assert ast.literal_eval(done.stdout.strip().splitlines()[-1]) == digest(said)
+    _maps_alike(path, said["odom"])
+
+
+def _maps_alike(log, told):
+    """What `volery slam` makes of the log alone is the way that was told in flight."""
+    options = SlamOptions(start=(60.0, 120.0, 0.0, 0.0))
+    way = SlamRun(open_source(log), options).run().trajectory
+    flown = np.array([(stamp_of(p.message), *_place(p.message)) for p in told])
+    there = np.stack([np.interp(way.time_ns, flown[:, 0], flown[:, k]) for k in (1, 2, 3)], 1)
+    assert len(way.time_ns) > 300
+    np.testing.assert_allclose(way.position, there, atol=0.05)
+
+
+def _place(message):
+    p = message.pose.pose.position
+    return p.x, p.y, p.z

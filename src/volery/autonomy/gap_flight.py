@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from volery.autonomy.gap_steering import Caution, GapSteering
 from volery.autonomy.ground_plane import GroundPlane
 from volery.autonomy.lone_returns import LoneReturns
+from volery.autonomy.number_lists import declare_mount
 from volery.autonomy.obstacle_memory import ObstacleMemory
 from volery.autonomy.scan_points import Pose, ScanProjector
 from volery.core import rotations
@@ -63,15 +64,13 @@ class GapFlight(Node):
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
         odometry = str(self.declare_parameter("odometry", "odom").value)
-        self._height_m = self.declare_parameter("height_m", 3.0, read_only=False)
-        self._speed_m_s = self.declare_parameter("speed_m_s", 3.0, read_only=False)
-        radius = float(self.declare_parameter("safe_radius_m", 1.1).value)
-        deceleration = float(self.declare_parameter("deceleration_m_s2", 2.0).value)
+        self._height_m = self.declare_parameter("height_m", 3.0, least=0.1, read_only=False)
+        self._speed_m_s = self.declare_parameter("speed_m_s", 3.0, least=0.1, read_only=False)
+        radius = float(self.declare_parameter("safe_radius_m", 1.1, least=0.05).value)
+        deceleration = float(self.declare_parameter("deceleration_m_s2", 2.0, least=0.1).value)
         self._steering = GapSteering(Caution(radius, deceleration))
-        self._level = ScanProjector(self.declare_parameter("level_mount", [0.0, 0.0, 0.0]).value)
-        self._nodding = ScanProjector(
-            self.declare_parameter("nodding_mount", [0.0, 0.0, 0.0]).value
-        )
+        self._level = ScanProjector(declare_mount(self, "level"))
+        self._nodding = ScanProjector(declare_mount(self, "nodding"))
         self._pose: Pose | None = None
         self._joint: tuple[int, float, float] | None = None
         self._range: tuple[int, float] | None = None

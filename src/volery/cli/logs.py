@@ -9,6 +9,7 @@ import typer
 from volery.cli.guard import complain, warn
 from volery.cli.tables import print_table
 from volery.core.clock import NS_PER_S
+from volery.core.counting import counted
 from volery.core.errors import RecordingError
 
 _FORMATS = {"mcap": "MCAP", "bag": "ROS 1 bag"}
@@ -74,5 +75,9 @@ def convert_log(path: Path, out: Path, layout: Path, *, overwrite: bool) -> None
         log.close()
         made.unlink(missing_ok=True)
     if scans.left_out:
-        warn(f"{path}: {scans.left_out:,} lines left out; {scans.trouble}")
-    typer.echo(f"{scans.scans:,} scans, {log.messages:,} messages written to {out}")
+        warn(f"{path}: {counted(scans.left_out, 'line')} left out; {scans.trouble}")
+    for doubt in scans.doubts:
+        warn(f"{path}: {doubt}")
+    typer.echo(
+        f"{counted(scans.scans, 'scan')}, {counted(log.messages, 'message')} written to {out}"
+    )

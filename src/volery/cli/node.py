@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from contextlib import closing
@@ -37,7 +38,7 @@ def run_node(options: NodeOptions) -> None:
     from volery.bridges.nodes.host import NodeHost
     from volery.bridges.nodes.profile import Profile, absolute_names, load_profile
     from volery.graph.messages import add_definitions
-    from volery.runtime.node_loading import start_node
+    from volery.runtime.node_loading import find_node, start_node
     from volery.scenario.schema import NodeEntry
 
     profile = Profile() if options.profile is None else load_profile(options.profile)
@@ -55,10 +56,13 @@ def run_node(options: NodeOptions) -> None:
         raise BridgeError(
             "--lock-step: ROS 2 keeps no order between topics; use rosbridge or ros-tcp"
         )
+    if options.lock_step_s is not None and not 0.0 < options.lock_step_s < math.inf:
+        raise BridgeError(f"--lock-step: a period in s above 0, not {options.lock_step_s:g}")
+    folder = options.profile.parent if options.profile else None
+    find_node(entry, "volery node", folder)  # before it waits for a graph
     with closing(await_link(via, name)) as link:
         host = NodeHost(link, clock=profile.clock)
         context = host.context(absolute_names(profile.remap, namespace))
-        folder = options.profile.parent if options.profile else None
         node = start_node(entry, context, namespace, "volery node", folder)
         if options.lock_step_s is not None:
             host.join_lock_step(node.get_name(), options.lock_step_s)

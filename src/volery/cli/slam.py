@@ -13,15 +13,19 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from volery.cli.guard import warn
+from volery.core.counting import counted
 from volery.core.errors import RecordingError, VoleryError
 
 if TYPE_CHECKING:
-    from volery.runtime.slam_run.run import Outcome
+    from volery.runtime.slam_run.run import Outcome, SlamOptions, SlamRun
+    from volery.runtime.slam_run.sources import LogSource, TextSource
 
 _MAPS = ("map.png", "map.pgm", "map.yaml")
 _NAMES = (*_MAPS, "path.tum", "summary.json")
 _PLAIN_PERIOD_S = 10.0
 """Between lines of progress where nobody watches a terminal."""
+_WAYS_TIMES, _WAYS_APART_M = 5.0, 5.0
+"""Ways by odometry and by scans that differ by so many times and metres are not of one flight."""
 _DEGRADED = 0.1
 """Share of the log's time from which on an IMU that was not used is worth a word."""
 
@@ -51,8 +55,8 @@ class SlamAsked:
 def map_log(asked: SlamAsked) -> None:
     """Run the SLAM over a log, write what came of it and say so."""
     from volery.bridges.logs.text_layout import TextLayout
-    from volery.runtime.slam_run.channels import Asked
-    from volery.runtime.slam_run.run import SlamOptions, SlamRun
+    from volery.runtime.slam_run.channels import Asked, other_uavs
+    from volery.runtime.slam_run.run import SlamOptions
     from volery.runtime.slam_run.sources import open_source
     from volery.scenario.data_files import load_data_file
 
@@ -71,14 +75,32 @@ def map_log(asked: SlamAsked) -> None:
         asked.reach,
         asked.loops,
     )
-    run = SlamRun(source, options)
+    run = _run(source, options)
+    others = other_uavs(source.topics, run.channels.uav)
     typer.echo(f"mapping {asked.log}", err=True)
-    outcome = run.run(_Progress().tell)
-    if source.trouble:
-        warn(f"{asked.log}: {source.trouble}")
+    if others and asked.uav is None and asked.scan is None:
+        warn(f"{run.channels.uav} is mapped; the log has {', '.join(others)}, too: --uav")
+    try:
+        outcome = run.run(_Progress().tell)
+    finally:  # what is wrong with the log is often why nothing came of it
+        for trouble in filter(None, (source.trouble, *source.doubts)):
+            warn(f"{asked.log}: {trouble}")
     cell_m = _write(asked, outcome)
     _tell(asked.out, _summary(asked, outcome, source.refused, cell_m))
     _advise(outcome, source.topics)
+    _compare_ways(outcome)
+
+
+def _run(source: LogSource | TextSource, options: SlamOptions) -> SlamRun:
+    """Ready to begin; where the log lacks something it is told whether it is whole."""
+    from volery.runtime.slam_run.run import SlamRun
+
+    try:
+        return SlamRun(source, options)
+    except RecordingError as error:
+        if not source.damage:
+            raise
+        raise RecordingError(f"{error}; the log is {source.damage}") from None
 
 
 class _Progress:
@@ -92,7 +114,7 @@ class _Progress:
         now = time.monotonic()
         if sys.stderr.isatty() or now - self._told >= _PLAIN_PERIOD_S:
             self._told = now
-            typer.echo(f"{scans:,} scans, {seconds:.0f} s of the log", err=True)
+            typer.echo(f"{counted(scans, 'scan')}, {seconds:.0f} s of the log", err=True)
 
 
 def _advise(outcome: Outcome, topics: dict[str, str]) -> None:
@@ -106,6 +128,18 @@ def _advise(outcome: Outcome, topics: dict[str, str]) -> None:
         warn(
             f"degraded or lost for {poor / total:.0%} of the time, in the plane; of a vehicle that "
             f"leans or flies the log's IMU ({', '.join(imus)}) may tell more: --imu"
+        )
+
+
+def _compare_ways(outcome: Outcome) -> None:
+    """Say that odometry and scans tell of ways that cannot both be right."""
+    wheels, seen = outcome.wheels_m, outcome.trajectory.length_m
+    if wheels is None or abs(wheels - seen) < _WAYS_APART_M:
+        return
+    if max(wheels, seen) > _WAYS_TIMES * min(wheels, seen):
+        warn(
+            f"by its odometry it went {wheels:.1f} m over ground, by what the scans saw "
+            f"{seen:.1f} m: are the units right? --no-odometry leaves it out"
         )
 
 
@@ -170,6 +204,7 @@ def _summary(
     status = outcome.status
     told = {
         "log": asked.log.name,
+        "uav": outcome.channels.uav,
         "mode": "imu" if outcome.channels.has_imu else "planar",
         "topics": outcome.channels.names,
         "scans": outcome.heard,
@@ -198,20 +233,26 @@ def _summary(
 def _tell(out: Path, told: dict[str, Any]) -> None:
     share = told["cpu_share"]
     typer.echo(
-        f"{told['scans']:,} scans over {told['lasted_s']:.1f} s, {told['way_m']:.1f} m over ground "
-        f"({'with' if told['mode'] == 'imu' else 'without'} IMU)"
+        f"{counted(told['scans'], 'scan')} over {told['lasted_s']:.1f} s, "
+        f"{told['way_m']:.1f} m over ground ({'with' if told['mode'] == 'imu' else 'without'} IMU)"
     )
     typer.echo(
-        f"{told['keyframes']:,} keyframes, {told['closures']} closures, "
-        f"{told['sessions']} session{'s' if told['sessions'] != 1 else ''}, "
-        f"{told['refused']:,} messages refused"
+        f"{counted(told['keyframes'], 'keyframe')}, {counted(told['closures'], 'closure')}, "
+        f"{counted(told['sessions'], 'session')}, {counted(told['refused'], 'message')} refused"
     )
-    states = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in told["states_s"].items())
+    topics = [topic for topic in told["topics"].values() if topic != "/tf_static"]
+    typer.echo(f"heard     {told['uav']}: {', '.join(topics)}")
+    states = ", ".join(f"{name} {_lasting(s)}" for name, s in told["states_s"].items())
     typer.echo(f"state     {states or 'none told'}")
     for problem, seconds in told["problems_s"].items():
-        typer.echo(f"problem   {problem}: {seconds:.0f} s")
+        typer.echo(f"problem   {problem}: {_lasting(seconds)}")
     if share is not None:
         typer.echo(f"CPU       {told['cpu_s']:.1f} s, {share:.1%} of the log's time")
     for name in _NAMES:
         if name not in _MAPS or told["cell_m"] is not None:
             typer.echo(f"written   {out / name}")
+
+
+def _lasting(seconds: float) -> str:
+    """Tenths of what is short, too."""
+    return f"{seconds:.1f} s" if seconds < 10.0 else f"{seconds:.0f} s"

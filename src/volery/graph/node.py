@@ -15,6 +15,7 @@ names that start with `~/` belong to the node.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
@@ -25,7 +26,7 @@ from volery.core.errors import GraphError, NodeError, VoleryError
 from volery.graph.client import Client
 from volery.graph.graph import Graph, Publisher, Subscription, check_period
 from volery.graph.messages import Published, message_type
-from volery.graph.parameters import Parameter, same_kind
+from volery.graph.parameters import Parameter, Within
 from volery.graph.qos import DEFAULT_DEPTH, QoSProfile, profile_of
 from volery.graph.thinking import Deferring, DelayedPublisher, Thinker
 
@@ -187,18 +188,29 @@ class Node:
         message_type(f"{srv_type}_Request")
         return Client(self._context.graph, self.resolve(service), srv_type, self._thinker)
 
-    def declare_parameter(self, name: str, default: Any, *, read_only: bool = True) -> Parameter:
+    def declare_parameter(
+        self,
+        name: str,
+        default: Any,
+        *,
+        read_only: bool = True,
+        least: float | None = None,
+        most: float = math.inf,
+    ) -> Parameter:
         """Declare a parameter; an override given at start wins over the default.
 
         Unless it is `read_only` it may be set while the node runs, which then reads
-        `Parameter.value` each time anew.
+        `Parameter.value` each time anew. A number with a `least` value is finite, and `most` at
+        most. `GraphError` for what does not fit.
         """
         value = self._overrides.pop(name, default)
-        if not same_kind(value, default):
-            raise GraphError(
-                f"node {self._name}: parameter '{name}' must be like {default!r}, not {value!r}"
+        within = None if least is None else Within(least, most)
+        try:
+            parameter = Parameter(
+                name, value, like=default, within=within, read_only=read_only, before_set=self.join
             )
-        parameter = Parameter(name, value, like=default, read_only=read_only, before_set=self.join)
+        except GraphError as error:
+            raise GraphError(f"node {self._name}: {error}") from None
         self._context.graph.parameters.declare(self.full_name, parameter)
         self._parameters[name] = parameter
         return parameter

@@ -6,18 +6,39 @@ once, at its start, declares it read-only, and setting it is refused rather than
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from volery.core.errors import GraphError
+
+
+class Within(NamedTuple):
+    """Bounds of a number; whatever is not finite lies outside."""
+
+    least: float
+    most: float = math.inf
+
+    def holds(self, value: Any) -> bool:
+        """Whether a number lies within."""
+        return bool(self.least <= value <= self.most and value < math.inf)
+
+    def __str__(self) -> str:
+        """As an error tells it."""
+        return (
+            f"{self.least:g} to {self.most:g}"
+            if self.most < math.inf
+            else f"{self.least:g} or more"
+        )
 
 
 class Parameter:
     """A declared parameter and its value.
 
-    like: a value of the kind that it takes, None where it takes any. read_only: whether the value
-    that it has at the node's start is for good. before_set: called before another value is set.
+    like: a value of the kind that it takes, None where it takes any. within: bounds of a number.
+    read_only: whether the value that it has at the node's start is for good. before_set: called
+    before another value is set.
     """
 
     def __init__(
@@ -26,6 +47,7 @@ class Parameter:
         value: Any,
         *,
         like: Any = None,
+        within: Within | None = None,
         read_only: bool = True,
         before_set: Callable[[], None] | None = None,
     ) -> None:
@@ -34,18 +56,25 @@ class Parameter:
         self.read_only = read_only
         self._before_set = before_set
         self._like = like
+        self._within = within
+        self._check(value)
 
     def set(self, value: Any) -> None:
-        """Set another value. `GraphError` if it is read-only, or for a value of another kind."""
+        """Set another value. `GraphError` if it is read-only, or for a value that does not fit."""
         if self.read_only:
             raise GraphError(
                 f"parameter '{self.name}' is read-only: its node takes it at its start"
             )
-        if not same_kind(value, self._like):
-            raise GraphError(f"parameter '{self.name}' must be like {self._like!r}, not {value!r}")
+        self._check(value)
         if self._before_set is not None:
             self._before_set()
         self.value = value
+
+    def _check(self, value: Any) -> None:
+        if not same_kind(value, self._like):
+            raise GraphError(f"parameter '{self.name}' must be like {self._like!r}, not {value!r}")
+        if self._within is not None and not self._within.holds(value):
+            raise GraphError(f"parameter '{self.name}' must be {self._within}, not {value!r}")
 
 
 class Parameters:

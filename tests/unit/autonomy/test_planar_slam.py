@@ -258,7 +258,7 @@ def test_a_kept_state_goes_on_as_before(short):
 def test_parameters_of_the_wrong_length_are_refused():
     with pytest.raises(NodeError, match="start is"):
         Listening(start=[1.0])
-    with pytest.raises(NodeError, match="mount has 6"):
+    with pytest.raises(NodeError, match="mount is"):
         Listening(mount=[1.0])
 
 

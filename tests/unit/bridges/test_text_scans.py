@@ -89,7 +89,7 @@ def test_a_scanner_may_turn_clockwise(tmp_path):
         ("nan 0 0 0 1000 2000 3000", "line 5: nan s is no time"),
         ("-5 0 0 0 1000 2000 3000", "line 5: -5e-06 s is no time"),
         ("9e99 0 0 0 1000 2000 3000", "line 5: 9e[+]93 s is no time"),
-        ("\x00\xff", "line 5: 1 columns"),
+        ("\x00\xff", "line 5: 1 column where"),
     ],
 )
 def test_lines_that_cannot_be_read_are_left_out_and_told(tmp_path, line, trouble):
@@ -122,7 +122,7 @@ def test_the_command_writes_a_log(tmp_path, kind):
     told = convert(source, out, "--layout", layout)
     assert told.exit_code == 0, told.output
     assert "50 scans, 51 messages" in told.output
-    assert "1 lines left out; line 51: 1 columns" in told.output
+    assert "1 line left out; line 51: 1 column where" in told.output
     walked, decoder = LogWalk(out), LogDecoder()
     scans = [decoder.decode(one).message for one in walked if one.topic.topic.endswith("/scan")]
     assert len(scans) == 50
@@ -191,3 +191,43 @@ def test_a_clock_set_back_is_followed_and_disorder_is_not(tmp_path):
 def test_odometry_that_is_no_number_is_not_told(tmp_path):
     scans = walk(tmp_path, "1000000 nan 0 0 1 2 3\n")
     assert [one.topic for one in scans] == ["/tf_static", "/uav1/laser/horizontal/scan"]
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "value"),
+    [
+        ("ranges", "beams", "3"),
+        ("ranges", "first_column", True),
+        ("ranges", "range_max_m", "5.6"),
+        ("ranges", "no_echo", ["0"]),
+        ("odometry", "columns", [1, "2", 3]),
+        ("mount", "position_m", ["0", 0.0, 0.18]),
+        ("time", "unit_s", "1e-6"),
+    ],
+)
+def test_a_text_is_no_number_of_a_layout(table, key, value):
+    changed = {**LAYOUT, table: {**LAYOUT.get(table, {}), key: value}}
+    with pytest.raises(ValueError, match="numbers stand here"):
+        TextLayout.model_validate(changed)
+
+
+@pytest.mark.parametrize(
+    ("words", "unit_s", "time_ns"),
+    [
+        ("1700000019900000", 1e-6, 1_700_000_019_900_000_000),
+        ("1700000019.9", 1.0, 1_700_000_019_900_000_000),
+        ("1700000019900.25", 1e-3, 1_700_000_019_900_250_000),
+        ("1700000019.123456789", 1.0, 1_700_000_019_123_456_789),
+    ],
+)
+def test_stamps_are_those_of_the_log_to_the_nanosecond(words, unit_s, time_ns, tmp_path):
+    layout = {**LAYOUT, "time": {"unit_s": unit_s}}
+    assert {one.time_ns for one in walk(tmp_path, f"{words} 0 0 0 1 2 3\n", layout)} == {time_ns}
+
+
+def test_a_time_of_too_many_digits_costs_its_line_alone(tmp_path):
+    text = "1 0 0 0 1 2 3\n1e-9999999999999999999 0 0 0 1 2 3\n2 0 0 0 1 2 3\n"
+    scans = walk(tmp_path, text)
+    assert len(list(scans)) == 5
+    assert scans.left_out == 1
+    assert "line 2: 1e-99" in scans.trouble

@@ -75,8 +75,9 @@ def test_a_text_log_becomes_map_path_and_summary(mapped, carried):
     assert told["way_m"] == pytest.approx(16.0, abs=0.3)
     assert "mapping " in said
     assert "m over ground (without IMU)" in said
-    assert f"1 lines left out; line {len(carried.time_s) + 1}: " in said
+    assert f"1 line left out; line {len(carried.time_s) + 1}: " in said
     assert "warning: " in said
+    assert said.count("warning: ") == 1
     assert "error: " not in said
     path = tum_of(folder)
     assert path.shape == (len(carried.time_s), 8)
@@ -232,6 +233,28 @@ def test_what_cannot_be_mapped_is_told_in_a_line(content, arguments, told, text,
     assert result.exit_code == 2
     assert told in result.output
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("line", "instead", "told"),
+    [
+        ("[odometry]", "[odometry]\nunit_m = 1.0", "warning: by its odometry it went 16"),
+        ("beams = 241", "beams = 200", "41 columns unused: a line has 245, the layout's last"),
+        (
+            "[ranges]",
+            "[ranges]\nunit_m = 1.0",
+            "range lies between 0.02 and 8 m: is ranges.unit_m = 1 right?",
+        ),
+    ],
+)
+def test_a_layout_that_hardly_fits_is_told(line, instead, told, text, tmp_path):
+    layout = (text / "layout.toml").read_text()
+    assert line in layout
+    (tmp_path / "layout.toml").write_text(layout.replace(line, instead))
+    command = (text / "scans.txt", "--layout", tmp_path / "layout.toml", "--out", tmp_path / "o")
+    said = slam(*command).output
+    assert said.count("warning: ") == 2  # the other one is of the line that is cut off
+    assert told in said
 
 
 def test_a_log_without_anything_in_reach_says_why(text, carried, tmp_path):

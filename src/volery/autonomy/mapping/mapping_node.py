@@ -19,6 +19,7 @@ from volery.autonomy.mapping.map_files import MapLimits, node_count, read_map, w
 from volery.autonomy.mapping.octree import Octree
 from volery.autonomy.mapping.scan_intake import ScanIntake
 from volery.autonomy.motion_history import MotionHistory, NodHistory
+from volery.autonomy.number_lists import declare_mount
 from volery.autonomy.scan_points import Pose
 from volery.autonomy.scan_rays import Beams, RayMaker, Rays
 from volery.core.clock import NS_PER_S
@@ -73,24 +74,24 @@ class Mapping(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("mapping", **options)
-        self._resolution = float(self.declare_parameter("resolution_m", 0.2).value)
-        self._reach = float(self.declare_parameter("reach_m", 15.0).value)
-        every = int(self.declare_parameter("every", 2).value)
-        rate = float(self.declare_parameter("scan_rate_hz", 5.0).value)
-        extent = float(self.declare_parameter("extent_m", 500.0).value)
-        nodes = int(self.declare_parameter("max_nodes", 3_000_000).value)
-        self._half = float(self.declare_parameter("half_height_m", 0.6).value)
+        self._resolution = float(self.declare_parameter("resolution_m", 0.2, least=0.01).value)
+        self._reach = float(self.declare_parameter("reach_m", 15.0, least=0.1).value)
+        every = int(self.declare_parameter("every", 2, least=1).value)
+        rate = float(self.declare_parameter("scan_rate_hz", 5.0, least=0.01, most=1000.0).value)
+        extent = float(self.declare_parameter("extent_m", 500.0, least=1.0).value)
+        nodes = int(self.declare_parameter("max_nodes", 3_000_000, least=1).value)
+        self._half = float(self.declare_parameter("half_height_m", 0.6, least=0.01).value)
         self._folder = str(self.declare_parameter("folder", f"maps{self.get_namespace()}").value)
         self._limits = MapLimits(self._resolution, extent, nodes)
         beams = Beams(reach_m=self._reach, every=every)
         self._intakes = {
-            name: ScanIntake(
-                RayMaker(self.declare_parameter(f"{name}_mount", [0.0] * 3).value, beams), rate
-            )
+            name: ScanIntake(RayMaker(declare_mount(self, name), beams), rate)
             for name in ("level", "nodding")
         }
         self._octree = Octree(self._resolution, nodes)
-        self._grid = LevelGrid(float(self.declare_parameter("grid_cell_m", 0.4).value), extent)
+        self._grid = LevelGrid(
+            float(self.declare_parameter("grid_cell_m", 0.4, least=0.01).value), extent
+        )
         self._frame = MapFrame()
         self._motion, self._nod = MotionHistory(), NodHistory()
         self._ground = GroundPlane()
@@ -104,8 +105,8 @@ class Mapping(Node):
 
     def _open(self) -> None:
         odometry = str(self.declare_parameter("odometry", "odom").value)
-        voxels_s = float(self.declare_parameter("voxels_period_s", 10.0).value)
-        grid_s = float(self.declare_parameter("grid_period_s", 1.0).value)
+        voxels_s = float(self.declare_parameter("voxels_period_s", 10.0, least=0.01).value)
+        grid_s = float(self.declare_parameter("grid_period_s", 1.0, least=0.01).value)
         self._voxels = self.create_publisher(reports.OCTOMAP, "octomap_binary", 1, latched=True)
         self._level = self.create_publisher(OccupancyGrid, "projected_map", 1, latched=True)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)

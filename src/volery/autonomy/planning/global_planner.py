@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from volery.autonomy.map_frame import MAP, MapFrame
 from volery.autonomy.mapping.reports import OCTOMAP, voxels_of
+from volery.autonomy.number_lists import declare_numbers
 from volery.autonomy.planning.global_path import Search, plan_way
 from volery.autonomy.planning.voxel_space import Solid, VoxelSpace
 from volery.autonomy.scan_points import Pose as Motion
 from volery.core.clock import NS_PER_S
-from volery.core.errors import DataFileError, PlanError
+from volery.core.errors import DataFileError, NodeError, PlanError
 from volery.core.kept import keep, put_back
 from volery.graph.messages import (
     Bool,
@@ -62,14 +63,16 @@ class GlobalPlanner(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("global_planner", **options)
-        self._height = float(self.declare_parameter("height_m", 3.0).value)
-        low, high = self.declare_parameter("heights_m", [2.2, 4.2]).value
+        self._height = float(self.declare_parameter("height_m", 3.0, least=0.1).value)
+        low, high = declare_numbers(self, "heights_m", [2.2, 4.2], "[least, most]")
+        if not low < high:
+            raise NodeError(f"heights_m is [least, most], not {[low, high]}")
         self._search = Search(
-            radius_m=float(self.declare_parameter("radius_m", 0.8).value),
-            heights_m=(float(low), float(high)),
-            iterations=int(self.declare_parameter("iterations", 4000).value),
+            radius_m=float(self.declare_parameter("radius_m", 0.8, least=0.05).value),
+            heights_m=(low, high),
+            iterations=int(self.declare_parameter("iterations", 4000, least=1).value),
         )
-        self._cell = float(self.declare_parameter("cell_m", 0.4).value)
+        self._cell = float(self.declare_parameter("cell_m", 0.4, least=0.05).value)
         self._seed = int(self.declare_parameter("seed", 1).value)
         self._frame = MapFrame()
         self._map: Solid | None = None

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.map_frame import MAP, UNKNOWN_PLACE, MapFrame
+from volery.autonomy.number_lists import declare_mount
 from volery.autonomy.planning.local_planning import Doing, LocalPlanning, Policy, Sight
 from volery.autonomy.planning.neighbours import Neighbours
 from volery.autonomy.planning.primitives import Limits, Path, State
@@ -72,21 +73,24 @@ class LocalPlanner(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("local_planner", **options)
-        mounts = {
-            name: self.declare_parameter(f"{name}_mount", [0.0] * 3).value
-            for name in ("level", "nodding")
-        }
-        cell = float(self.declare_parameter("cell_m", 0.25).value)
-        scan_rate = float(self.declare_parameter("scan_rate_hz", 13.3).value)
+        mounts = {name: declare_mount(self, name) for name in ("level", "nodding")}
+        cell = float(self.declare_parameter("cell_m", 0.25, least=0.05, most=5.0).value)
+        scan_rate = float(
+            self.declare_parameter("scan_rate_hz", 13.3, least=0.1, most=1000.0).value
+        )
         self._sight = Surroundings(mounts, cell, scan_rate)
-        self._height = self.declare_parameter("height_m", 3.0, read_only=False)
-        self._speed = self.declare_parameter("speed_m_s", 3.0, read_only=False)
-        self._acceleration = float(self.declare_parameter("acceleration_m_s2", 2.5).value)
-        self._radius = float(self.declare_parameter("radius_m", 0.6).value)
+        self._height = self.declare_parameter("height_m", 3.0, least=0.1, read_only=False)
+        self._speed = self.declare_parameter("speed_m_s", 3.0, least=0.1, read_only=False)
+        self._acceleration = float(
+            self.declare_parameter("acceleration_m_s2", 2.5, least=0.1).value
+        )
+        self._radius = float(self.declare_parameter("radius_m", 0.6, least=0.05).value)
         self._unknown_stops = bool(self.declare_parameter("unknown_stops", True).value)
-        self._ahead_ns = ns_from_s(float(self.declare_parameter("ahead_s", 0.1).value))
-        self._arrival_m = float(self.declare_parameter("arrival_m", 1.0).value)
-        radius = float(self.declare_parameter("separation_m", 2.0).value)
+        self._ahead_ns = ns_from_s(
+            float(self.declare_parameter("ahead_s", 0.1, least=0.0, most=10.0).value)
+        )
+        self._arrival_m = float(self.declare_parameter("arrival_m", 1.0, least=0.01).value)
+        radius = float(self.declare_parameter("separation_m", 2.0, least=0.0).value)
         self._separation = Separation(radius_m=radius)
         self._planning = LocalPlanning(self._policy())
         self._frame = MapFrame()
@@ -103,7 +107,7 @@ class LocalPlanner(Node):
 
     def _open(self) -> None:
         odometry = str(self.declare_parameter("odometry", "odom").value)
-        period = float(self.declare_parameter("period_s", 0.18).value)
+        period = float(self.declare_parameter("period_s", 0.18, least=0.01, most=60.0).value)
         self._trajectory = self.create_publisher(MultiDOFJointTrajectory, "planning/trajectory", 1)
         self._status = self.create_publisher(String, "planning/status", 1, latched=True)
         self.create_subscription(Odometry, odometry, self._on_odometry, 5)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.fixed_joints import LEVEL, FixedJoints, Mount
+from volery.autonomy.number_lists import declare_numbers
 from volery.autonomy.scan_rays import is_usable
 from volery.autonomy.slam import reports
 from volery.autonomy.slam.planar.follower import Follower
@@ -20,7 +21,6 @@ from volery.autonomy.slam.planar.settings import PlanarSettings, Returns
 from volery.autonomy.slam.planar.way import PlanarWay
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.errors import NodeError
 from volery.core.kept import keep, put_back
 from volery.graph.messages import (
     LaserScan,
@@ -70,19 +70,17 @@ class PlanarSlam(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)
-        start = self.declare_parameter("start", []).value
-        mount = self.declare_parameter("mount", []).value
-        if len(start) not in (0, 4) or len(mount) not in (0, 6):
-            raise NodeError("start is [x, y, z, yaw], mount has 6 numbers, or they are empty")
-        self._start = np.array(start if len(start) else [0.0] * 4, np.float64)
+        start = declare_numbers(self, "start", [], "[x, y, z, yaw]", or_empty=True)
+        mount = declare_numbers(self, "mount", [], "[x, y, z, roll, pitch, yaw]", or_empty=True)
+        self._start = np.array(start or [0.0] * 4)
         self._mount = LEVEL
         self._is_mount_told = len(mount) == 6
         if self._is_mount_told:
-            turn = rotations.from_rpy(*map(float, mount[3:]))
-            self._mount = Mount(np.array(mount[:3], np.float64), turn)
+            turn = rotations.from_rpy(*mount[3:])
+            self._mount = Mount(np.array(mount[:3]), turn)
         kept = Returns(
-            nearest_m=float(self.declare_parameter("nearest_m", 0.05).value),
-            reach_m=float(self.declare_parameter("reach_m", 30.0).value),
+            nearest_m=float(self.declare_parameter("nearest_m", 0.05, least=0.0).value),
+            reach_m=float(self.declare_parameter("reach_m", 30.0, least=0.1).value),
         )
         self._settings = PlanarSettings(returns=kept)
         self._hears_odometry = bool(self.declare_parameter("odometry", True).value)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.motion_history import NodHistory
+from volery.autonomy.number_lists import declare_mount, declare_numbers
 from volery.autonomy.scan_rays import has_return, is_usable, scan_times
 from volery.autonomy.slam import reports
 from volery.autonomy.slam.health import Health
@@ -21,7 +22,6 @@ from volery.autonomy.slam.tracker import Tracker
 from volery.autonomy.slam.way import Way
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.errors import NodeError
 from volery.core.kept import keep, put_back
 from volery.graph.messages import (
     Imu,
@@ -47,6 +47,7 @@ _UNKNOWN, _DOUBTED = (3.0, 0.3), (0.5, 0.0)
 not fit the map."""
 _QUEUE = 500
 """Readings that wait while the node's process does not get to them: two seconds at 200 Hz."""
+_NOISE = "[gyro, its walk, its bias, accelerometer, its walk, its bias]"
 _MOST_RAD_S, _MOST_M_S2 = 60.0, 500.0
 """Beyond what any IMU measures."""
 
@@ -72,25 +73,28 @@ class Slam(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)
-        start = self.declare_parameter("start", []).value
-        noise = self.declare_parameter("imu_noise", []).value
-        if len(start) not in (0, 4) or len(noise) not in (0, 6):
-            raise NodeError("start is [x, y, z, yaw], imu_noise has 6 numbers, or they are empty")
-        self._start = np.array(start if len(start) else [0.0] * 4, np.float64)
-        self._mounts = {
-            name: np.array(self.declare_parameter(f"{name}_mount", [0.0] * 3).value, np.float64)
-            for name in ("level", "nodding")
-        }
-        self._imu_noise = ImuNoise(*map(float, noise)) if len(noise) else ImuNoise()
-        self._matching = Matching(reach_m=float(self.declare_parameter("reach_m", 30.0).value))
-        self._standing = float(self.declare_parameter("standing_height_m", 0.2).value)
+        start = declare_numbers(self, "start", [], "[x, y, z, yaw]", or_empty=True)
+        noise = declare_numbers(self, "imu_noise", [], _NOISE, or_empty=True)
+        self._start = np.array(start or [0.0] * 4)
+        self._mounts = {name: np.array(declare_mount(self, name)) for name in ("level", "nodding")}
+        self._imu_noise = ImuNoise(*noise) if noise else ImuNoise()
+        self._matching = Matching(
+            reach_m=float(self.declare_parameter("reach_m", 30.0, least=0.1).value)
+        )
+        self._standing = float(self.declare_parameter("standing_height_m", 0.2, least=0.0).value)
         self._has_loops = bool(self.declare_parameter("loop_closures", True).value)
-        period = NS_PER_S / float(self.declare_parameter("scan_rate_hz", 20.0).value)
+        period = NS_PER_S / float(
+            self.declare_parameter("scan_rate_hz", 20.0, least=0.1, most=1000.0).value
+        )
         self._sweep_ns = round(0.9 * period)  # a scan that comes a little early is not left out
-        self._odom_period_ns = round(NS_PER_S / self.declare_parameter("odom_rate_hz", 50.0).value)
+        self._odom_period_ns = round(
+            NS_PER_S / self.declare_parameter("odom_rate_hz", 50.0, least=0.1, most=1000.0).value
+        )
         self._uav = self.get_namespace().strip("/") or "uav"
         self._begin()
-        self._open(1.0 / float(self.declare_parameter("pose_rate_hz", 10.0).value))
+        self._open(
+            1.0 / float(self.declare_parameter("pose_rate_hz", 10.0, least=0.1, most=1000.0).value)
+        )
 
     def _begin(self) -> None:
         self._tracker = Tracker(self._start, self._imu_noise, self._matching)

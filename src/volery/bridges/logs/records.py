@@ -192,6 +192,8 @@ def log_format(path: Path) -> str:
         return "mcap"
     if start == BAG_MAGIC:
         return "bag"
+    if BAG_MAGIC.startswith(start) or MCAP_MAGIC.startswith(start):
+        raise RecordingError(f"{path}: cut off in its first {len(start)} bytes")
     raise RecordingError(f"{path}: neither an MCAP log nor a ROS 1 bag (version 2.0)")
 
 

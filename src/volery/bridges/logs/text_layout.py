@@ -12,9 +12,9 @@ Columns are numbered from 0. Everything else has a default.
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from volery.scenario.base import Data, Name, NonNegative, Positive, Topic, Vector3
 
@@ -22,7 +22,19 @@ Column = Annotated[int, Field(ge=0, le=100_000)]
 Turn = Annotated[float, Field(ge=-360.0, le=360.0)]
 
 
-class TimeColumn(Data):
+class _Table(Data):
+    """Whose numbers are numbers: neither texts in quotation marks nor true or false."""
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_text_for_a_number(cls, value: Any) -> Any:
+        found = value if isinstance(value, list | tuple) else [value]
+        if any(isinstance(one, str | bool) for one in found):
+            raise ValueError("numbers stand here, without quotation marks")
+        return value
+
+
+class TimeColumn(_Table):
     """When a scan was taken."""
 
     column: Column = 0
@@ -30,7 +42,7 @@ class TimeColumn(Data):
     """Microseconds, unless stated otherwise."""
 
 
-class RangeColumns(Data):
+class RangeColumns(_Table):
     """The beams of one scan, from `angle_min_deg` to `angle_max_deg`, counter-clockwise from above.
 
     Where the minimum is the greater angle, the scanner turns clockwise.
@@ -57,7 +69,7 @@ class RangeColumns(Data):
         return self
 
 
-class OdometryColumns(Data):
+class OdometryColumns(_Table):
     """A pose in the plane beside each scan: columns of x, y and yaw."""
 
     columns: tuple[Column, Column, Column]
@@ -65,7 +77,7 @@ class OdometryColumns(Data):
     unit_deg: Positive = 1.0
 
 
-class WheelColumns(Data):
+class WheelColumns(_Table):
     """Two wheels' counters beside each scan, which make a pose in the plane."""
 
     columns: tuple[Column, Column]
@@ -76,7 +88,7 @@ class WheelColumns(Data):
     """Between the wheels."""
 
 
-class Place(Data):
+class Place(_Table):
     """Of the scanner in the body, FLU."""
 
     position_m: Vector3 = (0.0, 0.0, 0.0)

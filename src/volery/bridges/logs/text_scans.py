@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from volery.bridges.logs.bag import Log
 from volery.bridges.logs.text_layout import Place, TextLayout
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
+from volery.core.counting import counted
 from volery.core.errors import RecordingError
 from volery.graph.messages import (
     LaserScan,
@@ -36,6 +38,8 @@ _COMMENTS = ("#", "%", "//")
 _LONGEST_LINE = 10_000_000
 _LATEST_S = 4.0e9
 """Stamps of messages end there: 32 bits of seconds."""
+_FEW = 0.01
+"""Share of the beams that meets something where units are wrong, or a scanner sees nothing."""
 _JUMP_NS = NS_PER_S // 2
 """A time so far before that of the line before is a clock that was set; less is disorder."""
 
@@ -57,10 +61,18 @@ class TextScans:
     left_out: int = 0
     clock_set: int = 0
     trouble: str = ""
+    _most_columns: int = field(default=0, repr=False)
+    _met: int = field(default=0, repr=False)
+    """Beams that have met something in the scanner's reach."""
+    _unit_ns: Decimal = field(init=False, repr=False)
+    """Of the times."""
     _newest_ns: int = field(default=-1, repr=False)
     _counters: tuple[float, float] | None = field(default=None, repr=False)
     _pose: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0), repr=False)
     """By the wheels: x, y in m, yaw in rad."""
+
+    def __post_init__(self) -> None:
+        self._unit_ns = Decimal(repr(self.layout.time.unit_s)) * NS_PER_S
 
     def __iter__(self) -> Iterator[Published]:
         """Messages in the order of the lines."""
@@ -77,6 +89,24 @@ class TextScans:
             reason = self.trouble or "it is empty"
             raise RecordingError(f"{self.path}: holds no scan of this layout ({reason})")
 
+    @property
+    def doubts(self) -> list[str]:
+        """What may be wrong with the layout, a line each, once the log has been walked through."""
+        it, doubts = self.layout.ranges, []
+        unused = self._most_columns - self.layout.columns
+        if unused > 0:
+            doubts.append(
+                f"{counted(unused, 'column')} unused: a line has {self._most_columns:,}, the "
+                f"layout's last one is column {self.layout.columns - 1:,}, counted from 0"
+            )
+        share = self._met / max(self.scans * it.beams, 1)
+        if share < _FEW:
+            doubts.append(
+                f"{'hardly any' if self._met else 'no'} range lies between {it.range_min_m:g} and "
+                f"{it.range_max_m:g} m: is ranges.unit_m = {it.unit_m:g} right?"
+            )
+        return doubts
+
     def write_to(self, log: Log) -> None:
         """Put all messages into a log."""
         for published in self:
@@ -84,8 +114,9 @@ class TextScans:
 
     def _messages(self, number: int, line: str) -> Iterator[Published]:
         try:
-            row = self._numbers(line)
-            time_ns = self._time_ns(row)
+            words = _APART.split(line.strip(" \t\r\n,;"))
+            row = self._numbers(words)
+            time_ns = self._time_ns(words[self.layout.time.column])
         except ValueError as error:
             self.left_out += 1
             self.trouble = self.trouble or f"line {number}: {error}"
@@ -100,23 +131,29 @@ class TextScans:
         if pose is not None:
             yield _published(f"{uav}/odom", time_ns, _odometry(self.layout, time_ns, *pose))
         scan = _scan(self.layout, time_ns, row)
+        self._met += int(np.count_nonzero(np.isfinite(scan.ranges)))
         yield _published(f"{uav}/{self.layout.topic}", time_ns, scan)
 
-    def _numbers(self, line: str) -> NDArray[np.float64]:
-        words = _APART.split(line.strip(" \t\r\n,;"))
+    def _numbers(self, words: list[str]) -> NDArray[np.float64]:
+        self._most_columns = max(self._most_columns, len(words))
         if len(words) < self.layout.columns:
-            raise ValueError(f"{len(words)} columns where the layout needs {self.layout.columns}")
+            found = counted(len(words), "column")
+            raise ValueError(f"{found} where the layout needs {self.layout.columns}")
         try:
             row = np.array(words[: self.layout.columns], dtype=np.float64)
         except ValueError:
             raise ValueError("a column holds no number") from None
         return row
 
-    def _time_ns(self, row: NDArray[np.float64]) -> int:
-        time_s = float(row[self.layout.time.column]) * self.layout.time.unit_s
+    def _time_ns(self, word: str) -> int:
+        """Exactly what the word says: a double of seconds would be off by 200 ns by now."""
+        time_s = float(word) * self.layout.time.unit_s
         if not 0.0 <= time_s < _LATEST_S:  # which NaN is not
             raise ValueError(f"{time_s:g} s is no time that a message can bear")
-        time_ns = round(time_s * 1e9)
+        try:
+            time_ns = int((Decimal(word) * self._unit_ns).to_integral_value())
+        except ArithmeticError:
+            raise ValueError(f"{word[:40]} is no time that can be told exactly") from None
         if self._newest_ns - _JUMP_NS <= time_ns <= self._newest_ns:
             raise ValueError(f"at {time_s:.6f} s, not after the line before it")
         return time_ns

@@ -62,13 +62,18 @@ def choose(path: Path, topics: dict[str, str], asked: Asked) -> Channels:
     return Channels(uav, names, bool(wanted))
 
 
+def other_uavs(topics: dict[str, str], uav: str) -> list[str]:
+    """UAVs of a log, besides one, that have a level LIDAR."""
+    return sorted({t.split("/")[1] for t in topics if t.endswith(f"/{LEVEL}")} - {"", uav})
+
+
 def _check_uav(path: Path, topics: dict[str, str], asked: Asked) -> None:
     """Refuse a UAV of which the log has nothing."""
     uav = asked.uav
     if uav is None or asked.scan is not None or any(t.startswith(f"/{uav}/") for t in topics):
         return
-    known = sorted({t.split("/")[1] for t in topics if t.endswith(f"/{LEVEL}")} - {""})
-    raise RecordingError(f"{path}: there is no {uav} in it; there is {_list(known)}")
+    known = _list(other_uavs(topics, uav))
+    raise RecordingError(f"{path}: there is no {uav} in it; there is {known}")
 
 
 def _one(

@@ -19,8 +19,9 @@ from volery.core.errors import RecordingError
 from volery.graph.messages import LaserScan, stamp_of
 from volery.runtime.slam_run.channels import LEVEL, NODDING, Asked, Channels, choose
 from volery.runtime.slam_run.log_host import LogHost
+from volery.runtime.slam_run.mounts import frames_of, read_joints
 from volery.runtime.slam_run.sources import LogSource, TextSource
-from volery.runtime.slam_run.trajectory import Trajectory, corrected
+from volery.runtime.slam_run.trajectory import Trajectory, corrected, way_m
 
 Array = NDArray[np.float64]
 
@@ -73,6 +74,8 @@ class Outcome:
     """As `scans`, of the nodding LIDAR; empty where there is none."""
     nods: Array = field(default_factory=lambda: np.zeros((0, 2)))
     """(J, 2) times, s, and angles of its mount, rad, positive down; times rise."""
+    wheels_m: float | None = None
+    """Way over ground by the odometry that was heard; None: none was."""
 
 
 class SlamRun:
@@ -82,9 +85,13 @@ class SlamRun:
         self._source, self._options = source, options
         self.channels = choose(source.path, source.topics, options.asked)
         self._joints = FixedJoints()
+        self._frames: dict[str, str] = {}
+        """Of the LIDARs, level and nodding, that the node hears."""
         self._host = LogHost()
         self._odometry: list[tuple[float, ...]] = []
         self._times: list[int] = []
+        self._wheels: list[tuple[float, float]] = []
+        """Places of the log's odometry."""
         self._scans: list[tuple[int, LaserScan]] = []
         self._nodding: list[tuple[int, LaserScan]] = []
         self._next_nodding_ns = 0
@@ -101,8 +108,6 @@ class SlamRun:
     def run(self, tell: Callable[[int, float], None] | None = None) -> Outcome:
         """Go through the whole log; `tell` hears of scans and seconds of the log so far."""
         uav, host = self.channels.uav, self._host
-        if self.channels.has_imu:
-            self._read_joints()
         self._start_node()
         host.listen(f"/{uav}/slam/odom", self._on_odometry)
         host.listen(f"/{uav}/slam/status", self._on_status)
@@ -116,6 +121,9 @@ class SlamRun:
                 heard, self._newest = heard + 1, message
             if topic == "/tf_static":
                 self._joints.add(message)
+            if ours == f"/{uav}/odom":
+                place = message.pose.pose.position
+                self._wheels.append((place.x, place.y))
             self._keep_nodding(ours, time_ns, message)
             if first is not None:
                 lasted += max(time_ns - before, 0)
@@ -138,11 +146,6 @@ class SlamRun:
             self._next_nodding_ns = time_ns + _NODDING_NS
             self._nodding.append((len(self._times) - 1, message))
 
-    def _read_joints(self) -> None:
-        """Where the LIDARs sit must be known before the node begins."""
-        for _, _, message in self._source.messages({"/tf_static"}):
-            self._joints.add(message)
-
     def _start_node(self) -> None:
         o, uav = self._options, self.channels.uav
         parameters: dict[str, Any] = {"reach_m": o.reach_m, "loop_closures": o.loop_closures}
@@ -159,15 +162,27 @@ class SlamRun:
             return
         from volery.autonomy.slam.slam_node import Slam
 
-        parameters["level_mount"] = level or self._place_of(f"{uav}/laser_horizontal")
-        nodding = o.nodding_mount
-        parameters["nodding_mount"] = (
-            list(nodding) if nodding is not None else self._place_of(f"{uav}/laser_nodding")
-        )
+        self._find_mounts()
+        for name, frame in self._frames.items():
+            parameters[f"{name}_mount"] = [float(v) for v in self._mount(frame).position]
         Slam(**options, parameter_overrides=parameters)
 
-    def _place_of(self, frame: str) -> list[float]:
-        return [float(number) for number in self._joints.mount_of(frame).position]
+    def _find_mounts(self) -> None:
+        """Where the LIDARs sit must be known before the node begins."""
+        o, names, uav = self._options, self.channels.names, self.channels.uav
+        topics = {"level": f"/{uav}/{LEVEL}", "nodding": f"/{uav}/{NODDING}"}
+        self._frames = frames_of(
+            self._source, {name: names[topic] for name, topic in topics.items() if topic in names}
+        )
+        told = {"level": o.level_mount, "nodding": o.nodding_mount}
+        asked = {frame for name, frame in self._frames.items() if told[name] is None}
+        self._joints, unknown = read_joints(self._source, set(self._frames.values()))
+        for name, frame in self._frames.items():
+            if frame in unknown & asked:
+                raise RecordingError(
+                    f"{self._source.path}: nothing in it tells where {frame} sits in the body "
+                    f"(/tf_static, /tf, /volery/scenario): --{name}-mount X,Y,Z says it"
+                )
 
     # ------------------------------------------------------------------------------ what it tells
 
@@ -237,11 +252,12 @@ class SlamRun:
             self.channels, trajectory, self._scans, self._mount, heard, lasted_s, cpu_s,
             self._status, self._states, self._problems, self._nodding,
             np.array(sorted(self._nods)).reshape(-1, 2),
+            way_m(np.array(self._wheels)) if self._wheels else None,
         )  # fmt: skip
 
     def _mount(self, frame: str) -> Mount:
         o, found = self._options, self._joints.mount_of(frame)
-        place = o.nodding_mount if frame.endswith(_JOINT) else o.level_mount
+        place = o.nodding_mount if frame == self._frames.get("nodding") else o.level_mount
         return found if place is None else Mount(np.array(place), found.attitude)
 
 

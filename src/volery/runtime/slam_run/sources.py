@@ -12,6 +12,7 @@ from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.records import LogRecord, LogTopic, LogWalk, log_format
 from volery.bridges.logs.text_layout import TextLayout
 from volery.bridges.logs.text_scans import TextScans
+from volery.core.counting import counted
 from volery.core.errors import GraphError, RecordingError
 
 _ROS2_FORMS = {"msg": "ros2msg", "idl": "ros2idl"}
@@ -35,6 +36,9 @@ class LogSource:
     trouble: str = ""
     refused: int = 0
     """Messages that cannot be read."""
+    damage: str = ""
+    """What can be seen of the file without reading its messages."""
+    doubts: tuple[str, ...] = ()
     _walk: Any = field(default=None, repr=False)
 
     def messages(self, wanted: set[str]) -> Iterator[Heard]:
@@ -63,6 +67,9 @@ class TextSource:
     trouble: str = ""
     refused: int = 0
     """Lines left out."""
+    damage: str = ""
+    doubts: list[str] = field(default_factory=list)
+    """What may be wrong with the layout."""
 
     @property
     def topics(self) -> dict[str, str]:
@@ -82,9 +89,9 @@ class TextSource:
         for published in scans:
             if published.topic in wanted:
                 yield Heard(published.topic, published.time_ns, published.message)
-        self.refused = scans.left_out
+        self.refused, self.doubts = scans.left_out, scans.doubts
         if scans.left_out:
-            self.trouble = f"{scans.left_out:,} lines left out; {scans.trouble}"
+            self.trouble = f"{counted(scans.left_out, 'line')} left out; {scans.trouble}"
 
 
 def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | TextSource:
@@ -107,7 +114,8 @@ def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | Tex
             raise
         raise RecordingError(f"{error}; a scanner's text log needs --layout") from None
     summary = summarize(path)
-    return LogSource(path, {t.topic: t.msgtype for t in summary.topics}, _walk=LogWalk)
+    topics = {t.topic: t.msgtype for t in summary.topics}
+    return LogSource(path, topics, damage=summary.trouble, _walk=LogWalk)
 
 
 def _ros2_topics(path: Path) -> dict[str, str]:

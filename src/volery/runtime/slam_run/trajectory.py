@@ -33,7 +33,12 @@ class Trajectory(NamedTuple):
     @property
     def length_m(self) -> float:
         """Over ground."""
-        return float(np.hypot(*np.diff(self.position[:, :2], axis=0).T).sum())
+        return way_m(self.position)
+
+
+def way_m(places: Array) -> float:
+    """Way over ground along places (N, 2+), m."""
+    return float(np.hypot(*np.diff(places[:, :2], axis=0).T).sum())
 
 
 def rising(time_ns: Times) -> Times:

@@ -1,0 +1,35 @@
+"""Parameters of nodes that are lists of numbers: poses, mounts of sensors."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from volery.core.errors import NodeError
+from volery.graph.node import Node
+
+
+def declare_numbers(
+    node: Node, name: str, default: list[float], form: str, *, or_empty: bool = False
+) -> list[float]:
+    """Declare a parameter of as many finite numbers as `form` names, such as `[x, y, z]`.
+
+    It may be empty where `or_empty` is true. `NodeError` for everything else.
+    """
+    told = node.declare_parameter(name, default).value
+    if (or_empty and not len(told)) or (
+        len(told) == form.count(",") + 1 and all(map(_is_number, told))
+    ):
+        return [float(number) for number in told]
+    raise NodeError(
+        f"{name} is {form}, finite numbers{', or empty' if or_empty else ''}, not {told!r}"
+    )
+
+
+def declare_mount(node: Node, lidar: str) -> list[float]:
+    """Where a LIDAR sits in the body, m: the parameter `level_mount`, `nodding_mount`."""
+    return declare_numbers(node, f"{lidar}_mount", [0.0, 0.0, 0.0], "[x, y, z]")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,160 @@
+"""`volery slam` on a log of a flight: it finds where the LIDARs sit, or asks for it."""
+
+import json
+import math
+import re
+from contextlib import closing
+
+import numpy as np
+import pytest
+from node_bench import NodeBench
+from slam_bench import LEVEL, NODDING, Flight, S, messages, nod_angle, trunks
+from typer.testing import CliRunner
+
+from volery.autonomy.slam.slam_node import Slam
+from volery.bridges.logs.bag import open_log
+from volery.cli.app import app
+from volery.graph.messages import (
+    Published,
+    Quaternion,
+    String,
+    TFMessage,
+    Transform,
+    TransformStamped,
+    Vector3,
+    header,
+    stamp_of,
+)
+
+SECONDS = 6.0
+LEVEL_FRAME, NODDING_FRAME = "uav1/laser_horizontal", "uav1/laser_nodding"
+SENSORS = [
+    {"kind": "lidar", "name": name, "model": "utm_30lx", "position_m": place.tolist()}
+    for name, place in (("horizontal", LEVEL), ("nodding", NODDING))
+]
+CONTENT = {
+    "name": "woods",
+    "duration_s": 9.0,
+    "types": {"surveyor": {"sensors": SENSORS}},
+    "uavs": [{"type": "surveyor", "position_m": [0.0, 0.0]}],
+}
+ORIGIN = {"name": "woods", "seed": 1, "version": "0", "folder": None, "content": CONTENT}
+
+
+def joint(time_ns, parent, child, place, nod=0.0):
+    turn = Quaternion(0.0, math.sin(0.5 * nod), 0.0, math.cos(0.5 * nod))
+    moved = Transform(Vector3(*map(float, place)), turn)
+    return TransformStamped(header(time_ns, parent), child, moved)
+
+
+def own_motion(time_ns):
+    """A joint of `/tf` that is none of a scanner."""
+    return joint(time_ns, "uav1/odom", "uav1/base_link", (50.0, 20.0, 3.0))
+
+
+class Flown:
+    """A recorded flight, what its own SLAM said meanwhile, and what tells of the mounts."""
+
+    def __init__(self):
+        self.told = messages(Flight(), trunks(), SECONDS)
+        for _, topic, message in self.told:
+            if topic.startswith("laser"):
+                is_level = "horizontal" in topic
+                message.header.frame_id = LEVEL_FRAME if is_level else NODDING_FRAME
+        bench = NodeBench()
+        mounts = {"level_mount": LEVEL.tolist(), "nodding_mount": NODDING.tolist()}
+        bench.start(Slam, **mounts)
+        said = bench.listen("/uav1/slam/odom")
+        for when, topic, message in self.told:
+            bench.run_to(max(when, bench.now_ns))
+            bench.send(f"/uav1/{topic}", message)
+        places = [m.pose.pose.position for m in said]
+        self.own = np.array(
+            [(stamp_of(m) / S, p.x, p.y, p.z) for m, p in zip(said, places, strict=True)]
+        )
+
+    def write(self, path, *, tells, others=()):
+        """A log in which `/tf_static`, `/tf`, the scenario or nothing tells of the nodding one."""
+        with closing(open_log(path)) as log:
+
+            def put(topic, when, message):
+                log.write(Published(topic, message.__msgtype__, when, message))
+
+            if tells == "scenario":
+                put("/volery/scenario", 0, String(json.dumps(ORIGIN)))
+            fixed = [joint(0, "uav1/base_link", LEVEL_FRAME, LEVEL)]
+            if tells == "static":
+                half = 0.5 * NODDING
+                fixed.append(joint(0, "uav1/base_link", "uav1/bracket", half))
+                fixed.append(joint(0, "uav1/bracket", NODDING_FRAME, half))
+            if tells == "bracket":
+                fixed.append(joint(0, "uav1/bracket", NODDING_FRAME, (0.0, 0.0, 0.0)))
+            put("/tf_static", 0, TFMessage(fixed))
+            for name in others:
+                put(f"/{name}/laser/horizontal/scan", 0, self.told[-1][2])
+            for when, topic, message in self.told:
+                if topic == "joint_states":
+                    moving = [own_motion(when)]
+                    child = {"moving": NODDING_FRAME, "bracket": "uav1/bracket"}.get(tells)
+                    if child is not None:
+                        nod = nod_angle(when / S)[0]
+                        moving.append(joint(when, "uav1/base_link", child, NODDING, nod))
+                    put("/tf", when, TFMessage(moving))
+                put(f"/uav1/{topic}", when, message)
+
+
+@pytest.fixture(scope="module")
+def flown():
+    return Flown()
+
+
+def slam(log, out, *more):
+    return CliRunner().invoke(app, ["slam", str(log), "--out", str(out), *more])
+
+
+@pytest.mark.parametrize("tells", ["static", "moving", "bracket", "scenario"])
+def test_a_log_gives_the_way_that_its_own_slam_told(tells, flown, tmp_path):
+    flown.write(tmp_path / "flight.mcap", tells=tells)
+    result = slam(tmp_path / "flight.mcap", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    path = np.loadtxt(tmp_path / "out" / "path.tum")
+    own = np.stack([np.interp(path[:, 0], flown.own[:, 0], flown.own[:, k]) for k in (1, 2, 3)], 1)
+    assert len(path) > 200
+    assert np.abs(own[-1] - own[0]).max() > 1.0
+    np.testing.assert_allclose(path[:, 1:4], own, atol=0.015)
+
+
+def test_a_mount_that_nothing_tells_is_asked_for(flown, tmp_path):
+    flown.write(tmp_path / "flight.mcap", tells="nothing")
+    refused = slam(tmp_path / "flight.mcap", tmp_path / "out")
+    assert refused.exit_code == 2
+    assert f"nothing in it tells where {NODDING_FRAME} sits" in refused.output
+    assert "--nodding-mount" in refused.output
+    assert not (tmp_path / "out").exists()
+    told = slam(tmp_path / "flight.mcap", tmp_path / "out", "--nodding-mount", "0.1,0,-0.08")
+    assert told.exit_code == 0, told.output
+
+
+def test_of_several_uavs_it_says_which_one_it_maps(flown, tmp_path):
+    flown.write(tmp_path / "flight.mcap", tells="moving", others=("uav2", "uav3"))
+    result = slam(tmp_path / "flight.mcap", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert "warning: uav1 is mapped; the log has uav2, uav3, too: --uav" in result.output
+    assert "heard     uav1: /uav1/laser/horizontal/scan, /uav1/imu, /uav1/laser/n" in result.output
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["uav"] == "uav1"
+    assert re.search(r"state     (starting 0\.\d s, )?tracking \d\.\d s", result.output)
+    assert "1 session, " in result.output
+    asked = slam(tmp_path / "flight.mcap", tmp_path / "out", "--overwrite", "--uav", "uav1")
+    assert asked.exit_code == 0, asked.output
+    assert "warning: " not in asked.output
+
+
+@pytest.mark.parametrize(("length", "told"), [(5, "in its first 5 bytes"), (100, "cut off")])
+def test_a_log_that_was_cut_off_at_its_beginning_says_so(length, told, flown, tmp_path):
+    flown.write(tmp_path / "flight.mcap", tells="moving")
+    log = tmp_path / "short.mcap"
+    log.write_bytes((tmp_path / "flight.mcap").read_bytes()[:length])
+    result = slam(log, tmp_path / "out")
+    assert result.exit_code == 2
+    assert "cut off" in result.output
+    assert told in result.output
