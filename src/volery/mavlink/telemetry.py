@@ -14,6 +14,7 @@ from volery.core.frames import ned_of_enu
 from volery.mavlink import arming, motion, plans
 from volery.mavlink.codec import dialect
 from volery.mavlink.modes import Mode
+from volery.mavlink.release import custom_version, flight_version
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot import Autopilot
@@ -157,15 +158,13 @@ def _timesync(pilot: Autopilot) -> Any:
 
 
 def _autopilot_version(pilot: Autopilot) -> Any:
-    from volery.mavlink.release import flight_version
-
     return dialect().MAVLink_autopilot_version_message(
         _CAPABILITIES,
         flight_version(),
         0,
         0,
         0,
-        [0] * 8,
+        custom_version(),
         [0] * 8,
         [0] * 8,
         0,

@@ -1,6 +1,8 @@
 """Parameters as PX4 carries them, streams and their rates, what is told on request."""
 
+import importlib.metadata
 import math
+import re
 from collections import Counter
 
 import pytest
@@ -103,6 +105,9 @@ def test_what_is_told_on_request(station):
     version = station.last("AUTOPILOT_VERSION")
     assert version.capabilities & 4
     assert version.capabilities & 16384
+    assert version.flight_sw_version.to_bytes(4) == bytes((1, 18, 0, 255))  # the PX4 it is like
+    own = [int(part) for part in re.findall(r"\d+", importlib.metadata.version("volery"))[:3]]
+    assert list(version.flight_custom_version) == [*reversed(own), 0, 0, 0, 0, 0]
     assert station.command(512, 242.0) == ACCEPTED
     home = station.last("HOME_POSITION")
     assert home.latitude == pytest.approx(473977420, abs=2)
