@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 _FACES_RAD = math.radians(5.0)
 """A heading that is reached (modelling choice)."""
+_LOITER_RADIUS_M = 80.0
+"""Of items that name none: the default of PX4's NAV_LOITER_RAD."""
 _MOST_STEPS = 2 * plans.MOST_ITEMS[plans.MISSION]
 """Items that are passed at one instant; jumps cannot hang it."""
 
@@ -76,6 +78,7 @@ def _do(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState
         plans.WAYPOINT: _waypoint,
         plans.LOITER_TIME: _waypoint,
         plans.LOITER_UNLIMITED: _waypoint,
+        plans.LOITER_TO_ALTITUDE: _change_height,
         plans.LAND: _land,
         plans.DELAY: _delay,
         plans.CONDITION_DELAY: _delay,
@@ -94,7 +97,7 @@ def _do_on_ground(pilot: Autopilot, mission: Mission, item: plans.Item, state: F
         return True
     if item.command in (plans.DELAY, plans.CONDITION_DELAY):
         return _delay(pilot, mission, item, state)
-    if item.placed and item.command != plans.SET_HOME:
+    if item.placed and item.command in plans.PLACED:
         if pilot.memory.order != "take_off":
             switching.rise(pilot)
         return False
@@ -139,7 +142,8 @@ def _waypoint(pilot: Autopilot, mission: Mission, item: plans.Item, state: Fligh
         target = place_of(pilot, item)
         # params count clockwise from north
         yaw = 0.5 * math.pi - math.radians(item.params[3])
-        facing = yaw if math.isfinite(yaw) else bearing(pilot, target)
+        turns = math.isfinite(yaw) and item.command != plans.LOITER_TIME  # which says no heading
+        facing = yaw if turns else bearing(pilot, target)
         memory.leg = Leg(target, facing, switching.cruise(pilot))
     leg = memory.leg
     rests = fly_leg(pilot, leg)
@@ -155,6 +159,28 @@ def _waypoint(pilot: Autopilot, mission: Mission, item: plans.Item, state: Fligh
     if not mission.waiting:
         mission.waiting, mission.since_ns = True, memory.now_ns
     return _has_waited(pilot, mission, wait_s)
+
+
+def _change_height(
+    pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState
+) -> bool:
+    """LOITER_TO_ALT: at the present height to within its radius, then to its height."""
+    memory = pilot.memory
+    if state.mode == "TAKE_OFF":
+        return False
+    x, y, z = place_of(pilot, item)
+    if not mission.entered or memory.leg is None:
+        mission.entered = True
+        target = (x, y, state.position[2])
+        memory.leg = Leg(target, bearing(pilot, target), switching.cruise(pilot))
+    own = abs(item.params[1])
+    radius = own if math.isfinite(own) and own > 0.0 else _LOITER_RADIUS_M
+    radius += float(pilot.parameter("NAV_ACC_RAD"))
+    level = math.hypot(x - state.position[0], y - state.position[1])
+    if level <= radius and memory.leg.target[2] != z:
+        memory.leg = Leg((x, y, z), memory.leg.yaw, memory.leg.speed)
+    fly_leg(pilot, memory.leg)
+    return level <= radius and _near_height(pilot, z)
 
 
 def _is_near(pilot: Autopilot, item: plans.Item, leg: Leg) -> bool:
