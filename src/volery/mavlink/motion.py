@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from volery.mavlink.vehicle import FlightState, Quaternion, Vector
 
 _GRAVITY = 9.80665
+_LOCAL_NED, _BY_AUTOPILOT = 1, 8
+"""MAV_FRAME, MAV_ESTIMATOR_TYPE."""
 
 
 def ms(pilot: Autopilot) -> int:
@@ -101,6 +103,26 @@ def local_position(pilot: Autopilot) -> Any:
     """LOCAL_POSITION_NED, from where the vehicle stood at the start."""
     place, velocity = _local(pilot)
     return dialect().MAVLink_local_position_ned_message(ms(pilot), *place, *velocity)
+
+
+def odometry(pilot: Autopilot) -> Any:
+    """ODOMETRY in the local frame, velocities too, as PX4 sends it; covariances are not known."""
+    place, velocity = _local(pilot)
+    x, y, z, w = q_ned_frd_of_enu_flu(pilot.state.attitude)
+    unknown = [math.nan] + [0.0] * 20
+    return dialect().MAVLink_odometry_message(
+        us(pilot),
+        _LOCAL_NED,
+        _LOCAL_NED,
+        *place,
+        [w, x, y, z],
+        *velocity,
+        *frd_of_flu(pilot.state.rates),
+        unknown,
+        unknown,
+        0,
+        _BY_AUTOPILOT,
+    )
 
 
 def global_position(pilot: Autopilot) -> Any:

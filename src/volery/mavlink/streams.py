@@ -33,8 +33,8 @@ RATES_HZ: dict[int, dict[int, float]] = {
 """By profile and message id."""
 FASTEST_NS = 10_000_000
 """As often as the vehicle's state comes."""
-_ONCE = {148}
-"""Messages that are only sent on request."""
+_HEARTBEAT = 0
+"""Which cannot be asked to come otherwise."""
 
 
 def begin(link: Link, now_ns: int) -> Link:
@@ -50,7 +50,7 @@ def ask_for(pilot: Autopilot, link: Link, number: int, period_us: float) -> bool
 
     Whether that can be; no faster than the state of the vehicle comes.
     """
-    if number not in telemetry.BUILDERS or number in _ONCE:
+    if number not in telemetry.BUILDERS or number == _HEARTBEAT:
         return False
     if period_us < 0.0:
         link.periods_ns.pop(number, None)
@@ -67,9 +67,7 @@ def ask_for(pilot: Autopilot, link: Link, number: int, period_us: float) -> bool
 
 
 def interval_of(link: Link, number: int) -> Any:
-    """MESSAGE_INTERVAL of a message; None where there is no such message."""
-    if number not in telemetry.BUILDERS:
-        return None
+    """MESSAGE_INTERVAL of a message; -1 of one that is not sent, or that is not there."""
     period_ns = link.periods_ns.get(number)
     period_us = -1 if period_ns is None else period_ns // 1000
     return dialect().MAVLink_message_interval_message(number, min(period_us, 2**31 - 1))

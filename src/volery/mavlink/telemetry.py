@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from volery.core.frames import ned_of_enu
-from volery.mavlink import arming, motion, plans
+from volery.mavlink import arming, motion, newer_messages, plans
 from volery.mavlink.codec import dialect
 from volery.mavlink.modes import Mode
 from volery.mavlink.release import custom_version, flight_version
@@ -205,5 +205,8 @@ BUILDERS: dict[int, Callable[[Autopilot], Any]] = {
     230: _estimator_status,
     HOME_POSITION: _home_position,
     245: _extended_sys_state,
+    300: newer_messages.protocol_version,
+    331: motion.odometry,
+    436: newer_messages.current_mode,
 }
 """By message id; a builder returns None where there is nothing to tell."""

@@ -3,16 +3,18 @@
 import importlib.metadata
 import math
 import re
+import struct
 from collections import Counter
 
 import pytest
-from flying_bench import NAN, Station, fly
+from flying_bench import NAN, PACKETS, Station, fly
 
 from volery.mavlink.codec import Codec, dialect
+from volery.mavlink.framing import lengths_of
 from volery.mavlink.parameters import DEFAULTS, NAMES
 from volery.mavlink.streams import RATES_HZ
 
-ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
+ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +97,19 @@ def test_intervals_are_set_told_and_taken_back(station):
     station.heard.clear()
     station.seconds(0.5)
     assert not station.of("ATTITUDE")
-    assert station.command(511, 9999.0, 1000.0) == UNSUPPORTED
+    assert station.command(510, 30.0) == ACCEPTED
+    assert station.last("MESSAGE_INTERVAL").interval_us == -1
+    for unknown in (510, 511, 512):
+        station.heard.clear()
+        assert (
+            station.command(unknown, 9999.0, 1000.0)
+            == ({510: ACCEPTED, 511: FAILED, 512: DENIED}[unknown])
+        )
+        told = [(m.message_id, m.interval_us) for m in station.of("MESSAGE_INTERVAL")]
+        assert told == ([(9999, -1)] if unknown == 510 else [])
+    assert station.command(511, 0.0, 1000.0) == FAILED  # the heartbeat stays as it is
+    assert station.command(511, 30.0, 1000.0, 0.0, 0.0, 0.0, 0.0, 2.0) == FAILED
+    assert station.command(510, -3.0) == DENIED
     assert station.command(511, NAN, 1000.0) == DENIED
     assert station.command(511, 30.0, 0.0) == ACCEPTED  # this link begins without it
 
@@ -111,7 +125,7 @@ def test_what_is_told_on_request(station):
     assert station.command(512, 242.0) == ACCEPTED
     home = station.last("HOME_POSITION")
     assert home.latitude == pytest.approx(473977420, abs=2)
-    assert station.command(512, 1234.0) == UNSUPPORTED
+    assert station.command(512, 241.0) == DENIED  # VIBRATION is not known
     assert station.command(9999, 0.0) == UNSUPPORTED
     station.send("ping", 5, 77, 0, 0)
     assert (station.last("PING").seq, station.last("PING").target_system) == (77, 255)
@@ -119,6 +133,48 @@ def test_what_is_told_on_request(station):
     sync = station.last("TIMESYNC")
     assert sync.ts1 == 123456
     assert sync.tc1 == station.simulation.time_ns
+
+
+def payloads(taken, number, layout):
+    """What the frames of a message that pymavlink does not know hold; takes them out of `taken`."""
+    found = []
+    for message in taken:
+        data, at = bytes(message.data), 0
+        for length in lengths_of(data):
+            frame, at = data[at : at + length], at + length
+            if int.from_bytes(frame[7:10], "little") == number:
+                found.append(
+                    struct.unpack(layout, frame[10:-2].ljust(struct.calcsize(layout), b"\0"))
+                )
+    return found
+
+
+def test_modes_and_versions_are_told_in_messages_that_pymavlink_lacks(station):
+    taken = []
+    graph = station.simulation.graph
+    graph.subscribe("/uav1/mavlink/out", lambda heard: taken.append(heard.message), PACKETS)
+    assert station.command(512, 300.0) == ACCEPTED
+    assert station.command(519, 1.0) == ACCEPTED
+    assert station.command(512, 436.0) == ACCEPTED
+    assert station.command(512, 435.0, 4.0) == ACCEPTED
+    assert station.command(512, 435.0, 9.0) == DENIED
+    assert payloads(taken, 300, "<HHH16s") == [(200, 100, 200, bytes(16))] * 2
+    assert payloads(taken, 436, "<IIB") == [(50593792, 50593792, 0)]  # hold is no standard mode
+    hold = (50593792, 1, 8, 4, 0, b"Hold".ljust(35, b"\0"))
+    assert payloads(taken, 435, "<IIBBB35s") == [hold]
+    assert station.command(512, 435.0, 0.0) == ACCEPTED
+    modes = payloads(taken, 435, "<IIBBB35s")[1:]
+    assert [mode[3] for mode in modes] == [1, 2, 3, 4, 5, 6, 7, 8]
+    assert {mode[4]: mode[0] >> 16 for mode in modes}[7] == 0x0604  # landing
+
+
+def test_odometry_is_told_with_covariances_that_are_not_known(station):
+    assert station.command(512, 331.0) == ACCEPTED
+    told = station.last("ODOMETRY")
+    assert (told.frame_id, told.child_frame_id) == (1, 1)
+    assert told.q == pytest.approx([math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)], abs=1e-4)
+    assert math.isnan(told.pose_covariance[0])
+    assert math.isnan(told.velocity_covariance[0])
 
 
 def test_health_is_all_well_and_place_agrees_with_the_map(station):
