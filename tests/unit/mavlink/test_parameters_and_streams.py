@@ -29,6 +29,7 @@ def test_the_whole_list_comes_and_single_ones(station):
     station.send("param_request_list", 1, 1)
     station.seconds(1.0)
     told = {m.param_id: m for m in station.of("PARAM_VALUE")}
+    assert station.of("PARAM_VALUE")[0] is told.pop("_HASH_CHECK")
     assert set(told) == set(NAMES)
     assert {m.param_count for m in told.values()} == {len(NAMES)}
     assert sorted(m.param_index for m in told.values()) == list(range(len(NAMES)))
@@ -45,6 +46,58 @@ def test_the_whole_list_comes_and_single_ones(station):
     assert len(station.of("PARAM_VALUE")) == count
     faults = [(m.param_id, m.param_index, m.error) for m in station.of("PARAM_ERROR")]
     assert faults == [("NO_SUCH", -1, 1), ("", 9999, 1)]
+
+
+def crc32(data):
+    """Bit by bit, beginning with 0, nothing inverted: as PX4's `crc32part`."""
+    remainder = 0
+    for byte in data:
+        remainder ^= byte
+        for _ in range(8):
+            remainder = remainder >> 1 ^ (0xEDB88320 if remainder & 1 else 0)
+    return remainder
+
+
+def test_the_check_of_all_parameters_is_px4s_and_ends_a_list(station):
+    station.heard.clear()
+    station.send("param_request_read", 1, 1, b"_HASH_CHECK", -1)
+    station.send("param_request_list", 1, 1)
+    station.seconds(0.5)
+    first, *told = station.of("PARAM_VALUE")
+    assert (first.param_type, first.param_index, first.param_count) == (5, 65535, len(NAMES))
+    values = {m.param_id: bytes(m.get_msgbuf()[10:14]) for m in told if m.param_type != 5}
+    whole = b"".join(name.encode() + values[name] for name in NAMES)
+    assert int.from_bytes(first.get_msgbuf()[10:14], "little") == crc32(whole)
+    station.heard.clear()
+    station.send("param_request_list", 1, 1)
+    station.send("param_set", 1, 1, b"_HASH_CHECK", first.param_value, 5)
+    station.seconds(0.5)
+    assert [m.param_id for m in station.of("PARAM_VALUE")] == ["_HASH_CHECK"]
+    assert station.last("PARAM_ERROR").error == 5  # it cannot be set
+
+
+def files(station, opcode, size=0, sequence=9, path=b""):
+    """Opcode, size, opcode answered and first byte of the answer to a request of MAVLink FTP."""
+    head = struct.pack("<HBBBBBBI", sequence, 3, opcode, size, 0, 0, 0, 77)
+    station.send("file_transfer_protocol", 0, 1, 1, (head + path).ljust(251, b"\0"))
+    answer = station.last("FILE_TRANSFER_PROTOCOL")
+    told, session, *rest, _, _, offset = struct.unpack_from("<HBBBBBBI", bytes(answer.payload))
+    assert (told, session, offset) == (sequence + 1 & 0xFFFF, 3, 77)
+    assert (answer.target_system, answer.target_component) == (255, 190)
+    return (*rest, answer.payload[12])
+
+
+def test_who_asks_for_files_or_logs_hears_that_there_are_none(station):
+    path = b"/etc/extras/component_general.json.xz"
+    assert files(station, 4, len(path), path=path) == (129, 1, 4, 10)
+    assert files(station, 3, 1, 65535, b"/") == (129, 1, 3, 10)
+    assert files(station, 5, 239) == (129, 1, 5, 4)  # no such session
+    assert files(station, 6, 1, path=b"a") == (129, 1, 6, 1)
+    assert files(station, 4, 240) == (129, 1, 4, 3)
+    assert files(station, 99) == (129, 1, 99, 7)
+    assert files(station, 2) == (128, 0, 2, 0)
+    station.send("log_request_list", 1, 1, 0, 65535)
+    assert (station.last("LOG_ENTRY").num_logs, station.last("LOG_ENTRY").size) == (0, 0)
 
 
 def test_setting_checks_type_and_range(station):
