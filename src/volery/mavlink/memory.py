@@ -95,6 +95,8 @@ class Mission:
     jumps_left: dict[int, int] = field(default_factory=dict)
     speed: float = math.nan
     """m/s that a DO_CHANGE_SPEED asked for."""
+    interest: Vector | None = None
+    """m, map: the place that a region of interest has it face."""
     reached: int = -1
     complete: bool = False
 

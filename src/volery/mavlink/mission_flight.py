@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from volery.mavlink import plans, switching
+from volery.mavlink import payload_items, plans, switching
 from volery.mavlink.codec import dialect
 from volery.mavlink.legs import bearing, fly_leg
 from volery.mavlink.memory import Leg
@@ -20,6 +20,8 @@ _FACES_RAD = math.radians(5.0)
 """A heading that is reached (modelling choice)."""
 _LOITER_RADIUS_M = 80.0
 """Of items that name none: the default of PX4's NAV_LOITER_RAD."""
+_FACING = plans.PLACED - {plans.LAND, plans.TAKE_OFF}
+"""Items on whose way a region of interest is faced."""
 _MOST_STEPS = 2 * plans.MOST_ITEMS[plans.MISSION]
 """Items that are passed at one instant; jumps cannot hang it."""
 
@@ -35,9 +37,21 @@ def fly(pilot: Autopilot, state: FlightState) -> None:
     for _ in range(_MOST_STEPS):
         if mission is not memory.mission or mission.complete or memory.mode is not Mode.MISSION:
             return
+        _face_interest(pilot, mission, items[mission.current])
         if not _do(pilot, mission, items[mission.current], state):
             return
         _reach(pilot, mission)
+
+
+def _face_interest(pilot: Autopilot, mission: Mission, item: plans.Item) -> None:
+    """On the way to a place look at the region of interest, as PX4's multicopters do."""
+    leg = pilot.memory.leg
+    if mission.interest is None or leg is None or leg.locked or item.command not in _FACING:
+        return
+    x, y, _ = mission.interest
+    away = math.hypot(x - pilot.state.position[0], y - pilot.state.position[1])
+    if away > float(pilot.parameter("NAV_ACC_RAD")):
+        leg.yaw = bearing(pilot, mission.interest)
 
 
 def _reach(pilot: Autopilot, mission: Mission) -> None:
@@ -108,6 +122,9 @@ def _set(pilot: Autopilot, mission: Mission, item: plans.Item) -> bool:
     """What takes no time."""
     if item.command == plans.CHANGE_SPEED and item.params[1] > 0.0:
         mission.speed = item.params[1]
+    elif item.command in payload_items.INTEREST:
+        somewhere = payload_items.is_place_of_interest(item.command)
+        mission.interest = place_of(pilot, item) if somewhere else None
     elif item.command == plans.SET_HOME:
         from volery.mavlink.arming import set_home
 

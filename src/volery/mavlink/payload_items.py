@@ -1,9 +1,9 @@
 """Items of missions for cameras, gimbals, grippers and their like, and markers.
 
 Surveys and corridors are full of them. An autopilot takes them whether or not there is a payload;
-without one they change nothing, and are passed one after the other. Which ones there are, in which
-frames, and which of their parameters may be set: `mavlink_mission.cpp` and
-`mavlink_command_params.hpp` of PX4 1.18.
+without one they change nothing but the heading (regions of interest), and are passed one after the
+other. Which ones there are, in which frames, and which of their parameters may be set:
+`mavlink_mission.cpp` and `mavlink_command_params.hpp` of PX4 1.18.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import math
 
 _GRIPPER, _WINCH = 211, 42600
 _ROI_LOCATION, _ROI_OLD, _ROI_OLDEST = 195, 201, 80
+INTEREST = {_ROI_LOCATION, 196, 197, _ROI_OLD, _ROI_OLDEST}
+"""Regions of interest; only `_ROI_LOCATION` has a place."""
 _MISSION_FRAME, _GLOBAL_FRAMES = 2, (0, 3, 5, 6)
 """MAV_FRAME."""
 _MODES_WITH_PLACE, _MODES_WITHOUT = (0, 3), (0, 1, 2)
@@ -71,6 +73,11 @@ def fault_of(command: int, frame: int, fields: tuple[float, ...]) -> int:
     modes = _MODES_WITH_PLACE if somewhere else _MODES_WITHOUT
     known = not old or (math.isfinite(fields[0]) and int(fields[0]) in modes)
     return _ACCEPTED if known else _INVALID_PARAM1
+
+
+def is_place_of_interest(command: int) -> bool:
+    """Whether an item says which place is to be faced."""
+    return command == _ROI_LOCATION
 
 
 def _is_unset(value: float) -> bool:

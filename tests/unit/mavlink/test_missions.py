@@ -119,6 +119,30 @@ def test_a_loiter_of_some_time_names_no_heading(flight):
     assert math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) == pytest.approx(0.0, abs=0.1)
 
 
+def test_a_region_of_interest_is_faced_until_there_is_none(flight):
+    simulation, station = flight
+    assert station.upload(
+        [
+            at(0.0, 0.0, 3.0, TAKE_OFF),
+            (195, 6, (0.0, 0.0, 0.0, 0.0), *at(20.0, 0.0, 0.0)[3:]),
+            at(0.0, 30.0, 3.0),
+            do(197),
+            at(0.0, 60.0, 3.0),
+        ]
+    ) == (ACCEPTED)
+    assert station.command(300, 0.0, 0.0) == ACCEPTED
+    uav = simulation.uavs["uav1"]
+    yaws = {}
+    for _ in range(60):
+        station.seconds(0.3)
+        x, y, z, w = uav.attitude
+        yaws[round(uav.position_map[0] / 4.0)] = math.atan2(
+            2 * (w * z + x * y), 1 - 2 * (y * y + z * z)
+        )
+    assert yaws[5] == pytest.approx(math.atan2(20.0, -20.0), abs=0.15)  # 20 m north-west of there
+    assert yaws[14] == pytest.approx(0.0, abs=0.1)  # the way leads east
+
+
 def test_plans_come_back_as_they_went(flight):
     _, station = flight
     fence = [
