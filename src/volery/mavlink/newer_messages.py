@@ -9,6 +9,7 @@ import math
 import struct
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from volery.mavlink.codec import NEWER
 from volery.mavlink.modes import Mode
 
 if TYPE_CHECKING:
@@ -37,7 +38,8 @@ class _Message:
     crc_extra: ClassVar[int]
     unpacker: ClassVar[struct.Struct]
     ordered_fieldnames: ClassVar[tuple[str, ...]]
-    array_lengths: ClassVar[tuple[int, ...]] = ()
+    fieldtypes: ClassVar[tuple[str, ...]] = ()
+    lengths: ClassVar[tuple[int, ...]] = ()
 
     def __init__(self, **fields: int | bytes) -> None:
         self.__dict__.update(fields)
@@ -46,7 +48,7 @@ class _Message:
 class ProtocolVersion(_Message):
     """PROTOCOL_VERSION: the hashes are 0 where nobody knows them."""
 
-    id, crc_extra = 300, 217
+    id, crc_extra = 300, NEWER[300]
     unpacker = struct.Struct("<HHH8s8s")
     ordered_fieldnames = (
         *("version", "min_version", "max_version"),
@@ -57,7 +59,7 @@ class ProtocolVersion(_Message):
 class AvailableModes(_Message):
     """AVAILABLE_MODES: one of the modes."""
 
-    id, crc_extra = 435, 134
+    id, crc_extra = 435, NEWER[435]
     unpacker = struct.Struct("<IIBBB35s")
     ordered_fieldnames = (
         *("custom_mode", "properties", "number_modes", "mode_index", "standard_mode"),
@@ -68,7 +70,7 @@ class AvailableModes(_Message):
 class CurrentMode(_Message):
     """CURRENT_MODE."""
 
-    id, crc_extra = 436, 193
+    id, crc_extra = 436, NEWER[436]
     unpacker = struct.Struct("<IIB")
     ordered_fieldnames = ("custom_mode", "intended_custom_mode", "standard_mode")
 

@@ -122,7 +122,7 @@ def test_every_default_is_allowed():
         assert len(name) <= 16
 
 
-@pytest.mark.parametrize("profile", [1, 2])
+@pytest.mark.parametrize("profile", [1, 2, 3])
 def test_streams_come_at_their_rates(profile):
     simulation, station = fly(sensors=())
     with simulation:
@@ -134,9 +134,23 @@ def test_streams_come_at_their_rates(profile):
         silent = {83, 85}  # targets: nothing is flown; the battery is ideal
         if 147 not in counts:
             silent |= {147}
+        assert 436 in RATES_HZ[profile]  # not of pymavlink's, so it is not heard
         for number, rate in RATES_HZ[profile].items():
+            if number == 436:
+                continue
             wanted = 0 if number in silent else 10.0 * rate
             assert counts[number] == pytest.approx(wanted, abs=1.0), number
+
+
+def test_rates_are_those_of_px4():
+    """Of v1.18: `onboard` and `normal` in mavlink_main.cpp, and px4-rc.mavlink's for port 14550."""
+    onboard, normal, simulated = RATES_HZ[1], RATES_HZ[2], RATES_HZ[3]
+    assert (onboard[30], onboard[31], onboard[331], onboard[111]) == (100.0, 50.0, 30.0, 10.0)
+    assert (normal[30], normal[31], normal[24], normal[32]) == (15.0, 10.0, 5.0, 1.0)
+    assert not {2, 105, 111, 331} & set(normal)  # SYSTEM_TIME and the like are onboard's
+    raised = {number for number in simulated if simulated[number] != normal[number]}
+    assert raised == {30, 31, 32, 33, 36, 83, 85}
+    assert {simulated[number] for number in raised} == {50.0}
 
 
 def test_intervals_are_set_told_and_taken_back(station):
@@ -259,8 +273,12 @@ def test_frames_are_those_of_pymavlink():
         common.MAVLink_extended_sys_state_message(0, 0),
         common.MAVLink_mission_current_message(0, 65535, 1, 2),
         common.MAVLink_highres_imu_message(1, *(0.5,) * 13, 63, 3),
+        common.MAVLink_attitude_target_message(1, 7, [1.0, 0.0, 0.5, 0.0], 0.1, 0.2, 0.3, 0.6),
+        common.MAVLink_battery_status_message(0, 1, 1, 0, [4000] * 10, 5, 6, 7, 80, 0, 1, [1] * 4),
     ]
     codec, theirs = Codec(7), common.MAVLink(None, 7, 1)
     for k, message in enumerate(messages):
         theirs.seq = k
-        assert codec.pack(message, k) == bytes(message.pack(theirs))
+        expected = bytes(message.pack(theirs))
+        assert codec.pack(message, k) == expected
+        assert codec.pack(message, k) == expected  # from what was kept for other links
