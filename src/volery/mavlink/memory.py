@@ -153,6 +153,10 @@ class Memory:
     has_receiver: bool = False
     """Whether satellite fixes come at all."""
     fix_lost: bool = False
+    pressure: float = math.nan
+    """Pa, of the barometer; nan: there is none."""
+    air_temperature: float = math.nan
+    """degC, beside the pressure."""
     warned: set[str] = field(default_factory=set)
     """Failsafes that have been told of, and acted on."""
     failsafe: bool = False

@@ -58,10 +58,10 @@ def _command_int(pilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def _set_mode(pilot: Autopilot, source: Source, message: Any) -> None:
-    """The old message, which has no answer."""
+    """The old message; PX4 answers it as the command that has replaced it."""
     custom = message.custom_mode
     params = (float(message.base_mode), custom >> 16 & 255, custom >> 24 & 255, *(math.nan,) * 4)
-    commands.do(pilot, source, commands.Command(commands.DO_SET_MODE, params, None))
+    commands.take(pilot, source, commands.Command(commands.DO_SET_MODE, params, None))
 
 
 def _data_stream(pilot: Autopilot, source: Source, message: Any) -> None:

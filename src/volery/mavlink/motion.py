@@ -171,6 +171,17 @@ def _specific_force(state: FlightState) -> Vector:
     )
 
 
+def scaled_pressure(pilot: Autopilot) -> Any:
+    """SCALED_PRESSURE of the barometer; None where there is none."""
+    memory = pilot.memory
+    if not math.isfinite(memory.pressure):
+        return None
+    warmth = memory.air_temperature if math.isfinite(memory.air_temperature) else 0.0
+    return dialect().MAVLink_scaled_pressure_message(
+        ms(pilot), memory.pressure / 100.0, 0.0, clipped(warmth * 100.0, 16)
+    )
+
+
 def vfr_hud(pilot: Autopilot) -> Any:
     """VFR_HUD."""
     state = pilot.state

@@ -187,6 +187,7 @@ BUILDERS: dict[int, Callable[[Autopilot], Any]] = {
     1: _sys_status,
     2: _system_time,
     24: motion.gps_raw_int,
+    29: motion.scaled_pressure,
     30: motion.attitude,
     31: motion.attitude_quaternion,
     32: motion.local_position,

@@ -131,7 +131,7 @@ def test_streams_come_at_their_rates(profile):
         station.heard.clear()
         station.seconds(10.0)
         counts = Counter(message.get_msgId() for message in station.heard)
-        silent = {83, 85}  # targets: nothing is flown; the battery is ideal
+        silent = {29, 83, 85}  # no barometer; targets: nothing is flown; the battery is ideal
         if 147 not in counts:
             silent |= {147}
         assert 436 in RATES_HZ[profile]  # not of pymavlink's, so it is not heard
@@ -233,6 +233,24 @@ def test_modes_and_versions_are_told_in_messages_that_pymavlink_lacks(station):
     modes = payloads(taken, 435, "<IIBBB35s")[1:]
     assert [mode[3] for mode in modes] == [1, 2, 3, 4, 5, 6, 7, 8]
     assert {mode[4]: mode[0] >> 16 for mode in modes}[7] == 0x0604  # landing
+
+
+def test_a_barometer_is_told_where_there_is_one(station):
+    assert station.command(512, 29.0) == DENIED
+    simulation, other = fly(sensors=[{"kind": "barometer"}])
+    with simulation:
+        other.seconds(1.0)
+        assert other.command(512, 29.0) == ACCEPTED
+        told = other.last("SCALED_PRESSURE")
+        assert told.press_abs == pytest.approx(956.0, abs=3.0)  # 488 m above the sea
+        assert told.temperature != 0
+
+
+def test_the_old_message_for_modes_is_answered(station):
+    station.heard.clear()
+    station.send("set_mode", 1, 1, 4 << 16 | 3 << 24)
+    answers = [(ack.command, ack.result) for ack in station.of("COMMAND_ACK")]
+    assert answers == [(176, ACCEPTED)]
 
 
 def test_odometry_is_told_with_covariances_that_are_not_known(station):
