@@ -15,6 +15,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
@@ -49,6 +50,10 @@ _TOPICS = {
     "battery": "sensor_msgs/msg/BatteryState",
 }
 _SLOW = ("range", "battery")
+_GONE_S = 1.5
+"""Of wall time: one that waits for a state asks again every second."""
+_LATE_FRAMES = 16
+"""A frame this far back was held up on its way; farther back, ArduPilot has restarted."""
 _log = logging.getLogger(__name__)
 
 Address = tuple[Any, ...]
@@ -128,6 +133,10 @@ class _Seat(asyncio.DatagramProtocol):
         self._motors = motors
         self._transport: asyncio.DatagramTransport | None = None
         self._number = -1
+        self._heard_s = 0.0
+        """Wall time of its last frame."""
+        self._told: set[str] = set()
+        """Warnings that were given."""
         self._line = b""
         self._slow: dict[str, Any] = {}
         """Newest messages of topics that do not come each time."""
@@ -148,6 +157,8 @@ class _Seat(asyncio.DatagramProtocol):
 
     is_in_step = False
     """As of `Pilot`: asyncio's transport is the loop's."""
+    may_sleep = False
+    """As of `Pilot`: it answers each state, and repeats its question where it heard none."""
 
     def tell(self, time_ns: int, news: News) -> bool:
         """As of `Pilot`."""
@@ -180,15 +191,32 @@ class _Seat(asyncio.DatagramProtocol):
         """As of asyncio."""
         servos = parse_servos(data)
         if servos is None:
+            self._warn("what speaks to its port is no ArduPilot")
             return
-        if self.peer is None or servos.number < self._number:
+        now_s = time.monotonic()
+        if self.peer is None or self._is_new(servos, addr, now_s):
             self._welcome(addr)
-        if addr != self.peer:  # there is one already
+        if addr != self.peer:
+            self._warn("its ArduPilot is there already; another one is not heard")
             return
+        self._heard_s = now_s
         if servos.number == self._number:
             self._repeat()
-        else:
+        elif servos.number > self._number:
             self._obey(servos)
+
+    def _is_new(self, servos: Servos, addr: Address, now_s: float) -> bool:
+        """Whether an ArduPilot begins: where the present one is gone, or itself restarted."""
+        if addr != self.peer:
+            return now_s - self._heard_s > _GONE_S
+        back = self._number - servos.number
+        return back > _LATE_FRAMES or (back > 0 and servos.number == 0)
+
+    def _warn(self, text: str) -> None:
+        """Once, as datagrams come by the hundred."""
+        if text not in self._told:
+            self._told.add(text)
+            _log.warning("%s: %s", self.uav, text)
 
     def error_received(self, exc: Exception) -> None:
         """As of asyncio: nobody listens at its address just now; its silence will tell."""

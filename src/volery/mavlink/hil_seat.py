@@ -27,6 +27,9 @@ class Way(Protocol):
     def send(self, data: bytes) -> bool:
         """Send frames; whether all of them are under way."""
 
+    def flush(self) -> bool:
+        """Send what waits; whether all is under way."""
+
     def end(self) -> None:
         """End the connection."""
 
@@ -43,6 +46,7 @@ class HilSeat:
         self._way: Way | None = None
         self._link = HilLink(system)
         self._noise, self._told = 0, False
+        self._is_armed = False
         self._sensing = Sensing()
         self._meetings = Meetings(
             gateway, uav, "px4", self, period_ns=PERIOD_NS, topics=TOPICS, patience=patience
@@ -59,6 +63,7 @@ class HilSeat:
             self._way = way
             self._link = HilLink(self._system)
             self._noise, self._told = 0, False
+            self._is_armed = False
         return partial(self._hear, way)
 
     def heartbeat(self) -> bytes:
@@ -96,8 +101,13 @@ class HilSeat:
         sensed = self._sensing.read(news)
         if self._way is None or sensed is None:
             return False
-        is_sent = self._way.send(self._link.tell(time_ns, sensed))
-        return is_sent and self._link.locked and self.taken
+        self._way.send(self._link.tell(time_ns, sensed))
+        return self._link.locked and self.taken
+
+    @property
+    def may_sleep(self) -> bool:
+        """As of `Pilot`: a PX4 in Offboard, disarmed, without setpoints, says nothing for long."""
+        return self._way is not None and not self._is_armed and self._way.flush()
 
     def begin_anew(self) -> None:
         """As of `Pilot`: a PX4 cannot go back in time."""
@@ -126,6 +136,7 @@ class HilSeat:
                 self._told = True
                 _log.warning("%s: what is connected does not speak MAVLink: no PX4?", self.uav)
         for actuators in answers:
+            self._is_armed = actuators.armed
             if actuators.time_ns >= self._meetings.time_ns:
                 self._meetings.go_on(_shares(actuators))
             else:

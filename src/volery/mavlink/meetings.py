@@ -2,7 +2,8 @@
 
 At each meeting the autopilot is told what is new of its UAV, and the simulation stands still until
 `go_on`. What it asks of the rotors before is in force from the next physics step. One that is
-waited for and stays silent ends the run with an error, or is given up with a warning.
+waited for and stays silent ends the run with an error, or is given up with a warning; without one
+that is asleep time goes on.
 """
 
 from __future__ import annotations
@@ -31,6 +32,10 @@ _SPEEDS = "std_msgs/msg/Float32MultiArray"
 _CLOCK = "rosgraph_msgs/msg/Clock"
 _MARGIN_S = 5.0
 """By which the simulation is more patient than a seat that gives its autopilot up by itself."""
+_GLANCE_S = 0.05
+"""How often silence is looked at."""
+_SLEEP_S = 0.5
+"""Who says nothing for so long of wall time may be asleep, or for a fifth of its patience."""
 _log = logging.getLogger(__name__)
 
 News = Mapping[str, Any]
@@ -55,6 +60,10 @@ class Pilot(Protocol):
     @property
     def is_in_step(self) -> bool:
         """Whether it answers each meeting, and may be told by any thread."""
+
+    @property
+    def may_sleep(self) -> bool:
+        """Whether it is well without an answer: it flies nothing, and hears what it is told."""
 
     def tell(self, time_ns: int, news: News) -> bool:
         """Tell it of a meeting; whether its answer is waited for: it calls `go_on`."""
@@ -98,9 +107,10 @@ class Meetings:
         """Wall time at which the present meeting began."""
         self._is_unsayable = False
         """Whether it has been said that the pilot cannot be told something."""
-        self._watch: asyncio.Task[None] | None = None
-        if patience.drops:
-            self._watch = self._loop.create_task(self._watch_silence())
+        self._is_asleep = False
+        """Whether time goes on without its answers."""
+        self._period_s = period_ns / NS_PER_S
+        self._watch = self._loop.create_task(self._watch_silence())
         self._time_ns = -1
         self._boxes: dict[str, Mailbox] = {
             name: self._session.subscribe(f"/{uav}/{name}", msgtype, depth=1, wake=_nothing)
@@ -131,6 +141,7 @@ class Meetings:
     def go_on(self, shares: Sequence[float] | None = None) -> None:
         """End the meeting, `shares` as of `turn_rotors`; without a meeting only those are asked."""
         messages = [] if shares is None else [(self._rotors, self._asked(shares))]
+        self._is_asleep = self._is_asleep and shares is None
         if self._pending:
             self._pending = False
             messages.append((self._done, self._clock(clock=time_from_ns(self._time_ns))))
@@ -140,8 +151,7 @@ class Meetings:
         """Leave the lock step and the graph; a second time nothing happens."""
         with self.lock:
             self._pending = False
-        if self._watch is not None:
-            self._watch.cancel()
+        self._watch.cancel()
         self._session.close()
 
     def _join(self, name: str, period_ns: int) -> None:
@@ -190,13 +200,32 @@ class Meetings:
         return {name: published[-1].message for name, published in found.items() if published}
 
     async def _watch_silence(self) -> None:
-        """Give up an autopilot that is silent for too long."""
+        """Go on without an autopilot that is asleep; give up one that is silent for too long."""
         while True:
-            await asyncio.sleep(min(0.1, 0.2 * self._patience.timeout_s))
+            await asyncio.sleep(self._period_s if self._is_asleep else self._glance_s)
             with self.lock:
-                silent_s = time.monotonic() - self._since_s if self._pending else 0.0
-                if silent_s >= self._patience.timeout_s:
-                    self._give_up()
+                if self._pending:
+                    self._judge(time.monotonic() - self._since_s)
+
+    @property
+    def _glance_s(self) -> float:
+        return min(_GLANCE_S, 0.1 * self._patience.timeout_s)
+
+    def _judge(self, silent_s: float) -> None:
+        """Of a meeting that lasts: whether there is still somebody to wait for."""
+        sleeps = self._is_asleep or silent_s >= min(_SLEEP_S, 0.2 * self._patience.timeout_s)
+        if sleeps and self._pilot.may_sleep:
+            self._go_on_without()
+        elif self._patience.drops and silent_s >= self._patience.timeout_s:
+            self._give_up()
+
+    def _go_on_without(self) -> None:
+        if not self._is_asleep:
+            self._is_asleep = True
+            _log.warning(
+                "%s: its autopilot is disarmed and silent; it is not waited for", self._uav
+            )
+        self.go_on()
 
     def _give_up(self) -> None:
         _log.warning(

@@ -20,9 +20,13 @@ PERIOD_US = 4000
 WHOLE_GROUPS = (0x7, 0x38, 0x1C0, 0x1A00, 0x400)
 
 
-def connect(port):
-    """Over TCP, as PX4 does."""
-    link = socket.create_connection(("127.0.0.1", port), timeout=60.0)
+def connect(port, unread_bytes=None):
+    """Over TCP, as PX4 does; the kernel holds `unread_bytes` for it where said."""
+    link = socket.socket()
+    link.settimeout(60.0)
+    if unread_bytes is not None:
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, unread_bytes)
+    link.connect(("127.0.0.1", port))
     link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return link
 
@@ -55,7 +59,10 @@ class Terminal:
 
 
 class StandIn(threading.Thread):
-    """Connects at once; answers `answers` times with `throttle`, armed from the `arm_at`-th on."""
+    """Connects at once; answers `answers` times with `throttle`, armed from the `arm_at`-th on.
+
+    With `dozes` it then hears so many readings without a word, and answers as often again.
+    """
 
     def __init__(
         self,
@@ -65,6 +72,7 @@ class StandIn(threading.Thread):
         throttle=0.0,
         arm_at=0,
         falls_silent=False,
+        dozes=0,
         in_lock_step=True,
         link=None,
     ):
@@ -72,6 +80,7 @@ class StandIn(threading.Thread):
         self.port, self.answers = port, answers
         self.throttle, self.arm_at = throttle, arm_at
         self.falls_silent, self.in_lock_step = falls_silent, in_lock_step
+        self.dozes = dozes
         self.fault = None
         self.sensors, self.fixes, self.groups = [], [], 0
         self.done = threading.Event()
@@ -86,9 +95,11 @@ class StandIn(threading.Thread):
 
     def run(self):
         try:
-            for number in range(self.answers):
-                self._check(self._next_sensor())
-                self._answer(number)
+            self._fly(self.answers)
+            if self.dozes:
+                for _ in range(self.dozes):
+                    self._check(self._next_sensor())
+                self._fly(self.answers)
             if not self.falls_silent:
                 self._link.close()
         except Exception as fault:
@@ -99,6 +110,11 @@ class StandIn(threading.Thread):
 
     def close(self):
         self._link.close()
+
+    def _fly(self, answers):
+        for number in range(answers):
+            self._check(self._next_sensor())
+            self._answer(number)
 
     def _next_sensor(self):
         while True:

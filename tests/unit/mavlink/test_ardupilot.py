@@ -9,7 +9,7 @@ import threading
 import time
 
 import pytest
-from ardupilot_stand_in import ArdupilotStandIn
+from ardupilot_stand_in import ArdupilotStandIn, read
 from autopilot_bench import free_port, irises
 
 from volery.bridges.doors import Doors
@@ -167,7 +167,7 @@ def test_what_was_lost_is_said_again(opened):
     pilot.link.close()
 
 
-def test_noise_and_a_second_one_are_passed_over(opened):
+def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, caplog):
     simulation, door = opened()
     pilot = ArdupilotStandIn(door._port, 160, pwm=CLIMB)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
@@ -180,10 +180,34 @@ def test_noise_and_a_second_one_are_passed_over(opened):
             other.sendto(data, ("127.0.0.1", door._port))
         pilot.start()
         meet(simulation, door, 1)
-        frame = struct.pack("<HHI16H", 18458, 400, 10_000, *[1000] * 16)
-        other.sendto(frame, ("127.0.0.1", door._port))
+        for number in (10_000, 0):  # one that flies elsewhere, and one that was just started
+            frame = struct.pack("<HHI16H", 18458, 400, number, *[1000] * 16)
+            other.sendto(frame, ("127.0.0.1", door._port))
         simulation.run(0.2)
     finish(pilot)
+    assert caplog.messages == [
+        "uav1: what speaks to its port is no ArduPilot",
+        "uav1: its ArduPilot is there already; another one is not heard",
+    ]
+
+
+def test_a_frame_that_comes_late_begins_nothing_anew(opened):
+    simulation, door = opened()
+    pilot = ArdupilotStandIn(door._port, 1)
+    pilot.send(1000)
+    meet(simulation, door, 1)
+    run = threading.Thread(target=simulation.run, args=(0.0047,))
+    run.start()
+    times = []
+    for number in (1001, 1002, 1003):
+        times += read(pilot.link.recv(65000).decode(), "", "timestamp", 1)
+        for late in (990, 999):
+            pilot.send(late)
+        pilot.send(number)
+    run.join(20.0)
+    assert not run.is_alive()
+    assert times == pytest.approx([0.00125, 0.0025, 0.00375])
+    pilot.link.close()
 
 
 def test_frames_that_are_none():

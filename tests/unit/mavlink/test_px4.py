@@ -9,7 +9,7 @@ import time
 
 import pytest
 from autopilot_bench import free_port, irises
-from px4_stand_in import StandIn, Terminal
+from px4_stand_in import StandIn, Terminal, connect
 
 from volery.bridges.doors import Doors
 from volery.core.errors import BridgeError, PartnerError
@@ -139,6 +139,33 @@ def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened,
     simulation.run(0.5)
     assert again.done.wait(20.0)
     assert again.fault is None
+    pilot.close()
+
+
+def test_time_goes_on_without_one_that_is_disarmed_and_says_nothing(opened, caplog):
+    """As PX4 in Offboard without setpoints: it answers again when time has gone on."""
+    simulation, door = opened(patience=Patience(1.0))
+    pilot = StandIn(door._port, 50, arm_at=1000, dozes=100)
+    meet(simulation, door, 1)
+    pilot.start()
+    simulation.run(1.0)
+    assert pilot.done.wait(20.0)
+    if pilot.fault:
+        raise pilot.fault
+    assert len(pilot.sensors) == 200
+    told = {text for text in caplog.messages if "silent" in text}
+    assert told == {"uav1: its autopilot is disarmed and silent; it is not waited for"}
+
+
+def test_one_that_is_disarmed_and_hears_nothing_ends_the_run(opened):
+    simulation, door = opened(patience=Patience(0.5))
+    link = connect(door._port, unread_bytes=4096)
+    pilot = StandIn(door._port, 50, arm_at=1000, falls_silent=True, link=link)
+    meet(simulation, door, 1)
+    pilot.start()
+    with pytest.raises(PartnerError, match=r"did not answer within 0\.5 s"):
+        simulation.run(60.0)
+    assert len(pilot.sensors) == 50
     pilot.close()
 
 
