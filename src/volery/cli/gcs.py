@@ -19,10 +19,13 @@ from volery.comms.ground import HEAD, HELP, Ground
 from volery.comms.protocol import Frame
 from volery.comms.server import PORT
 from volery.comms.station import Station
+from volery.comms.station_core import FATAL
 from volery.core.errors import CommsError
 
 _LEAVE_S = 2.0
 """For how long commands may still be on their way when the last line has been read."""
+_FIRST_S, _OTHERS_S = 2.0, 0.3
+"""For how long a script waits for the first state of a UAV, then for those of others."""
 
 
 def parse_server(text: str) -> tuple[str, int]:
@@ -47,13 +50,14 @@ def command_station(
             Identity.ground(number),
             desk.on_message,
             desk.on_refusal,
+            on_joined=desk.on_joined,
             host=host,
             port=port,
             name="gcs",
             token=token,
             planes_per_batch=planes_per_batch,
         )
-        desk.ground = Ground(station.send, planes_per_batch)
+        desk.ground = Ground(station.send, planes_per_batch, lambda: station.joined)
         asyncio.run(desk.work(station))
 
 
@@ -64,19 +68,41 @@ class _Desk:
 
     def __init__(self, log: TextIO | None) -> None:
         self._log = log
+        self._clock_ns = time.time_ns() - time.monotonic_ns()
+        self._has_joined = False
+        self._is_sent_away = False
+        self._lines: asyncio.Queue[str | None] = asyncio.Queue()
 
     async def work(self, station: Station) -> None:
-        """Until the last line, or `quit`."""
+        """Until the last line, or `quit`; `CommsError` where the server sends this station away."""
         await station.start()
         self._say(f"joined as ground station, address {station.core.address}; help shows commands")
-        lines = _lines(asyncio.get_running_loop())
+        self._has_joined = True
+        lines = self._lines
+        _read_into(lines, asyncio.get_running_loop())
+        waits = not sys.stdin.isatty()
         try:
             while (line := await lines.get()) is not None and line.strip() not in ("quit", "exit"):
+                if waits and line.strip() != "help":
+                    await self._wait_for_states()
+                    waits = False
                 self._do(line)
-            with contextlib.suppress(TimeoutError, asyncio.TimeoutError):
-                await asyncio.wait_for(station.until_settled(), _LEAVE_S)
+            if station.joined:
+                with contextlib.suppress(TimeoutError, asyncio.TimeoutError):
+                    await asyncio.wait_for(station.until_settled(), _LEAVE_S)
+            if still_open := self.ground.open_commands(station.core.is_settled):
+                self._say(f"warning: nobody has said that it came: {', '.join(still_open)}")
         finally:
             await station.stop()
+        if station.core.fatal is not None:
+            raise CommsError(f"the server sends this station away: {station.core.fatal.text}")
+
+    async def _wait_for_states(self) -> None:
+        ends = time.monotonic() + _FIRST_S
+        while not self.ground.has_heard and time.monotonic() < ends:
+            await asyncio.sleep(0.02)
+        if self.ground.has_heard:
+            await asyncio.sleep(_OTHERS_S)
 
     def _do(self, line: str) -> None:
         word = line.strip()
@@ -85,7 +111,9 @@ class _Desk:
         if word == "help":
             typer.echo(HELP)
         elif word == "list":
-            print_table(HEAD, self.ground.rows(time.monotonic_ns()), right=(4, 5, 6))
+            print_table(HEAD, self.ground.rows(self._now_ns()), right=(4, 5, 6))
+            if not self.ground.has_heard:
+                typer.echo("no UAV has been heard so far")
             sys.stdout.flush()
         else:
             try:
@@ -95,12 +123,27 @@ class _Desk:
 
     def on_message(self, frame: Frame) -> None:
         """What a station tells."""
-        if line := self.ground.take(frame, time.monotonic_ns()):
+        if line := self.ground.take(frame, self._now_ns()):
             self._say(line)
 
     def on_refusal(self, refusal: Refusal) -> None:
-        """What the server refuses."""
-        self._say(self.ground.refused(refusal))
+        """What the server refuses; that it does not let this station in ends the command."""
+        if refusal.sequence or refusal.reason not in FATAL:
+            self._say(self.ground.refused(refusal))
+        else:
+            self._is_sent_away = True
+            self._lines.put_nowait(None)
+
+    def on_joined(self, joined: bool) -> None:
+        """The server is there again, or gone."""
+        if joined and self._has_joined:
+            self._say("the server is back")
+        elif not joined and not self._is_sent_away:
+            self._say("the connection to the server is lost; trying again")
+
+    def _now_ns(self) -> int:
+        """A clock that never goes back, set by the time of day at the start."""
+        return self._clock_ns + time.monotonic_ns()
 
     def _say(self, line: str) -> None:
         typer.echo(line)
@@ -111,9 +154,8 @@ class _Desk:
             self._log.flush()
 
 
-def _lines(loop: asyncio.AbstractEventLoop) -> asyncio.Queue[str | None]:
+def _read_into(queue: asyncio.Queue[str | None], loop: asyncio.AbstractEventLoop) -> None:
     """Lines of standard input as they come, then None; read in a thread, which may block."""
-    queue: asyncio.Queue[str | None] = asyncio.Queue()
 
     def read() -> None:
         with contextlib.suppress(RuntimeError):  # the loop has ended
@@ -122,4 +164,3 @@ def _lines(loop: asyncio.AbstractEventLoop) -> asyncio.Queue[str | None]:
             loop.call_soon_threadsafe(queue.put_nowait, None)
 
     threading.Thread(target=read, name="volery-lines", daemon=True).start()
-    return queue

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from volery.cli.links import DEFAULT_VIA, await_link
+from volery.cli.links import DEFAULT_VIA, LinkTold, await_link
 from volery.core.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def launch_profile(
         names = ", ".join(node.get_name() for node in nodes)
         typer.echo(f"{names} run on {way}; Ctrl-C ends them", err=True)
         try:
-            host.spin()
+            host.spin(LinkTold(link, way))
         finally:
             for node in nodes:
                 node.destroy_node()

@@ -66,6 +66,27 @@ def await_link(via: str, name: str, patience_s: float = PATIENCE_S) -> Link:
             time.sleep(_AGAIN_S)
 
 
+class LinkTold:
+    """Says when a link's connection breaks, and when it is back; ask it again and again.
+
+    For `NodeHost.spin` it is an end that never comes.
+    """
+
+    def __init__(self, link: Link, via: str) -> None:
+        self._link = link
+        self._via = via
+        self._was = True
+
+    def __call__(self) -> bool:
+        """Say what has changed."""
+        connected = getattr(self._link, "connected", True)
+        if connected != self._was:
+            self._was = connected
+            what = "is there again" if connected else "is gone; waiting for it"
+            typer.echo(f"the graph at {self._via} {what}", err=True)
+        return False
+
+
 def _ros2_terms(via: str) -> Ros2Terms:
     """Of `ros2://DOMAIN?interface=NAME`, `ros2-zenoh://HOST:PORT?domain=DOMAIN`, `rclpy://DOMAIN`."""
     from volery.bridges.ros2.environment import Ros2Terms

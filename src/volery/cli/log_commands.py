@@ -128,4 +128,6 @@ def report(
     )
     for text in written.warnings:
         warn(text)
+    if written.fit:
+        typer.echo(f"fit     {written.fit}")
     typer.echo(f"report  {written.path}")

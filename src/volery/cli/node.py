@@ -11,7 +11,7 @@ from typing import Any
 
 import typer
 
-from volery.cli.links import DEFAULT_VIA, ROS2_WAYS, await_link
+from volery.cli.links import DEFAULT_VIA, ROS2_WAYS, LinkTold, await_link
 from volery.cli.yaml_form import from_yaml
 from volery.core.errors import BridgeError
 
@@ -64,7 +64,7 @@ def run_node(options: NodeOptions) -> None:
             host.join_lock_step(node.get_name(), options.lock_step_s)
         typer.echo(f"{node.get_name()} runs on {via}; Ctrl-C ends it", err=True)
         try:
-            host.spin()
+            host.spin(LinkTold(link, via))
         finally:
             node.destroy_node()
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from volery.cli.flight import RunOptions
+from volery.cli.guard import warn
 from volery.core.errors import CommandError
 
 if TYPE_CHECKING:
@@ -56,11 +57,14 @@ def page_of(options: RunOptions) -> Iterator[Page]:
 @contextmanager
 def serving(settings: PageSettings, shelf: Shelf | None = None) -> Iterator[Page]:
     """Serve the page, with cards of what is on the shelf, and say where."""
+    from volery.server.page import is_built
     from volery.server.page_server import PageServer
 
     with PageServer(settings, shelf) as server:
         needed = "  (it asks for the token)" if settings.tokens.needed else ""
         typer.echo(f"page    {server.url}{needed}", err=True)
+        if not is_built():
+            warn("the page is not built: make web builds it; the rest of the address works")
         yield Page(server)
 
 

@@ -13,7 +13,7 @@ from volery.comms.addresses import is_meant, is_station
 from volery.comms.bodies import Reason
 from volery.comms.known import Known
 from volery.comms.mailbox import Mailbox
-from volery.comms.protocol import Frame
+from volery.comms.protocol import Frame, Kind
 from volery.comms.rate import RateLimit
 from volery.comms.settings import RouterSettings
 from volery.core.clock import NS_PER_S
@@ -55,8 +55,16 @@ class Directory:
         return now_ns < self._grace_ends_ns
 
     def meant(self, frame: Frame) -> list[Known]:
-        """Stations that a message to many is meant for, its source left out."""
-        return [each for each in self.stations() if self._is_meant(each.address, frame)]
+        """Stations that a message to many is meant for, its source left out.
+
+        Sensing is not for those who have been away for long.
+        """
+        lasts = frame.kind != Kind.SENSING
+        return [
+            each
+            for each in self._stations.values()
+            if (lasts or not each.is_gone) and self._is_meant(each.address, frame)
+        ]
 
     def keep(self, frame: Frame) -> list[Frame]:
         """Keep a message to many for those who come; returns what is kept no longer for it."""
@@ -88,6 +96,9 @@ class Directory:
             else:
                 before_ns = now_ns - round(self._settings.keep_s * NS_PER_S)
                 yield from ((f, Reason.EXPIRED) for f in station.mailbox.expire(before_ns))
+                if self._becomes_gone(station, now_ns):
+                    station.is_gone = True
+                    yield from ((f, Reason.EXPIRED) for f in station.mailbox.expire_many())
 
     def _is_forgotten(self, station: Known, now_ns: int) -> bool:
         if station.connection is not None:
@@ -95,6 +106,11 @@ class Directory:
         if not station.appeared:
             return not self.expects(now_ns)
         return now_ns - station.left_ns > self._settings.forget_s * NS_PER_S
+
+    def _becomes_gone(self, station: Known, now_ns: int) -> bool:
+        away_ns = now_ns - station.left_ns
+        waits = station.is_gone or station.connection is not None
+        return not waits and away_ns > self._settings.keep_many_s * NS_PER_S
 
     def _is_meant(self, address: int, frame: Frame) -> bool:
         planes = self._settings.planes_per_batch

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from volery.comms.addresses import PLANES_PER_BATCH, Identity, is_meant, is_station
 from volery.comms.bodies import Refusal
+from volery.comms.freshness import Freshness
 from volery.comms.payloads import (
     COMMANDS,
     MISSION,
@@ -43,6 +44,9 @@ quit                        leave
 
 WHO: a linear id such as 3, batch.plane such as 0.3, a name such as uav4, batch1, or all."""
 
+_USAGE = {
+    line.split()[0]: line.partition("  ")[0] for line in HELP.partition("\n\n")[0].splitlines()
+}
 _SIMPLE = {"land": "land", "hold": "hold", "return": "return_home", "resume": "resume"}
 _TYPED = {"return_home": "return", "take_off_to": "take_off"}
 """Words of people for commands of another name."""
@@ -81,26 +85,39 @@ HEAD = (
 class Ground:
     """Knows what UAVs tell, and turns lines into commands.
 
-    send: sends a message, as `Station.send`. planes_per_batch: as of the server.
+    send: sends a message, as `Station.send`. planes_per_batch: as of the server. is_joined: whether
+    a server is there.
     """
 
-    def __init__(self, send: Send, planes_per_batch: int = PLANES_PER_BATCH) -> None:
+    def __init__(
+        self,
+        send: Send,
+        planes_per_batch: int = PLANES_PER_BATCH,
+        is_joined: Callable[[], bool] = lambda: True,
+    ) -> None:
         self._send = send
+        self._is_joined = is_joined
         self._planes = planes_per_batch
         self._states: dict[int, tuple[Any, int]] = {}
+        self._fresh: dict[int, Freshness] = {}
         self._missions: dict[int, Any] = {}
         self._slams: dict[int, str] = {}
         self._asked: dict[int, str] = {}
 
     def take(self, frame: Frame, now_ns: int) -> str | None:
-        """Take a message; a line to be shown, where there is something to say."""
+        """Take a message; a line to be shown, where there is something to say.
+
+        now_ns: by a clock that never goes back, near the time of day that stations put on frames.
+        """
         try:
             named = decode_named(frame.payload)
         except CommsError as error:
             return f"{self._name(frame.source)}: {error}"
         if named[:2] == (STATE, STATE_TYPE):
             before = self._states.get(frame.source)
-            self._states[frame.source] = named.message, now_ns
+            fresh = self._fresh.setdefault(frame.source, Freshness())
+            made_ns = fresh.made_ns(frame.time_ns, now_ns)
+            self._states[frame.source] = named.message, made_ns
             mode = named.message.mode
             changed = before is None or before[0].mode != mode
             return f"{self._name(frame.source)}: {mode}" if changed else None
@@ -133,8 +150,8 @@ class Ground:
     def rows(self, now_ns: int) -> list[Row]:
         """Every UAV that has been heard, by address."""
         return [
-            self._row(address, state, now_ns - heard_ns)
-            for address, (state, heard_ns) in sorted(self._states.items())
+            self._row(address, state, now_ns - made_ns)
+            for address, (state, made_ns) in sorted(self._states.items())
         ]
 
     def command(self, line: str) -> str:
@@ -149,6 +166,8 @@ class Ground:
             name, fields = "take_off_to", {"altitude": _number(rest[1])}
         elif word == "go_to" and len(rest) in (4, 5):
             name, fields = "go_to", _place(rest[1:])
+        elif usage := _USAGE.get(_TYPED.get(word, word)):
+            raise CommsError(f"'{line.strip()}': usage: {usage}")
         else:
             raise CommsError(f"'{line.strip()}' is no command; help shows them")
         names = {state.name: address for address, (state, _) in self._states.items()}
@@ -161,7 +180,19 @@ class Ground:
         anybody = is_station(address) or any(
             is_meant(each, address, self._planes) for each in self._states
         )
-        return f"sent: {said}{'' if anybody else ' (no UAV there has been heard so far)'}"
+        note = "" if anybody else " (no UAV there has been heard so far)"
+        if self._is_joined():
+            return f"sent: {said}{note}"
+        return f"queued: {said}{note}; it goes when the server is back"
+
+    def open_commands(self, is_settled: Callable[[int], bool]) -> list[str]:
+        """Commands of which nobody has said that they came, or were refused, oldest first."""
+        return [said for sequence, said in self._asked.items() if not is_settled(sequence)]
+
+    @property
+    def has_heard(self) -> bool:
+        """Whether a UAV has told its state."""
+        return bool(self._states)
 
     def _name(self, address: int) -> str:
         known = self._states.get(address)

@@ -34,6 +34,10 @@ class Held:
     def __len__(self) -> int:
         return len(self._messages)
 
+    def __contains__(self, sequence: int) -> bool:
+        """Whether a message is held."""
+        return sequence in self._messages
+
     def put(self, sequence: int, kind: Kind, destination: int, data: bytes) -> None:
         """Hold a message. `CommsError` where there is no room, nor a measurement to give way."""
         there = self._of.setdefault(destination, {})

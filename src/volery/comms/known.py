@@ -20,6 +20,8 @@ class Known:
     name: str = ""
     connection: int | None = None
     appeared: bool = False
+    is_gone: bool = False
+    """Whether it has been away for so long that sensing for many is not meant for it."""
     left_ns: int = 0
     """When its connection ended."""
     session: int = 0

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from volery.comms.addresses import is_station
 from volery.comms.bodies import Received
 from volery.comms.protocol import Frame, Kind
 from volery.comms.settings import RouterSettings
@@ -162,6 +163,19 @@ class Mailbox:
                     frame = queue.popleft().frame
                     self._bytes -= len(frame.data)
                     old.append(frame)
+            self._forget_empty(source, lane)
+        return old
+
+    def expire_many(self) -> list[Frame]:
+        """Remove and return the sensing that was sent to many."""
+        old: list[Frame] = []
+        for source, lane in list(self._lanes.items()):
+            gone = [w.frame for w in lane.sensing if not is_station(w.frame.destination)]
+            if gone:
+                kept = [w for w in lane.sensing if is_station(w.frame.destination)]
+                lane.sensing = deque(kept)
+                self._bytes -= sum(len(frame.data) for frame in gone)
+                old += gone
             self._forget_empty(source, lane)
         return old
 

@@ -196,7 +196,7 @@ class Router:
             self._refuse_connection(number, refused.reason, refused.text)
             return
         station = self._directory.find(frame.source) or self._office.expect(frame.source, now_ns)
-        station.appeared = True
+        station.appeared, station.is_gone = True, False
         if station.connection is not None:
             self._replace(station)
         station.name = decode_hello(frame.payload).name

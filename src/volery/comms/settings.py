@@ -23,6 +23,9 @@ class RouterSettings:
     """Messages on their way to one station that it has not yet told to have come."""
     keep_s: float = 60.0
     """For how long a message waits for its station."""
+    keep_many_s: float = 5.0
+    """For how long sensing to batches and to all waits for a station that is away; after that it is
+    as one that nobody listens to: what a fleet told a minute ago is of no use to who comes back."""
     forget_s: float = 600.0
     """After which a station that is away is no longer known."""
     grace_s: float = 5.0

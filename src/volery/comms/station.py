@@ -30,7 +30,7 @@ _ACKNOWLEDGE_S = 0.05
 
 
 def _ignore(_what: object) -> None:
-    return
+    """Nobody wants to know."""
 
 
 class Station:
@@ -42,6 +42,9 @@ class Station:
         Batch and plane, or `Identity.ground()`.
     on_message, on_refusal
         Called in the loop with what comes, each message once, in order.
+    on_joined
+        Called in the loop with True when a server has welcomed it, with False when that connection
+        is lost; not by `stop`.
     host, port
         Of the communication server.
     name, token, planes_per_batch
@@ -55,6 +58,7 @@ class Station:
         on_message: Callable[[Frame], None] = _ignore,
         on_refusal: Callable[[Refusal], None] = _ignore,
         *,
+        on_joined: Callable[[bool], None] = _ignore,
         host: str = "127.0.0.1",
         port: int = PORT,
         name: str = "",
@@ -70,6 +74,7 @@ class Station:
         )
         self._on_message = on_message
         self._on_refusal = on_refusal
+        self._on_joined = on_joined
         self._address = (host, port)
         self._pipe: _Pipe | None = None
         self._task: asyncio.Task[None] | None = None
@@ -116,6 +121,7 @@ class Station:
             await asyncio.gather(self._task, return_exceptions=True)
             self._task = None
         if self._pipe is not None:
+            self._on_joined = _ignore
             self._pipe.transport.abort()
             self._lost(self._pipe)
 
@@ -178,10 +184,13 @@ class Station:
         self._flush()
 
     def _came(self, data: bytes) -> None:
+        before = self.joined
         for frame in self.core.feed(data, time.monotonic_ns()):
             self._on_message(frame)
         while self.core.refusals:
             self._on_refusal(self.core.refusals.popleft())
+        if self.joined and not before:
+            self._on_joined(True)
         if self.core.has_to_acknowledge and self._acknowledges is None:
             self._acknowledges = self._loop.call_later(_ACKNOWLEDGE_S, self._acknowledge)
         self._flush()
@@ -194,8 +203,10 @@ class Station:
 
     def _lost(self, pipe: _Pipe) -> None:
         if self._pipe is pipe:
-            self._pipe = None
+            self._pipe, before = None, self.joined
             self.core.disconnected()
+            if before:
+                self._on_joined(False)
             self._changed.set()
 
     def _flush(self) -> None:

@@ -88,6 +88,10 @@ class StationCore:
         """Messages that may have to be sent again."""
         return len(self._held)
 
+    def is_settled(self, sequence: int) -> bool:
+        """Whether the server is done with a message: it has come, or a rule has disposed of it."""
+        return sequence not in self._held
+
     @property
     def dropped(self) -> int:
         """Measurements that this station itself dropped, since too many were held."""

@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from volery.mavlink import feasibility, home, requirements
 from volery.mavlink.modes import Mode
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot import Autopilot
-    from volery.mavlink.vehicle import Vector
 
 
 def troubles(pilot: Autopilot) -> list[str]:
@@ -24,6 +24,8 @@ def troubles(pilot: Autopilot) -> list[str]:
     found = []
     if state.crashed:
         found.append("the vehicle has crashed")
+    if memory.mode in (Mode.RETURN, Mode.LAND) and not memory.armed:
+        found.append("mode not suitable for arming")
     if memory.fix_lost and not pilot.parameter("COM_ARM_WO_GPS"):
         found.append("no satellite fix")
     if math.isfinite(state.charge) and state.charge < float(pilot.parameter("BAT_LOW_THR")):
@@ -31,31 +33,33 @@ def troubles(pilot: Autopilot) -> list[str]:
     tilt = 1.0 - 2.0 * (state.attitude[0] ** 2 + state.attitude[1] ** 2)
     if not state.airborne and tilt < 0.7:  # PX4 refuses beyond about 45 deg
         found.append("the vehicle lies on its side")
-    if memory.mode.by_sticks and not sticks_are_there(pilot):
-        found.append("no manual control input")
+    lacks = requirements.missing(pilot, memory.mode)
+    found += [lacks] if lacks else []
+    if int(pilot.parameter("NAV_DLL_ACT")) and not requirements.ground_is_there(pilot):
+        found.append("no connection to the ground control station")
     return found
 
 
-def sticks_are_there(pilot: Autopilot) -> bool:
-    """Whether MANUAL_CONTROL has come within COM_RC_LOSS_T."""
-    age_ns = pilot.memory.now_ns - pilot.memory.sticks.time_ns
-    return age_ns <= float(pilot.parameter("COM_RC_LOSS_T")) * 1e9
+def obstacle(pilot: Autopilot) -> str:
+    """The first trouble, or what is wrong with the mission that it would begin; empty: none."""
+    found = troubles(pilot)
+    if not found and pilot.memory.mode is Mode.MISSION:
+        return feasibility.trouble(pilot)
+    return found[0] if found else ""
 
 
-def arm(pilot: Autopilot, *, forced: bool) -> str:
-    """Arm; why not, empty where it is armed."""
+def arm(pilot: Autopilot) -> str:
+    """Arm; why not, empty where it is armed. Nobody can force it: PX4 checks for all outside."""
     memory = pilot.memory
     if memory.armed:
         return ""
-    if memory.mode in (Mode.RETURN, Mode.LAND):
-        memory.mode = Mode.HOLD
-    found = troubles(pilot)
-    if pilot.state.crashed or (found and not forced):
-        return found[0]
+    why = obstacle(pilot)
+    if why:
+        return why
     memory.armed, memory.armed_ns = True, memory.now_ns
     memory.airborne, memory.failsafe = False, False
     memory.warned.clear()
-    set_home(pilot, pilot.state.position)
+    home.set_on_arming(pilot)
     pilot.say(6, "Armed by external command")
     pilot.announce()
     return ""
@@ -88,13 +92,3 @@ def finish(pilot: Autopilot, text: str) -> None:
         memory.mode = Mode.HOLD
     pilot.say(6, text)
     pilot.announce()
-
-
-def set_home(pilot: Autopilot, place: Vector) -> None:
-    """Let home be a place in the map."""
-    from volery.mavlink.telemetry import BUILDERS, HOME_POSITION
-
-    pilot.memory.home = place
-    message = BUILDERS[HOME_POSITION](pilot)
-    if message is not None:
-        pilot.send(message)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 from volery.core.errors import CommandError
-from volery.mavlink import arming, plans, requests, switching, transfers
+from volery.mavlink import arming, feasibility, home, plans, requests, switching, transfers
 from volery.mavlink.codec import dialect
 from volery.mavlink.fence import breach
 from volery.mavlink.modes import Mode, mode_of
@@ -23,6 +23,8 @@ UNSUPPORTED_FRAME = 8
 DO_SET_MODE = 176
 _FENCE_TELLS = (0, 1)
 """GF_ACTION of fences that keep nobody from flying there."""
+_CHANGE_MODE = 1
+"""MAV_DO_REPOSITION_FLAGS."""
 _ABOVE_HOME = (3, 6, 10, 11)
 
 
@@ -39,7 +41,8 @@ def take(pilot: Autopilot, source: Source, command: Command) -> None:
     link, system, component = source
     result = do(pilot, source, command)
     ack = dialect().MAVLink_command_ack_message
-    pilot.send(ack(command.number, result, 255, 0, system, component), link)
+    progress = 0  # PX4's, where the protocol would have 255
+    pilot.send(ack(command.number, result, progress, 0, system, component), link)
 
 
 def do(pilot: Autopilot, source: Source, command: Command) -> int:
@@ -61,7 +64,7 @@ def _arm(pilot: Autopilot, _source: Source, command: Command) -> int:
     forced = round(force) == 21196 if math.isfinite(force) else False  # PX4's magic number
     if wanted not in (0.0, 1.0):
         return DENIED
-    why = arming.arm(pilot, forced=forced) if wanted else arming.disarm(pilot, forced=forced)
+    why = arming.arm(pilot) if wanted else arming.disarm(pilot, forced=forced)
     if why:
         pilot.say(2, f"{'Arming' if wanted else 'Disarming'} denied: {why}")
     return TEMPORARILY_REJECTED if why else ACCEPTED
@@ -108,11 +111,15 @@ def _switch(pilot: Autopilot, mode: Mode) -> int:
 
 
 def _reposition(pilot: Autopilot, _source: Source, command: Command) -> int:
-    """DO_REPOSITION: fly somewhere, hold there; what is nan stays as it is."""
-    speed, _, _, yaw, latitude, longitude, altitude = command.params
+    """DO_REPOSITION: fly somewhere, hold there; what is nan stays as it is.
+
+    Only its flag to change the mode takes a UAV out of another mode than hold, as in PX4.
+    """
+    speed, flags, _, yaw, latitude, longitude, altitude = command.params
     if any(math.isinf(param) for param in command.params):
         return DENIED
-    if not switching.flies(pilot):
+    changes_mode = math.isfinite(flags) and bool(int(flags) & _CHANGE_MODE)
+    if not switching.flies(pilot) or not (changes_mode or pilot.memory.mode is Mode.HOLD):
         return DENIED
     x, y, z = pilot.state.position
     if math.isfinite(latitude) and math.isfinite(longitude):
@@ -149,26 +156,33 @@ def _change_speed(pilot: Autopilot, _source: Source, command: Command) -> int:
 
 def _set_home(pilot: Autopilot, _source: Source, command: Command) -> int:
     latitude, longitude, altitude = command.params[4:7]
-    if command.params[0] == 1.0:
-        arming.set_home(pilot, pilot.state.position)
+    if command.params[0] > 0.5:
+        home.set_here(pilot)
         return ACCEPTED
-    finite = math.isfinite(latitude) and math.isfinite(longitude) and math.isfinite(altitude)
-    if not finite or abs(latitude) > 90.0 or abs(longitude) > 180.0:
+    if not all(map(math.isfinite, (latitude, longitude, altitude))):
         return DENIED
-    x, y, _ = pilot.earth.place(latitude, longitude, pilot.build.origin[2])
-    arming.set_home(pilot, (x, y, _height_in_map(pilot, altitude, command.frame)))
-    return ACCEPTED
+    why = home.choose(pilot, latitude, longitude, _height_in_map(pilot, altitude, command.frame))
+    if why:
+        pilot.say(4, why)
+    return DENIED if why else ACCEPTED
 
 
 def _start_mission(pilot: Autopilot, _source: Source, command: Command) -> int:
-    first = command.params[0]
-    if math.isfinite(first) and first > 0.0 and not transfers.jump_to(pilot, int(first)):
+    """MISSION_START: arm, and fly it from an item on; -1: from where it was."""
+    why = feasibility.obstacle(pilot)
+    if why:
+        pilot.say(2, f"Mission start denied: {why}")
         return DENIED
-    if pilot.memory.mission.complete:
-        transfers.jump_to(pilot, 0)
+    first, mission = command.params[0], pilot.memory.mission
+    if not -1.0 <= first < len(pilot.memory.plans[plans.MISSION]):
+        return DENIED
+    if first < 0.0:
+        first = 0.0 if mission.complete else mission.current
+    if mission.complete or int(first) != mission.current:
+        transfers.jump_to(pilot, int(first))
     result = _switch(pilot, Mode.MISSION)
     if result == ACCEPTED and not pilot.memory.armed:
-        why = arming.arm(pilot, forced=False)
+        why = arming.arm(pilot)
         if why:
             pilot.say(2, f"Arming denied: {why}")
             return TEMPORARILY_REJECTED
@@ -207,9 +221,9 @@ def _reboot(pilot: Autopilot, _source: Source, _command: Command) -> int:
 
 def _height_in_map(pilot: Autopilot, altitude: float, frame: int | None) -> float:
     """Z in the map of an altitude: above home in frames that say so, else above the sea."""
-    home: Vector = pilot.memory.home or pilot.memory.origin
+    base: Vector = pilot.memory.home or pilot.memory.origin
     if frame is not None and frame in _ABOVE_HOME:
-        return home[2] + altitude
+        return base[2] + altitude
     return altitude - pilot.build.origin[2]
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from volery.mavlink import arming, switching
+from volery.mavlink import arming, requirements, switching
 from volery.mavlink.fence import breach
 from volery.mavlink.modes import Mode
 
@@ -18,7 +18,6 @@ PERIOD_NS = 100_000_000
 """Between two looks (modelling choice)."""
 _FIX_PATIENCE_NS = 5_000_000_000
 """Without a fix the estimate counts for this long, PX4's EKF2_NOAID_TOUT."""
-_HOMEWARD = (Mode.RETURN, Mode.LAND)
 
 
 def check(pilot: Autopilot, state: FlightState) -> None:
@@ -92,19 +91,18 @@ def _fence(pilot: Autopilot, state: FlightState) -> tuple[str, Mode | None] | No
 
 
 def _link(pilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
-    memory = pilot.memory
+    """As in PX4 one that was never heard counts as lost, and who lands already goes on landing."""
     action = int(pilot.parameter("NAV_DLL_ACT"))
-    limit_ns = int(pilot.parameter("COM_DL_LOSS_T")) * 1_000_000_000
-    if not action or memory.ground_heard_ns < 0 or memory.mode in _HOMEWARD:
+    if not action or requirements.ground_is_there(pilot):
         return None
-    if memory.now_ns - memory.ground_heard_ns <= limit_ns:
+    if pilot.memory.mode is Mode.LAND and "link" not in pilot.memory.warned:
         return None
     mode = {1: Mode.HOLD, 2: Mode.RETURN, 3: Mode.LAND}[action]
     return "Failsafe: connection to ground station lost", mode
 
 
 def _sticks(pilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
-    if not pilot.memory.mode.by_sticks or arming.sticks_are_there(pilot):
+    if not pilot.memory.mode.by_sticks or requirements.sticks_are_there(pilot):
         return None
     mode = {1: Mode.HOLD, 3: Mode.LAND}.get(int(pilot.parameter("NAV_RCL_ACT")), Mode.RETURN)
     return "Failsafe: manual control lost", mode

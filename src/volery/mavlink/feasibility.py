@@ -9,13 +9,18 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from volery.mavlink import plans
+from volery.mavlink import plans, requirements
 from volery.mavlink.fence import breach
 from volery.mavlink.modes import Mode
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot import Autopilot
     from volery.mavlink.vehicle import Vector
+
+
+def obstacle(pilot: Autopilot) -> str:
+    """What keeps a mission from being begun; empty where one is there that can be flown."""
+    return requirements.missing(pilot, Mode.MISSION) or trouble(pilot)
 
 
 def trouble(pilot: Autopilot) -> str:
@@ -37,7 +42,7 @@ def look(pilot: Autopilot) -> None:
         _warn_of_far_start(pilot)
         return
     pilot.say(2, why)
-    if pilot.memory.mode is Mode.MISSION:
+    if pilot.memory.mode is Mode.MISSION and pilot.memory.armed:
         switching.enter(pilot, Mode.HOLD)
 
 

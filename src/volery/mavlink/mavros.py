@@ -220,10 +220,10 @@ class Mavros:
         )
 
     def _arm(self, request: Any, response: Any) -> Any:
-        troubles = arming.troubles(self._pilot) if request.value else ()
+        why = arming.obstacle(self._pilot) if request.value else "not landed"
         result = self._do(400, (1.0 if request.value else 0.0, 0.0))
         if result:
-            _log.warning("%s: arming %s: %s", self._prefix, request.value, ", ".join(troubles))
+            _log.warning("%s: arming %s: %s", self._prefix, request.value, why)
         response.success, response.result = result == 0, result
         return response
 

@@ -129,6 +129,8 @@ class Memory:
     target: Setpoint | None = None
     """What is flown, for who watches."""
     home: Vector | None = None
+    chosen_home: Vector | None = None
+    """Latitude and longitude in degrees and altitude of a home that somebody chose, as he did."""
     origin: Vector = (0.0, 0.0, 0.0)
     """m, map: where the local frame begins, the place at the start."""
     cruise: float = math.nan
@@ -137,6 +139,8 @@ class Memory:
     plans: dict[int, list[Item]] = field(default_factory=lambda: {0: [], 1: [], 2: []})
     """By MAV_MISSION_TYPE: mission, fence, rally."""
     transfers: dict[int, Transfer] = field(default_factory=dict)
+    last_items: dict[int, tuple[Source, int]] = field(default_factory=dict)
+    """By MAV_MISSION_TYPE: whose upload came through last, and the number of its last item."""
     mission: Mission = field(default_factory=Mission)
     leg: Leg | None = None
     way_home: Return | None = None

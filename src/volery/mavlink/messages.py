@@ -58,7 +58,7 @@ def _command_int(pilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def _set_mode(pilot: Autopilot, source: Source, message: Any) -> None:
-    """The old message; PX4 answers it as the command that has replaced it."""
+    """The old message: PX4 makes a command of it, and answers that."""
     custom = message.custom_mode
     params = (float(message.base_mode), custom >> 16 & 255, custom >> 24 & 255, *(math.nan,) * 4)
     commands.take(pilot, source, commands.Command(commands.DO_SET_MODE, params, None))
@@ -89,7 +89,7 @@ HANDLERS: dict[str, Callable[[Autopilot, Source, Any], None]] = {
     "MISSION_REQUEST_LIST": transfers.begin_download,
     "MISSION_REQUEST_INT": transfers.send_item,
     "MISSION_REQUEST": transfers.send_item,
-    "MISSION_ACK": transfers.end_download,
+    "MISSION_ACK": transfers.take_ack,
     "MISSION_CLEAR_ALL": transfers.clear,
     "MISSION_SET_CURRENT": transfers.set_current,
     "FILE_TRANSFER_PROTOCOL": file_protocol.answer_file_request,

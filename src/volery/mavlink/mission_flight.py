@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from volery.mavlink import payload_items, plans, switching
+from volery.mavlink import home, payload_items, plans, switching
 from volery.mavlink.codec import dialect
 from volery.mavlink.legs import bearing, fly_leg
 from volery.mavlink.memory import Leg
@@ -62,7 +62,9 @@ def _reach(pilot: Autopilot, mission: Mission) -> None:
     _advance(mission, items)
     if mission.complete:
         mission.speed = math.nan
-        pilot.say(6, "Mission finished, loitering")
+        if pilot.memory.mode is Mode.MISSION:  # else its last item was the way home
+            landed = pilot.state.mode == "LANDED"
+            pilot.say(6, f"Mission finished, {'landed' if landed else 'loitering'}")
 
 
 def _advance(mission: Mission, items: list[plans.Item]) -> None:
@@ -126,10 +128,13 @@ def _set(pilot: Autopilot, mission: Mission, item: plans.Item) -> bool:
         somewhere = payload_items.is_place_of_interest(item.command)
         mission.interest = place_of(pilot, item) if somewhere else None
     elif item.command == plans.SET_HOME:
-        from volery.mavlink.arming import set_home
-
-        here = item.params[0] == 1.0 or not item.placed
-        set_home(pilot, pilot.state.position if here else place_of(pilot, item))
+        if item.params[0] == 1.0 or not item.placed:
+            home.set_here(pilot)
+        else:
+            height = place_of(pilot, item)[2]
+            why = home.choose(pilot, item.latitude, item.longitude, height)
+            if why:
+                pilot.say(4, why)
     return True
 
 
@@ -267,7 +272,7 @@ def place_of(pilot: Autopilot, item: plans.Item) -> Vector:
     x, y, _ = pilot.state.position
     if item.placed:
         x, y, _ = pilot.earth.place(item.latitude, item.longitude, pilot.build.origin[2])
-    home = pilot.memory.home or pilot.memory.origin
+    base = pilot.memory.home or pilot.memory.origin
     above = item.frame in plans.ABOVE_HOME
-    z = item.altitude + (home[2] if above else -pilot.build.origin[2])
+    z = item.altitude + (base[2] if above else -pilot.build.origin[2])
     return x, y, z

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from volery.mavlink import arming, feasibility, plans
+from volery.mavlink import arming, feasibility, requirements
 from volery.mavlink.memory import Leg
 from volery.mavlink.modes import Mode
 
@@ -35,8 +35,6 @@ _OUTSIDE = {"TAKE_OFF": Mode.TAKE_OFF, "LAND": Mode.LAND, "RETURN": Mode.RETURN}
 """What is told where somebody else flies it; else: hold."""
 _PATIENCE_NS = 50_000_000
 """For this long an order may take to show."""
-LEAST_OFFBOARD_HZ = 2.0
-"""PX4 enters offboard only where setpoints come more often than that."""
 
 
 def flies(pilot: Autopilot) -> bool:
@@ -64,24 +62,17 @@ def obstacle_to(pilot: Autopilot, mode: Mode) -> str:
         return "the vehicle has crashed"
     if memory.fix_lost and mode not in (Mode.ALTITUDE, Mode.LAND):
         return "no valid position"
-    if mode.by_sticks and not arming.sticks_are_there(pilot):
-        return "no manual control input"
-    if mode is Mode.OFFBOARD and not offboard_is_fresh(pilot):
-        return "no offboard signal"
     if mode is Mode.MISSION:
-        return feasibility.trouble(pilot) if memory.plans[plans.MISSION] else "no valid mission"
-    return ""
-
-
-def offboard_is_fresh(pilot: Autopilot) -> bool:
-    """Whether setpoints come often enough to fly by."""
-    offboard, now_ns = pilot.memory.offboard, pilot.memory.now_ns
-    return offboard.setpoint is not None and now_ns - offboard.time_ns < 1e9 / LEAST_OFFBOARD_HZ
+        return feasibility.obstacle(pilot)
+    return requirements.missing(pilot, mode)
 
 
 def ask_for(pilot: Autopilot, mode: Mode) -> str:
-    """Enter a mode that somebody asks for; why not, empty where it is entered."""
-    why = obstacle_to(pilot, mode)
+    """Enter a mode that somebody asks for; why not, empty where it is entered.
+
+    A disarmed UAV may be in any: what is missing keeps it from being armed, as in PX4.
+    """
+    why = obstacle_to(pilot, mode) if pilot.memory.armed else ""
     if not why:
         pilot.memory.failsafe = False
         enter(pilot, mode)

@@ -117,7 +117,7 @@ def _home_position(pilot: Autopilot) -> Any:
     origin = pilot.memory.origin
     place = (home[0] - origin[0], home[1] - origin[1], home[2] - origin[2])
     return dialect().MAVLink_home_position_message(
-        *motion.degrees_e7(pilot.earth.geodetic(home)),
+        *motion.degrees_e7(pilot.memory.chosen_home or pilot.earth.geodetic(home)),
         *ned_of_enu(place),
         (math.nan,) * 4,
         *(math.nan,) * 3,

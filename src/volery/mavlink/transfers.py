@@ -39,23 +39,22 @@ def begin_upload(pilot: Autopilot, source: Source, message: Any) -> None:
         _take_over(pilot, transfer)
         return
     pilot.memory.transfers[kind] = transfer
+    pilot.memory.last_items.pop(kind, None)
     _ask(pilot, transfer)
 
 
 def take_item(pilot: Autopilot, source: Source, message: Any) -> None:
-    """Take the item that was asked for."""
+    """Take the item that was asked for; the last one of a plan may come again: its ACK was lost."""
     kind, sequence = int(message.mission_type), int(message.seq)
     transfer = pilot.memory.transfers.get(kind)
     if transfer is None or not transfer.upload or transfer.source != source:
         if transfer is None and kind in plans.MOST_ITEMS:
-            _answer(pilot, source, plans.ERROR, kind)
+            repeated = pilot.memory.last_items.get(kind) == (source, sequence)
+            _answer(pilot, source, plans.ACCEPTED if repeated else plans.ERROR, kind)
         return
     transfer.time_ns = pilot.memory.now_ns
-    expected = len(transfer.items)
-    if sequence != expected:
-        if sequence > expected:
-            _end(pilot, transfer, plans.INVALID_SEQUENCE)
-        return  # one that came twice
+    if sequence != len(transfer.items):
+        return  # early or repeated: what is awaited is asked for again, as PX4 does
     item = plans.item_of(message)
     fault = plans.fault_of(item, kind, transfer.count)
     if fault:
@@ -105,8 +104,14 @@ def send_item(pilot: Autopilot, source: Source, message: Any) -> None:
     pilot.send(message_class(*head, *item.params, x, y, item.altitude, kind), link)
 
 
-def end_download(_pilot: Autopilot, _source: Source, _message: Any) -> None:
-    """Take note that the other side has everything: nothing is kept of it."""
+def take_ack(pilot: Autopilot, source: Source, message: Any) -> None:
+    """End an upload that its sender cancels; of downloads nothing is kept that could end."""
+    kind = int(message.mission_type)
+    transfer = pilot.memory.transfers.get(kind)
+    if transfer is None or not transfer.upload or transfer.source != source:
+        return
+    if int(message.type) == plans.CANCELLED:
+        del pilot.memory.transfers[kind]
 
 
 def clear(pilot: Autopilot, source: Source, message: Any) -> None:
@@ -161,6 +166,7 @@ def _end(pilot: Autopilot, transfer: Transfer, result: int) -> None:
 
 def _take_over(pilot: Autopilot, transfer: Transfer) -> None:
     _replace(pilot, transfer.kind, transfer.items)
+    pilot.memory.last_items[transfer.kind] = (transfer.source, transfer.count - 1)
     _end(pilot, transfer, plans.ACCEPTED)
     if transfer.kind in (plans.MISSION, plans.FENCE):
         feasibility.look(pilot)

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from volery.autonomy.fixed_joints import FixedJoints
 from volery.bridges.logs.decoding import LogDecoder
+from volery.bridges.logs.flights import Origin
 from volery.bridges.logs.records import LogRecord, LogWalk
 from volery.core.clock import NS_PER_S
-from volery.core.errors import GraphError, VoleryError
+from volery.core.errors import GraphError, RecordingError, VoleryError
 from volery.graph.messages import stamp_of
 from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
 from volery.report.ways import Way
@@ -59,6 +60,18 @@ class LoggedFlight:
     """Name, if it is told."""
     description: str
     lasts_s: float
+    origin: Origin | None = None
+    """The scenario, where the log tells it."""
+    trouble: str = ""
+    """What is wrong with the file: cut off, damaged chunks; empty for a whole one."""
+
+
+@dataclass(frozen=True)
+class LoggedWay:
+    """A way of a log, and what is wrong with the file."""
+
+    way: Way
+    trouble: str
 
 
 @dataclass
@@ -93,6 +106,8 @@ class _Log:
     joints: FixedJoints = field(default_factory=FixedJoints)
     types: dict[str, str] = field(default_factory=dict)
     scenario: dict[str, Any] = field(default_factory=dict)
+    origin: Origin | None = None
+    trouble: str = ""
     first_ns: int | None = None
     last_ns: int = 0
 
@@ -114,7 +129,8 @@ class _Log:
         elif topic == "/tf_static":
             self.joints.add(decoder.decode(record).message)
         elif topic == "/volery/scenario":
-            self.scenario = _content(decoder.decode(record).message)
+            message = decoder.decode(record).message
+            self.scenario, self.origin = _content(message), _origin(message)
         elif kind in _POSE_TYPES:
             message = decoder.decode(record).message
             self.ways.setdefault(topic, _Rows()).take(message, stamp_of(message) or time_ns)
@@ -145,13 +161,14 @@ def read_flight(path: Path) -> LoggedFlight:
     names = sorted({topic.split("/")[1] for topic in log.ways if topic.count("/") > 1})
     uavs = [uav for name in names if (uav := log.uav(name)) is not None]
     if not uavs:
-        raise VoleryError(f"{path}: no UAV tells its pose in it (/NAME/{ESTIMATES[-1]})")
+        what = f"; the file is {log.trouble}" if log.trouble else ""
+        raise VoleryError(f"{path}: no UAV tells its pose in it (/NAME/{ESTIMATES[-1]}){what}")
     told = {word: str(log.scenario.get(word) or "") for word in ("name", "description")}
     lasts_s = (log.last_ns - (log.first_ns or 0)) / NS_PER_S
-    return LoggedFlight(uavs, told["name"], told["description"], lasts_s)
+    return LoggedFlight(uavs, told["name"], told["description"], lasts_s, log.origin, log.trouble)
 
 
-def read_way(path: Path, topic: str | None = None) -> Way:
+def read_way(path: Path, topic: str | None = None) -> LoggedWay:
     """One way of a log: that of `topic`, or of the only topic that there is to choose.
 
     `VoleryError` names the topics where that cannot be said.
@@ -159,13 +176,13 @@ def read_way(path: Path, topic: str | None = None) -> Way:
     log = _read(path)
     known = [name for name, rows in log.ways.items() if rows.poses and _tells_a_way(name)]
     if topic is None and len(known) == 1:
-        return log.ways[known[0]].way()
+        return LoggedWay(log.ways[known[0]].way(), log.trouble)
     if topic is None or topic not in log.ways:
         what = "which way is meant?" if topic is None else f"there is no {topic}."
         if topic in log.types:
             what = f"{topic} tells no poses: it is a {log.types[topic]}."
         raise VoleryError(f"{path}: {what} Poses stand on: {', '.join(sorted(known)) or 'nothing'}")
-    return log.ways[topic].way()
+    return LoggedWay(log.ways[topic].way(), log.trouble)
 
 
 def _tells_a_way(topic: str) -> bool:
@@ -174,12 +191,13 @@ def _tells_a_way(topic: str) -> bool:
 
 
 def _read(path: Path) -> _Log:
-    decoder, log = LogDecoder(), _Log()
-    for record in LogWalk(path):
+    decoder, log, walk = LogDecoder(), _Log(), LogWalk(path)
+    for record in walk:
         try:
             log.take(record, decoder)
         except GraphError:
             continue  # of a type that is not known here
+    log.trouble = walk.trouble
     return log
 
 
@@ -190,3 +208,10 @@ def _content(message: Any) -> dict[str, Any]:
         return dict(told["content"])
     except (AttributeError, KeyError, TypeError, ValueError):
         return {}
+
+
+def _origin(message: Any) -> Origin | None:
+    try:
+        return Origin.from_json(message.data)
+    except (AttributeError, RecordingError):
+        return None

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.collections import EllipseCollection
 from numpy.typing import NDArray
 
 from volery.report.charts import as_svg, new_axes
 from volery.report.palette import FAINT, INK, UAV_COLORS
+from volery.report.true_trunks import TrueTrunks
 
 Array = NDArray[np.float64]
 
 _MAP_SIZE = (7.2, 6.4)
 _POINTS = 1500
+_LEAST_SHARE = 0.012
+"""Least width of a ring as a share of the map's."""
+_DATES_S = 1e8
+"""Seconds that no run lasts, and that had passed since 1970 in 1973."""
 _STYLES = ("-", (0, (4, 2)))
 """Lines come in pairs, the second of each dashed."""
 
@@ -29,9 +37,11 @@ class Line(NamedTuple):
     """(N, 3) m"""
 
 
-def ways_from_above(lines: Sequence[Line], trunks: Array) -> str:
-    """Ways over the map of trunks (T, 2 or 3), as SVG."""
+def ways_from_above(lines: Sequence[Line], trunks: Array, true: TrueTrunks) -> str:
+    """Ways over the map of trunks (T, 2 or 3) and the true ones, rings, as SVG."""
     figure, axes = new_axes(*_MAP_SIZE)
+    if len(true.places):
+        _rings(axes, true)
     if len(trunks):
         axes.plot(*trunks[:, :2].T, ".", color=FAINT, markersize=4, label="trunks, by the estimate")
     for number, line in enumerate(lines):
@@ -48,14 +58,55 @@ def ways_from_above(lines: Sequence[Line], trunks: Array) -> str:
 def over_time(lines: Sequence[Line], axis: int) -> str:
     """One coordinate of ways over time, as SVG; axis 0 is x, 1 is y, 2 is z."""
     figure, axes = new_axes()
+    start_s, clock = _clock_of(lines)
     for number, line in enumerate(lines):
         every = max(len(line.time_s) // _POINTS, 1)
-        x, y = line.time_s[::every], line.position[::every, axis]
+        x, y = line.time_s[::every] - start_s, line.position[::every, axis]
         axes.plot(x, y, label=line.label, **_style(number))
-    axes.set_xlabel("time, s")
+    axes.set_xlabel(clock)
     axes.set_ylabel(f"{'xyz'[axis]}, m")
     figure.legend(loc="outside upper left", ncols=3, frameon=False, labelcolor=INK)
     return as_svg(figure)
+
+
+def is_date(time_s: float) -> bool:
+    """Whether a time counts from 1970, as clocks of computers do, and not from a run's start."""
+    return time_s > _DATES_S
+
+
+def date_text(time_s: float) -> str:
+    """A time that counts from 1970, in words."""
+    return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
+
+
+def _clock_of(lines: Sequence[Line]) -> tuple[float, str]:
+    """Where the axis of time begins, s, and what stands below it."""
+    starts = [float(line.time_s[0]) for line in lines if len(line.time_s)]
+    if not starts or not is_date(min(starts)):
+        return 0.0, "time, s"
+    start_s = math.floor(min(starts))
+    return float(start_s), f"time since {date_text(start_s)}, s"
+
+
+def _rings(axes: Any, true: TrueTrunks) -> None:
+    """True trunks as rings of their width, or of the least that can be seen."""
+    spread = float(np.ptp(true.places, axis=0).max())
+    widths = np.maximum(true.widths_m, _LEAST_SHARE * spread)
+    axes.add_collection(
+        EllipseCollection(
+            *(widths, widths, 0.0),
+            units="xy",
+            offsets=true.places,
+            transOffset=axes.transData,
+            facecolors="none",
+            edgecolors=INK,
+            linewidths=0.5,
+            alpha=0.6,
+        )
+    )
+    axes.plot(
+        *([], [], "o"), color=INK, alpha=0.6, fillstyle="none", markersize=5, label="true trunks"
+    )
 
 
 def _style(number: int) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.staticfiles import StaticFiles
@@ -19,7 +20,7 @@ _NOT_BUILT = """<!doctype html>
 <style>body{font:16px/1.5 system-ui,sans-serif;max-width:40em;margin:4em auto;padding:0 1em}</style>
 <h1>Volery is running, its page is not built</h1>
 <p>This is a checkout of the sources without the page. Node.js 20 or newer builds it:
-<pre>cd web &amp;&amp; npm ci &amp;&amp; npm run build</pre>
+<pre>make web</pre>
 <p>Everything else is here: <a href="./api/status">status</a>,
 <a href="./api/scenarios">scenarios</a>, <a href="./api/world.glb">the world</a>, and rosbridge for
 roslib, Foxglove and other clients at <code>./rosbridge</code>.
@@ -27,12 +28,16 @@ roslib, Foxglove and other clients at <code>./rosbridge</code>.
 """
 
 
+def is_built() -> bool:
+    """Whether there is a page to be served."""
+    return (STATIC / "index.html").is_file()
+
+
 async def index(_request: Request) -> Response:
     """The page, or how it is built."""
-    page = STATIC / "index.html"
-    if not page.is_file():
+    if not is_built():
         return HTMLResponse(_NOT_BUILT, headers={"Cache-Control": "no-cache"})
-    return FileResponse(page, headers={"Cache-Control": "no-cache"})
+    return FileResponse(STATIC / "index.html", headers={"Cache-Control": "no-cache"})
 
 
 class PageFiles(StaticFiles):
@@ -40,6 +45,12 @@ class PageFiles(StaticFiles):
 
     def __init__(self) -> None:
         super().__init__(directory=STATIC, check_dir=False)
+
+    async def check_config(self) -> None:
+        """As of starlette, but a page that is not built is none of its errors."""
+        if not is_built():
+            raise HTTPException(404)
+        await super().check_config()
 
     def file_response(self, full_path: object, *arguments: object, **options: object) -> Response:
         """As of starlette, and how long a browser may keep the file."""

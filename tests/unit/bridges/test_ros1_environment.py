@@ -8,8 +8,10 @@ import sys
 import pytest
 
 from volery.bridges.ros1 import environment as ros1_environment
+from volery.bridges.ros1.master import Ros1Master
+from volery.bridges.ros1.node import _check_master
 from volery.bridges.sharing import Sharing
-from volery.core.errors import BridgeError
+from volery.core.errors import BridgeError, UnreachableError
 
 
 @pytest.fixture
@@ -37,6 +39,12 @@ def test_debians_folder_is_on_the_path_only_while_rospy_is_imported(elsewhere, m
     loaded = ros1_environment._load.__wrapped__()
     assert loaded.PATH[-1] == str(elsewhere)
     assert str(elsewhere) not in sys.path
+
+
+def test_a_master_may_come_later():
+    """So that nodes in processes of their own wait for it."""
+    with pytest.raises(UnreachableError, match="no ROS master answers at"):
+        _check_master(Ros1Master("http://127.0.0.1:9", "/node"))
 
 
 def test_which_topics_are_taken_from_ros1():

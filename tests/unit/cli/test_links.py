@@ -29,3 +29,19 @@ def test_what_never_comes_is_not_waited_for(capsys) -> None:
     with pytest.raises(BridgeError, match="no way into a graph"):
         links.await_link("pigeon://post", "node")
     assert capsys.readouterr().err == ""
+
+
+def test_a_graph_that_goes_and_comes_is_told_once_each(capsys) -> None:
+    class Line:
+        connected = True
+
+    line = Line()
+    told = links.LinkTold(line, "x://y")
+    for connected in (True, False, False, True, True):
+        line.connected = connected
+        assert told() is False
+    assert capsys.readouterr().err == (
+        "the graph at x://y is gone; waiting for it\nthe graph at x://y is there again\n"
+    )
+    assert links.LinkTold(object(), "ros2")() is False  # of which no server tells
+    assert capsys.readouterr().err == ""

@@ -53,8 +53,9 @@ def state(name="uav1", mode="HOLD", battery=0.5):
     )
 
 
-def frame(name, msgtype, message, source=0):
-    return Frame(Kind.SENSING, source, FIRST_GROUND, 1, 1, 0, encode_named(name, msgtype, message))
+def frame(name, msgtype, message, source=0, time_ns=0):
+    payload = encode_named(name, msgtype, message)
+    return Frame(Kind.SENSING, source, FIRST_GROUND, 1, 1, time_ns, payload)
 
 
 class Desk:
@@ -128,8 +129,9 @@ def test_states_replies_and_refusals_are_shown() -> None:
     desk = Desk()
     assert desk.ground.take(frame(STATE, STATE_TYPE, state()), 0) == "uav1: HOLD"
     assert desk.ground.take(frame(STATE, STATE_TYPE, state()), 10**9) is None
-    assert desk.ground.take(frame(STATE, STATE_TYPE, state(mode="LAND")), 10**9) == "uav1: LAND"
-    other = frame(STATE, STATE_TYPE, state("uav6", battery=math.nan), source=5)
+    landing = frame(STATE, STATE_TYPE, state(mode="LAND"), time_ns=10**9)
+    assert desk.ground.take(landing, 10**9) == "uav1: LAND"
+    other = frame(STATE, STATE_TYPE, state("uav6", battery=math.nan), source=5, time_ns=10**9)
     desk.ground.take(other, 10**9)
     first, second = desk.ground.rows(3 * 10**9)
     assert first == (
@@ -183,6 +185,117 @@ def test_known_names_with_other_types_are_told_of(name: str) -> None:
     other = frame(name, "geometry_msgs/msg/Point", Point(1.0, 2.0, 3.0))
     assert desk.ground.take(other, 0) == f"0.0: {name} (geometry_msgs/msg/Point)"
     assert desk.ground.rows(0) == []
+
+
+@pytest.mark.parametrize(
+    ("line", "usage"),
+    [
+        ("go_to uav1 1", "go_to WHO X Y Z [HEADING]"),
+        ("hold", "hold WHO"),
+        ("return_home uav1", "return WHO"),
+        ("take_off_to 0 3", "take_off WHO [ALTITUDE]"),
+    ],
+)
+def test_wrong_usage_is_told_the_right_one(line: str, usage: str) -> None:
+    with pytest.raises(CommsError) as error:
+        Desk().ground.command(line)
+    assert str(error.value) == f"'{line}': usage: {usage}"
+
+
+@pytest.mark.parametrize("clock_s", [0, 7, -7, 3600])
+def test_what_a_server_has_kept_is_as_old_as_it_is(clock_s: int) -> None:
+    """The clock of the station goes after ours by so much."""
+    ground, now, tenth, away = Desk().ground, 10**18, 10**8, clock_s * 10**9
+
+    def take(sent: int, came: int) -> str:
+        ground.take(frame(STATE, STATE_TYPE, state(), time_ns=now + sent - away), now + came)
+        return ground.rows(now + came)[0].age
+
+    if clock_s == 0:  # a backlog first: the clocks are taken for the same
+        assert [take(2 * k * tenth, 80 * tenth + k) for k in range(3)] == ["8.0", "7.8", "7.6"]
+    for k in range(40, 44):  # one every 0.2 s, as they are made
+        told = take(2 * k * tenth, 2 * k * tenth + tenth // 10)
+    assert told == "0.0"
+    assert take(88 * tenth, 188 * tenth) == "10.0"  # the first of those kept meanwhile
+    assert take(186 * tenth, 188 * tenth) == "0.2"
+    assert take(188 * tenth, 188 * tenth + tenth // 10) == "0.0"
+    assert ground.rows(now + 218 * tenth)[0].age == "3.0"
+
+
+def test_commands_without_a_server_are_queued_and_named_at_the_end() -> None:
+    joined, asked = [True, False], iter((7, 8))
+    ground = Ground(lambda *_: next(asked), is_joined=lambda: joined.pop(0))
+    assert ground.command("hold 0").startswith("sent: hold to 0")
+    said = ground.command("land 1")
+    assert said.startswith("queued: land to 1")
+    assert said.endswith("it goes when the server is back")
+    assert ground.open_commands({7}.__contains__) == ["land to 1"]
+
+
+class Gcs:
+    """`volery gcs` fed through a pipe."""
+
+    def __init__(self, port: int, *options: str) -> None:
+        self.command = [sys.executable, "-m", "volery.cli.app", "gcs", *options]
+        self.command += ["--server", f"127.0.0.1:{port}"]
+
+    def __enter__(self):
+        pipe = subprocess.PIPE
+        self.process = subprocess.Popen(self.command, stdin=pipe, stdout=pipe, text=True, bufsize=1)
+        return self
+
+    def __exit__(self, *_error) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+    def says(self, start: str) -> None:
+        line = self.process.stdout.readline()
+        assert line.startswith(start), line
+
+    def tell(self, line: str) -> None:
+        self.process.stdin.write(line + "\n")
+
+
+def test_gcs_says_that_the_server_is_gone_and_back_and_what_did_not_come() -> None:
+    with served() as (first, port), Gcs(port) as gcs:
+        gcs.says("joined as ground station")
+        first.kill()
+        gcs.says("the connection to the server is lost; trying again")
+        gcs.tell("hold uav1")
+        gcs.says("queued: hold to uav1")
+        first.wait()
+        with served(port) as (second, _):
+            gcs.says("the server is back")
+            second.kill()
+            gcs.says("the connection to the server is lost; trying again")
+        gcs.tell("land uav2")
+        gcs.says("queued: land to uav2")
+        gcs.tell("quit")
+        gcs.says("warning: nobody has said that it came: hold to uav1, land to uav2")
+        assert gcs.process.wait(10.0) == 0
+
+
+def test_a_script_waits_for_the_first_states(graph) -> None:
+    vehicles = graph.do(lambda: graph.graph.advertise("/volery/vehicles", States))
+    both = States(Header(Time(0, 0), "map"), [state("uav1"), state("uav2")])
+    with served() as (_, port), Doors(graph.gateway) as doors, Gcs(port) as gcs:
+        doors.open(UavStations(port=port))
+        gcs.tell("list\nquit")
+        gcs.says("joined as ground station")
+        for _ in range(5):
+            graph.do(lambda: vehicles.publish(both))
+            time.sleep(0.2)
+        rows = [line for line in gcs.process.stdout if " HOLD " in line]
+    assert [row.split()[0] for row in rows] == ["uav1", "uav2"]
+
+
+def test_a_wrong_batch_size_is_refused_once() -> None:
+    with served() as (_, port):
+        command = Gcs(port, "--batch-size", "7").command
+        done = subprocess.run(command, capture_output=True, text=True, check=False, input="")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.count("batch") == 1
 
 
 def test_servers_as_people_write_them() -> None:

@@ -281,6 +281,53 @@ def test_old_messages_expire() -> None:
     assert bench.got[1] == []
 
 
+def test_sensing_for_many_does_not_wait_for_who_is_long_away() -> None:
+    bench = Bench()
+    one, _ = bench.station(0), bench.station(1)
+    bench.run(10 * S)
+    bench.cut(1)
+    for text, to, kind in (
+        ("early", ALL, Kind.SENSING),
+        ("mine", 1, Kind.SENSING),
+        ("go", ALL, Kind.COMMAND),
+    ):
+        bench.send(0, to, text, kind)
+    bench.run(6 * S)
+    for k in range(300):
+        bench.send(0, ALL, f"late {k}")
+        bench.run(200 * MS)
+    counted = bench.router.statistics
+    assert (counted.waiting, counted.expired) == (0, 3)  # by then a minute has passed
+    bench.send(0, 1, "newest")
+    bench.run(S)
+    assert one.unsettled == 1
+    bench.connect(1)
+    bench.send(0, ALL, "fresh")
+    bench.run()
+    assert bench.got[1] == [b"newest", b"fresh"]
+
+
+def test_sensing_for_many_waits_for_who_is_away_shortly() -> None:
+    bench = Bench()
+    bench.station(0)
+    bench.station(1)
+    bench.run(10 * S)
+    bench.cut(1)
+    bench.send(0, ALL, "one")
+    bench.run(4 * S)
+    bench.send(0, 1, "two")
+    bench.connect(1)
+    bench.run()
+    assert bench.got[1] == [b"one", b"two"]
+    bench.cut(1)
+    bench.send(0, ALL, "three")
+    bench.send(0, 1, "four")
+    bench.run(6 * S)
+    assert bench.router.statistics.expired == 1
+    bench.connect(1)
+    assert bench.got[1] == [b"one", b"two", b"four"]
+
+
 def test_stations_long_gone_are_forgotten() -> None:
     bench = Bench(RouterSettings(forget_s=20.0))
     one, _ = bench.station(0), bench.station(1)

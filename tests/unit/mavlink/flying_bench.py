@@ -108,6 +108,10 @@ class Station:
     def mode(self, main, sub=0):
         return self.command(176, 1.0, float(main), float(sub))
 
+    def tell_it_is_there(self):
+        """Send the heartbeat of a ground station."""
+        self.send("heartbeat", 6, 8, 0, 0, 4, 3)
+
     def up(self, height=3.0):
         """Arm and take off."""
         self.set("MIS_TAKEOFF_ALT", height)

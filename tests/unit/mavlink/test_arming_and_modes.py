@@ -5,7 +5,7 @@ import math
 import pytest
 from flying_bench import NAN, Station, fly
 
-ARM, TAKE_OFF, LAND, RETURN, REPOSITION = 400, 22, 21, 20, 192
+ARM, TAKE_OFF, LAND, RETURN, REPOSITION, SET_HOME = 400, 22, 21, 20, 192, 179
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 
 
@@ -82,14 +82,60 @@ def test_disarming_in_the_air_takes_force_and_lets_it_fall(flight):
     assert "Preflight Fail: the vehicle has crashed" in station.texts
 
 
-def test_modes_that_need_something_are_refused_without_it(flight):
+@pytest.mark.parametrize(("command", "mode"), [(RETURN, (4, 5)), (LAND, (4, 6))])
+def test_is_not_armed_in_modes_that_only_come_down(flight, command, mode):
     _, station = flight
-    assert station.mode(6) == REJECTED  # no setpoint has come
-    assert station.mode(4, 4) == REJECTED  # no mission
-    assert station.mode(3) == REJECTED  # no sticks
+    assert station.command(command) == ACCEPTED
+    for force in (0.0, 21196.0):  # which PX4 hears from nobody outside
+        assert station.command(ARM, 1.0, force) == REJECTED
+    assert "Arming denied: mode not suitable for arming" in station.texts
+    assert station.present_mode == mode
+    assert not station.armed
+    assert station.mode(4, 3) == ACCEPTED
+    station.up(2.0)
+    assert station.command(command) == ACCEPTED
+    station.command(512, 1.0)
+    assert station.last("SYS_STATUS").onboard_control_sensors_health & 1 << 28  # it may fly so
+
+
+@pytest.mark.parametrize(
+    ("mode", "why"),
+    [
+        ((6, 0), "no offboard signal"),
+        ((4, 4), "no valid mission"),
+        ((3, 0), "no manual control input"),
+        ((2, 0), "no manual control input"),
+    ],
+)
+def test_modes_that_need_something_are_refused_without_it_and_before_arming(flight, mode, why):
+    _, station = flight
+    assert station.mode(*mode) == ACCEPTED  # as PX4, which looks at arming
+    assert station.present_mode == mode
+    assert station.command(ARM, 1.0) == REJECTED
+    assert f"Arming denied: {why}" in station.texts
+    assert not station.armed
+    assert station.mode(4, 3) == ACCEPTED
+    station.up(2.0)
+    assert station.mode(*mode) == REJECTED
+    assert any(text.endswith(f"not possible: {why}") for text in station.texts)
+    assert station.present_mode == (4, 3)
+
+
+def test_modes_that_are_none(flight):
+    _, station = flight
     assert station.mode(1) == UNSUPPORTED
     assert station.command(176, 0.0, 4.0, 3.0) == DENIED  # not PX4's kind of mode
     assert station.present_mode == (4, 3)
+
+
+def test_the_old_message_for_modes_is_answered_as_the_command(flight):
+    _, station = flight
+    for mode, result in ((4 << 16 | 5 << 24, ACCEPTED), (1 << 16, UNSUPPORTED)):
+        station.send("set_mode", 1, 1, mode)
+        ack = station.last("COMMAND_ACK")
+        assert (ack.command, ack.result, ack.progress) == (176, result, 0)
+        assert (ack.target_system, ack.target_component) == (255, 190)
+    assert station.present_mode == (4, 5)
 
 
 def test_repositions_above_sea_and_keeps_what_is_nan(flight):
@@ -109,6 +155,22 @@ def test_repositions_above_sea_and_keeps_what_is_nan(flight):
     station.command(REPOSITION, NAN, 1.0, 0.0, NAN, NAN, NAN, NAN)
     station.seconds(1.0)
     assert uav.position_map == pytest.approx([before[0], 6.0, 6.0], abs=0.3)
+
+
+@pytest.mark.parametrize("flags", [0.0, 2.0, NAN])
+def test_a_reposition_without_its_flag_does_not_leave_another_mode(flight, flags):
+    _, station = flight
+    station.up(3.0)
+    place = (47.397742 + math.degrees(20.0 / 6.37e6), 8.545594, 488.0 + 6.0)
+    assert station.command(RETURN) == ACCEPTED
+    assert station.command(REPOSITION, -1.0, flags, 0.0, NAN, *place) == DENIED
+    station.seconds(1.0)
+    assert station.present_mode == (4, 5)
+    assert station.mode(4, 3) == ACCEPTED
+    assert station.command(REPOSITION, -1.0, flags, 0.0, NAN, *place) == ACCEPTED
+    assert station.command(RETURN) == ACCEPTED
+    assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, *place) == ACCEPTED
+    assert station.present_mode == (4, 3)
 
 
 def test_returns_at_the_height_that_is_set(flight):
@@ -132,6 +194,44 @@ def test_returns_at_the_height_that_is_set(flight):
     assert highest == pytest.approx(9.1, abs=0.4)
     assert not station.armed
     assert simulation.uavs["uav1"].position_map[:2] == pytest.approx([0.0, 0.0], abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("north", "place"), [(0.0, (473977420, 85455940)), (60_000.0, (479373904, 85455940))]
+)
+def test_home_is_told_as_it_was_set_and_arming_keeps_it(flight, north, place):
+    _, station = flight
+    station.send("command_int", 1, 1, 0, SET_HOME, 0, 0, 0.0, NAN, NAN, NAN, *place, 500.0)
+    assert station.last("COMMAND_ACK").result == ACCEPTED
+    for _ in range(2):
+        home = station.last("HOME_POSITION")
+        assert (home.latitude, home.longitude, home.altitude) == (*place, 500_000)
+        assert home.z == pytest.approx(-12.0, abs=0.2)
+        assert home.x == pytest.approx(north, rel=2e-3, abs=0.1)
+        assert station.command(ARM, 1.0) == ACCEPTED
+        station.seconds(3.0)
+    assert station.command(SET_HOME, 1.0) == ACCEPTED
+    assert station.last("HOME_POSITION").altitude == pytest.approx(488_100, abs=50)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        (0.0, 0.0, 0.0),
+        (-47.397742, -171.454406, 488.0),  # on the other side of the earth
+        (47.4, 8.5, 1e9),
+        (47.4, NAN, 488.0),
+        (95.0, 8.5, 488.0),
+    ],
+)
+def test_a_home_that_the_map_cannot_hold_is_denied(flight, place):
+    _, station = flight
+    station.command(512, 242.0)
+    before = station.last("HOME_POSITION")
+    assert station.command(SET_HOME, 0.0, NAN, NAN, NAN, *place) == DENIED
+    station.command(512, 242.0)
+    after = station.last("HOME_POSITION")
+    assert (after.latitude, after.altitude) == (before.latitude, before.altitude)
 
 
 def test_cruising_speed_is_that_of_the_parameter(flight):

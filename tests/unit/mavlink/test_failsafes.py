@@ -71,8 +71,9 @@ def test_a_hold_for_a_lost_ground_station_ends_the_way_to_a_place(flight):
     simulation, station = flight
     station.set("NAV_DLL_ACT", 1)
     station.set("COM_DL_LOSS_T", 5)
+    station.tell_it_is_there()
     station.up(2.0)
-    station.send("heartbeat", 6, 8, 0, 0, 4, 3)
+    station.tell_it_is_there()
     assert reposition(station, 200.0) == ACCEPTED
     station.seconds(8.5)
     stopped = simulation.uavs["uav1"].position_map[1]
@@ -119,8 +120,9 @@ def test_a_lost_ground_station_is_acted_on(flight, action, mode):
     _, station = flight
     station.set("NAV_DLL_ACT", action)
     station.set("COM_DL_LOSS_T", 5)
+    station.tell_it_is_there()
     station.up(2.0)
-    station.send("heartbeat", 6, 8, 0, 0, 4, 3)
+    station.tell_it_is_there()
     head_north(station, 4.0, speed=0.5)
     assert station.present_mode == (6, 0)
     for _ in range(30):
@@ -128,6 +130,35 @@ def test_a_lost_ground_station_is_acted_on(flight, action, mode):
         station.seconds(0.05)
     assert station.present_mode == mode
     assert "Failsafe: connection to ground station lost" in station.texts
+    assert station.mode(4, 3) == ACCEPTED
+    station.seconds(1.0)
+    assert station.present_mode == HOLD  # who takes over keeps it
+
+
+def test_a_ground_station_that_was_never_heard_is_a_lost_one(flight):
+    _, station = flight
+    station.up(2.0)
+    station.set("NAV_DLL_ACT", 2)
+    station.seconds(0.2)
+    assert station.present_mode == RETURN
+    assert station.texts.count("Failsafe: connection to ground station lost") == 1
+
+
+def test_without_its_ground_station_it_is_not_armed_where_that_counts(flight):
+    _, station = flight
+    station.set("COM_DL_LOSS_T", 5)
+    station.set("NAV_DLL_ACT", 1)
+    why = "Arming denied: no connection to the ground control station"
+    assert station.command(400, 1.0) == 1
+    assert station.texts.count(why) == 1
+    station.tell_it_is_there()
+    assert station.command(400, 1.0) == ACCEPTED
+    assert station.command(400, 0.0) == ACCEPTED
+    station.seconds(5.2)
+    assert station.command(400, 1.0) == 1  # lost again
+    assert station.texts.count(why) == 2
+    station.set("NAV_DLL_ACT", 0)
+    assert station.command(400, 1.0) == ACCEPTED
 
 
 def test_a_low_battery_warns_returns_and_lands(flight):

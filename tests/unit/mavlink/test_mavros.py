@@ -43,7 +43,7 @@ class Program:
 
 
 @pytest.mark.parametrize("prefix", ["/mavros", "/uav1/mavros"])
-def test_an_offboard_program_takes_off_and_flies(prefix):
+def test_an_offboard_program_takes_off_and_flies(prefix, caplog):
     simulation, _ = fly()
     with simulation:
         program = Program(simulation, prefix)
@@ -53,8 +53,11 @@ def test_an_offboard_program_takes_off_and_flies(prefix):
         place = zero_message("geometry_msgs/msg/PoseStamped")
         place.pose.position.x, place.pose.position.z = 1.0, 2.0
         place.pose.orientation.w = 1.0
-        refused = program.call("set_mode", "mavros_msgs/srv/SetMode", custom_mode="OFFBOARD")
-        assert not refused.mode_sent
+        early = program.call("set_mode", "mavros_msgs/srv/SetMode", custom_mode="OFFBOARD")
+        assert early.mode_sent
+        refused = program.call("cmd/arming", "mavros_msgs/srv/CommandBool", value=True)
+        assert (refused.success, refused.result) == (False, 1)
+        assert f"{prefix}: arming True: no offboard signal" in caplog.messages
         program.stream(program.places, place, 1.0)
         for name in ("OFFBOARD",):
             sent = program.call("set_mode", "mavros_msgs/srv/SetMode", custom_mode=name)

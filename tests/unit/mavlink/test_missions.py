@@ -5,7 +5,7 @@ import math
 import pytest
 from flying_bench import NAN, Station, fly
 
-ACCEPTED, REJECTED = 0, 1
+ACCEPTED, DENIED = 0, 2
 WAYPOINT, LOITER, RETURN, LAND, TAKE_OFF, DELAY, YAW, JUMP, SPEED = (
     *(16, 19, 20, 21, 22, 93, 115, 177, 178),
 )
@@ -86,7 +86,7 @@ def test_a_mission_of_ten_items_is_flown_and_ends_where_it_began(flight):
     assert reached == [0, 1, 2, 3, 4, 5, 6, 3, 4, 5, 6, 7, 8, 9]  # the jump goes back once
     assert fastest < 4.3
     assert corner < 0.5
-    assert "Mission finished, loitering" in station.texts
+    assert "Mission finished, landed" in station.texts
     assert uav.position_map[:2] == pytest.approx([0.0, 0.0], abs=0.5)
     assert not station.armed
 
@@ -141,6 +141,20 @@ def test_a_region_of_interest_is_faced_until_there_is_none(flight):
         )
     assert yaws[5] == pytest.approx(math.atan2(20.0, -20.0), abs=0.15)  # 20 m north-west of there
     assert yaws[14] == pytest.approx(0.0, abs=0.1)  # the way leads east
+
+
+@pytest.mark.parametrize(
+    ("last", "mode", "told"),
+    [([], (4, 4), ["Mission finished, loitering"]), ([do(RETURN)], (4, 5), [])],
+)
+def test_its_end_in_the_air_is_told_where_it_stays_there(flight, last, mode, told):
+    _, station = flight
+    assert station.upload([at(0, 0, 3, TAKE_OFF), at(4, 0, 3), *last]) == ACCEPTED
+    assert station.command(300, 0.0, 0.0) == ACCEPTED
+    station.seconds(9.0)
+    assert station.last("MISSION_ITEM_REACHED").seq == 1 + len(last)
+    assert [text for text in station.texts if text.startswith("Mission finished")] == told
+    assert station.present_mode == mode
 
 
 def test_plans_come_back_as_they_went(flight):
@@ -210,7 +224,7 @@ def test_contradictory_plans_are_refused_with_the_reason(flight, items, kind, re
     assert station.last("MISSION_COUNT").count == 1  # what was there is there still
 
 
-def test_too_many_items_wrong_order_and_strangers(flight):
+def test_too_many_items_and_strangers(flight):
     simulation, station = flight
     station.send("mission_count", 1, 1, 501, 0)
     assert station.last("MISSION_ACK").type == 4
@@ -219,10 +233,48 @@ def test_too_many_items_wrong_order_and_strangers(flight):
     other.send("mission_count", 1, 1, 1, 0)
     assert other.last("MISSION_ACK").type == 14
     other.item(0, at(0, 0, 3))  # nobody asked it
-    station.item(0, at(0, 0, 3))
-    station.item(0, at(0, 0, 3))  # comes twice: passed over
-    station.item(2, at(0, 0, 3))
-    assert station.last("MISSION_ACK").type == 13
+    assert station.last("MISSION_REQUEST_INT").seq == 0
+
+
+def test_items_may_come_early_and_twice(flight):
+    _, station = flight
+    items = [at(0, 0, 3), at(0, 0, 4), at(0, 0, 5)]
+    station.send("mission_count", 1, 1, 3, 0)
+    for sequence in (1, 2, 0, 2, 0):
+        station.item(sequence, items[sequence])
+    assert not station.of("MISSION_ACK")
+    station.heard.clear()
+    station.seconds(0.4)
+    assert station.last("MISSION_REQUEST_INT").seq == 1  # what is awaited is asked for again
+    for sequence in (1, 1, 2):
+        station.item(sequence, items[sequence])
+    assert [ack.type for ack in station.of("MISSION_ACK")] == [ACCEPTED]
+    station.item(2, items[2])  # the ACK was lost
+    assert [ack.type for ack in station.of("MISSION_ACK")] == [ACCEPTED, ACCEPTED]
+    station.item(1, items[1])
+    assert station.last("MISSION_ACK").type == 1  # no transfer is under way
+    for sequence, (*_, height) in enumerate(items):
+        station.send("mission_request_int", 1, 1, sequence, 0)
+        assert station.last("MISSION_ITEM_INT").z == height
+
+
+def test_an_upload_that_its_sender_cancels_ends_at_once(flight):
+    simulation, station = flight
+    assert station.upload([at(0, 0, 5)]) == ACCEPTED
+    station.send("mission_count", 1, 1, 3, 0)
+    other = Station(simulation, system=200, link=9)
+    other.send("mission_ack", 1, 1, 15, 0)  # not his to cancel
+    assert other.upload([at(0, 0, 3)]) == 14
+    station.send("mission_ack", 1, 1, 15, 1)  # of another kind of plan
+    station.send("mission_ack", 1, 1, 1, 0)  # not a cancellation
+    assert other.upload([at(0, 0, 3)]) == 14
+    station.send("mission_ack", 1, 1, 15, 0)
+    station.heard.clear()
+    station.seconds(1.0)
+    assert not station.of("MISSION_REQUEST_INT")
+    station.send("mission_request_int", 1, 1, 0, 0)
+    assert station.last("MISSION_ITEM_INT").z == 5.0  # what was there is there still
+    assert other.upload([at(0, 0, 4)]) == ACCEPTED
 
 
 def test_items_that_are_lost_are_asked_for_again_and_given_up(flight):
@@ -255,11 +307,32 @@ def test_pausing_setting_the_item_and_going_on(flight):
     assert [m.seq for m in station.of("MISSION_ITEM_REACHED")][-1] == 2
 
 
+def test_what_cannot_be_started_is_denied(flight):
+    _, station = flight
+    assert station.command(300, 0.0, 0.0) == DENIED
+    assert "Mission start denied: no valid mission" in station.texts
+    assert station.upload([at(0, 0, 3, TAKE_OFF), at(4, 0, 3), at(0, 0, 3)]) == ACCEPTED
+    for first in (3.0, -2.0, NAN, math.inf):
+        assert station.command(300, first, 0.0) == DENIED
+    assert not station.armed
+
+
+def test_a_mission_is_started_from_the_item_that_is_asked_for(flight):
+    _, station = flight
+    assert station.upload([at(0, 0, 3, TAKE_OFF), at(4, 0, 3), at(0, 0, 3)]) == ACCEPTED
+    for first, current in ((2.0, 2), (-1.0, 2), (0.0, 0)):
+        assert station.command(300, first, 0.0) == ACCEPTED
+        station.command(512, 42.0)
+        assert station.last("MISSION_CURRENT").seq == current
+    assert station.armed
+    assert station.present_mode == (4, 4)
+
+
 def test_a_mission_that_leaves_the_fence_is_not_begun(flight):
     _, station = flight
     assert station.upload([at(0, 0, 3, TAKE_OFF), at(50, 0, 3)]) == ACCEPTED
     station.set("GF_MAX_HOR_DIST", 20.0)
-    assert station.command(300, 0.0, 0.0) == REJECTED
+    assert station.command(300, 0.0, 0.0) == DENIED
     assert any("Geofence violation for waypoint 2" in text for text in station.texts)
     station.set("GF_MAX_HOR_DIST", 0.0)
     assert station.command(300, 0.0, 0.0) == ACCEPTED
@@ -281,8 +354,12 @@ def test_missions_that_cannot_be_flown_are_told_of_and_not_begun(flight, items, 
     assert station.upload(items) == ACCEPTED  # as PX4, which keeps them
     assert text in station.texts
     station.heard.clear()
-    assert station.command(300, 0.0, 0.0) == REJECTED
+    assert station.command(300, 0.0, 0.0) == DENIED
     assert any(text in said for said in station.texts)
+    station.heard.clear()
+    assert station.mode(4, 4) == ACCEPTED
+    assert station.command(400, 1.0) == 1
+    assert f"Arming denied: {text}" in station.texts
     station.command(512, 0.0)
     assert not station.armed
 

@@ -14,9 +14,11 @@ from live_graph import LiveGraph
 from page_bench import TOKENS, VIEWER, Client, ask, eventually, serving
 from websockets.exceptions import ConnectionClosed
 
+from volery.cli import pages
 from volery.core.errors import BridgeError
 from volery.graph.zero import zero_message
 from volery.runtime.lobby import Lobby
+from volery.server import page
 from volery.server.page_server import PageServer
 from volery.server.read_only import READ_ONLY_SERVICES
 from volery.server.settings import PageSettings
@@ -261,3 +263,24 @@ def test_what_is_not_there_is_told_as_json(server):
         answer = ask(server, path, method)
         assert answer.status == status
         assert json.loads(answer.body)["error"]
+
+
+def test_without_the_pages_build_nothing_breaks(monkeypatch, tmp_path, capsys):
+    """Status and rosbridge are there; a line tells at the start how the page is built."""
+    monkeypatch.setattr(page, "STATIC", tmp_path / "static")
+    with pages.serving(PageSettings(port=0)) as served:
+        server = served._server
+        assert "make web" in ask(server, "/").body.decode()
+        for path in ("/favicon.ico", "/assets/index.js"):
+            assert ask(server, path).status == 404
+        assert ask(server, "/api/status").status == 200
+        (tmp_path / "static").mkdir()
+        for name in ("index.html", "icon.svg"):
+            (tmp_path / "static" / name).write_text(name)
+        assert ask(server, "/icon.svg").status == 200
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].startswith("page    http://127.0.0.1:")
+    assert said[1] == (
+        "warning: the page is not built: make web builds it; the rest of the address works"
+    )
+    assert len(said) == 2

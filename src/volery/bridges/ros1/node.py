@@ -14,7 +14,7 @@ from volery.bridges.ros1.environment import load_rospy
 from volery.bridges.ros1.master import Ros1Master
 from volery.bridges.ros1.raw import raw_message_class, raw_service_class
 from volery.bridges.ros1.registrar import Ros1Registrar
-from volery.core.errors import BridgeError, GraphError
+from volery.core.errors import BridgeError, GraphError, UnreachableError
 from volery.core.listening import check_address
 from volery.graph.ros1 import ros1_codec, ros2_name
 
@@ -206,7 +206,7 @@ def _check_master(master: Ros1Master) -> None:
     try:
         master.ask("getPid")
     except OSError as error:
-        raise BridgeError(
+        raise UnreachableError(
             f"no ROS master answers at {master.uri} ({error}); start roscore, or rosmaster --core"
         ) from None
 
