@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any
 
@@ -44,6 +44,18 @@ def _crc() -> Callable[[bytes], int]:
     return check
 
 
+NEWER = {300: 217, 435: 134, 436: 193}
+"""CRC_EXTRA of messages of `common` that pymavlink's `common` does not have, by their ids."""
+
+
+def crc_extra_of(number: int) -> int:
+    """What goes into the checksum of a message that is sent."""
+    if number in NEWER:
+        return NEWER[number]
+    extra: int = dialect().mavlink_map[number].crc_extra
+    return extra
+
+
 class Codec:
     """Packs messages of one vehicle.
 
@@ -56,19 +68,32 @@ class Codec:
         self._source = (system, component)
 
     def pack(self, message: Any, sequence: int) -> bytes:
-        """A frame with a sequence number from 0 to 255."""
-        if any(message.array_lengths):
+        """A frame with a sequence number from 0 to 255; packs its fields once for all links."""
+        if "char" in message.fieldtypes:
             self._mav.seq = sequence
             packed: bytes = message.pack(self._mav)
             return packed
-        payload = message.unpacker.pack(*map(message.__dict__.get, message.ordered_fieldnames))
-        payload = payload.rstrip(b"\0") or b"\0"
+        payload = message.__dict__.get("on_wire")
+        if payload is None:
+            payload = message.on_wire = _payload_of(message)
         number = type(message).id  # some have a field of that name
         head = _HEAD.pack(
             _MAGIC, len(payload), 0, 0, sequence, *self._source, number & 0xFFFF, number >> 16
         )
         frame: bytes = head + payload
         return frame + _CHECK.pack(check_of(frame[1:] + bytes((message.crc_extra,))))
+
+
+def _payload_of(message: Any) -> bytes:
+    """Fields of a message of numbers, without the zeros at the end."""
+    fields: Iterable[Any] = map(message.__dict__.get, message.ordered_fieldnames)
+    if any(length > 1 for length in message.lengths):
+        spread: list[Any] = []
+        for field, length in zip(fields, message.lengths, strict=True):
+            spread += field if length > 1 else (field,)
+        fields = spread
+    packed: bytes = message.unpacker.pack(*fields)
+    return packed.rstrip(b"\0") or b"\0"
 
 
 class Parser:

@@ -7,16 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 from volery.core.errors import CommandError
-from volery.mavlink import (
-    arming,
-    feasibility,
-    home,
-    plans,
-    streams,
-    switching,
-    telemetry,
-    transfers,
-)
+from volery.mavlink import arming, feasibility, home, plans, requests, switching, transfers
 from volery.mavlink.codec import dialect
 from volery.mavlink.fence import breach
 from volery.mavlink.modes import Mode, mode_of
@@ -35,8 +26,6 @@ _FENCE_TELLS = (0, 1)
 _CHANGE_MODE = 1
 """MAV_DO_REPOSITION_FLAGS."""
 _ABOVE_HOME = (3, 6, 10, 11)
-_RETIRED_REQUESTS = {410: 242, 519: 300, 520: 148}
-"""MAV_CMD that MAV_CMD_REQUEST_MESSAGE replaced, and the message that each asked for."""
 
 
 class Command(NamedTuple):
@@ -210,35 +199,10 @@ def _pause(pilot: Autopilot, _source: Source, command: Command) -> int:
     return _switch(pilot, Mode.MISSION if command.params[0] == 1.0 else Mode.HOLD)
 
 
-def _interval(pilot: Autopilot, source: Source, command: Command) -> int:
-    number, period_us = command.params[:2]
-    if not (math.isfinite(number) and math.isfinite(period_us)):
-        return DENIED
-    link = pilot.memory.links[source[0]]
-    return ACCEPTED if streams.ask_for(pilot, link, int(number), period_us) else UNSUPPORTED
-
-
-def _request(pilot: Autopilot, source: Source, command: Command) -> int:
-    number = command.params[0]
-    if not math.isfinite(number):
-        return DENIED
-    return _send_once(pilot, source, int(number), command.params[1])
-
-
-def _request_as_of_old(pilot: Autopilot, source: Source, command: Command) -> int:
-    return _send_once(pilot, source, _RETIRED_REQUESTS[command.number], math.nan)
-
-
-def _send_once(pilot: Autopilot, source: Source, number: int, what: float) -> int:
-    if number == telemetry.MESSAGE_INTERVAL:
-        asked = int(what) if math.isfinite(what) else -1
-        message = streams.interval_of(pilot.memory.links[source[0]], asked)
-    else:
-        build = telemetry.BUILDERS.get(number)
-        message = None if build is None else build(pilot)
-    if message is None:
-        return UNSUPPORTED
-    pilot.send(message, source[0])
+def _check(pilot: Autopilot, _source: Source, _command: Command) -> int:
+    """RUN_PREARM_CHECKS: tell everything that keeps it from being armed."""
+    for why in arming.troubles(pilot):
+        pilot.say(2, f"Preflight Fail: {why}")
     return ACCEPTED
 
 
@@ -277,8 +241,10 @@ _HANDLERS: dict[int, Callable[[Autopilot, Source, Command], int]] = {
     246: _reboot,
     300: _start_mission,
     400: _arm,
-    511: _interval,
-    512: _request,
-    **dict.fromkeys(_RETIRED_REQUESTS, _request_as_of_old),
+    401: _check,
+    510: requests.get_interval,
+    511: requests.set_interval,
+    512: requests.send,
+    **dict.fromkeys(requests.RETIRED, requests.send_as_of_old),
 }
 """By MAV_CMD."""

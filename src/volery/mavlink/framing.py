@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from volery.mavlink.codec import check_of, dialect
+from volery.mavlink.codec import NEWER, check_of, crc_extra_of, dialect
 
 _SECOND, _FIRST = 0xFD, 0xFE
 """Start of a frame of MAVLink 2 and 1."""
@@ -73,10 +73,10 @@ class Framer:
             system, component = data[5], data[6]
             number = int.from_bytes(data[7:10], "little")
             end = 10 + data[1]
-        known = self._known.get(number)
-        if known is None or (data[0] == _SECOND and data[2] & ~SIGNED):
+        known = number in self._known or number in NEWER
+        if not known or (data[0] == _SECOND and data[2] & ~SIGNED):
             return None
-        check = check_of(data[1:end] + bytes((known.crc_extra,)))
+        check = check_of(data[1:end] + bytes((crc_extra_of(number),)))
         if check != int.from_bytes(data[end : end + 2], "little"):
             return None
         return Frame(data, number, system, component)

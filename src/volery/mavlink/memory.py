@@ -95,6 +95,8 @@ class Mission:
     jumps_left: dict[int, int] = field(default_factory=dict)
     speed: float = math.nan
     """m/s that a DO_CHANGE_SPEED asked for."""
+    interest: Vector | None = None
+    """m, map: the place that a region of interest has it face."""
     reached: int = -1
     complete: bool = False
 
@@ -155,6 +157,10 @@ class Memory:
     has_receiver: bool = False
     """Whether satellite fixes come at all."""
     fix_lost: bool = False
+    pressure: float = math.nan
+    """Pa, of the barometer; nan: there is none."""
+    air_temperature: float = math.nan
+    """degC, beside the pressure."""
     warned: set[str] = field(default_factory=set)
     """Failsafes that have been told of, and acted on."""
     failsafe: bool = False

@@ -6,7 +6,14 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from volery.mavlink import commands, offboard, parameter_protocol, sticks, transfers
+from volery.mavlink import (
+    commands,
+    file_protocol,
+    offboard,
+    parameter_protocol,
+    sticks,
+    transfers,
+)
 from volery.mavlink.codec import dialect
 
 if TYPE_CHECKING:
@@ -85,4 +92,6 @@ HANDLERS: dict[str, Callable[[Autopilot, Source, Any], None]] = {
     "MISSION_ACK": transfers.take_ack,
     "MISSION_CLEAR_ALL": transfers.clear,
     "MISSION_SET_CURRENT": transfers.set_current,
+    "FILE_TRANSFER_PROTOCOL": file_protocol.answer_file_request,
+    "LOG_REQUEST_LIST": file_protocol.list_logs,
 }

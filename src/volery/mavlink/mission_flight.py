@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from volery.mavlink import home, plans, switching
+from volery.mavlink import home, payload_items, plans, switching
 from volery.mavlink.codec import dialect
 from volery.mavlink.legs import bearing, fly_leg
 from volery.mavlink.memory import Leg
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 _FACES_RAD = math.radians(5.0)
 """A heading that is reached (modelling choice)."""
+_LOITER_RADIUS_M = 80.0
+"""Of items that name none: the default of PX4's NAV_LOITER_RAD."""
+_FACING = plans.PLACED - {plans.LAND, plans.TAKE_OFF}
+"""Items on whose way a region of interest is faced."""
 _MOST_STEPS = 2 * plans.MOST_ITEMS[plans.MISSION]
 """Items that are passed at one instant; jumps cannot hang it."""
 
@@ -33,9 +37,21 @@ def fly(pilot: Autopilot, state: FlightState) -> None:
     for _ in range(_MOST_STEPS):
         if mission is not memory.mission or mission.complete or memory.mode is not Mode.MISSION:
             return
+        _face_interest(pilot, mission, items[mission.current])
         if not _do(pilot, mission, items[mission.current], state):
             return
         _reach(pilot, mission)
+
+
+def _face_interest(pilot: Autopilot, mission: Mission, item: plans.Item) -> None:
+    """On the way to a place look at the region of interest, as PX4's multicopters do."""
+    leg = pilot.memory.leg
+    if mission.interest is None or leg is None or leg.locked or item.command not in _FACING:
+        return
+    x, y, _ = mission.interest
+    away = math.hypot(x - pilot.state.position[0], y - pilot.state.position[1])
+    if away > float(pilot.parameter("NAV_ACC_RAD")):
+        leg.yaw = bearing(pilot, mission.interest)
 
 
 def _reach(pilot: Autopilot, mission: Mission) -> None:
@@ -78,6 +94,7 @@ def _do(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState
         plans.WAYPOINT: _waypoint,
         plans.LOITER_TIME: _waypoint,
         plans.LOITER_UNLIMITED: _waypoint,
+        plans.LOITER_TO_ALTITUDE: _change_height,
         plans.LAND: _land,
         plans.DELAY: _delay,
         plans.CONDITION_DELAY: _delay,
@@ -96,7 +113,7 @@ def _do_on_ground(pilot: Autopilot, mission: Mission, item: plans.Item, state: F
         return True
     if item.command in (plans.DELAY, plans.CONDITION_DELAY):
         return _delay(pilot, mission, item, state)
-    if item.placed and item.command != plans.SET_HOME:
+    if item.placed and item.command in plans.PLACED:
         if pilot.memory.order != "take_off":
             switching.rise(pilot)
         return False
@@ -107,6 +124,9 @@ def _set(pilot: Autopilot, mission: Mission, item: plans.Item) -> bool:
     """What takes no time."""
     if item.command == plans.CHANGE_SPEED and item.params[1] > 0.0:
         mission.speed = item.params[1]
+    elif item.command in payload_items.INTEREST:
+        somewhere = payload_items.is_place_of_interest(item.command)
+        mission.interest = place_of(pilot, item) if somewhere else None
     elif item.command == plans.SET_HOME:
         if item.params[0] == 1.0 or not item.placed:
             home.set_here(pilot)
@@ -144,7 +164,8 @@ def _waypoint(pilot: Autopilot, mission: Mission, item: plans.Item, state: Fligh
         target = place_of(pilot, item)
         # params count clockwise from north
         yaw = 0.5 * math.pi - math.radians(item.params[3])
-        facing = yaw if math.isfinite(yaw) else bearing(pilot, target)
+        turns = math.isfinite(yaw) and item.command != plans.LOITER_TIME  # which says no heading
+        facing = yaw if turns else bearing(pilot, target)
         memory.leg = Leg(target, facing, switching.cruise(pilot))
     leg = memory.leg
     rests = fly_leg(pilot, leg)
@@ -160,6 +181,28 @@ def _waypoint(pilot: Autopilot, mission: Mission, item: plans.Item, state: Fligh
     if not mission.waiting:
         mission.waiting, mission.since_ns = True, memory.now_ns
     return _has_waited(pilot, mission, wait_s)
+
+
+def _change_height(
+    pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState
+) -> bool:
+    """LOITER_TO_ALT: at the present height to within its radius, then to its height."""
+    memory = pilot.memory
+    if state.mode == "TAKE_OFF":
+        return False
+    x, y, z = place_of(pilot, item)
+    if not mission.entered or memory.leg is None:
+        mission.entered = True
+        target = (x, y, state.position[2])
+        memory.leg = Leg(target, bearing(pilot, target), switching.cruise(pilot))
+    own = abs(item.params[1])
+    radius = own if math.isfinite(own) and own > 0.0 else _LOITER_RADIUS_M
+    radius += float(pilot.parameter("NAV_ACC_RAD"))
+    level = math.hypot(x - state.position[0], y - state.position[1])
+    if level <= radius and memory.leg.target[2] != z:
+        memory.leg = Leg((x, y, z), memory.leg.yaw, memory.leg.speed)
+    fly_leg(pilot, memory.leg)
+    return level <= radius and _near_height(pilot, z)
 
 
 def _is_near(pilot: Autopilot, item: plans.Item, leg: Leg) -> bool:

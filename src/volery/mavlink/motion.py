@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from volery.mavlink.vehicle import FlightState, Quaternion, Vector
 
 _GRAVITY = 9.80665
+_LOCAL_NED, _BY_AUTOPILOT = 1, 8
+"""MAV_FRAME, MAV_ESTIMATOR_TYPE."""
 
 
 def ms(pilot: Autopilot) -> int:
@@ -103,6 +105,26 @@ def local_position(pilot: Autopilot) -> Any:
     return dialect().MAVLink_local_position_ned_message(ms(pilot), *place, *velocity)
 
 
+def odometry(pilot: Autopilot) -> Any:
+    """ODOMETRY in the local frame, velocities too, as PX4 sends it; covariances are not known."""
+    place, velocity = _local(pilot)
+    x, y, z, w = q_ned_frd_of_enu_flu(pilot.state.attitude)
+    unknown = [math.nan] + [0.0] * 20
+    return dialect().MAVLink_odometry_message(
+        us(pilot),
+        _LOCAL_NED,
+        _LOCAL_NED,
+        *place,
+        [w, x, y, z],
+        *velocity,
+        *frd_of_flu(pilot.state.rates),
+        unknown,
+        unknown,
+        0,
+        _BY_AUTOPILOT,
+    )
+
+
 def global_position(pilot: Autopilot) -> Any:
     """GLOBAL_POSITION_INT."""
     state = pilot.state
@@ -146,6 +168,17 @@ def _specific_force(state: FlightState) -> Vector:
         ax + w * tx + z * ty - y * tz,
         ay + w * ty + x * tz - z * tx,
         az + w * tz + y * tx - x * ty,
+    )
+
+
+def scaled_pressure(pilot: Autopilot) -> Any:
+    """SCALED_PRESSURE of the barometer; None where there is none."""
+    memory = pilot.memory
+    if not math.isfinite(memory.pressure):
+        return None
+    warmth = memory.air_temperature if math.isfinite(memory.air_temperature) else 0.0
+    return dialect().MAVLink_scaled_pressure_message(
+        ms(pilot), memory.pressure / 100.0, 0.0, clipped(warmth * 100.0, 16)
     )
 
 

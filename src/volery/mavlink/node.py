@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from volery.core.errors import NodeError
-from volery.graph.messages import NavSatFix, message_type
+from volery.graph.messages import FluidPressure, NavSatFix, Temperature, message_type
 from volery.graph.node import Node
 from volery.mavlink import autopilot, streams
 from volery.mavlink.graph_vehicle import GraphVehicle, build_of, state_of
@@ -55,6 +55,8 @@ class Autopilot(Node):
         self.create_subscription(self._packets, "mavlink/in", self._take, 1000)
         self.create_subscription(message_type(_STATE), "flight_state", self._fly, 1)
         self.create_subscription(NavSatFix, "fix", self._take_fix, 1)
+        self.create_subscription(FluidPressure, "pressure", self._take_pressure, 1)
+        self.create_subscription(Temperature, "pressure/temperature", self._take_temperature, 1)
 
     def get_state(self) -> Memory:
         """Everything that changes; links are the doors', who goes back keeps those there are."""
@@ -87,6 +89,12 @@ class Autopilot(Node):
         memory.has_receiver = True
         if fix.status.status >= 0:
             memory.fix_ns = self.get_clock().now_ns()
+
+    def _take_pressure(self, pressure: Any) -> None:
+        self.core.memory.pressure = float(pressure.fluid_pressure)
+
+    def _take_temperature(self, temperature: Any) -> None:
+        self.core.memory.air_temperature = float(temperature.temperature)
 
     def _flush(self) -> None:
         """Hand out what was sent, in one message a link."""

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+import struct
 from typing import TYPE_CHECKING, Any
 
 from volery.mavlink.codec import dialect
-from volery.mavlink.parameters import DEFAULTS, NAMES, from_wire, on_wire, refusal, type_of
+from volery.mavlink.parameters import (
+    CHECK,
+    DEFAULTS,
+    NAMES,
+    UINT32,
+    check_of,
+    from_wire,
+    on_wire,
+    refusal,
+    type_of,
+)
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot import Autopilot
@@ -18,7 +29,8 @@ A_TICK = 2
 
 
 def send_list(pilot: Autopilot, source: Source, _message: Any) -> None:
-    """Begin to send all values on the link."""
+    """Begin to send all values on the link, their check first."""
+    _tell_check(pilot, source[0])
     pilot.memory.links[source[0]].parameters_to_send = list(reversed(range(len(NAMES))))
 
 
@@ -33,7 +45,9 @@ def send_one(pilot: Autopilot, source: Source, message: Any) -> None:
     name, index = message.param_id, message.param_index
     if 0 <= index < len(NAMES):
         name = NAMES[index]
-    if index < len(NAMES) and name in DEFAULTS:
+    if index < 0 and name == CHECK:
+        _tell_check(pilot, source[0])
+    elif index < len(NAMES) and name in DEFAULTS:
         _tell(pilot, source[0], name)
     else:
         _tell_fault(pilot, source, "" if index >= 0 else name, _DOES_NOT_EXIST, index)
@@ -42,6 +56,10 @@ def send_one(pilot: Autopilot, source: Source, message: Any) -> None:
 def set_one(pilot: Autopilot, source: Source, message: Any) -> None:
     """Set a parameter and tell all links; of what is refused, why, and the value that holds."""
     name = message.param_id
+    if name == CHECK:  # whose list is up to date asks for an end of it
+        pilot.memory.links[source[0]].parameters_to_send = []
+        _tell_fault(pilot, source, name, _READ_ONLY)
+        return
     if name not in DEFAULTS:
         pilot.say(4, f"unknown param: {name}")
         _tell_fault(pilot, source, name, _DOES_NOT_EXIST)
@@ -68,6 +86,14 @@ def _tell_fault(pilot: Autopilot, source: Source, name: str, fault: int, index: 
     if message is not None:
         link, system, component = source
         pilot.send(message(system, component, name.encode(), index, fault), link)
+
+
+def _tell_check(pilot: Autopilot, link: int) -> None:
+    check = struct.pack("<I", check_of(pilot.memory.parameters))
+    message = dialect().MAVLink_param_value_message
+    pilot.send(
+        message(CHECK.encode(), *struct.unpack("<f", check), UINT32, len(NAMES), 65535), link
+    )
 
 
 def _tell(pilot: Autopilot, link: int, name: str) -> None:

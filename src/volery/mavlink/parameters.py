@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 import struct
+import zlib
 from typing import NamedTuple
 
 Value = int | float
-INT32, REAL32 = 6, 9
+UINT32, INT32, REAL32 = 5, 6, 9
 """MAV_PARAM_TYPE."""
 
 
@@ -71,6 +72,8 @@ DEFAULTS: dict[str, Parameter] = {
     "SYS_AUTOSTART": Parameter(4001, 0, 9999999, "PX4's number of a generic quadrotor", fixed=True),
 }
 NAMES = tuple(sorted(DEFAULTS))
+CHECK = "_HASH_CHECK"
+"""Under which name the check of all values is told."""
 
 
 def defaults() -> dict[str, Value]:
@@ -101,6 +104,18 @@ def on_wire(name: str, value: Value) -> float:
         packed: float = struct.unpack("<f", struct.pack("<i", int(value)))[0]
         return packed
     return float(value)
+
+
+def check_of(values: dict[str, Value]) -> int:
+    """CRC-32 over names and values, by which stations know whether theirs are up to date.
+
+    As PX4's `param_hash_check`: the remainder begins with 0 and is not inverted.
+    """
+    packed = (struct.pack("<i" if type_of(name) == INT32 else "<f", values[name]) for name in NAMES)
+    data = b"".join(
+        part for pair in zip(map(str.encode, NAMES), packed, strict=True) for part in pair
+    )
+    return zlib.crc32(data, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 def from_wire(kind: int, carried: float) -> Value | None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from volery.mavlink import payload_items
+
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
 """MAV_MISSION_TYPE."""
 MOST_ITEMS = {MISSION: 500, FENCE: 200, RALLY: 50}
 """Modelling choice, of the size of PX4's on a flight controller."""
 
-WAYPOINT, LOITER_UNLIMITED, LOITER_TIME = 16, 17, 19
+WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LOITER_TO_ALTITUDE = 16, 17, 19, 31
 RETURN_TO_LAUNCH, LAND, TAKE_OFF = 20, 21, 22
 DELAY, CONDITION_DELAY, CONDITION_YAW = 93, 112, 115
 JUMP, CHANGE_SPEED, SET_HOME = 177, 178, 179
@@ -18,15 +20,23 @@ JUMP, CHANGE_SPEED, SET_HOME = 177, 178, 179
 RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT = 5000, 5001, 5002, 5003, 5004
 RALLY_POINT = 5100
 """MAV_CMD of fences and rally points."""
-PLACED = {WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LAND, TAKE_OFF}
+PLACED = {WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LOITER_TO_ALTITUDE, LAND, TAKE_OFF}
 """Items of missions that lead to a place."""
 _KNOWN = {
     MISSION: PLACED
-    | {RETURN_TO_LAUNCH, DELAY, CONDITION_DELAY, CONDITION_YAW, JUMP, CHANGE_SPEED, SET_HOME},
+    | {RETURN_TO_LAUNCH, DELAY, CONDITION_DELAY, CONDITION_YAW, JUMP, CHANGE_SPEED, SET_HOME}
+    | payload_items.COMMANDS,
     FENCE: {RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT},
     RALLY: {RALLY_POINT},
 }
-NEED_NO_PLACE = {DELAY, CONDITION_DELAY, CONDITION_YAW, JUMP, CHANGE_SPEED, SET_HOME}
+NEED_NO_PLACE = {
+    DELAY,
+    CONDITION_DELAY,
+    CONDITION_YAW,
+    JUMP,
+    CHANGE_SPEED,
+    SET_HOME,
+} | payload_items.MARKERS
 """What may stand before a take-off."""
 AMSL, MISSION_FRAME, ABOVE_HOME = (0, 5), (2,), (3, 6, 10, 11)
 """MAV_FRAME: GLOBAL(_INT); MISSION; GLOBAL_RELATIVE_ALT(_INT), and TERRAIN_ALT(_INT), which counts
@@ -74,6 +84,9 @@ def fault_of(item: Item, kind: int, count: int) -> int:  # noqa: PLR0911
         return UNSUPPORTED
     if any(math.isinf(param) or abs(param) > 1e9 for param in item.params):
         return INVALID
+    if kind == MISSION and item.command in payload_items.COMMANDS:
+        fields = (*item.params, item.latitude, item.longitude, item.altitude)
+        return payload_items.fault_of(item.command, item.frame, fields)
     if item.command == JUMP:
         whole = item.params[0] == item.params[0] // 1 and item.params[1] == item.params[1] // 1
         return ACCEPTED if whole and 0 <= item.params[0] < count else INVALID_PARAM1

@@ -1,4 +1,8 @@
-"""The version that an autopilot tells: this package's."""
+"""The versions that an autopilot tells.
+
+Clients ask which PX4 they talk to, to know what it can do: that is the one whose protocol is
+followed. This package's own version stands where PX4 has that of a vendor.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +10,21 @@ import re
 from functools import cache
 from importlib.metadata import version
 
-_RELEASED, _DEVELOPMENT = 255, 0
+_FOLLOWED = (1, 18, 0)
+"""PX4's release whose protocol this is."""
+_RELEASED = 255
 """FIRMWARE_VERSION_TYPE."""
 
 
-@cache
 def flight_version() -> int:
     """Major, minor, patch and type of release, a byte each."""
-    text = version("volery")
-    numbers = [int(part) for part in re.findall(r"\d+", text)[:3]]
+    major, minor, patch = _FOLLOWED
+    return major << 24 | minor << 16 | patch << 8 | _RELEASED
+
+
+@cache
+def custom_version() -> tuple[int, ...]:
+    """Eight bytes: this package's patch, minor and major, then what is a commit's in PX4: 0."""
+    numbers = [int(part) for part in re.findall(r"\d+", version("volery"))[:3]]
     major, minor, patch = [*numbers, 0, 0, 0][:3]
-    kind = _DEVELOPMENT if re.search(r"[a-z]", text) else _RELEASED
-    return major << 24 | minor << 16 | patch << 8 | kind
+    return patch, minor, major, 0, 0, 0, 0, 0

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from volery.core.errors import BridgeError
-from volery.mavlink.codec import check_of, dialect
+from volery.mavlink.codec import check_of, crc_extra_of
 from volery.mavlink.framing import SIGNED, Frame, lengths_of
 
 _RADIO_STATUS = 109
@@ -107,7 +107,7 @@ class Signing:
 
     def _signed(self, frame: bytes, key: bytes) -> bytes:
         end = len(frame) - 2
-        extra = dialect().mavlink_map[int.from_bytes(frame[7:10], "little")].crc_extra
+        extra = crc_extra_of(int.from_bytes(frame[7:10], "little"))
         body = frame[:2] + bytes((frame[2] | SIGNED,)) + frame[3:end]
         check = check_of(body[1:] + bytes((extra,))).to_bytes(2, "little")
         self._stamp = min(max(self._stamp + 1, self._now()), _LAST)

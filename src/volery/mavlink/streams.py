@@ -1,7 +1,8 @@
 """Streams: which message goes out on which link how often, in simulated time.
 
 Rates are those of PX4's links: `onboard` for a companion computer, `normal` for a ground station
-(its `mavlink_main.cpp`). SET_MESSAGE_INTERVAL changes them for its link.
+(`mavlink_main.cpp` of PX4 1.18), and what the start script of its simulations raises on port 14550
+(`px4-rc.mavlink`). SET_MESSAGE_INTERVAL changes them for its link.
 """
 
 from __future__ import annotations
@@ -17,24 +18,27 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot import Autopilot
     from volery.mavlink.memory import Link
 
-NONE, ONBOARD, GROUND = 0, 1, 2
+NONE, ONBOARD, GROUND, SIMULATED_GROUND = 0, 1, 2, 3
 _ALWAYS = {0: 1.0}
+_NORMAL = (
+    _ALWAYS
+    | {1: 1.0, 24: 5.0, 29: 1.0, 30: 15.0, 31: 10.0, 32: 1.0, 33: 5.0, 36: 1.0, 42: 1.0, 49: 0.2}
+    | {74: 4.0, 83: 2.0, 85: 1.5, 141: 1.0, 147: 0.5, 230: 0.5, 242: 0.5, 245: 1.0, 436: 0.5}
+)
 RATES_HZ: dict[int, dict[int, float]] = {
     NONE: _ALWAYS,
     ONBOARD: _ALWAYS
-    | {1: 5.0, 2: 1.0, 24: 5.0, 30: 100.0, 31: 50.0, 32: 30.0, 33: 50.0, 36: 10.0, 42: 1.0}
+    | {1: 5.0, 2: 1.0, 24: 5.0, 29: 1.0, 30: 100.0, 31: 50.0, 32: 30.0, 33: 50.0, 36: 10.0, 42: 1.0}
     | {49: 0.2, 74: 10.0, 83: 10.0, 85: 10.0, 105: 50.0, 111: 10.0, 141: 10.0, 147: 0.5}
-    | {230: 1.0, 242: 0.5, 245: 5.0},
-    GROUND: _ALWAYS
-    | {1: 1.0, 2: 1.0, 24: 1.0, 30: 15.0, 31: 10.0, 32: 1.0, 33: 5.0, 36: 1.0, 42: 1.0}
-    | {49: 0.2, 74: 4.0, 83: 2.0, 85: 1.5, 111: 1.0, 141: 1.0, 147: 0.5, 230: 0.5}
-    | {242: 0.5, 245: 1.0},
+    | {230: 1.0, 242: 0.5, 245: 5.0, 331: 30.0, 436: 0.5},
+    GROUND: _NORMAL,
+    SIMULATED_GROUND: _NORMAL | dict.fromkeys((30, 31, 32, 33, 36, 83, 85), 50.0),
 }
 """By profile and message id."""
 FASTEST_NS = 10_000_000
 """As often as the vehicle's state comes."""
-_ONCE = {148}
-"""Messages that are only sent on request."""
+_HEARTBEAT = 0
+"""Which cannot be asked to come otherwise."""
 
 
 def begin(link: Link, now_ns: int) -> Link:
@@ -50,7 +54,7 @@ def ask_for(pilot: Autopilot, link: Link, number: int, period_us: float) -> bool
 
     Whether that can be; no faster than the state of the vehicle comes.
     """
-    if number not in telemetry.BUILDERS or number in _ONCE:
+    if number not in telemetry.BUILDERS or number == _HEARTBEAT:
         return False
     if period_us < 0.0:
         link.periods_ns.pop(number, None)
@@ -67,9 +71,7 @@ def ask_for(pilot: Autopilot, link: Link, number: int, period_us: float) -> bool
 
 
 def interval_of(link: Link, number: int) -> Any:
-    """MESSAGE_INTERVAL of a message; None where there is no such message."""
-    if number not in telemetry.BUILDERS:
-        return None
+    """MESSAGE_INTERVAL of a message; -1 of one that is not sent, or that is not there."""
     period_ns = link.periods_ns.get(number)
     period_us = -1 if period_ns is None else period_ns // 1000
     return dialect().MAVLink_message_interval_message(number, min(period_us, 2**31 - 1))

@@ -11,9 +11,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from volery.core.frames import ned_of_enu
-from volery.mavlink import arming, motion, plans
+from volery.mavlink import arming, motion, newer_messages, plans
 from volery.mavlink.codec import dialect
 from volery.mavlink.modes import Mode
+from volery.mavlink.release import custom_version, flight_version
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot import Autopilot
@@ -157,15 +158,13 @@ def _timesync(pilot: Autopilot) -> Any:
 
 
 def _autopilot_version(pilot: Autopilot) -> Any:
-    from volery.mavlink.release import flight_version
-
     return dialect().MAVLink_autopilot_version_message(
         _CAPABILITIES,
         flight_version(),
         0,
         0,
         0,
-        [0] * 8,
+        custom_version(),
         [0] * 8,
         [0] * 8,
         0,
@@ -188,6 +187,7 @@ BUILDERS: dict[int, Callable[[Autopilot], Any]] = {
     1: _sys_status,
     2: _system_time,
     24: motion.gps_raw_int,
+    29: motion.scaled_pressure,
     30: motion.attitude,
     31: motion.attitude_quaternion,
     32: motion.local_position,
@@ -206,5 +206,8 @@ BUILDERS: dict[int, Callable[[Autopilot], Any]] = {
     230: _estimator_status,
     HOME_POSITION: _home_position,
     245: _extended_sys_state,
+    300: newer_messages.protocol_version,
+    331: motion.odometry,
+    436: newer_messages.current_mode,
 }
 """By message id; a builder returns None where there is nothing to tell."""

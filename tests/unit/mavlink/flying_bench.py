@@ -58,7 +58,8 @@ class Station:
     def _hear(self, published):
         if published.message.link == self.link and not self.deaf:
             frames = self._framer.datagram(bytes(published.message.data))
-            self.heard += [self._parser.decode(frame.data) for frame in frames]
+            told = [self._parser.decode(frame.data) for frame in frames]
+            self.heard += filter(None, told)  # of those that pymavlink knows
 
     def send(self, name, *fields):
         message = getattr(dialect(), f"MAVLink_{name}_message")(*fields)

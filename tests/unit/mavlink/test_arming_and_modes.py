@@ -78,6 +78,8 @@ def test_disarming_in_the_air_takes_force_and_lets_it_fall(flight):
     assert simulation.uavs["uav1"].crashed
     assert station.command(ARM, 1.0) == REJECTED
     assert "Arming denied: the vehicle has crashed" in station.texts
+    assert station.command(401) == ACCEPTED
+    assert "Preflight Fail: the vehicle has crashed" in station.texts
 
 
 @pytest.mark.parametrize(("command", "mode"), [(RETURN, (4, 5)), (LAND, (4, 6))])

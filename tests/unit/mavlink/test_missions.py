@@ -38,6 +38,30 @@ TOUR = [
 ]
 
 
+SURVEY = [
+    do(206, 0.0, 0.0, 1.0, 0.0),
+    (530, 2, (0.0, 2.0, NAN, NAN), 0.0, 0.0, NAN),
+    do(178, 1.0, 5.0),
+    at(0.0, 0.0, 3.0, TAKE_OFF),
+    (195, 6, (0.0, 0.0, 0.0, 0.0), LATITUDE, LONGITUDE, 1.0),
+    at(3.0, 0.0, 3.0),
+    do(206, 2.0, 0.0, 1.0, 0.0),
+    (205, 2, (-90.0, 0.0, 0.0, 0.0), 0.0, 0.0, 2.0),
+    do(1000, -45.0, 0.0, NAN, NAN),
+    do(2000, 0.0, 1.0, 0.0, 0.0),
+    at(3.0, 3.0, 3.0, WAYPOINT, (0.0, 0.0, 0.0, NAN)),
+    do(2001, 0.0),
+    do(2500, 0.0),
+    do(2501, 0.0),
+    do(206, 0.0, 0.0, 1.0, 0.0),
+    do(197),
+    do(211, 1.0, 0.0),
+    do(189),
+    at(0.0, 0.0, 5.0, 31, (0.0, 2.0, 0.0, 1.0)),
+    do(RETURN),
+]
+
+
 @pytest.fixture
 def flight():
     simulation, station = fly()
@@ -67,6 +91,58 @@ def test_a_mission_of_ten_items_is_flown_and_ends_where_it_began(flight):
     assert not station.armed
 
 
+def test_a_survey_passes_by_what_is_for_payloads_and_changes_height_last(flight):
+    simulation, station = flight
+    assert station.upload(SURVEY) == ACCEPTED
+    assert station.command(300, 0.0, 0.0) == ACCEPTED
+    uav = simulation.uavs["uav1"]
+    highest = {}
+    for _ in range(100):
+        station.seconds(0.3)
+        now = len(station.of("MISSION_ITEM_REACHED"))
+        highest[now] = max(highest.get(now, 0.0), uav.position_map[2])
+        if now == len(SURVEY):
+            break
+    reached = [message.seq for message in station.of("MISSION_ITEM_REACHED")]
+    assert reached == list(range(len(SURVEY)))
+    assert highest[18] > 4.0  # 31 ends at 5 m, within NAV_MC_ALT_RAD
+    assert station.present_mode == (4, 5)
+
+
+def test_a_loiter_of_some_time_names_no_heading(flight):
+    simulation, station = flight
+    stay = at(0.0, 8.0, 3.0, LOITER, (9.0, 0.0, 0.0, 1.0))  # its fourth is about leaving circles
+    assert station.upload([at(0.0, 0.0, 3.0, TAKE_OFF), stay]) == ACCEPTED
+    assert station.command(300, 0.0, 0.0) == ACCEPTED
+    station.seconds(12.0)
+    x, y, z, w = simulation.uavs["uav1"].attitude
+    assert math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_region_of_interest_is_faced_until_there_is_none(flight):
+    simulation, station = flight
+    assert station.upload(
+        [
+            at(0.0, 0.0, 3.0, TAKE_OFF),
+            (195, 6, (0.0, 0.0, 0.0, 0.0), *at(20.0, 0.0, 0.0)[3:]),
+            at(0.0, 30.0, 3.0),
+            do(197),
+            at(0.0, 60.0, 3.0),
+        ]
+    ) == (ACCEPTED)
+    assert station.command(300, 0.0, 0.0) == ACCEPTED
+    uav = simulation.uavs["uav1"]
+    yaws = {}
+    for _ in range(60):
+        station.seconds(0.3)
+        x, y, z, w = uav.attitude
+        yaws[round(uav.position_map[0] / 4.0)] = math.atan2(
+            2 * (w * z + x * y), 1 - 2 * (y * y + z * z)
+        )
+    assert yaws[5] == pytest.approx(math.atan2(20.0, -20.0), abs=0.15)  # 20 m north-west of there
+    assert yaws[14] == pytest.approx(0.0, abs=0.1)  # the way leads east
+
+
 @pytest.mark.parametrize(
     ("last", "mode", "told"),
     [([], (4, 4), ["Mission finished, loitering"]), ([do(RETURN)], (4, 5), [])],
@@ -91,7 +167,7 @@ def test_plans_come_back_as_they_went(flight):
         ),
     ]
     rally = [(5100, 3, (0.0, 0.0, 0.0, 0.0), LATITUDE, LONGITUDE, 20.0)]
-    for kind, items in ((0, TOUR), (1, fence), (2, rally)):
+    for kind, items in ((0, TOUR), (0, SURVEY), (1, fence), (2, rally)):
         assert station.upload(items, kind) == ACCEPTED
         station.send("mission_request_list", 1, 1, kind)
         assert station.last("MISSION_COUNT").count == len(items)
@@ -106,7 +182,8 @@ def test_plans_come_back_as_they_went(flight):
             )
             told = (item.param1, item.param2, item.param3, item.param4)
             assert told == pytest.approx(params, nan_ok=True)
-            assert (item.x, item.y, item.z) == (round(x * 1e7), round(y * 1e7), z)
+            assert (item.x, item.y) == (round(x * 1e7), round(y * 1e7))
+            assert item.z == pytest.approx(z, nan_ok=True)
         station.send("mission_ack", 1, 1, 0, kind)
         station.send("mission_request_int", 1, 1, len(items), kind)
         assert station.last("MISSION_ACK").type == 13
@@ -126,7 +203,13 @@ def test_plans_come_back_as_they_went(flight):
         ([(*at(0, 0, 3)[:3], 95.0, 8.5, 3.0)], 0, 10),
         ([(*at(0, 0, 3)[:3], 47.0, 190.0, 3.0)], 0, 11),
         ([(WAYPOINT, 1, (0, 0, 0, 0), LATITUDE, LONGITUDE, 3.0)], 0, 2),  # a local frame
-        ([do(2000, 0.0)], 0, 3),  # no camera is on board
+        ([do(183, 1.0, 1500.0)], 0, 3),  # servos: not of PX4's missions
+        ([at(0, 0, 3, 18, (2.0, 0.0, 5.0, 0.0))], 0, 3),  # nor turns
+        ([at(0, 0, 3, 189)], 0, 3),  # a marker has no place
+        ([do(195)], 0, 3),  # a region of interest has one
+        ([do(201, 3.0)], 0, 6),
+        ([do(2001, 0.0, 7.0)], 0, 7),  # takes one parameter
+        ([(1, *do(197)[1:])], 0, 3),
         ([do(DELAY, NAN)], 0, 6),
         ([(5001, 0, (3.0, 0, 0, 0), LATITUDE, LONGITUDE, 0.0)] * 2, 1, 5),  # a corner is missing
         ([(5003, 0, (0.0, 0, 0, 0), LATITUDE, LONGITUDE, 0.0)], 1, 6),

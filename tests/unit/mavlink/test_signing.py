@@ -10,12 +10,14 @@ from volery.bridges.doors import Doors
 from volery.core.errors import BridgeError
 from volery.mavlink.codec import Codec, Parser, dialect
 from volery.mavlink.framing import Framer
+from volery.mavlink.newer_messages import available_modes
 from volery.mavlink.outfit import with_autopilots
 from volery.mavlink.signing import Signing, key_of
 from volery.mavlink.tcp_door import MavlinkTcp
 from volery.runtime import Simulation
 
 mavutil = pytest.importorskip("pymavlink.mavutil")
+development = pytest.importorskip("pymavlink.dialects.v20.development")
 
 KEY = hashlib.sha256(b"a word among friends").digest()
 NOW_S = 1_800_000_000.0
@@ -56,6 +58,18 @@ def test_pymavlink_takes_what_is_signed():
         assert heard.get_link_id() == 7
         assert heard.pitch == pytest.approx(0.2)
         assert Parser().decode(frame.data).roll == pytest.approx(0.1)
+
+
+def test_messages_that_pymavlink_lacks_are_signed_too():
+    """As pymavlink's dialect `development` has them."""
+    message = available_modes(4)[0]
+    data = ours().sign(Codec(1).pack(message, 0))
+    mav = development.MAVLink(None, 255, 190)
+    mav.signing.secret_key, mav.signing.timestamp = KEY, STAMP
+    mav.signing.allow_unsigned_callback = None
+    heard = mav.decode(bytearray(data))
+    assert heard.get_signed()
+    assert (heard.mode_index, heard.mode_name, heard.number_modes) == (4, "Hold", 8)
 
 
 def test_what_pymavlink_signs_is_accepted_once():

@@ -1,0 +1,84 @@
+"""Items of missions for cameras, gimbals, grippers and their like, and markers.
+
+Surveys and corridors are full of them. An autopilot takes them whether or not there is a payload;
+without one they change nothing but the heading (regions of interest), and are passed one after the
+other. Which ones there are, in which frames, and which of their parameters may be set:
+`mavlink_mission.cpp` and `mavlink_command_params.hpp` of PX4 1.18.
+"""
+
+from __future__ import annotations
+
+import math
+
+_GRIPPER, _WINCH = 211, 42600
+_ROI_LOCATION, _ROI_OLD, _ROI_OLDEST = 195, 201, 80
+INTEREST = {_ROI_LOCATION, 196, 197, _ROI_OLD, _ROI_OLDEST}
+"""Regions of interest; only `_ROI_LOCATION` has a place."""
+_MISSION_FRAME, _GLOBAL_FRAMES = 2, (0, 3, 5, 6)
+"""MAV_FRAME."""
+_MODES_WITH_PLACE, _MODES_WITHOUT = (0, 3), (0, 1, 2)
+"""MAV_ROI of the old commands, in global frames and in that of missions."""
+_ALL = 0b1111111
+_USED = {
+    80: 0b1110111,
+    187: _ALL,
+    189: 0b1110000,
+    195: 0b1110000,
+    196: 0b0000001,
+    197: 0b0000001,
+    200: _ALL,
+    201: 0b0000111,
+    203: _ALL,
+    204: _ALL,
+    205: _ALL,
+    206: 0b0001111,
+    _GRIPPER: 0b0000011,
+    214: 0b0000111,
+    260: _ALL,
+    530: 0b0000011,
+    532: 0b0000111,
+    534: 0b0000111,
+    1000: _ALL,
+    1001: _ALL,
+    2000: 0b0001111,
+    2001: 0b0000001,
+    2003: 0b0001111,
+    2500: 0b0000111,
+    2501: 0b0000011,
+    _WINCH: 0b0001111,
+}
+"""Parameters that may be set, by MAV_CMD: the lowest bit stands for the first of the seven."""
+COMMANDS = frozenset(_USED)
+MARKERS = COMMANDS - {_GRIPPER, _WINCH, 187}
+"""What may stand before a take-off; PX4 counts the others as places."""
+
+_ACCEPTED, _BAD_FRAME, _UNSUPPORTED, _INVALID_PARAM1 = 0, 2, 3, 6
+"""MAV_MISSION_RESULT; those of the parameters follow one another."""
+_UNSET_DEGREES = ((2**31 - 1) * 1e-7, -(2**31) * 1e-7)
+"""Whole numbers that mean "not set" in place of a latitude or longitude."""
+
+
+def fault_of(command: int, frame: int, fields: tuple[float, ...]) -> int:
+    """MAV_MISSION_RESULT of an item; `fields`: four parameters, degrees, degrees, height."""
+    if frame != _MISSION_FRAME and frame not in _GLOBAL_FRAMES:
+        return _BAD_FRAME
+    somewhere = frame != _MISSION_FRAME
+    old = command in (_ROI_OLD, _ROI_OLDEST)
+    if not old and somewhere != (command == _ROI_LOCATION):
+        return _UNSUPPORTED
+    used = _USED[command]
+    for k, value in enumerate(fields):
+        if not used >> k & 1 and not _is_unset(value):
+            return _INVALID_PARAM1 + k
+    modes = _MODES_WITH_PLACE if somewhere else _MODES_WITHOUT
+    known = not old or (math.isfinite(fields[0]) and int(fields[0]) in modes)
+    return _ACCEPTED if known else _INVALID_PARAM1
+
+
+def is_place_of_interest(command: int) -> bool:
+    """Whether an item says which place is to be faced."""
+    return command == _ROI_LOCATION
+
+
+def _is_unset(value: float) -> bool:
+    return value == 0.0 or math.isnan(value) or value in _UNSET_DEGREES
