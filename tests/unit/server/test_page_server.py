@@ -249,7 +249,7 @@ def test_without_a_build_the_page_says_how_to_make_one(server, monkeypatch, tmp_
     monkeypatch.setattr("volery.server.page.STATIC", tmp_path)
     told = ask(server, "/")
     assert told.status == 200
-    assert b"npm run build" in told.body
+    assert b"make web" in told.body
     (tmp_path / "index.html").write_text("<!doctype html><title>the page</title>")
     assert b"the page" in ask(server, "/").body
 
