@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 
 _STEP_M, _STEP_RAD, _STEP_S = 2.0, 0.6, 10.0
 """Motion, or time, between keyframes."""
+_LOST_STEP_S = 2.0
+"""Time likewise while it is lost: it may hold still until it is known where in the map it is."""
 _RELEVEL_NS = 25 * NS_PER_S
 """So long the steps between keyframes follow what is learnt of where down is."""
 _PER_ROOT_M = np.array([0.015, 0.015, 0.015, 0.0006])
@@ -39,8 +41,8 @@ _APART_M = 40.0
 _NEAR_M = 12.0
 _ASTRAY = np.array([1000.0, 1000.0, 1000.0, 3.0])
 """Standard deviations of the step over which the motion was lost."""
-_LOST_TRIES = 4
-"""Keyframes tried at each new one while it is not known where in the map it is."""
+_LOST_TRIES, _LOST_LEAP = 4, 3
+"""Keyframes tried at each new one while it is lost; so many apart, as neighbours look alike."""
 
 
 class Placement(NamedTuple):
@@ -99,6 +101,7 @@ class Way:
         self.session += 1
         self.is_placed = False
         self._gathering = Gathering()
+        self._cursor = 0
 
     def pose(self, tracker: Tracker) -> tuple[Array, Array]:
         """Present position (3,) and attitude (4,) in the map."""
@@ -126,11 +129,12 @@ class Way:
         if not self.frames or self.frames[-1].session != self.session:
             return True
         last, state = self.frames[-1], tracker.state
+        step_s = _STEP_S if self.is_placed else _LOST_STEP_S
         turn = rotations.multiply(state[Q : Q + 4], rotations.conjugate(last.attitude))
         return bool(
             norm(state[:3] - last.position) > _STEP_M
             or abs(float(rotations.yaw_of(turn))) > _STEP_RAD
-            or tracker.time_ns - last.time_ns > _STEP_S * NS_PER_S
+            or tracker.time_ns - last.time_ns > step_s * NS_PER_S
         )
 
     def _append(self, frame: Keyframe, gravity: Array) -> None:
@@ -217,15 +221,16 @@ class Way:
         return found.edge
 
     def _find_anywhere(self, newest: int) -> Edge | None:
-        """Lost: some of the keyframes of earlier sessions, in turn."""
+        """Lost: some of the keyframes of earlier sessions, in turn, the latest of them first."""
         old = [k for k, frame in enumerate(self.frames) if frame.session != self.session]
+        old = [row for first in range(_LOST_LEAP) for row in old[::-1][first::_LOST_LEAP]]
         fresh = sum(frame.session == self.session for frame in self.frames)
         if not old or fresh < 3 or self._closer is None:
             return None
         best = None
         for _ in range(min(_LOST_TRIES, len(old))):
             row = old[self._cursor % len(old)]
-            self._cursor += 3  # neighbours look alike
+            self._cursor += 1
             found = self._closer.match(self.frames, self.poses, newest, row, (4.0, math.pi))
             if found is not None and (best is None or found.met > best.met):
                 best = found
