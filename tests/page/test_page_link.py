@@ -167,3 +167,4 @@ def test_256_uavs(browsing, tmp_path):
         until(lambda: rows.count() == 8)  # 25 and 250 to 256
         rows.last.click()
         page.get_by_role("option", name="uav256", selected=True).wait_for()
+        page.close()  # before its server ends, of which it would complain
