@@ -1,8 +1,7 @@
 """Streams: which message goes out on which link how often, in simulated time.
 
 Rates are those of PX4's links: `onboard` for a companion computer, `normal` for a ground station
-(`mavlink_main.cpp` of PX4 1.18), and what the start script of its simulations raises on port 14550
-(`px4-rc.mavlink`). SET_MESSAGE_INTERVAL changes them for its link.
+(`mavlink_main.cpp` of PX4 1.18). SET_MESSAGE_INTERVAL changes them for its link.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot import Autopilot
     from volery.mavlink.memory import Link
 
-NONE, ONBOARD, GROUND, SIMULATED_GROUND = 0, 1, 2, 3
+NONE, ONBOARD, GROUND = 0, 1, 2
 _ALWAYS = {0: 1.0}
 _NORMAL = (
     _ALWAYS
@@ -32,7 +31,6 @@ RATES_HZ: dict[int, dict[int, float]] = {
     | {49: 0.2, 74: 10.0, 83: 10.0, 85: 10.0, 105: 50.0, 111: 10.0, 141: 10.0, 147: 0.5}
     | {230: 1.0, 242: 0.5, 245: 5.0, 331: 30.0, 436: 0.5},
     GROUND: _NORMAL,
-    SIMULATED_GROUND: _NORMAL | dict.fromkeys((30, 31, 32, 33, 36, 83, 85), 50.0),
 }
 """By profile and message id."""
 FASTEST_NS = 10_000_000

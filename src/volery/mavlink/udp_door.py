@@ -18,7 +18,7 @@ from volery.mavlink.fleet import Fleet, Sink
 from volery.mavlink.framing import Framer, lengths_of
 from volery.mavlink.party import why_not
 from volery.mavlink.signing import Signing
-from volery.mavlink.streams import ONBOARD, SIMULATED_GROUND
+from volery.mavlink.streams import GROUND, ONBOARD
 
 _MOST_DATAGRAM = 1400
 """Bytes: below the MTU of Ethernet."""
@@ -80,7 +80,7 @@ class MavlinkUdp:
         k = ports.number_of(system) + self._shift
         links = [
             (ports.ONBOARD_FROM + k, ports.ONBOARD_TO + k, ONBOARD),
-            (ports.GROUND_FROM + k, self._ground, SIMULATED_GROUND),
+            (ports.GROUND_FROM + k, self._ground, GROUND),
         ]
         opened: list[_UdpLink] = []
         try:
