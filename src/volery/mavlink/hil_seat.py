@@ -27,9 +27,6 @@ class Way(Protocol):
     def send(self, data: bytes) -> bool:
         """Send frames; whether all of them are under way."""
 
-    def flush(self) -> bool:
-        """Send what waits; whether all is under way."""
-
     def end(self) -> None:
         """End the connection."""
 
@@ -107,7 +104,7 @@ class HilSeat:
     @property
     def may_sleep(self) -> bool:
         """As of `Pilot`: a PX4 in Offboard, disarmed, without setpoints, says nothing for long."""
-        return self._way is not None and not self._is_armed and self._way.flush()
+        return self._way is not None and not self._is_armed
 
     def begin_anew(self) -> None:
         """As of `Pilot`: a PX4 cannot go back in time."""

@@ -36,6 +36,8 @@ _GLANCE_S = 0.05
 """How often silence is looked at."""
 _SLEEP_S = 0.5
 """Who says nothing for so long of wall time may be asleep, or for a fifth of its patience."""
+_LONGEST_SLEEP = 6.0
+"""Times the patience: so long of wall time it may be."""
 _log = logging.getLogger(__name__)
 
 News = Mapping[str, Any]
@@ -63,7 +65,7 @@ class Pilot(Protocol):
 
     @property
     def may_sleep(self) -> bool:
-        """Whether it is well without an answer: it flies nothing, and hears what it is told."""
+        """Whether it may be well though it does not answer: it flies nothing."""
 
     def tell(self, time_ns: int, news: News) -> bool:
         """Tell it of a meeting; whether its answer is waited for: it calls `go_on`."""
@@ -107,8 +109,8 @@ class Meetings:
         """Wall time at which the present meeting began."""
         self._is_unsayable = False
         """Whether it has been said that the pilot cannot be told something."""
-        self._is_asleep = False
-        """Whether time goes on without its answers."""
+        self._asleep_since_s: float | None = None
+        """Wall time since which time goes on without its answers."""
         self._period_s = period_ns / NS_PER_S
         self._watch = self._loop.create_task(self._watch_silence())
         self._time_ns = -1
@@ -141,7 +143,8 @@ class Meetings:
     def go_on(self, shares: Sequence[float] | None = None) -> None:
         """End the meeting, `shares` as of `turn_rotors`; without a meeting only those are asked."""
         messages = [] if shares is None else [(self._rotors, self._asked(shares))]
-        self._is_asleep = self._is_asleep and shares is None
+        if shares is not None:
+            self._asleep_since_s = None
         if self._pending:
             self._pending = False
             messages.append((self._done, self._clock(clock=time_from_ns(self._time_ns))))
@@ -202,26 +205,32 @@ class Meetings:
     async def _watch_silence(self) -> None:
         """Go on without an autopilot that is asleep; give up one that is silent for too long."""
         while True:
-            await asyncio.sleep(self._period_s if self._is_asleep else self._glance_s)
+            await asyncio.sleep(self._glance_s)
             with self.lock:
                 if self._pending:
                     self._judge(time.monotonic() - self._since_s)
 
     @property
     def _glance_s(self) -> float:
+        if self._asleep_since_s is not None:
+            return self._period_s
         return min(_GLANCE_S, 0.1 * self._patience.timeout_s)
 
     def _judge(self, silent_s: float) -> None:
         """Of a meeting that lasts: whether there is still somebody to wait for."""
-        sleeps = self._is_asleep or silent_s >= min(_SLEEP_S, 0.2 * self._patience.timeout_s)
+        timeout_s, since_s = self._patience.timeout_s, self._asleep_since_s
+        if since_s is None:
+            sleeps = silent_s >= min(_SLEEP_S, 0.2 * timeout_s)
+        else:
+            sleeps = time.monotonic() - since_s < _LONGEST_SLEEP * timeout_s
         if sleeps and self._pilot.may_sleep:
             self._go_on_without()
-        elif self._patience.drops and silent_s >= self._patience.timeout_s:
+        elif self._patience.drops and silent_s >= timeout_s:
             self._give_up()
 
     def _go_on_without(self) -> None:
-        if not self._is_asleep:
-            self._is_asleep = True
+        if self._asleep_since_s is None:
+            self._asleep_since_s = time.monotonic()
             _log.warning(
                 "%s: its autopilot is disarmed and silent; it is not waited for", self._uav
             )

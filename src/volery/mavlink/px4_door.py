@@ -29,8 +29,6 @@ from volery.mavlink.party import why_not
 PORT = 4560
 _MOST_UNSENT_BYTES = 1 << 16
 """What may wait for a PX4 that does not read, beside what the kernel holds."""
-_KERNEL_BYTES = 1 << 14
-"""What our kernel may hold for it: a stopped PX4 is to be noticed within seconds."""
 _log = logging.getLogger(__name__)
 
 
@@ -118,18 +116,17 @@ class _Connection(asyncio.Protocol):
 
     def send(self, data: bytes) -> bool:
         """As of `Way`; frames are lost, whole, for a PX4 that does not read."""
-        self.flush()
+        self._flush()
         if len(self._unsent) + len(data) > _MOST_UNSENT_BYTES:
             return False
         self._unsent += data
-        return self.flush()
+        self._flush()
+        return not self._unsent
 
-    def flush(self) -> bool:
-        """As of `Way`."""
+    def _flush(self) -> None:
         with contextlib.suppress(OSError):  # no room now; or it has left, which the loop will tell
             if self._unsent and self._out is not None:
                 del self._unsent[: self._out.send(self._unsent)]
-        return not self._unsent
 
     def end(self) -> None:
         """As of `Way`."""
@@ -148,7 +145,6 @@ class _Connection(asyncio.Protocol):
             return
         tend(transport.get_extra_info("socket"))
         self._out = transport.get_extra_info("socket").dup()
-        self._out.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BYTES)
         self._hear = self._seat.take(self)
 
     def data_received(self, data: bytes) -> None:

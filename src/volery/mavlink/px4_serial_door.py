@@ -81,10 +81,6 @@ class Px4Serial:
             self._line.send(data)
         return True
 
-    def flush(self) -> bool:
-        """As of `Way`: a line tells nobody whether it is heard."""
-        return True
-
     def end(self) -> None:
         """As of `Way`."""
         if self._line is not None:

@@ -20,13 +20,9 @@ PERIOD_US = 4000
 WHOLE_GROUPS = (0x7, 0x38, 0x1C0, 0x1A00, 0x400)
 
 
-def connect(port, unread_bytes=None):
-    """Over TCP, as PX4 does; the kernel holds `unread_bytes` for it where said."""
-    link = socket.socket()
-    link.settimeout(60.0)
-    if unread_bytes is not None:
-        link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, unread_bytes)
-    link.connect(("127.0.0.1", port))
+def connect(port):
+    """Over TCP, as PX4 does."""
+    link = socket.create_connection(("127.0.0.1", port), timeout=60.0)
     link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return link
 
