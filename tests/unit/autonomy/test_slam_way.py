@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from volery.autonomy.slam.keyframes import Keyframe
+from volery.autonomy.slam.loop_closing import Closure
+from volery.autonomy.slam.pose_graph import Edge
 from volery.autonomy.slam.settings import Matching
 from volery.autonomy.slam.tracker import Tracker
 from volery.autonomy.slam.way import Way
@@ -23,6 +26,19 @@ class Closer:
         self.asked.append(older)
 
 
+class Guesser:
+    """Finds steps (4,) from some keyframes to the newest one."""
+
+    def __init__(self, steps, is_sure=False):
+        self.steps, self.is_sure = steps, is_sure
+
+    def match(self, _frames, _poses, newest, older, _reach):
+        if older not in self.steps:
+            return None
+        edge = Edge(older, newest, np.array(self.steps[older]), np.ones(4), True)
+        return Closure(edge, 0.2, 100.0, self.is_sure)
+
+
 def keyframe(number, session=0):
     nothing = np.zeros((0, 3)), np.zeros(0, np.int8)
     return Keyframe(number * S, np.zeros(3), LEVEL, 2.0 * number, *nothing, session)
@@ -37,14 +53,65 @@ def flown(count):
     return way, way._closer
 
 
+def find(way, count):
+    """What so many rounds of looking find."""
+    edges = [way.relocation.find(way._closer, way.frames, way.poses) for _ in range(count)]
+    return [edge for edge in edges if edge is not None]
+
+
+def lost_after(count, **how):
+    """A way that was lost after so many keyframes, 7 m apart, and has three since."""
+    way, closer = flown(count)
+    way.poses = [np.array([7.0 * k, 0.0, 0.0, 0.0]) for k in range(count)]
+    way.begin_anew(**how)
+    way.frames += [keyframe(count + k, session=1) for k in range(3)]
+    way.poses += [np.zeros(4) for _ in range(3)]
+    return way, closer
+
+
 def test_one_that_is_lost_tries_all_it_knows_the_latest_first():
-    way, closer = flown(9)
-    way.begin_anew()
-    way.frames += [keyframe(9 + k, session=1) for k in range(3)]
-    for _ in range(9):
-        assert way._find_anywhere(len(way.frames) - 1) is None
+    way, closer = lost_after(9)
+    assert not find(way, 9)
     assert closer.asked[:9] == [8, 5, 2, 7, 4, 1, 6, 3, 0]
     assert {row: closer.asked.count(row) for row in range(9)} == dict.fromkeys(range(9), 4)
+
+
+def test_keyframes_since_it_may_have_been_elsewhere_are_not_tried():
+    way, closer = lost_after(9, doubted_since_ns=6 * S)
+    assert not find(way, 7)
+    assert set(closer.asked) == set(range(7))
+
+
+def test_keyframes_of_a_session_that_was_never_placed_are_not_tried():
+    way, closer = lost_after(9)
+    way.begin_anew()
+    way.frames += [keyframe(12 + k, session=2) for k in range(3)]
+    way.poses += [np.zeros(4) for _ in range(3)]
+    assert not find(way, 9)
+    assert set(closer.asked) == set(range(9))
+
+
+@pytest.mark.parametrize(
+    ("second", "step", "is_found"),
+    [
+        (4, [2.0, 0.0, 0.0, 0.0], True),  # both see it at x = 30
+        (8, [-26.0, 0.0, 0.0, 0.0], False),  # so near to the first one that it says the same
+        (4, [2.0, 0.8, 0.0, 0.0], False),
+        (4, [2.0, 0.0, 0.0, 0.1], False),
+    ],
+)
+def test_two_guesses_from_afar_that_agree_are_a_find(second, step, is_found):
+    way, _ = lost_after(24)
+    way._closer = Guesser({11: [-47.0, 0.0, 0.0, 0.0], second: step})
+    edges = find(way, 6)
+    assert bool(edges) == is_found
+    assert all(edge.measured[0] in (-47.0, step[0]) for edge in edges)
+
+
+def test_one_that_is_sure_needs_no_other():
+    way, _ = lost_after(24)
+    way._closer = Guesser({11: [1.0, 0.0, 0.0, 0.0]}, is_sure=True)
+    assert find(way, 6)
 
 
 def test_one_that_is_lost_and_holds_still_looks_around_more_often():

@@ -68,7 +68,7 @@ class Health:
         unfit = seen >= MANY and met < MISFIT * usual
         self._misfit_ns = (self._misfit_ns or now) if unfit and tracker.has_flown else None
         long = self._misfit_ns is not None and now - self._misfit_ns > _LOST_NS
-        return long or tracker.sigma_m > _UNSURE_M
+        return long or tracker.sight.is_broken or tracker.sigma_m > _UNSURE_M
 
     def begin_anew(self) -> None:
         """The tracker has begun a new map."""

@@ -19,12 +19,20 @@ from volery.autonomy.slam.settings import Matching
 Array = NDArray[np.float64]
 
 _PICTURE, _FINE_M, _COARSE_M = 400, 0.2, 0.4
+_TRIED, _TRIED_LOST = 150, 75
+"""Returns that are tried everywhere."""
 _ROUNDS = 8
-_BEFORE, _AROUND = 2, 3
+_BEFORE, AROUND = 2, 3
 """Keyframes before the newest one, and on both sides of the older one, that are matched."""
 _LEAST_SHARE, _LEAST_MET = 0.42, 30.0
 """Share and number of uprights that must be met again, each counted by how well."""
-_LEAST_SHARE_LOST = 0.5
+_LEAST_SHARE_LOST, _GUESSED_SHARE_LOST, _LEAST_MET_LOST = 0.3, 0.15, 80.0
+"""Of one that is lost, to be sure, and to be a guess that another one may confirm.
+
+Of 450 pairs of a flight through the forest, matched at all headings within 12 m, those that lay so
+near had shares of 0.33 in the median, nine of ten above 0.2, and one of 86 was wrong; of those that
+lay farther apart, and so were wrong, nine of ten had less than 0.12, and all less than 0.23.
+"""
 _LEAST_INFORMATION = 2000.0
 """1/m^2, of the place in the weakest direction: what three trunks tell, seen ten times each."""
 _FLOOR = np.array([0.06, 0.06, 0.06, 0.004])
@@ -37,6 +45,8 @@ class Closure(NamedTuple):
     edge: Edge
     share: float
     met: float
+    is_sure: bool = True
+    """Whether it needs no other one that agrees; without, only where it is lost."""
 
 
 class LoopCloser:
@@ -57,10 +67,12 @@ class LoopCloser:
     ) -> Closure | None:
         """The newest keyframe as seen from an older one; None where they do not fit.
 
+        Of one that is lost (a reach of all headings) it may be no more than a guess.
+
         `reach`: how far the newest one may be from where it seems to be, m and rad.
         """  # fmt: skip
         query, query_kinds = _around(frames, poses, newest, range(newest - _BEFORE, newest + 1))
-        others = range(older - _AROUND, min(older + _AROUND + 1, newest - _BEFORE))
+        others = range(older - AROUND, min(older + AROUND + 1, newest - _BEFORE))
         known, known_kinds = _around(frames, poses, older, others)
         guess = between(poses[older], poses[newest])
         standing = query[query_kinds == UPRIGHT]
@@ -69,7 +81,8 @@ class LoopCloser:
         lost = reach[1] >= math.pi
         cell = _COARSE_M if lost else _FINE_M
         draw(np.ascontiguousarray(known[known_kinds == UPRIGHT][:, :2]), cell, self._picture)
-        thin = np.ascontiguousarray(standing[:: max(len(standing) // 150, 1), :2])
+        some = _TRIED_LOST if lost else _TRIED
+        thin = np.ascontiguousarray(standing[:: max(len(standing) // some, 1), :2])
         found = np.zeros(3)
         middle = np.zeros(3) if lost else guess[[0, 1, 3]]
         span = np.array([reach[0], reach[0], reach[1]])
@@ -98,8 +111,12 @@ class LoopCloser:
         )  # fmt: skip
         share = told[0] / max(told[1], 1.0)
         weakest = float(np.linalg.eigvalsh(information[:2, :2])[0])
-        wanted = _LEAST_SHARE_LOST if lost else _LEAST_SHARE
-        if not done or share < wanted or told[0] < _LEAST_MET or weakest < _LEAST_INFORMATION:
+        is_sure = share >= (_LEAST_SHARE_LOST if lost else _LEAST_SHARE)
+        is_guess = lost and share >= _GUESSED_SHARE_LOST
+        met = _LEAST_MET_LOST if lost else _LEAST_MET
+        if not done or told[0] < met or weakest < _LEAST_INFORMATION:
+            return None
+        if not (is_sure or is_guess):
             return None
         spread = np.linalg.inv(m.trust * information + 1e-3 * np.eye(4))
         sigmas = np.hypot(np.sqrt(np.maximum(np.diag(spread), 0.0)), _FLOOR)
@@ -107,7 +124,7 @@ class LoopCloser:
             sigmas[2] = 10.0  # no ground in common: the height stays open
         pose[3] = math.remainder(pose[3], math.tau)
         edge = Edge(rows[0], rows[1], pose.copy(), sigmas, True)
-        return Closure(edge, float(share), float(told[0]))
+        return Closure(edge, float(share), float(told[0]), bool(is_sure))
 
     def _height(
         self, known: Array, known_kinds: NDArray[np.int8], query: Array,

@@ -12,7 +12,7 @@ from volery.autonomy.slam.inertial_kernels import STATE_NUMBERS, P, Q
 from volery.autonomy.slam.linear import eliminate
 from volery.autonomy.slam.matching_kernels import GROUND, UPRIGHT, gather
 from volery.autonomy.slam.upright_kernels import Cells, add_upright
-from volery.core.compiled import kernel
+from volery.core.compiled import inner_kernel, kernel
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -35,6 +35,45 @@ def draw(points: Array, cell: float, picture: Picture) -> None:
             for dj in range(-1, 2):
                 worth = 4 if di == 0 and dj == 0 else (2 if di * dj == 0 else 1)
                 picture[i + di, j + dj] = max(picture[i + di, j + dj], worth)
+
+
+@inner_kernel
+def _count_at(points: Array, x: float, y: float, cell: float, picture: Picture) -> int:
+    n, count = picture.shape[0], 0
+    for k in range(points.shape[0]):
+        i = math.floor((points[k, 0] + x) / cell) + n // 2
+        j = math.floor((points[k, 1] + y) / cell) + n // 2
+        if 0 <= i < n and 0 <= j < n and picture[i, j] > 0:
+            count += 1
+    return count
+
+
+@kernel
+def count_drawn(points: Array, cell: float, picture: Picture) -> int:
+    """How many of points (K, 2) lie in marked cells of a `picture` around the origin."""
+    return _count_at(points, 0.0, 0.0, cell, picture)
+
+
+@kernel
+def shares_around(
+    one: Array,
+    picture: Picture,
+    other: Array,
+    other_picture: Picture,
+    cell: float,
+    steps: Array,
+    shares: Array,
+) -> None:
+    """Fill `shares` (K,): what meets a mark after `one` (M, 2) has moved by each of `steps` (K, 2).
+
+    It is the mean of two: of points `one` in `picture`, and of points `other` (N, 2), moved the
+    other way, in `other_picture`, in which `one` is drawn.
+    """
+    for k in range(steps.shape[0]):
+        x, y = steps[k, 0], steps[k, 1]
+        onwards = _count_at(one, x, y, cell, picture) / one.shape[0]
+        back = _count_at(other, -x, -y, cell, other_picture) / other.shape[0]
+        shares[k] = 0.5 * (onwards + back)
 
 
 @kernel

@@ -45,6 +45,8 @@ _LONGEST_GAP_NS = 2 * NS_PER_S
 _UNKNOWN, _DOUBTED = (3.0, 0.3), (0.5, 0.0)
 """How far velocity (m/s) and attitude (rad) may be off after such a gap, and after what is seen did
 not fit the map."""
+_NOTICED_NS, _SEEN_NS = round(1.5 * NS_PER_S), NS_PER_S // 2
+"""Within these a displacement is noticed by the map, and by what was seen just before."""
 _QUEUE = 500
 """Readings that wait while the node's process does not get to them: two seconds at 200 Hz."""
 _NOISE = "[gyro, its walk, its bias, accelerometer, its walk, its bias]"
@@ -156,6 +158,8 @@ class Slam(Node):
         seen = self._tracker.add_imu(time_ns, gyro, np.array([a.x, a.y, a.z]))
         for returns in seen:
             self._way.add(returns, self._tracker)
+        if self._tracker.sight.is_broken:
+            self._tell_status()  # each further sweep would pull it more the wrong way
         self._omega = gyro - self._tracker.state[BG : BG + 3]
         if self._tracker.is_ready and time_ns - self._odom_ns >= self._odom_period_ns:
             self._odom_ns = time_ns
@@ -227,8 +231,9 @@ class Slam(Node):
 
     def _tell_status(self) -> None:
         t, way, now = self._tracker, self._way, self.get_clock().now_ns()
+        noticed_ns = _SEEN_NS if t.sight.is_broken else _NOTICED_NS
         if self._health.look(t, now, way.is_placed):
-            self._lose(*_DOUBTED)
+            self._lose(*_DOUBTED, t.time_ns - noticed_ns)
         told = {
             "state": self._health.state,
             "problems": self._health.problems,
@@ -250,9 +255,11 @@ class Slam(Node):
             times = [frame.time_ns for frame in way.frames]
             self._path.publish(reports.path(t.time_ns, times, way.poses))
 
-    def _lose(self, speed_sigma: float, turn_sigma: float) -> None:
+    def _lose(
+        self, speed_sigma: float, turn_sigma: float, wrong_since_ns: int | None = None
+    ) -> None:
         """Begin new maps; where in the old one they lie must be found out."""
         self._tracker.begin_anew(speed_sigma, turn_sigma)
         self._health.begin_anew()
         if self._way.frames:
-            self._way.begin_anew()
+            self._way.begin_anew(wrong_since_ns)

@@ -34,6 +34,11 @@ class Sweep(NamedTuple):
         """When the last beam was cast."""
         return self.first_ns + round(self.beam_ns * (len(self.ranges) - 1))
 
+    @property
+    def nods(self) -> bool:
+        """Whether its mount is not level."""
+        return self.nod != 0.0 or self.last_nod != 0.0
+
     def points(self, nearest_m: float, reach_m: float, times: Times, states: Array) -> Array:
         """Returns (K, 3) between two distances, m in the body at the newest state; see `unskew`."""
         points = np.empty((len(self.ranges), 3))

@@ -17,6 +17,7 @@ from volery.autonomy.slam.inertial_kernels import STATE_NUMBERS, STATES, P, Q, V
 from volery.autonomy.slam.local_maps import Maps
 from volery.autonomy.slam.match import Match, judged
 from volery.autonomy.slam.matching_kernels import (
+    UPRIGHT,
     broad_plane,
     carry_along,
     classify,
@@ -26,6 +27,7 @@ from volery.autonomy.slam.matching_kernels import (
 )
 from volery.autonomy.slam.recovery import GAP_S, Recovery
 from volery.autonomy.slam.settings import ImuNoise, Matching
+from volery.autonomy.slam.sight import Sight
 from volery.autonomy.slam.standing import Rest, first_covariance, first_state, hold_still
 from volery.autonomy.slam.sweep import Seen, Sweep
 from volery.core import rotations
@@ -58,10 +60,10 @@ class Tracker:
     """
 
     _STATE = (
-        "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "standing_height",
-        "travelled_m", "recovery", "_times", "_states", "_imu", "_waiting", "_maps", "_inserted",
-        "_rest", "settling", "_broad", "_near_ground_ns", "_low_since_ns", "_range",
-        "_standing_ns", "_is_high", "refused",
+        "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "sight",
+        "standing_height", "travelled_m", "recovery", "_times", "_states", "_imu", "_waiting",
+        "_maps", "_inserted", "_rest", "settling", "_broad", "_near_ground_ns", "_low_since_ns",
+        "_range", "_standing_ns", "_is_high", "refused",
     )  # fmt: skip
 
     def __init__(
@@ -74,6 +76,7 @@ class Tracker:
         self.covariance = np.zeros((STATES, STATES))
         self.is_ready = self.is_standing = self.has_flown = False
         self.match: dict[str, Match] = {}
+        self.sight = Sight()
         self.standing_height = 0.2
         self.travelled_m = 0.0
         self.refused = 0
@@ -229,10 +232,12 @@ class Tracker:
             self.refused += 1
             return None
         points = sweep.points(m.nearest_m, m.reach_m, self._times, self._states)
-        if self.is_astray and not self.recovery.find(
-            self.state, self.covariance, self._states, self._maps, points
-        ):
-            return None
+        if self.is_astray:
+            self.sight = Sight()
+            if not self.recovery.find(
+                self.state, self.covariance, self._states, self._maps, points
+            ):
+                return None
         maps, slope = self._maps, self._broad[1:3].copy()
         known = broad_plane(self.state, maps.ground_keys, maps.sums, 6, slope, self._broad)
         kinds, planes = np.empty(len(points), np.int8), np.zeros((len(points), 3))
@@ -247,6 +252,9 @@ class Tracker:
         self.match[sweep.name] = judged(told, self.match.get(sweep.name), self.time_ns)
         is_drawn = self._draw(sweep, points, kinds)
         turned = moved_points(points, self.state[Q : Q + 4], self.state[:3])
+        if self.has_flown:
+            standing = turned[kinds == UPRIGHT, :2]
+            self.sight.take(self.time_ns, standing, self.state[:2], is_level=not sweep.nods)
         return Seen(turned, kinds, is_drawn)
 
     def _classify(self, points: Array, kinds: NDArray[np.int8], planes: Array, known: int) -> None:
@@ -298,7 +306,7 @@ class Tracker:
         may be off by now.
         """
         self._maps = Maps()
-        self._inserted, self.match = {}, {}
+        self._inserted, self.match, self.sight = {}, {}, Sight()
         self.covariance[:3] = self.covariance[:, :3] = 0.0
         self.covariance[np.arange(3), np.arange(3)] = 1e-4
         self.covariance[np.arange(3, 6), np.arange(3, 6)] += speed_sigma**2

@@ -18,6 +18,7 @@ from volery.autonomy.slam.keyframes import (
 )
 from volery.autonomy.slam.loop_closing import LoopCloser
 from volery.autonomy.slam.pose_graph import Edge, compose, load_gtsam, optimised
+from volery.autonomy.slam.relocation import Relocation
 from volery.autonomy.slam.settings import Matching
 from volery.autonomy.slam.sweep import Seen
 from volery.autonomy.slam.tracker import Tracker
@@ -41,8 +42,6 @@ _APART_M = 40.0
 _NEAR_M = 12.0
 _ASTRAY = np.array([1000.0, 1000.0, 1000.0, 3.0])
 """Standard deviations of the step over which the motion was lost."""
-_LOST_TRIES, _LOST_LEAP = 4, 3
-"""Keyframes tried at each new one while it is lost; so many apart, as neighbours look alike."""
 
 
 class Placement(NamedTuple):
@@ -57,7 +56,7 @@ class Way:
 
     _STATE = (
         "frames", "poses", "edges", "closures", "refused", "session", "is_placed", "correction",
-        "_gathering", "_tried", "_cursor", "_settling",
+        "relocation", "_gathering", "_tried", "_settling",
     )  # fmt: skip
 
     def __init__(self, matching: Matching, start: Array, has_loops: bool = True) -> None:
@@ -76,9 +75,9 @@ class Way:
         self.is_placed = True
         """Whether it is known where in the map the present session is."""
         self.correction = Placement(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+        self.relocation = Relocation()
         self._gathering = Gathering()
         self._tried = -1_000
-        self._cursor = 0
 
     def add(self, seen: Seen, tracker: Tracker) -> bool:
         """Take in a sweep; whether it has led to a new keyframe."""
@@ -96,12 +95,22 @@ class Way:
         self._correct(place[2])
         return True
 
-    def begin_anew(self) -> None:
-        """The motion was lost: from now on nobody knows where in the map the odometry is."""
+    def begin_anew(self, doubted_since_ns: int | None = None) -> None:
+        """The motion was lost: from now on nobody knows where in the map the odometry is.
+
+        Keyframes since then may be of another place than they say already, and so are all those of
+        a session that has never found its place.
+        """
+        doubted = {
+            k
+            for k, frame in enumerate(self.frames)
+            if frame.session == self.session
+            and (not self.is_placed or _is_since(frame, doubted_since_ns))
+        }
+        self.relocation.begin(doubted)
         self.session += 1
         self.is_placed = False
         self._gathering = Gathering()
-        self._cursor = 0
 
     def pose(self, tracker: Tracker) -> tuple[Array, Array]:
         """Present position (3,) and attitude (4,) in the map."""
@@ -187,7 +196,10 @@ class Way:
         if self._closer is None:
             return
         newest = len(self.frames) - 1
-        found = self._find_near(newest) if self.is_placed else self._find_anywhere(newest)
+        if self.is_placed:
+            found = self._find_near(newest)
+        else:
+            found = self.relocation.find(self._closer, self.frames, self.poses)
         if found is None:
             return
         self.edges.append(found)
@@ -205,6 +217,8 @@ class Way:
         for k in range(newest):
             if here.travelled_m - self.frames[k].travelled_m < _APART_M:
                 break
+            if k in self.relocation.doubted:
+                continue
             away = float(np.hypot(*(self.poses[k] - self.poses[newest])[:2]))
             if away < best:
                 best, row = away, k
@@ -219,22 +233,6 @@ class Way:
             self.refused += 1
             return None
         return found.edge
-
-    def _find_anywhere(self, newest: int) -> Edge | None:
-        """Lost: some of the keyframes of earlier sessions, in turn, the latest of them first."""
-        old = [k for k, frame in enumerate(self.frames) if frame.session != self.session]
-        old = [row for first in range(_LOST_LEAP) for row in old[::-1][first::_LOST_LEAP]]
-        fresh = sum(frame.session == self.session for frame in self.frames)
-        if not old or fresh < 3 or self._closer is None:
-            return None
-        best = None
-        for _ in range(min(_LOST_TRIES, len(old))):
-            row = old[self._cursor % len(old)]
-            self._cursor += 1
-            found = self._closer.match(self.frames, self.poses, newest, row, (4.0, math.pi))
-            if found is not None and (best is None or found.met > best.met):
-                best = found
-        return None if best is None else best.edge
 
     def _correct(self, gravity: Array) -> None:
         """Where the odometry's frame lies, by the newest keyframe."""
@@ -252,3 +250,7 @@ class Way:
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
         put_back(self, state)
+
+
+def _is_since(frame: Keyframe, time_ns: int | None) -> bool:
+    return time_ns is not None and frame.time_ns > time_ns
