@@ -20,23 +20,24 @@ class Closer:
     """Finds nothing, and notes what it was asked."""
 
     def __init__(self):
-        self.asked = []
+        self.asked, self.reaches = [], []
 
-    def match(self, _frames, _poses, _newest, older, _reach):
+    def find(self, _frames, _poses, _newest, older, reach):
         self.asked.append(older)
+        self.reaches.append(reach)
 
 
 class Guesser:
     """Finds steps (4,) from some keyframes to the newest one."""
 
-    def __init__(self, steps, is_sure=False):
-        self.steps, self.is_sure = steps, is_sure
+    def __init__(self, steps, margin=0.06):
+        self.steps, self.margin = steps, margin
 
-    def match(self, _frames, _poses, newest, older, _reach):
+    def find(self, _frames, _poses, newest, older, _reach):
         if older not in self.steps:
             return None
         edge = Edge(older, newest, np.array(self.steps[older]), np.ones(4), True)
-        return Closure(edge, 0.2, 100.0, self.is_sure)
+        return Closure(edge, 0.2, 100.0, self.margin)
 
 
 def keyframe(number, session=0):
@@ -73,7 +74,9 @@ def test_one_that_is_lost_tries_all_it_knows_the_latest_first():
     way, closer = lost_after(9)
     assert not find(way, 9)
     assert closer.asked[:9] == [8, 5, 2, 7, 4, 1, 6, 3, 0]
-    assert {row: closer.asked.count(row) for row in range(9)} == dict.fromkeys(range(9), 4)
+    assert {row: closer.asked.count(row) for row in range(9)} == dict.fromkeys(range(9), 6)
+    headings = [radians for _, radians in closer.reaches]
+    assert headings == [0.2] * 9 + [np.pi] * 45  # as the gyroscope tells, then any
 
 
 def test_keyframes_since_it_may_have_been_elsewhere_are_not_tried():
@@ -110,7 +113,7 @@ def test_two_guesses_from_afar_that_agree_are_a_find(second, step, is_found):
 
 def test_one_that_is_sure_needs_no_other():
     way, _ = lost_after(24)
-    way._closer = Guesser({11: [1.0, 0.0, 0.0, 0.0]}, is_sure=True)
+    way._closer = Guesser({11: [1.0, 0.0, 0.0, 0.0]}, margin=0.2)
     assert find(way, 6)
 
 

@@ -1,4 +1,4 @@
-"""Seeing places again: keyframes matched with those that lie near, or with all where it is lost."""
+"""Seeing places again: sets of keyframes matched with others that were seen before."""
 
 from __future__ import annotations
 
@@ -12,27 +12,29 @@ from numpy.typing import NDArray
 from volery.autonomy.slam.keyframes import Keyframe
 from volery.autonomy.slam.local_maps import Maps
 from volery.autonomy.slam.matching_kernels import UPRIGHT
-from volery.autonomy.slam.pose_graph import Edge, between, compose
+from volery.autonomy.slam.pose_graph import Edge, between
 from volery.autonomy.slam.relocation_kernels import draw, draw_maps, refine, search
 from volery.autonomy.slam.settings import Matching
 
 Array = NDArray[np.float64]
 
-_PICTURE, _FINE_M, _COARSE_M = 400, 0.2, 0.4
-_TRIED, _TRIED_LOST = 150, 75
-"""Returns that are tried everywhere."""
+_PICTURE = 400
 _ROUNDS = 8
 _BEFORE, AROUND = 2, 3
 """Keyframes before the newest one, and on both sides of the older one, that are matched."""
 _LEAST_SHARE, _LEAST_MET = 0.42, 30.0
 """Share and number of uprights that must be met again, each counted by how well."""
-_LEAST_SHARE_LOST, _GUESSED_SHARE_LOST, _LEAST_MET_LOST = 0.3, 0.15, 80.0
-"""Of one that is lost, to be sure, and to be a guess that another one may confirm.
+_LEAST_SHARE_LOST, _LEAST_MET_LOST = 0.15, 80.0
+_SURE_MARGIN, _GUESSED_MARGIN = 0.12, 0.05
+"""By how much its place must fit better than all others for one that is lost to be sure; to guess.
 
-Of 450 pairs of a flight through the forest, matched at all headings within 12 m, those that lay so
-near had shares of 0.33 in the median, nine of ten above 0.2, and one of 86 was wrong; of those that
-lay farther apart, and so were wrong, nine of ten had less than 0.12, and all less than 0.23.
+Of 480 pairs of keyframes of flights through the forest, matched within 12 m and 0.2 rad, those that
+lay so near had margins of 0.22 in the median, nine of ten above 0.12; those farther apart, which
+fitted somewhere all the same, at most 0.10. Shares alone do not tell them apart: in a thicket a
+wrong one came to 0.39, while one right one of twenty had less than 0.2.
 """
+_APART_M = 1.5
+"""A place so far from the best one is another one."""
 _LEAST_INFORMATION = 2000.0
 """1/m^2, of the place in the weakest direction: what three trunks tell, seen ten times each."""
 _FLOOR = np.array([0.06, 0.06, 0.06, 0.004])
@@ -45,8 +47,35 @@ class Closure(NamedTuple):
     edge: Edge
     share: float
     met: float
-    is_sure: bool = True
-    """Whether it needs no other one that agrees; without, only where it is lost."""
+    margin: float
+    """By how much it fits better than any other place that was tried."""
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it needs no other one that agrees, where nothing else is known of the place."""
+        return self.margin >= _SURE_MARGIN
+
+
+class _Trial(NamedTuple):
+    """How finely places are tried: cells of a picture, turns, and returns (all but so many)."""
+
+    cell_m: float
+    step_rad: float
+    returns: int
+
+
+_NEARBY, _ANYWHERE, _ANY_HEADING = (
+    _Trial(0.2, 0.0125, 150), _Trial(0.4, 0.035, 150), _Trial(0.4, 0.035, 75)
+)  # fmt: skip
+
+
+class _Pair(NamedTuple):
+    """What is matched: returns (K, 3) in the axes of a keyframe, and their kinds (K,)."""
+
+    query: Array
+    query_kinds: NDArray[np.int8]
+    known: Array
+    known_kinds: NDArray[np.int8]
 
 
 class LoopCloser:
@@ -67,56 +96,83 @@ class LoopCloser:
     ) -> Closure | None:
         """The newest keyframe as seen from an older one; None where they do not fit.
 
-        Of one that is lost (a reach of all headings) it may be no more than a guess.
-
         `reach`: how far the newest one may be from where it seems to be, m and rad.
-        """  # fmt: skip
-        query, query_kinds = _around(frames, poses, newest, range(newest - _BEFORE, newest + 1))
-        others = range(older - AROUND, min(older + AROUND + 1, newest - _BEFORE))
-        known, known_kinds = _around(frames, poses, older, others)
-        guess = between(poses[older], poses[newest])
-        standing = query[query_kinds == UPRIGHT]
-        if len(standing) < _LEAST_MET:
+        """
+        pair = _pair(frames, poses, newest, older)
+        if pair is None:
             return None
-        lost = reach[1] >= math.pi
-        cell = _COARSE_M if lost else _FINE_M
-        draw(np.ascontiguousarray(known[known_kinds == UPRIGHT][:, :2]), cell, self._picture)
-        some = _TRIED_LOST if lost else _TRIED
-        thin = np.ascontiguousarray(standing[:: max(len(standing) // some, 1), :2])
-        found = np.zeros(3)
-        middle = np.zeros(3) if lost else guess[[0, 1, 3]]
+        guess = between(poses[older], poses[newest])
         span = np.array([reach[0], reach[0], reach[1]])
-        search(thin, self._picture, cell, middle, span, 0.035 if lost else 0.0125, found)
+        found, margin = self._searched(pair, guess[[0, 1, 3]], span, _NEARBY)
         pose = np.array([found[0], found[1], guess[2], found[2]])
-        if lost:
-            pose[2] = self._height(known, known_kinds, query, query_kinds)
-        return self._refined(
-            pose, (known, known_kinds), (query, query_kinds), (older, newest), lost
+        closure = self._refined(pose, pair, (older, newest), margin)
+        fits = closure is not None and closure.share >= _LEAST_SHARE and closure.met >= _LEAST_MET
+        return closure if fits else None
+
+    def find(
+        self,
+        frames: Sequence[Keyframe],
+        poses: Sequence[Array],
+        newest: int,
+        older: int,
+        reach: tuple[float, float],
+    ) -> Closure | None:
+        """The newest keyframe of one that is lost as seen from an older one; maybe only a guess.
+
+        `reach`: how far it may be from the older one, m, and from the heading that it seems to
+        have, rad.
+        """
+        pair = _pair(frames, poses, newest, older)
+        if pair is None:
+            return None
+        seems = np.array([0.0, 0.0, between(poses[older], poses[newest])[3]])
+        span = np.array([reach[0], reach[0], reach[1]])
+        trial = _ANY_HEADING if reach[1] >= math.pi else _ANYWHERE
+        found, margin = self._searched(pair, seems, span, trial)
+        pose = np.array([found[0], found[1], _height(pair), found[2]])
+        closure = self._refined(pose, pair, (older, newest), margin)
+        fits = (
+            closure is not None
+            and closure.share >= _LEAST_SHARE_LOST
+            and closure.met >= _LEAST_MET_LOST
+            and margin >= _GUESSED_MARGIN
         )
+        return closure if fits else None
+
+    def _searched(
+        self, pair: _Pair, middle: Array, span: Array, trial: _Trial
+    ) -> tuple[Array, float]:
+        """The pose (3,) x, y, yaw that fits best, and by how much better than any other place."""
+        standing = pair.query[pair.query_kinds == UPRIGHT]
+        known = pair.known[pair.known_kinds == UPRIGHT]
+        draw(np.ascontiguousarray(known[:, :2]), trial.cell_m, self._picture)
+        thin = np.ascontiguousarray(standing[:: max(len(standing) // trial.returns, 1), :2])
+        side = 2 * math.ceil(span[0] / trial.cell_m) + 1
+        found, shares = np.zeros(3), np.empty((side, side))
+        best = search(
+            thin, self._picture, trial.cell_m, middle, span, trial.step_rad, found, shares
+        )
+        rows, columns = np.indices(shares.shape)
+        row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)
+        away = trial.cell_m * np.hypot(rows - row, columns - column) > _APART_M
+        return found, best - float(shares[away].max(initial=0.0))
 
     def _refined(
-        self, pose: Array, known: tuple[Array, NDArray[np.int8]],
-        query: tuple[Array, NDArray[np.int8]], rows: tuple[int, int], lost: bool,
-    ) -> Closure | None:  # fmt: skip
+        self, pose: Array, pair: _Pair, rows: tuple[int, int], margin: float
+    ) -> Closure | None:
         maps, m = self._maps, self._matching
         draw_maps(
-            np.ascontiguousarray(known[0]), known[1], maps.upright_keys, maps.cells,
+            np.ascontiguousarray(pair.known), pair.known_kinds, maps.upright_keys, maps.cells,
             maps.ground_keys, maps.sums,
         )  # fmt: skip
         information, told = np.zeros((4, 4)), np.zeros(4)
         done = refine(
-            pose, np.ascontiguousarray(query[0]), query[1], maps.upright_keys, maps.cells,
-            maps.ground_keys, maps.sums, m.upright_sigma_m**2, m.ground_sigma_m**2, _ROUNDS,
-            information, told,
+            pose, np.ascontiguousarray(pair.query), pair.query_kinds, maps.upright_keys,
+            maps.cells, maps.ground_keys, maps.sums, m.upright_sigma_m**2, m.ground_sigma_m**2,
+            _ROUNDS, information, told,
         )  # fmt: skip
-        share = told[0] / max(told[1], 1.0)
         weakest = float(np.linalg.eigvalsh(information[:2, :2])[0])
-        is_sure = share >= (_LEAST_SHARE_LOST if lost else _LEAST_SHARE)
-        is_guess = lost and share >= _GUESSED_SHARE_LOST
-        met = _LEAST_MET_LOST if lost else _LEAST_MET
-        if not done or told[0] < met or weakest < _LEAST_INFORMATION:
-            return None
-        if not (is_sure or is_guess):
+        if not done or weakest < _LEAST_INFORMATION:
             return None
         spread = np.linalg.inv(m.trust * information + 1e-3 * np.eye(4))
         sigmas = np.hypot(np.sqrt(np.maximum(np.diag(spread), 0.0)), _FLOOR)
@@ -124,18 +180,27 @@ class LoopCloser:
             sigmas[2] = 10.0  # no ground in common: the height stays open
         pose[3] = math.remainder(pose[3], math.tau)
         edge = Edge(rows[0], rows[1], pose.copy(), sigmas, True)
-        return Closure(edge, float(share), float(told[0]), bool(is_sure))
+        return Closure(edge, float(told[0] / max(told[1], 1.0)), float(told[0]), margin)
 
-    def _height(
-        self, known: Array, known_kinds: NDArray[np.int8], query: Array,
-        query_kinds: NDArray[np.int8],
-    ) -> float:  # fmt: skip
-        """How much higher the newest frame flew over its ground than the older one over its own."""
-        low = [points[kinds != UPRIGHT] for points, kinds in
-               ((known, known_kinds), (query, query_kinds))]  # fmt: skip
-        if not len(low[0]) or not len(low[1]):
-            return 0.0
-        return float(np.median(low[0][:, 2]) - np.median(low[1][:, 2]))
+
+def _pair(
+    frames: Sequence[Keyframe], poses: Sequence[Array], newest: int, older: int
+) -> _Pair | None:
+    """The newest keyframes and those around an older one; None where too little is seen."""
+    query = _around(frames, poses, newest, range(newest - _BEFORE, newest + 1))
+    if np.count_nonzero(query[1] == UPRIGHT) < _LEAST_MET:
+        return None
+    others = range(older - AROUND, min(older + AROUND + 1, newest - _BEFORE))
+    return _Pair(*query, *_around(frames, poses, older, others))
+
+
+def _height(pair: _Pair) -> float:
+    """How much higher the newest frame flew over its ground than the older one over its own."""
+    query = pair.query[pair.query_kinds != UPRIGHT]
+    known = pair.known[pair.known_kinds != UPRIGHT]
+    if not len(known) or not len(query):
+        return 0.0
+    return float(np.median(known[:, 2]) - np.median(query[:, 2]))
 
 
 def _around(
@@ -157,6 +222,3 @@ def _around(
     if not points:
         return np.zeros((0, 3)), np.zeros(0, np.int8)
     return np.concatenate(points), np.concatenate(kinds)
-
-
-__all__ = ["Closure", "LoopCloser", "compose"]

@@ -4,37 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.keyframes import Keyframe
-from volery.autonomy.slam.loop_closing import AROUND, Closure, LoopCloser
+from volery.autonomy.slam.loop_closing import AROUND, LoopCloser
 from volery.autonomy.slam.pose_graph import Edge, between, compose
 
 Array = NDArray[np.float64]
 
-_REACH_M = 12.0
-"""So far from an old keyframe it may be."""
-_TRIES, _LEAP = 4, 3
+_REACH_M, _TURN_RAD = 12.0, 0.2
+"""So far it may be from an old keyframe, m, and from the heading that the gyroscope tells, rad: when
+all have been tried, any heading is."""
+_TRIES, _LEAP = 6, 3
 """Keyframes tried at each new one; so many apart, as neighbours look alike."""
 _FRESH = 3
 """Keyframes since it was lost from which on they are matched."""
 _AGREED = np.array([0.5, 0.5, 0.5, 0.05])
 """m and rad within which guesses from two keyframes are of one place."""
-_GOOD, _GOOD_SHARE = 3, 0.2
-"""So many guesses that share so much are enough also where they have returns in common."""
-
-
-class _Guess(NamedTuple):
-    """A pair of keyframes that fits roughly."""
-
-    older: int
-    newer: int
-    share: float
-    moved: Array
-    """(4,) what would move the present session to where it says."""
 
 
 class Relocation:
@@ -44,7 +32,8 @@ class Relocation:
         self.doubted: set[int] = set()
         """Keyframes of which it is not sure where they are."""
         self._cursor = 0
-        self._guesses: list[_Guess] = []
+        self._guesses: list[tuple[int, Array]] = []
+        """Keyframes that fit roughly, and what would move the session to where they say."""
 
     def begin(self, doubted: set[int]) -> None:
         """It was lost just now, and so is where some more keyframes are."""
@@ -68,34 +57,25 @@ class Relocation:
         best = None
         for _ in range(min(_TRIES, len(old))):
             row = old[self._cursor % len(old)]
+            turn = _TURN_RAD if self._cursor < len(old) else math.pi
             self._cursor += 1
-            found = closer.match(frames, poses, newest, row, (_REACH_M, math.pi))
-            if found is None or not (found.is_sure or self._is_confirmed(found, poses)):
+            found = closer.find(frames, poses, newest, row, (_REACH_M, turn))
+            if found is None or not (found.is_sure or self._is_confirmed(found.edge, poses)):
                 continue
-            if best is None or found.met > best.met:
+            if best is None or found.margin > best.margin:
                 best = found
         return None if best is None else best.edge
 
-    def _is_confirmed(self, found: Closure, poses: Sequence[Array]) -> bool:
-        """Whether other guesses put the newest keyframe where this one does; it is kept, too."""
-        edge = found.edge
-        newest = poses[edge.to]
-        place = compose(poses[edge.origin], edge.measured)
-        alike = [guess for guess in self._guesses if _is_same(compose(guess.moved, newest), place)]
-        moved = compose(place, between(newest, np.zeros(4)))
-        guess = _Guess(edge.origin, edge.to, found.share, moved)
-        self._guesses.append(guess)
-        return _are_independent([*alike, guess])
-
-
-def _are_independent(alike: list[_Guess]) -> bool:
-    """Whether guesses of one place say more than one of them does."""
-    newest = alike[-1]
-    if any(abs(guess.older - newest.older) > 2 * AROUND for guess in alike):
-        return True
-    good = [guess for guess in alike if guess.share >= _GOOD_SHARE]
-    sides = {guess.older for guess in good}, {guess.newer for guess in good}
-    return len(good) >= _GOOD and min(map(len, sides)) > 1
+    def _is_confirmed(self, guess: Edge, poses: Sequence[Array]) -> bool:
+        """Whether a guess from elsewhere puts the newest keyframe there, too; this one is kept."""
+        newest = poses[guess.to]
+        place = compose(poses[guess.origin], guess.measured)
+        confirmed = any(
+            abs(row - guess.origin) > 2 * AROUND and _is_same(compose(moved, newest), place)
+            for row, moved in self._guesses
+        )
+        self._guesses.append((guess.origin, compose(place, between(newest, np.zeros(4)))))
+        return confirmed
 
 
 def _is_same(one: Array, other: Array) -> bool:

@@ -85,14 +85,17 @@ def search(
     reach: Array,
     step_rad: float,
     best: Array,
+    shares: Array,
 ) -> float:
     """The pose (3,) x, y, yaw of points (K, 2) in `picture` that meets most; its share of all.
 
-    Tried are `middle` (3,) +- `reach` (3,), in steps of a cell and of `step_rad`.
+    Tried are `middle` (3,) +- `reach` (3,), in steps of a cell and of `step_rad`; `shares` gets
+    those of all places, each at its best heading.
     """
     n, count = picture.shape[0], points.shape[0]
     wide, high = math.ceil(reach[0] / cell), math.ceil(reach[1] / cell)
     turns = math.ceil(reach[2] / step_rad)
+    shares[:] = 0.0
     most = -1
     for t in range(-turns, turns + 1):
         yaw = middle[2] + t * step_rad
@@ -107,6 +110,8 @@ def search(
                     b = math.floor((y + s * points[k, 0] + c * points[k, 1]) / cell) + n // 2
                     if 0 <= a < n and 0 <= b < n:
                         total += picture[a, b]
+                share = total / (4.0 * max(count, 1))
+                shares[i + wide, j + high] = max(shares[i + wide, j + high], share)
                 if total > most:
                     most = total
                     best[0], best[1], best[2] = x, y, yaw

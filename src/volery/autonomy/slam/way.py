@@ -154,10 +154,9 @@ class Way:
         is_new = frame.session != self.frames[-1].session
         self.frames.append(frame)
         row = len(self.frames) - 1
-        step = np.zeros(4)
+        step = step_between(self.frames[row - 1], frame.position, frame.attitude, gravity)
         sigmas = _ASTRAY
         if not is_new:
-            step = step_between(self.frames[row - 1], frame.position, frame.attitude, gravity)
             moved = norm(frame.position - self.frames[row - 1].position)
             sigmas = _PER_ROOT_M * math.sqrt(max(moved, 0.1))
         self.edges.append(Edge(row - 1, row, step, sigmas))
