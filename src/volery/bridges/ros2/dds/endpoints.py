@@ -179,7 +179,7 @@ class DdsCaller:
         return f"its server {FOREIGN}" if found and not any(found) else ""
 
     def _understood(self) -> list[bool]:
-        return [self._servers.understands(h) for h in self._writer.get_matched_subscriptions()]
+        return [self._servers.understands(h) for h in library.readers_of(self._writer)]
 
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
         """Send a request."""

@@ -108,6 +108,13 @@ def subscriptions(writer: Any) -> int:
     return max(int(_matched(writer._ref, None, 0)), 0)
 
 
+def readers_of(writer: Any) -> list[int]:
+    """Instance handles of a writer's readers, some hundreds at most; none once it is deleted."""
+    found = (ctypes.c_uint64 * _MOST_AT_ONCE)()
+    count = int(_matched(writer._ref, found, _MOST_AT_ONCE))
+    return found[: min(max(count, 0), _MOST_AT_ONCE)]
+
+
 def publications(reader: Any) -> int:
     """How many writers a reader has."""
     return max(int(_served(reader._ref, None, 0)), 0)
