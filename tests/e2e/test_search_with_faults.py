@@ -188,10 +188,8 @@ def test_without_its_sonar_it_says_so_and_keeps_its_height(flight: Flight) -> No
 @pytest.mark.slow
 def test_one_that_is_kidnapped_holds_finds_its_place_and_flies_on(flight: Flight) -> None:
     simulation, told, poses = flight.simulation, [], []
-    watched = [
-        simulation.graph.subscribe("/uav1/slam/status", lambda p: told.append(p.message.data)),
-        simulation.graph.subscribe("/uav1/slam/pose", lambda p: poses.append(p.message)),
-    ]
+    simulation.graph.subscribe("/uav1/slam/status", lambda p: told.append(p.message.data))
+    simulation.graph.subscribe("/uav1/slam/pose", lambda p: poses.append(p.message))
     simulation.inject({"kind": "displacement", "uav": "uav1", "offset_m": [0.0, 3.0, 0.0]})
     simulation.run(20.0)
     states = [json.loads(text)["state"] for text in told]
@@ -201,8 +199,6 @@ def test_one_that_is_kidnapped_holds_finds_its_place_and_flies_on(flight: Flight
     place = poses[-1].pose.pose.position
     found = np.array([place.x, place.y, place.z]) - simulation.uavs["uav1"].position_map
     assert np.abs(found).max() < 0.5
-    for subscription in watched:
-        simulation.graph.unsubscribe(subscription)
     flight.goes_on()
 
 

@@ -24,14 +24,14 @@ _BEFORE, AROUND = 2, 3
 """Keyframes before the newest one, and on both sides of the older one, that are matched."""
 _LEAST_SHARE, _LEAST_MET = 0.42, 30.0
 """Share and number of uprights that must be met again, each counted by how well."""
-_LEAST_SHARE_LOST, _LEAST_MET_LOST = 0.15, 80.0
-_SURE_MARGIN, _GUESSED_MARGIN = 0.12, 0.05
+_LEAST_SHARE_LOST, _LEAST_MET_LOST = 0.2, 80.0
+_SURE_MARGIN, _GUESSED_MARGIN = 0.15, 0.05
 """By how much its place must fit better than all others for one that is lost to be sure; to guess.
 
 Of 480 pairs of keyframes of flights through the forest, matched within 12 m and 0.2 rad, those that
-lay so near had margins of 0.22 in the median, nine of ten above 0.12; those farther apart, which
-fitted somewhere all the same, at most 0.10. Shares alone do not tell them apart: in a thicket a
-wrong one came to 0.39, while one right one of twenty had less than 0.2.
+lay so near had margins of 0.22 in the median, nine of ten above 0.12, and nine of ten a share of
+0.21; those farther apart, which fitted somewhere all the same, had margins of 0.10 at the most, but
+shares of up to 0.39, in a thicket. One wrong place with 0.15 and a share of 0.2 has been seen.
 """
 _APART_M = 1.5
 """A place so far from the best one is another one."""

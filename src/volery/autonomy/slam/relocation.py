@@ -15,8 +15,9 @@ from volery.autonomy.slam.pose_graph import Edge, between, compose
 Array = NDArray[np.float64]
 
 _REACH_M, _TURN_RAD = 12.0, 0.2
-"""So far it may be from an old keyframe, m, and from the heading that the gyroscope tells, rad: when
-all have been tried, any heading is."""
+"""How far it may be from an old keyframe, and from the heading that the gyroscope tells; when all
+keyframes have been tried so, any heading is tried.
+"""
 _TRIES, _LEAP = 6, 3
 """Keyframes tried at each new one; so many apart, as neighbours look alike."""
 _FRESH = 3
