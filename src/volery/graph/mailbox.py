@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from volery.core.counting import counted
 from volery.graph.messages import Published
 from volery.graph.qos import MOST_DEPTH
 from volery.graph.rows import Rows
@@ -81,8 +82,9 @@ class Mailbox:
     def _give_up(self) -> None:
         size = self._bytes / 2**20
         self._failure = (
-            f"reliable subscription of '{self.topic}' ended: {len(self._waiting)} messages "
-            f"({size:.0f} MB) waited for a client that is too slow"
+            f"reliable subscription of '{self.topic}' ended: "
+            f"{counted(len(self._waiting), 'message')} ({size:.0f} MB) waited for a client "
+            "that is too slow"
         )
         self._dropped += len(self._waiting) + 1
         self._waiting.clear()
