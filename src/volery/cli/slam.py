@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from volery.cli.guard import warn
+from volery.cli.targets import check_folder
 from volery.core.counting import counted
 from volery.core.errors import RecordingError, VoleryError
 
@@ -162,8 +163,7 @@ def _check_folder(out: Path, *, overwrite: bool) -> None:
     there = [name for name in _NAMES if (out / name).exists()]
     if there and not overwrite:
         raise RecordingError(f"{out / there[0]} exists; --overwrite replaces it")
-    if out.exists() and not out.is_dir():
-        raise RecordingError(f"{out} is no folder")
+    check_folder(out, "the map")
 
 
 def _numbers(text: str | None, count: int, option: str) -> Any:
