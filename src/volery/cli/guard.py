@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import logging
 import os
 import sys
 from collections.abc import Callable
@@ -17,6 +18,20 @@ P = ParamSpec("P")
 USER_ERROR = 2
 INTERRUPTED = 130
 """128 + SIGINT, as shells have it."""
+
+
+class _Words(logging.Formatter):
+    """A level as `complain` and `warn` have it."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """`warning: ...`, with the traceback where there is one."""
+        return f"{record.levelname.lower()}: {super().format(record)}"
+
+
+def word_logs() -> None:
+    """Have what the package logs look like what its commands say."""
+    if logging.lastResort is not None:
+        logging.lastResort.setFormatter(_Words())
 
 
 def complain(text: str) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +19,7 @@ from volery.bench.registry import Result
 from volery.bridges.logs.bag import open_log
 from volery.cli import doctor
 from volery.cli.app import app
-from volery.cli.guard import guarded
+from volery.cli.guard import guarded, word_logs
 from volery.core.errors import VoleryError
 from volery.scenario import library
 from volery.scenario.load import load_scenario
@@ -91,6 +92,25 @@ def test_a_file_that_cannot_be_read_is_told_without_numbers(
     assert result.exit_code == 2
     assert "Errno" not in result.stderr
     assert result.stderr.count(str(path)) == 1
+
+
+def test_the_options_of_a_run_are_grouped() -> None:
+    told = runner.invoke(app, ["run", "--help"]).stdout
+    titles = ("The flight", "What is written", "Doors and who may enter", "ROS 2", "Autopilots")
+    groups = [f"─ {title} ─" for title in titles]
+    firsts = ("--uavs", "--record", "--page", "--ros2 ", "--px4-dir")
+    places = [told.index(text) for pair in zip(groups, firsts, strict=True) for text in pair]
+    assert places == sorted(places)
+
+
+def test_what_is_logged_looks_like_what_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    word_logs()
+    assert logging.lastResort is not None
+    for level in (logging.WARNING, logging.ERROR):
+        logging.lastResort.emit(
+            logging.LogRecord("x", level, "", 0, "%s: is gone", ("uav1",), None)
+        )
+    assert capsys.readouterr().err == "warning: uav1: is gone\nerror: uav1: is gone\n"
 
 
 def test_version() -> None:
