@@ -17,7 +17,7 @@ from volery.bench.document import read_results, render
 from volery.bench.machine import describe_machine, describe_versions
 from volery.bench.registry import Result
 from volery.bridges.logs.bag import open_log
-from volery.cli import doctor
+from volery.cli import doctor, start
 from volery.cli.app import app
 from volery.cli.guard import guarded, word_logs
 from volery.core.errors import VoleryError
@@ -111,6 +111,22 @@ def test_what_is_logged_looks_like_what_is_said(capsys: pytest.CaptureFixture[st
             logging.LogRecord("x", level, "", 0, "%s: is gone", ("uav1",), None)
         )
     assert capsys.readouterr().err == "warning: uav1: is gone\nerror: uav1: is gone\n"
+
+
+def test_an_interrupt_while_the_command_loads_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Interrupting:
+        def find_spec(self, name: str, *_: object) -> None:
+            if name == "volery.cli.app":
+                raise KeyboardInterrupt
+
+    monkeypatch.delitem(sys.modules, "volery.cli.app")
+    monkeypatch.setattr(sys, "meta_path", [Interrupting(), *sys.meta_path])
+    with pytest.raises(SystemExit) as ended:
+        start.main()
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "stopped\n"
 
 
 def test_version() -> None:
