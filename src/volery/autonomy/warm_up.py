@@ -1,8 +1,8 @@
 """Compiles the kernels of this folder's modules: of scans, the ground, obstacles and gaps.
 
 As those beside the kernels of `slam`, `mapping` and the others, these functions are named by the
-`warm_ups` of the nodes that use them. Arrays of messages are read-only: kernels that compile for
-such take all others, too.
+`warm_ups` of the nodes that use them. A kernel compiles anew for each kind of array that it meets,
+so that they hand it the very kinds that the nodes do: arrays of messages are read-only.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from volery.autonomy.depth_view import DepthProjector
 from volery.autonomy.gaps import free_distances
 from volery.autonomy.ground_plane import GroundPlane
+from volery.autonomy.lone_returns import LoneReturns
 from volery.autonomy.motion_history import MotionHistory
 from volery.autonomy.obstacle_memory import ObstacleMemory
 from volery.autonomy.scan_points import Pose, ScanProjector
@@ -58,8 +59,8 @@ def gaps() -> None:
 
 
 def scan_points() -> None:
-    """The kernel that turns scans into points."""
-    ScanProjector([0.0, 0.0, 0.0]).points(a_scan(), a_pose(0))
+    """The kernel that turns scans into points, lone returns left out."""
+    ScanProjector([0.0, 0.0, 0.0]).points(LoneReturns().left_out(a_scan()), a_pose(0))
 
 
 def depth_points() -> None:

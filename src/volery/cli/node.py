@@ -39,6 +39,7 @@ def run_node(options: NodeOptions) -> None:
     from volery.bridges.nodes.profile import Profile, absolute_names, load_profile
     from volery.graph.messages import add_definitions
     from volery.runtime.node_loading import find_node, start_node
+    from volery.runtime.warm_up.sharing import compile_all
     from volery.scenario.schema import NodeEntry
 
     profile = Profile() if options.profile is None else load_profile(options.profile)
@@ -59,7 +60,8 @@ def run_node(options: NodeOptions) -> None:
     if options.lock_step_s is not None and not 0.0 < options.lock_step_s < math.inf:
         raise BridgeError(f"--lock-step: a period in s above 0, not {options.lock_step_s:g}")
     folder = options.profile.parent if options.profile else None
-    find_node(entry, "volery node", folder)  # before it waits for a graph
+    # Before it waits for a graph, or a graph for it.
+    compile_all(find_node(entry, "volery node", folder).warm_ups())
     with closing(await_link(via, name)) as link:
         host = NodeHost(link, clock=profile.clock)
         context = host.context(absolute_names(profile.remap, namespace))

@@ -39,7 +39,9 @@ def needs_of(scenario: Scenario, *, nodes: bool = True) -> list[Task]:
 
 def all_needs() -> list[Task]:
     """What compiles everything that ships."""
-    found: list[Task] = [*parts.ALWAYS, *parts.SOMETIMES]
+    from volery.autonomy.mapping.warm_up import drawn_scans
+
+    found: list[Task] = [*parts.ALWAYS, *parts.SOMETIMES, drawn_scans]
     for node in shipped_nodes():
         found += node.warm_ups()
     return list(dict.fromkeys(found))

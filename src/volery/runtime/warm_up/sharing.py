@@ -44,6 +44,12 @@ def compiled(tasks: Sequence[Task]) -> Iterator[None]:
             do(task)
 
 
+def compile_all(tasks: Sequence[Task]) -> None:
+    """Do what of `tasks` has not been done, and nothing beside."""
+    with compiled(tasks):
+        pass
+
+
 def help_with(names: Sequence[str]) -> None:
     """In the helper: do some of the tasks of such names, whose numbers come through stdin."""
     for number in _taken_from(sys.stdin.fileno()):
