@@ -12,6 +12,7 @@ import pytest
 
 from volery.autonomy import warm_up as seeing
 from volery.autonomy.mapping import warm_up as mapping
+from volery.core.errors import NodeError, ScenarioError
 from volery.graph.node import Node
 from volery.runtime.warm_up import parts, sharing, tasks
 from volery.runtime.warm_up.needs import all_needs, needs_of
@@ -84,6 +85,37 @@ def test_the_kernels_of_a_users_node_are_asked_for_at_each_start(
     for _ in range(2):
         sharing.compile_all(found)
     assert capfd.readouterr().out == 2 * "compiled\n"
+
+
+BROKEN = """
+from volery.graph.node import Node
+
+def fail():
+    raise ValueError("no array")
+
+class Fails(Node):
+    @classmethod
+    def warm_ups(cls):
+        return (fail,)
+
+class Names(Node):
+    @classmethod
+    def warm_ups(cls):
+        return (not_there,)
+"""
+
+
+def test_a_users_warm_up_that_fails_is_told_of(
+    flat_data: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "broken_warm_ups.py").write_text(BROKEN)
+    monkeypatch.chdir(tmp_path)
+    flat_data["nodes"] = [{"node": "broken_warm_ups:Fails"}]
+    with pytest.raises(NodeError, match="broken_warm_ups:fail: ValueError: no array"):
+        sharing.compile_all(needs_of(parse_scenario(flat_data))[2:])
+    flat_data["nodes"] = [{"node": "broken_warm_ups:Names"}]
+    with pytest.raises(ScenarioError, match="Names': warm_ups: NameError"):
+        needs_of(parse_scenario(flat_data))
 
 
 def test_functions_are_found_by_their_names() -> None:

@@ -74,7 +74,7 @@ class PlanarSlam(Node):
         """What compiles its kernels."""
         from volery.autonomy.slam.planar import warm_up
 
-        return (warm_up.walls,)
+        return warm_up.walls, warm_up.told_places
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)

@@ -86,4 +86,8 @@ def _of_node(entry: NodeEntry, scenario: Scenario) -> Iterator[Task]:
         node = find_node(entry, scenario.name, scenario.folder)
     except ScenarioError:
         return  # who starts the node tells of it
-    yield from node.warm_ups()
+    try:
+        yield from node.warm_ups()
+    except Exception as error:
+        where = f"{scenario.name}: node '{entry.node}'"
+        raise ScenarioError(f"{where}: warm_ups: {type(error).__name__}: {error}") from error

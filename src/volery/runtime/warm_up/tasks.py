@@ -41,12 +41,19 @@ def is_done(task: Task) -> bool:
 
 
 def do(task: Task) -> None:
-    """Compile what the cache lacks, and mark it as done."""
+    """Compile what the cache lacks, and mark it as done.
+
+    `NodeError` where one of another package fails.
+    """
     try:
         with _quicker():
             task()
     except NodeError:
         return  # a library is missing: a node that needs it says so when it starts
+    except Exception as error:
+        if is_own(task):
+            raise
+        raise NodeError(f"warm-up {name_of(task)}: {type(error).__name__}: {error}") from error
     if is_own(task):
         _mark(task).touch()
 
