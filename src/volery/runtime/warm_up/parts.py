@@ -41,12 +41,8 @@ def dynamics() -> None:
 
 def sensing() -> None:
     """Contacts, and sensors of the kinds that most UAVs have."""
-    for count in _COUNTS:
+    for count in (2, 1):  # views of a single one have another memory layout: some more kernels
         _look_and_measure(count)
-
-
-_COUNTS = 2, 1
-"""Of UAVs: views of a single one have another memory layout, which means another kernel."""
 
 
 def _look_and_measure(count: int) -> None:
