@@ -101,7 +101,6 @@ def imu_message(time_ns, gyro, force):
 
 def scan_message(time_ns, ranges):
     last = FIRST + STEP * (BEAMS - 1)
-    ranges.flags.writeable = False  # as those of the simulation
     rest = (SWEEP_S / (BEAMS - 1), 0.025, 0.1, 60.0, ranges, np.zeros(0, np.float32))
     return LaserScan(header(time_ns, "uav1/laser"), FIRST, last, STEP, *rest)
 
