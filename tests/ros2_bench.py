@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import queue
+import socket
 
 from ros_tcp_client import until
 
@@ -13,9 +15,29 @@ from volery.bridges.ros2.names import NodeName
 from volery.graph.cdr import decode_cdr, encode_cdr
 from volery.graph.zero import zero_message
 
-DOMAIN = 1 + 10 * (os.getpid() % 10)
-"""Test runs beside each other have ten domains each of their own, below the ports that the system
-gives away by itself."""
+_RUNS, _DOMAINS_EACH = 16, 6
+"""All their ports lie below those that the system gives away by itself."""
+_BASE_PORT, _PORTS_A_DOMAIN = 7400, 250  # RTPS 2.5, 9.6.2.3
+
+
+def _own_domains():
+    """First of the domains that no other test process has, and what keeps them until this ends.
+
+    That is a TCP socket at the first one's first port: DDS uses ports of UDP alone.
+    """
+    for run in range(_RUNS):
+        first, place = 1 + _DOMAINS_EACH * run, socket.socket()
+        try:
+            place.bind(("127.0.0.1", _BASE_PORT + _PORTS_A_DOMAIN * first))
+        except OSError:
+            place.close()
+        else:
+            return first, place
+    return 1 + _DOMAINS_EACH * (os.getpid() % _RUNS), None  # shared with others, at worst
+
+
+DOMAIN, _PLACE = _own_domains()
+"""This and the five after it are the test process's own: those beside it do not see into them."""
 
 
 class Other:
@@ -42,14 +64,14 @@ class Other:
     def call(self, service, srvtype, **fields):
         """Response of a service that is there, or will be soon; None where it has left."""
         caller = self.participant.caller(ServiceSpec(self.node, service, srvtype))
-        until(lambda: caller.ready)
         request = zero_message(f"{srvtype}_Request")
         for name, value in fields.items():
             setattr(request, name, value)
         come = queue.Queue()
-        caller.call(encode_cdr(request, f"{srvtype}_Request"), come.put, lambda: come.put(None))
-        data = come.get(timeout=10.0)
-        caller.close()
+        with contextlib.closing(caller):
+            until(lambda: caller.ready)
+            caller.call(encode_cdr(request, f"{srvtype}_Request"), come.put, lambda: come.put(None))
+            data = come.get(timeout=10.0)
         return None if data is None else decode_cdr(data, f"{srvtype}_Response")
 
     def close(self):

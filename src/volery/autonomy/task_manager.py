@@ -32,12 +32,19 @@ from volery.graph.messages import (
     PoseStamped,
     Range,
     String,
+    Twist,
+    Vector3,
     message_type,
 )
 
 _PERIOD_S = 0.2
 _REPEAT_S = 2.0
 """A take-off or landing that has not begun is asked for again, and the way home."""
+_LOW_M, _SONAR_S = 1.5, 1.0
+"""Lower than this by a sonar heard so lately it climbs before it searches: planners plan nothing
+near the ground."""
+_CLIMB_M_S, _CLIMB_END_M = 1.0, 0.3
+"""How fast it climbs then, and how far below its height the speed is asked for no more."""
 _RISE_S = 30.0
 """A take-off that takes longer has failed."""
 _RETURN_STUCK_S = 60.0
@@ -98,6 +105,10 @@ class TaskManager(TeamMember):
         "_paused",
         "_stands_m",
         "_low_ns",
+        "_sonar_m",
+        "_sonar_ns",
+        "_has_risen",
+        "_climbs",
         "_explores",
         *TeamMember.STATE,
     )
@@ -120,6 +131,12 @@ class TaskManager(TeamMember):
         """Height in the map of the place on which it stood last, and ..."""
         self._low_ns: int | None = None
         """... since when its sonar says that it stands on the ground; None: it does not."""
+        self._sonar_m, self._sonar_ns = math.inf, -1 << 62
+        """Height above ground by its sonar, and when it said so."""
+        self._has_risen = False
+        """Whether the last climb has come to its end."""
+        self._climbs = False
+        """Whether it rises from a place in the air, which no take-off does."""
         self._explores = False
         """Whether the explorer has taken up the present sector."""
         self._area = self.create_publisher(PolygonStamped, "search_area", 1, latched=True)
@@ -127,6 +144,7 @@ class TaskManager(TeamMember):
         self._take_off = self.create_client("volery_interfaces/srv/TakeOffTo", "take_off_to")
         self._land = self.create_client("std_srvs/srv/Trigger", "land")
         self._hold = self.create_client("std_srvs/srv/Trigger", "hold")
+        self._command = self.create_publisher(Twist, "cmd_vel", 1)
         self._pause = self.create_publisher(Bool, "planning/pause", 1, latched=True)
         for order in ("return_home", "hold", "land", "resume"):
             self.create_service("std_srvs/srv/Trigger", f"~/{order}", getattr(self, f"_on_{order}"))
@@ -145,6 +163,7 @@ class TaskManager(TeamMember):
             self._drop(now)
 
     def _on_range(self, message: Range) -> None:
+        self._sonar_m, self._sonar_ns = max(float(message.range), 0.0), self.now_ns
         if not (message.range <= _GROUND_M):  # too near to be measured is -inf
             self._low_ns = None
         elif self._low_ns is None:
@@ -187,7 +206,7 @@ class TaskManager(TeamMember):
         if self._is_aloft():
             if self.phase is not Phase.RETURN:
                 self._call(self._hold)
-            self._enter(Phase.IDLE)
+            self._search_or_climb(float(self._pose.position[2]))
         else:
             self._stands_m = float(self._pose.position[2])
             self._asked_ns = -1 << 62
@@ -195,6 +214,14 @@ class TaskManager(TeamMember):
         self._order = ""
         self._set_pause(False)
         return _answer(response, True, "searches")
+
+    def _search_or_climb(self, height_m: float) -> None:
+        """Go on in the air, at a height in the map: first upwards where planners would not plan."""
+        is_low = self.now_ns - self._sonar_ns < _SONAR_S * NS_PER_S and self._sonar_m < _LOW_M
+        if is_low:
+            self._stands_m = height_m - self._sonar_m
+        self._enter(Phase.RISE if is_low or not self._has_risen else Phase.IDLE)
+        self._climbs = self.phase is Phase.RISE
 
     def _is_aloft(self) -> bool:
         """Whether it flies, whoever had it take off."""
@@ -279,9 +306,13 @@ class TaskManager(TeamMember):
     def _rise(self, pose: Pose, now: int) -> None:
         climbed = pose.position[2] - self._stands_m
         if climbed > 0.8 * self.settings.altitude_m and abs(pose.velocity[2]) < _STILL_M_S:
+            self._has_risen = True
             self._enter(Phase.IDLE)
         elif now - self._phase_ns > _RISE_S * NS_PER_S:
             self._enter(Phase.DOWN if climbed < _LANDED_M else Phase.LAND)
+        elif self._climbs:
+            if climbed < self.settings.altitude_m - _CLIMB_END_M:
+                self._command.publish(Twist(Vector3(0.0, 0.0, _CLIMB_M_S), Vector3(0.0, 0.0, 0.0)))
         elif climbed < _LANDED_M:
             request = message_type("volery_interfaces/srv/TakeOffTo_Request")
             self._ask_now_and_then(self._take_off, request(self.settings.altitude_m))
@@ -384,6 +415,9 @@ class TaskManager(TeamMember):
 
     def _enter(self, phase: Phase) -> None:
         self._highest_m = -math.inf
+        self._climbs = False
+        if phase in (Phase.DONE, Phase.DOWN):
+            self._has_risen = False
         self.phase, self._phase_ns = phase, self.now_ns
         if phase in (Phase.DONE, Phase.DOWN) and self._pose is not None:
             self._stands_m = float(self._pose.position[2])

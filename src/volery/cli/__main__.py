@@ -1,5 +1,5 @@
 """`python -m volery.cli` is the command `volery`."""
 
-from volery.cli.app import main
+from volery.cli.start import main
 
 main()

@@ -8,6 +8,7 @@ import typer
 
 from volery.cli.flight_commands import launch, list_scenarios, play, px4, run, serve
 from volery.cli.graph_commands import node, service_app, topic_app
+from volery.cli.guard import word_logs
 from volery.cli.log_commands import convert, info, recover, report, slam
 from volery.cli.machine_commands import bench, doctor
 from volery.cli.model_commands import export, identify, interfaces
@@ -72,6 +73,7 @@ app.add_typer(service_app, name="service")
 
 def main() -> None:
     """Entry point of the command `volery`."""
+    word_logs()
     app()
 
 

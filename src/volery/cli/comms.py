@@ -49,5 +49,5 @@ def summary(counted: Statistics) -> str:
     return (
         f"stations {counted.present} here, {counted.away} away · messages {counted.accepted} in, "
         f"{counted.delivered} out, {counted.waiting} waiting, {lost} lost by rule · "
-        f"{refused} refused · {sum(counted.corrupt.values())} damaged frames"
+        f"{refused} refused · damaged frames {sum(counted.corrupt.values())}"
     )

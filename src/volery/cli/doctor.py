@@ -11,6 +11,8 @@ from pathlib import Path
 
 import typer
 
+from volery.core.counting import counted
+
 _PYTHON = (3, 11)
 _MEMORY_GIB = 2.0
 _DISK_GIB = 1.0
@@ -85,7 +87,7 @@ def _kernels() -> str:
             "set VOLERY_CACHE_DIR to a folder that is"
         )
     count = sum(1 for _ in folder.rglob("*.nbc"))
-    state = f"{count} compiled kernels" if count else "empty, the first flight compiles"
+    state = counted(count, "compiled kernel") if count else "empty, the first flight compiles"
     return f"{folder} ({state})"
 
 

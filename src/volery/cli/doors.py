@@ -63,7 +63,12 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
     more = {
         "comms": DoorKind(10200, _comms),
         "mavlink": DoorKind(14540, lambda address, terms: _mavlink(address, terms, key)),
-        "px4": DoorKind(4560, lambda address, terms: _px4(address, terms, patience)),
+        "px4": DoorKind(
+            4560,
+            lambda address, terms: _px4(
+                address, terms, patience, are_ours=options.px4_dir is not None
+            ),
+        ),
         "px4-serial": DoorKind(
             921600, lambda address, _terms: _px4_serial(address, patience), on_line=True
         ),
@@ -117,10 +122,17 @@ def _key_of(options: RunOptions) -> bytes | None:
     return key_of(options.mavlink_key)
 
 
-def _px4(address: Address, terms: Terms, patience: Patience) -> Door:
+def _px4(address: Address, terms: Terms, patience: Patience, *, are_ours: bool) -> Door:
+    """`are_ours`: the run starts the PX4s, and tells by itself of those that do not come."""
+    from volery.mavlink.absence import NOTICE_S
     from volery.mavlink.px4_door import Px4Door
 
-    return Px4Door(*address, patience=patience, anywhere=terms.anywhere)
+    return Px4Door(
+        *address,
+        patience=patience,
+        anywhere=terms.anywhere,
+        notice_s=None if are_ours else NOTICE_S,
+    )
 
 
 def _px4_serial(address: Address, patience: Patience) -> Door:

@@ -15,6 +15,7 @@ from volery.cli.interrupt import Interrupts
 from volery.cli.keys import Keys
 from volery.cli.progress import FlightProgress
 from volery.cli.steering import steer
+from volery.core.counting import counted
 from volery.core.errors import RecordingError, VoleryError
 
 if TYPE_CHECKING:
@@ -178,7 +179,7 @@ class Flight:
         head = f"{trouble}: flew" if trouble else "Flew"
         since = " since the last reset" if self._before_s else ""
         typer.echo(
-            f"{head} {simulated:.1f} s{since} with {count} UAV{'s' if count != 1 else ''} "
+            f"{head} {simulated:.1f} s{since} with {counted(count, 'UAV')} "
             f"in {self._wall_s:.1f} s ({factor:.1f} x real time){self._reason(trouble)}"
         )
         city = self._simulation.city
@@ -189,7 +190,9 @@ class Flight:
             typer.echo(f"  {event.describe()}")
         if len(events) > _CONTACTS_SHOWN:
             counts = Counter(event.uav for event in events)
-            typer.echo(f"  and more: {len(events)} contacts of {len(counts)} UAVs in all")
+            typer.echo(
+                f"  and more: {len(events)} contacts of {counted(len(counts), 'UAV')} in all"
+            )
 
     def _reason(self, trouble: str) -> str:
         """Why a flight that nobody stopped is over before its time."""
@@ -204,7 +207,7 @@ class Flight:
     def _tell_files(self, report: Path | None) -> None:
         if self._log is not None:
             size = self._log.path.stat().st_size / 1e6
-            messages = f"{self._log.messages:,} messages"
+            messages = counted(self._log.messages, "message")
             typer.echo(f"log     {self._log.path} ({size:.1f} MB, {messages})")
         if report is not None:
             typer.echo(f"report  {report}")

@@ -7,10 +7,12 @@ from typing import Annotated
 
 import typer
 
+from volery.cli import run_words
 from volery.cli.guard import guarded
 from volery.cli.options import (
     DomainOption,
     DoorsOption,
+    DoorTokenOption,
     DropOption,
     InterfaceOption,
     MavlinkKeyOption,
@@ -20,60 +22,33 @@ from volery.cli.options import (
     Ros2Option,
     SilenceOption,
     ThreadsOption,
-    TokenOption,
 )
 from volery.core.errors import BridgeError
 
 
 @guarded
 def run(
-    scenario: Annotated[str, typer.Argument(help="Name from `volery list`, or a TOML file.")],
-    uavs: Annotated[int | None, typer.Option(help="Number of UAVs.")] = None,
-    seconds: Annotated[float | None, typer.Option(help="Simulated seconds to fly.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of everything random.")] = None,
-    no_nodes: Annotated[
-        bool,
-        typer.Option("--no-nodes", help="Without the scenario's nodes: they run elsewhere."),
-    ] = False,
-    speed: Annotated[
-        str | None,
-        typer.Option(help="Factor of real time, such as 1 or 2.5, or max; 1 where doors are open."),
-    ] = None,
+    scenario: run_words.Scenario,
+    uavs: run_words.Uavs = None,
+    seconds: run_words.Seconds = None,
+    seed: run_words.Seed = None,
+    no_nodes: run_words.NoNodes = False,
+    speed: run_words.Speed = None,
     threads: ThreadsOption = None,
-    record: Annotated[
-        Path | None, typer.Option(help="Write a log: .mcap (ROS 2) or .bag (ROS 1).")
-    ] = None,
-    report: Annotated[
-        Path | None, typer.Option(help="Write an illustrated report into this folder.")
-    ] = None,
+    replay_commands: run_words.ReplayCommands = None,
+    record: run_words.Record = None,
+    report: run_words.Report = None,
+    recordings: run_words.Recordings = None,
+    overwrite: run_words.Overwrite = False,
+    digest: run_words.Digest = False,
+    page: run_words.Page = None,
     door: DoorsOption = None,
     allow_remote: RemoteOption = False,
-    token: TokenOption = None,
+    token: DoorTokenOption = None,
     ros2: Ros2Option = False,
     domain_id: DomainOption = None,
     middleware: MiddlewareOption = "dds",
     ros2_interface: InterfaceOption = None,
-    recordings: Annotated[
-        Path | None,
-        typer.Option(help="Folder in which clients may record: /volery/start_recording."),
-    ] = None,
-    replay_commands: Annotated[
-        Path | None,
-        typer.Option(help="Give every command again that clients gave in this recorded flight."),
-    ] = None,
-    digest: Annotated[
-        bool, typer.Option("--digest", help="Print the SHA-256 over all states and messages.")
-    ] = False,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace an existing log.")
-    ] = False,
-    page: Annotated[
-        str | None,
-        typer.Option(
-            metavar="[=HOST:PORT]",
-            help="Show the flight on a page in the browser; at 127.0.0.1:8080 unless said.",
-        ),
-    ] = None,
     px4_dir: Px4DirOption = None,
     autopilot_timeout: SilenceOption = 10.0,
     drop_silent: DropOption = False,
@@ -82,8 +57,7 @@ def run(
     """Fly a scenario.
 
     Doors: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, ros2, ros2-zenoh,
-    sensor-link, comms, mavlink, mavlink-tcp, mavlink-serial, px4,
-    px4-serial, ardupilot.
+    sensor-link, comms, mavlink, mavlink-tcp, mavlink-serial, px4, px4-serial, ardupilot.
 
     At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
     + and - double and halve the speed, m frees it. Ctrl-C ends the flight and still writes log and
@@ -209,7 +183,7 @@ def play(
     paused: Annotated[bool, typer.Option("--paused", help="Wait at the beginning.")] = False,
     door: DoorsOption = None,
     allow_remote: RemoteOption = False,
-    token: TokenOption = None,
+    token: DoorTokenOption = None,
 ) -> None:
     """Play a recorded log behind doors, rosbridge unless others are named, until Ctrl-C.
 

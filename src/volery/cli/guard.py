@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import logging
 import os
 import sys
 from collections.abc import Callable
@@ -19,6 +20,20 @@ INTERRUPTED = 130
 """128 + SIGINT, as shells have it."""
 
 
+class _Words(logging.Formatter):
+    """A level as `complain` and `warn` have it."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """`warning: ...`, with the traceback where there is one."""
+        return f"{record.levelname.lower()}: {super().format(record)}"
+
+
+def word_logs() -> None:
+    """Have what the package logs look like what its commands say."""
+    if logging.lastResort is not None:
+        logging.lastResort.setFormatter(_Words())
+
+
 def complain(text: str) -> None:
     """Say `error: ...` on stderr."""
     typer.echo(f"error: {text}", err=True)
@@ -29,6 +44,13 @@ def warn(text: str) -> None:
     typer.echo(f"warning: {text}", err=True)
 
 
+def _was_interrupted(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: libraries that are being imported make others of it."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
 def guarded(command: Callable[P, None]) -> Callable[P, None]:
     """Turn a user's mistakes and Ctrl-C into a line and an exit code."""
 
@@ -36,12 +58,12 @@ def guarded(command: Callable[P, None]) -> Callable[P, None]:
     def run(*arguments: P.args, **options: P.kwargs) -> None:
         try:
             command(*arguments, **options)
-        except VoleryError as error:
+        except (VoleryError, KeyboardInterrupt) as error:
+            if _was_interrupted(error):
+                typer.echo("stopped", err=True)
+                raise typer.Exit(INTERRUPTED) from None
             complain(str(error))
             raise typer.Exit(USER_ERROR) from None
-        except KeyboardInterrupt:
-            typer.echo("stopped", err=True)
-            raise typer.Exit(INTERRUPTED) from None
         except BrokenPipeError:
             # The reader of our output went away (`volery list | head -1`): end quietly.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from volery.cli.links import DEFAULT_VIA, LinkTold, await_link
+from volery.cli.links import DEFAULT_VIA, LinkTold, await_link, join_late
 from volery.core.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ def launch_profile(
     `BridgeError` where it names no nodes.
     """
     from volery.bridges.nodes.host import NodeHost
+    from volery.bridges.nodes.late_link import LateLink
     from volery.bridges.nodes.profile import load_profile
 
     profile = load_profile(path)
@@ -34,14 +35,15 @@ def launch_profile(
     if namespace is not None:
         profile = profile.model_copy(update={"namespace": namespace})
     way = via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
-    with closing(await_link(way, profile.name)) as link:
-        host = NodeHost(link, clock=profile.clock)
+    with closing(LateLink(profile.name, lambda: await_link(way, profile.name))) as late:
+        host = NodeHost(late, clock=profile.clock)
         nodes = start_profile(profile, host, path.parent)
-        if lock_step_s is not None:
-            host.join_lock_step(profile.name, lock_step_s)
-        names = ", ".join(node.get_name() for node in nodes)
-        typer.echo(f"{names} run on {way}; Ctrl-C ends them", err=True)
         try:
+            link = join_late(late, host)
+            if lock_step_s is not None:
+                host.join_lock_step(profile.name, lock_step_s)
+            names = ", ".join(node.get_name() for node in nodes)
+            typer.echo(f"{names} run on {way}; Ctrl-C ends them", err=True)
             host.spin(LinkTold(link, way))
         finally:
             for node in nodes:

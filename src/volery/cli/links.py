@@ -11,6 +11,8 @@ import typer
 from volery.core.errors import BridgeError, UnreachableError
 
 if TYPE_CHECKING:
+    from volery.bridges.nodes.host import NodeHost
+    from volery.bridges.nodes.late_link import LateLink
     from volery.bridges.ros2.environment import Ros2Terms
     from volery.graph.link import Link
 
@@ -64,6 +66,14 @@ def await_link(via: str, name: str, patience_s: float = PATIENCE_S) -> Link:
                 told = True
                 typer.echo(f"{error}; waits {patience_s:.0f} s for it", err=True)
             time.sleep(_AGAIN_S)
+
+
+def join_late(late: LateLink, host: NodeHost) -> Link:
+    """Join the graph of nodes that are there already; their timers count from then on."""
+    before_ns = host.now_ns()
+    link = late.join()
+    host.postpone(host.now_ns() - before_ns)
+    return link
 
 
 class LinkTold:

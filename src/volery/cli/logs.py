@@ -51,7 +51,7 @@ def recover_log(path: Path, out: Path | None) -> None:
     if recovery.trouble:
         typer.echo(f"{path}: {recovery.trouble}")
     typer.echo(
-        f"{recovery.messages:,} messages up to {recovery.end_ns / NS_PER_S:.3f} s "
+        f"{counted(recovery.messages, 'message')} up to {recovery.end_ns / NS_PER_S:.3f} s "
         f"written to {recovery.path}"
     )
 

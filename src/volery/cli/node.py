@@ -12,7 +12,7 @@ from typing import Any
 
 import typer
 
-from volery.cli.links import DEFAULT_VIA, ROS2_WAYS, LinkTold, await_link
+from volery.cli.links import DEFAULT_VIA, ROS2_WAYS, LinkTold, await_link, join_late
 from volery.cli.yaml_form import from_yaml
 from volery.core.errors import BridgeError
 
@@ -36,9 +36,10 @@ def run_node(options: NodeOptions) -> None:
     from pydantic import ValidationError
 
     from volery.bridges.nodes.host import NodeHost
+    from volery.bridges.nodes.late_link import LateLink
     from volery.bridges.nodes.profile import Profile, absolute_names, load_profile
     from volery.graph.messages import add_definitions
-    from volery.runtime.node_loading import find_node, start_node
+    from volery.runtime.node_loading import start_node
     from volery.runtime.warm_up.sharing import compile_all
     from volery.scenario.schema import NodeEntry
 
@@ -60,16 +61,16 @@ def run_node(options: NodeOptions) -> None:
     if options.lock_step_s is not None and not 0.0 < options.lock_step_s < math.inf:
         raise BridgeError(f"--lock-step: a period in s above 0, not {options.lock_step_s:g}")
     folder = options.profile.parent if options.profile else None
-    # Before it waits for a graph, or a graph for it.
-    compile_all(find_node(entry, "volery node", folder).warm_ups())
-    with closing(await_link(via, name)) as link:
-        host = NodeHost(link, clock=profile.clock)
+    with closing(LateLink(name, lambda: await_link(via, name))) as late:
+        host = NodeHost(late, clock=profile.clock)
         context = host.context(absolute_names(profile.remap, namespace))
         node = start_node(entry, context, namespace, "volery node", folder)
-        if options.lock_step_s is not None:
-            host.join_lock_step(node.get_name(), options.lock_step_s)
-        typer.echo(f"{node.get_name()} runs on {via}; Ctrl-C ends it", err=True)
         try:
+            compile_all(node.warm_ups())  # before the graph, or a clock in lock step, waits for it
+            link = join_late(late, host)
+            if options.lock_step_s is not None:
+                host.join_lock_step(node.get_name(), options.lock_step_s)
+            typer.echo(f"{node.get_name()} runs on {via}; Ctrl-C ends it", err=True)
             host.spin(LinkTold(link, via))
         finally:
             node.destroy_node()

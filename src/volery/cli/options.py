@@ -8,48 +8,92 @@ from typing import Annotated, Any, Literal
 import typer
 from typer.core import TyperCommand
 
+FLIGHT, FILES, DOORS = "The flight", "What is written", "Doors and who may enter"
+ROS2, AUTOPILOTS = "ROS 2", "Autopilots"
+"""How a help groups many options."""
+
 DoorsOption = Annotated[
     list[str] | None,
-    typer.Option(help="Open a door to other programs: NAME or NAME=[HOST:]PORT, repeatable."),
+    typer.Option(
+        help="Open a door to other programs: NAME or NAME=[HOST:]PORT, repeatable.",
+        rich_help_panel=DOORS,
+    ),
 ]
 RemoteOption = Annotated[
-    bool, typer.Option("--allow-remote", help="Let doors listen beyond this machine.")
+    bool,
+    typer.Option(
+        "--allow-remote", help="Let doors listen beyond this machine.", rich_help_panel=DOORS
+    ),
 ]
 TokenOption = Annotated[
     str | None, typer.Option(envvar="VOLERY_TOKEN", help="What remote clients must show.")
 ]
+DoorTokenOption = Annotated[
+    str | None,
+    typer.Option(
+        envvar="VOLERY_TOKEN", help="What remote clients must show.", rich_help_panel=DOORS
+    ),
+]
 Ros2Option = Annotated[
-    bool, typer.Option("--ros2", help="Take part in a ROS 2 graph: the door ros2 or ros2-zenoh.")
+    bool,
+    typer.Option(
+        "--ros2",
+        help="Take part in a ROS 2 graph: the door ros2 or ros2-zenoh.",
+        rich_help_panel=ROS2,
+    ),
 ]
 DomainOption = Annotated[
     int | None,
-    typer.Option(min=0, max=232, help="ROS 2 domain; ROS_DOMAIN_ID unless given."),
+    typer.Option(
+        min=0, max=232, help="ROS 2 domain; ROS_DOMAIN_ID unless given.", rich_help_panel=ROS2
+    ),
 ]
 MiddlewareOption = Annotated[
-    Literal["dds", "zenoh"], typer.Option(help="How --ros2 talks to ROS 2.")
+    Literal["dds", "zenoh"],
+    typer.Option(help="How --ros2 talks to ROS 2.", rich_help_panel=ROS2),
 ]
 InterfaceOption = Annotated[
     list[str] | None,
-    typer.Option(help="Network interface for ROS 2 over DDS, repeatable; else this machine alone."),
+    typer.Option(
+        help="Network interface for ROS 2 over DDS, repeatable; else this machine alone.",
+        rich_help_panel=ROS2,
+    ),
 ]
 ThreadsOption = Annotated[
-    int | None, typer.Option(min=1, max=256, help="Threads; results do not depend on it.")
+    int | None,
+    typer.Option(
+        min=1, max=256, help="Threads; results do not depend on it.", rich_help_panel=FLIGHT
+    ),
 ]
 Px4DirOption = Annotated[
     Path | None,
-    typer.Option(help="Run the PX4 of this folder for each UAV; opens the door px4."),
+    typer.Option(
+        help="Run the PX4 of this folder for each UAV; opens the door px4.",
+        rich_help_panel=AUTOPILOTS,
+    ),
 ]
 SilenceOption = Annotated[
     float,
-    typer.Option(min=0.1, help="Wall seconds that an autopilot in lock step may be silent."),
+    typer.Option(
+        min=0.1,
+        help="Wall seconds that an autopilot in lock step may be silent.",
+        rich_help_panel=AUTOPILOTS,
+    ),
 ]
 MavlinkKeyOption = Annotated[
     Path | None,
-    typer.Option(help="File with a text whose SHA-256 signs MAVLink; what is unsigned counts not."),
+    typer.Option(
+        help="File with a text whose SHA-256 signs MAVLink; what is unsigned counts not.",
+        rich_help_panel=AUTOPILOTS,
+    ),
 ]
 DropOption = Annotated[
     bool,
-    typer.Option("--drop-silent", help="Go on without a silent autopilot; else the run ends."),
+    typer.Option(
+        "--drop-silent",
+        help="Go on without a silent autopilot; else the run ends.",
+        rich_help_panel=AUTOPILOTS,
+    ),
 ]
 
 BatchSizeOption = Annotated[

@@ -13,6 +13,7 @@ from volery.cli.flight import RunOptions
 from volery.cli.interrupt import Interrupts
 from volery.cli.keys import Keys
 from volery.cli.steering import steer
+from volery.core.counting import counted
 
 _DOORS = ("rosbridge",)
 """Opened where no door is named: a log is played for somebody."""
@@ -58,6 +59,7 @@ def _introduce(player: Any) -> None:
     told = player.describe()
     what = f", a flight of '{told['scenario']}'" if told["scenario"] else ""
     span = f"{player.start_s:.3f} to {player.end_s:.3f} s"
-    typer.echo(f"playing {player.path} ({span}, {sum(told['counts']):,} messages{what})", err=True)
+    messages = counted(sum(told["counts"]), "message")
+    typer.echo(f"playing {player.path} ({span}, {messages}{what})", err=True)
     if told["trouble"]:
         typer.echo(f"        {told['trouble']}", err=True)

@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from volery.cli.guard import warn
+from volery.cli.targets import check_folder
 from volery.core.counting import counted
 from volery.core.errors import RecordingError, VoleryError
 
 if TYPE_CHECKING:
+    from volery.runtime.slam_run.beginning import Pose
     from volery.runtime.slam_run.run import Outcome, SlamOptions, SlamRun
     from volery.runtime.slam_run.sources import LogSource, TextSource
 
@@ -77,7 +79,7 @@ def map_log(asked: SlamAsked) -> None:
     )
     run = _run(source, options)
     others = other_uavs(source.topics, run.channels.uav)
-    typer.echo(f"mapping {asked.log}", err=True)
+    typer.echo(f"mapping {asked.log}{_beginning(run.start, start)}", err=True)
     if others and asked.uav is None and asked.scan is None:
         warn(f"{run.channels.uav} is mapped; the log has {', '.join(others)}, too: --uav")
     try:
@@ -86,7 +88,7 @@ def map_log(asked: SlamAsked) -> None:
         for trouble in filter(None, (source.trouble, *source.doubts)):
             warn(f"{asked.log}: {trouble}")
     cell_m = _write(asked, outcome)
-    _tell(asked.out, _summary(asked, outcome, source.refused, cell_m))
+    _tell(asked.out, _summary(asked, outcome, source.refused, cell_m, run.start))
     _advise(outcome, source.topics)
     _compare_ways(outcome)
 
@@ -101,6 +103,20 @@ def _run(source: LogSource | TextSource, options: SlamOptions) -> SlamRun:
         if not source.damage:
             raise
         raise RecordingError(f"{error}; the log is {source.damage}") from None
+
+
+def _beginning(start: Pose | None, asked: Pose | None) -> str:
+    """Where it begins, if the log has told it."""
+    if start is None or asked is not None:
+        return ""
+    x, y, z, yaw = _in_degrees(start)
+    return f" from {x:g}, {y:g}, {z:g} m, {yaw:g} degrees, as it tells; --start says otherwise"
+
+
+def _in_degrees(start: Pose | None) -> tuple[float, float, float, float]:
+    """x, y, z, m, and yaw, degrees, for people; the map's origin where nothing tells it."""
+    x, y, z, yaw = start or (0.0, 0.0, 0.0, 0.0)
+    return round(x, 2), round(y, 2), round(z, 2), round(math.degrees(yaw), 1)
 
 
 class _Progress:
@@ -147,8 +163,7 @@ def _check_folder(out: Path, *, overwrite: bool) -> None:
     there = [name for name in _NAMES if (out / name).exists()]
     if there and not overwrite:
         raise RecordingError(f"{out / there[0]} exists; --overwrite replaces it")
-    if out.exists() and not out.is_dir():
-        raise RecordingError(f"{out} is no folder")
+    check_folder(out, "the map")
 
 
 def _numbers(text: str | None, count: int, option: str) -> Any:
@@ -199,7 +214,11 @@ def _write_map(asked: SlamAsked, outcome: Outcome) -> float:
 
 
 def _summary(
-    asked: SlamAsked, outcome: Outcome, refused: int, cell_m: float | None
+    asked: SlamAsked,
+    outcome: Outcome,
+    refused: int,
+    cell_m: float | None,
+    start: Pose | None,
 ) -> dict[str, Any]:
     status = outcome.status
     told = {
@@ -207,6 +226,7 @@ def _summary(
         "uav": outcome.channels.uav,
         "mode": "imu" if outcome.channels.has_imu else "planar",
         "topics": outcome.channels.names,
+        "start": _in_degrees(start),
         "scans": outcome.heard,
         "lasted_s": round(outcome.lasted_s, 3),
         "way_m": round(outcome.trajectory.length_m, 2),

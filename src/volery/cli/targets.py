@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 
-from volery.core.errors import RecordingError, VoleryError
+from volery.core.errors import RecordingError, VoleryError, reason_of
 
 
 def check_record(path: Path, *, overwrite: bool) -> None:
@@ -23,6 +24,20 @@ def check_report(folder: Path) -> None:
 
     _check_parent(folder, "the report")
     check_folder(folder)
+
+
+def check_folder(folder: Path, what: str) -> None:
+    """Refuse a folder in which `what` could not be written, or made where it would be."""
+    if folder.exists() and not folder.is_dir():
+        raise VoleryError(f"{folder} is no folder")
+    place = folder.absolute()
+    while not place.exists():
+        place = place.parent
+    try:
+        with tempfile.TemporaryDirectory(prefix=".volery-", dir=place):
+            return
+    except OSError as error:
+        raise VoleryError(f"{folder}: cannot write {what} there: {reason_of(error)}") from None
 
 
 def _check_parent(path: Path, what: str) -> None:

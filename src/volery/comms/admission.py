@@ -5,6 +5,7 @@ from __future__ import annotations
 from volery.comms.addresses import Identity
 from volery.comms.bodies import Hello, Reason, Refusal
 from volery.comms.settings import RouterSettings
+from volery.core.counting import counted
 from volery.core.errors import CommsError
 from volery.core.listening import shows_token
 
@@ -15,7 +16,7 @@ def admit(hello: Hello, source: int, settings: RouterSettings) -> Refusal | None
         return Refusal(Reason.TOKEN, 0, "the token is wrong, or there is none")
     planes = settings.planes_per_batch
     if hello.planes_per_batch != planes:
-        text = f"here a batch has {planes} planes, not {hello.planes_per_batch}"
+        text = f"here a batch has {counted(planes, 'plane')}, not {hello.planes_per_batch}"
         return Refusal(Reason.BATCH_SIZE, 0, text)
     try:
         address = Identity(hello.batch, hello.plane).address(planes)

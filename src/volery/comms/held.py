@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from volery.comms.addresses import is_station
 from volery.comms.protocol import Kind
+from volery.core.counting import counted
 from volery.core.errors import CommsError
 
 MOST_A_DESTINATION = 1024
@@ -45,8 +46,8 @@ class Held:
             oldest = next((s for s, held in there.items() if held is Kind.SENSING), None)
             if kind is Kind.COMMAND or oldest is None:
                 raise CommsError(
-                    f"{len(there)} messages to {destination} and {len(self._messages)} in all are "
-                    "not settled yet: no room for another one"
+                    f"{counted(len(there), 'message')} to {destination} and "
+                    f"{len(self._messages)} in all are not settled yet: no room for another one"
                 )
             self.dropped += 1
             self._remove(oldest)

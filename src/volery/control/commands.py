@@ -261,7 +261,17 @@ class FleetCommands:
 
     def land(self, i: int) -> None:
         """Let UAV `i` stop, descend straight down and stop its rotors on the ground."""
-        self._enter_guided(i, FlightMode.LAND)["braking"] = True
+        pilot = self._enter_guided(i, FlightMode.LAND)
+        pilot["braking"] = True
+        pilot["sink"] = 0.0
+
+    def set_landing_speed(self, i: int, speed_m_s: float) -> None:
+        """Let the present landing of UAV `i` sink at a speed other than its airframe's own."""
+        if not (math.isfinite(speed_m_s) and speed_m_s > 0.0):
+            raise CommandError(f"landing speed = {speed_m_s} m/s is not above 0")
+        if self.mode(i) is not FlightMode.LAND:
+            raise CommandError(f"{self.names[i]} does not land ({self.mode(i).name})")
+        self._pilots["sink"][i] = speed_m_s
 
     def return_home(self, i: int, height_m: float = DEFAULT_RETURN_HEIGHT_M) -> None:
         """Let UAV `i` fly back at least `height_m` above its home, and land there."""
@@ -270,6 +280,7 @@ class FleetCommands:
         pilot = self._enter_guided(i, FlightMode.RETURN)
         pilot["braking"] = True
         pilot["phase"] = 0
+        pilot["sink"] = 0.0
         pilot["return_height"] = max(
             float(pilot["home"][2]) + height_m, float(self._believed(i).position[2])
         )

@@ -11,6 +11,7 @@ from volery.control.belief import new_beliefs
 from volery.control.flight_modes import FlightMode
 from volery.control.setpoints import checked, new_pilots
 from volery.control.step import UAV
+from volery.core.counting import counted
 from volery.core.errors import CommandError
 from volery.vehicle.fleet import NEVER, new_bodies
 from volery.vehicle.plants import Plant
@@ -36,7 +37,7 @@ def checked_plants(plants: Plant | Sequence[Plant], count: int) -> tuple[Plant, 
     """One plant a UAV. CommandError where there are more or fewer."""
     plants = tuple(plants) if isinstance(plants, Sequence) else (plants,) * count
     if len(plants) != count:
-        raise CommandError(f"there are {len(plants)} plants for {count} UAVs")
+        raise CommandError(f"{counted(len(plants), 'plant')} for {counted(count, 'UAV')}")
     return plants
 
 

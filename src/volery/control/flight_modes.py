@@ -138,7 +138,8 @@ def plan(
         else:
             lead_level(pilot, estimate, gains, gains.speed)
         if pilot.mode == LAND:
-            steer_height(pilot, estimate, gains, -gains.landing)
+            sink = pilot.sink if pilot.sink > 0.0 else gains.landing
+            steer_height(pilot, estimate, gains, -sink)
         elif pilot.braking:
             brake_height(pilot, estimate, gains)
         else:

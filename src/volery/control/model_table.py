@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from volery.control.gains import ControlRates, gains_of
 from volery.control.step import MODEL
+from volery.core.counting import counted
 from volery.core.errors import CommandError
 from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe
@@ -62,11 +63,11 @@ def checked_wear(
     """Wear of each UAV's rotors, an empty one where all are new. CommandError if it fits none."""
     worn = [tuple(one) for one in wear or [()] * len(airframes)]
     if len(worn) != len(airframes):
-        raise CommandError(f"wear is given for {len(worn)} UAVs, not {len(airframes)}")
+        raise CommandError(f"wear is given for {counted(len(worn), 'UAV')}, not {len(airframes)}")
     for name, airframe, rotors in zip(names, airframes, worn, strict=True):
         if len(rotors) not in (0, len(airframe.rotors.places)):
             raise CommandError(
-                f"wear of {name} names {len(rotors)} rotors; {airframe.name} has "
+                f"wear of {name} names {counted(len(rotors), 'rotor')}; {airframe.name} has "
                 f"{len(airframe.rotors.places)}"
             )
     return worn

@@ -69,6 +69,7 @@ PILOT = np.dtype(
         ("path_row", "i8"),  # the segment flown now
         ("home", "f8", 3),  # m, map: where the last take-off began
         ("return_height", "f8"),  # m, map
+        ("sink", "f8"),  # m/s at which LAND descends; 0: the airframe's own speed
         ("position_target", "f8", 3),  # m, map
         ("velocity_target", "f8", 3),  # m/s, map or heading frame
         ("acceleration_target", "f8", 3),  # m/s^2, map

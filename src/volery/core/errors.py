@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from enum import Enum
 
 
@@ -79,3 +80,15 @@ class PlanError(VoleryError):
 
 class CommsError(VoleryError):
     """A message cannot be sent over the radio network, or a station cannot join it."""
+
+
+def reason_of(error: Exception) -> str:
+    """Why something failed, in words for people: an `OSError` without number, names and addresses.
+
+    asyncio tells of a refused connection as "Connect call failed ('127.0.0.1', 9090)".
+    """
+    number = error.errno if isinstance(error, OSError) else None
+    if number is not None and number > 0:  # those of failed look-ups of names are negative
+        return os.strerror(number)
+    told = error.strerror if isinstance(error, OSError) else None
+    return told or str(error) or type(error).__name__

@@ -17,6 +17,7 @@ from typing import Any
 
 from rosbags.interfaces import Nodetype
 
+from volery.core.counting import counted
 from volery.core.errors import GraphError
 
 INTEGER_RANGES = {
@@ -203,7 +204,7 @@ def parse_definition(text: str, name: str, source: str) -> list[Definition]:
 
 def _dashes(kind: str) -> str:
     count = _SECTIONS[kind] - 1
-    return f"a .{kind} file has {count} line{'s' if count != 1 else ''} '---'"
+    return f"a .{kind} file has {counted(count, 'line')} '---'"
 
 
 def _complete_action(parts: list[Definition], name: str) -> None:
@@ -363,5 +364,5 @@ def _default(text: str, described: Any) -> Any:
         items = [item.strip() for item in text[1:-1].split(",")]
         values = [_number_value(item, base) for item in items if item]
     if (kind == Nodetype.ARRAY and len(values) != size) or (size and len(values) > size):
-        raise ValueError(f"the default has {len(values)} elements, the array {size}")
+        raise ValueError(f"the default has {counted(len(values), 'element')}, the array {size}")
     return values

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
+from volery.core.counting import counted
 from volery.core.errors import GraphError
 from volery.graph.definition_files import INTEGER_RANGES, NUMBERS
 from volery.graph.definition_store import EMPTY_MEMBER
@@ -179,9 +180,9 @@ def _value_decoder(described: Any) -> Convert:
 
     def check(length: int) -> None:
         if exact is not None and length != exact:
-            raise _Mismatch(f"must have {exact} elements, not {length}")
+            raise _Mismatch(f"must have {counted(exact, 'element')}, not {length}")
         if most is not None and length > most:
-            raise _Mismatch(f"must have at most {most} elements, not {length}")
+            raise _Mismatch(f"must have at most {counted(most, 'element')}, not {length}")
 
     if inner == Nodetype.BASE and inner_detail[0] in NUMBERS:
         return _array_decoder(inner_detail[0], check)
@@ -209,7 +210,9 @@ def _scalar_decoder(base: str, limit: int) -> Convert:
             if not isinstance(value, str):
                 raise _Mismatch(f"must be a string, not {_shown(value)}")
             if limit and len(value) > limit:
-                raise _Mismatch(f"must have at most {limit} characters, not {len(value)}")
+                raise _Mismatch(
+                    f"must have at most {counted(limit, 'character')}, not {len(value)}"
+                )
             if not value.isascii():
                 try:
                     value.encode()

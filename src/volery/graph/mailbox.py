@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from volery.core.counting import counted
 from volery.graph.messages import Published
 from volery.graph.qos import MOST_DEPTH
 from volery.graph.rows import Rows
@@ -44,8 +45,7 @@ class Mailbox:
 
     def __init__(self, topic: str, depth: int, wake: Wake, *, reliable: bool = False) -> None:
         self.topic = topic
-        self.failure: str | None = None
-        """Why nothing comes any more; None while all is well."""
+        self._failure: str | None = None
         self._waiting: deque[tuple[int, Published]] = deque()
         self._depth = depth
         self._reliable = reliable
@@ -55,10 +55,15 @@ class Mailbox:
         self._received = 0
         self._dropped = 0
 
+    @property
+    def failure(self) -> str | None:
+        """Why nothing comes any more; None while all is well."""
+        return self._failure
+
     def put(self, published: Published) -> None:
         """Add a message; where there is no room the oldest one goes, or all if reliable."""
         with self._lock:
-            if self.failure is not None:
+            if self._failure is not None:
                 return
             self._received += 1
             was_empty = not self._waiting
@@ -69,16 +74,17 @@ class Mailbox:
             elif len(self._waiting) >= self._depth:
                 self._waiting.popleft()
                 self._dropped += 1
-            if self.failure is None:
+            if self._failure is None:
                 self._waiting.append((next(_arrivals), published))
-        if was_empty or self.failure is not None:
+        if was_empty or self._failure is not None:
             self._wake()
 
     def _give_up(self) -> None:
         size = self._bytes / 2**20
-        self.failure = (
-            f"reliable subscription of '{self.topic}' ended: {len(self._waiting)} messages "
-            f"({size:.0f} MB) waited for a client that is too slow"
+        self._failure = (
+            f"reliable subscription of '{self.topic}' ended: "
+            f"{counted(len(self._waiting), 'message')} ({size:.0f} MB) waited for a client "
+            "that is too slow"
         )
         self._dropped += len(self._waiting) + 1
         self._waiting.clear()

@@ -23,6 +23,7 @@ from volery.core.clock import NS_PER_S
 from volery.core.errors import BridgeError
 from volery.core.listening import check_address
 from volery.graph.session import Gateway
+from volery.mavlink.absence import NOTICE_S, Absence
 from volery.mavlink.json_frames import (
     STATE_HZ,
     Rotor,
@@ -62,7 +63,8 @@ Address = tuple[Any, ...]
 class ArdupilotDoor:
     """Listens for instance i, the autopilot of the i-th UAV, at `port` + 10 i.
 
-    rotors: of each UAV by its name, in the order of its airframe.
+    rotors: of each UAV by its name, in the order of its airframe. notice_s: wall time after which
+    it is said that ArduPilots are missing.
     """
 
     def __init__(
@@ -73,7 +75,10 @@ class ArdupilotDoor:
         *,
         patience: Patience = PATIENCE,
         anywhere: bool = False,
+        notice_s: float = NOTICE_S,
     ) -> None:
+        self._notice_s = notice_s
+        self._absence: Absence | None = None
         self._rotors = rotors
         self._host, self._port = host, port
         self._patience = patience
@@ -104,13 +109,30 @@ class ArdupilotDoor:
             seat = _Seat(gateway, uav, motors, self._patience)
             self._seats.append(seat)
             await self._listen(seat, self._port + PORT_STEP * k)
+        self._absence = Absence("ArduPilot", self._missing, self._how_to_start, self._notice_s)
 
     async def stop(self) -> None:
         """Let all ArduPilots go."""
+        if self._absence is not None:
+            self._absence.cancel()
         for seat in self._seats:
             seat.close()
         self._seats.clear()
         await asyncio.sleep(0)
+
+    def _missing(self) -> dict[str, str]:
+        """Where the ArduPilots that are not there are to speak, by UAV."""
+        return {
+            seat.uav: f"UDP {self._host}:{self._port + PORT_STEP * number}"
+            for number, seat in enumerate(self._seats)
+            if seat.peer is None
+        }
+
+    def _how_to_start(self) -> str:
+        absent = next((k for k, seat in enumerate(self._seats) if seat.peer is None), 0)
+        instance, odd = divmod(self._port + PORT_STEP * absent - PORT, PORT_STEP)
+        chosen = f" -I {instance}" if instance >= 0 and not odd else ""
+        return f"start with: arducopter --model JSON{chosen} ... (docs/mavlink.md)"
 
     async def _listen(self, seat: _Seat, port: int) -> None:
         loop = asyncio.get_running_loop()

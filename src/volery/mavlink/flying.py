@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from volery.mavlink import mission_flight, offboard, return_flight, sticks, switching
+from volery.mavlink import landing, mission_flight, offboard, return_flight, sticks, switching
 from volery.mavlink.legs import fly_leg
 from volery.mavlink.modes import Mode
 from volery.mavlink.setpoints import Setpoint
@@ -22,6 +22,8 @@ def fly(pilot: Autopilot, state: FlightState) -> None:
     if not memory.armed or state.crashed or memory.order.isupper():
         return
     _FLIGHTS[memory.mode](pilot, state)
+    if memory.order == "land" and state.mode == "LAND":
+        landing.follow(pilot, state)
 
 
 def _take_off(pilot: Autopilot, state: FlightState) -> None:

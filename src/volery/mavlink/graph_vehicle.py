@@ -18,6 +18,7 @@ from volery.mavlink.vehicle import Quaternion as Turn
 _TRIGGER = "std_srvs/srv/Trigger"
 _TAKE_OFF_TO = "volery_interfaces/srv/TakeOffTo"
 _GET_BUILD = "volery_interfaces/srv/GetBuild"
+_LANDING_SPEED = "volery_interfaces/srv/SetLandingSpeed"
 _GO_TO = "volery_interfaces/srv/GoTo"
 _SET_TARGET = "volery_interfaces/srv/SetPositionTarget"
 _SET_ATTITUDE = "volery_interfaces/srv/SetAttitudeTarget"
@@ -39,6 +40,7 @@ class GraphVehicle:
             name: node.create_client(_TRIGGER, name) for name in ("hold", "land", "stop")
         }
         self._take_off = node.create_client(_TAKE_OFF_TO, "take_off_to")
+        self._sink = node.create_client(_LANDING_SPEED, "set_landing_speed")
         self._go_to = node.create_client(_GO_TO, "go_to")
 
     def take_off(self, height_m: float) -> str:
@@ -54,6 +56,12 @@ class GraphVehicle:
     def land(self) -> str:
         """As `Vehicle`."""
         return _ask(self._clients["land"])
+
+    def sink(self, speed: float) -> str:
+        """As `Vehicle`."""
+        request = zero_message(f"{_LANDING_SPEED}_Request")
+        request.speed = speed
+        return _ask(self._sink, request)
 
     def stop(self) -> str:
         """As `Vehicle`."""

@@ -54,6 +54,11 @@ class HilSeat:
         """Whether a PX4 is there."""
         return self._way is not None
 
+    @property
+    def has_heard(self) -> bool:
+        """Whether a MAVLink frame has come from who is there."""
+        return self.taken and self._link.spoken
+
     def take(self, way: Way) -> Callable[[bytes], None]:
         """Let a new PX4 sit down; what it sends is to be given to the result."""
         with self._meetings.lock:

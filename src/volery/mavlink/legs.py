@@ -38,7 +38,8 @@ def fly_leg(pilot: Autopilot, leg: Leg) -> bool:
         switching.order(pilot, "go_to", pilot.vehicle.go_to(leg.target, leg.yaw))
         return False
     speed = min(leg.speed, _approach(level, float(pilot.parameter("MPC_ACC_HOR"))))
-    limit = float(pilot.parameter("MPC_Z_VEL_MAX_UP" if z > 0.0 else "MPC_Z_VEL_MAX_DN"))
+    way = "UP" if z > 0.0 else "DN"
+    limit = min(float(pilot.parameter(f"MPC_Z_{kind}_{way}")) for kind in ("V_AUTO", "VEL_MAX"))
     climb = min(limit, _approach(abs(z), 0.5 * float(pilot.parameter("MPC_ACC_HOR"))))
     share = speed / level if level > 1e-6 else 0.0
     velocity = (share * x, share * y, math.copysign(climb, z))

@@ -126,6 +126,8 @@ class Memory:
     order: str = ""
     """The last one to the UAV: what modes of its own may follow."""
     ordered_ns: int = 0
+    sinks: float = math.nan
+    """m/s at which the present landing was told to go down; nan: nothing was told."""
     target: Setpoint | None = None
     """What is flown, for who watches."""
     home: Vector | None = None

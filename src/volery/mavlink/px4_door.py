@@ -21,10 +21,12 @@ from collections.abc import Callable
 from volery.core.errors import BridgeError
 from volery.core.listening import check_address, tend
 from volery.graph.session import Gateway
+from volery.mavlink.absence import NOTICE_S, Absence
 from volery.mavlink.codec import dialect
 from volery.mavlink.hil_seat import HilSeat
 from volery.mavlink.meetings import PATIENCE, Patience, uavs_with
 from volery.mavlink.party import why_not
+from volery.mavlink.px4_processes import MOST_INSTANCES
 
 PORT = 4560
 _MOST_UNSENT_BYTES = 1 << 16
@@ -33,7 +35,10 @@ _log = logging.getLogger(__name__)
 
 
 class Px4Door:
-    """Serves PX4 instance i, the autopilot of the i-th UAV, at `port` + i."""
+    """Serves PX4 instance i, the autopilot of the i-th UAV, at `port` + i.
+
+    notice_s: wall time after which it is said that PX4s are missing; None: somebody else says so.
+    """
 
     def __init__(
         self,
@@ -42,8 +47,11 @@ class Px4Door:
         *,
         patience: Patience = PATIENCE,
         anywhere: bool = False,
+        notice_s: float | None = NOTICE_S,
     ) -> None:
         self._host, self._port = host, port
+        self._notice_s = notice_s
+        self._absence: Absence | None = None
         self._patience = patience
         self._anywhere = anywhere
         self._servers: list[asyncio.Server] = []
@@ -74,9 +82,15 @@ class Px4Door:
             seat = HilSeat(gateway, uav, k + 1, self._patience)
             self._seats.append(seat)
             await self._listen(seat, self._port + k)
+        if self._notice_s is not None:
+            self._absence = Absence(
+                "PX4", self._missing, lambda: how_to_start(len(uavs), self._port), self._notice_s
+            )
 
     async def stop(self) -> None:
         """Let all PX4s go."""
+        if self._absence is not None:
+            self._absence.cancel()
         for server in self._servers:
             server.close()
         for seat in self._seats:
@@ -85,6 +99,14 @@ class Px4Door:
         self._seats.clear()
         for _ in range(2):  # for connections to be aborted, and to be told so
             await asyncio.sleep(0)
+
+    def _missing(self) -> dict[str, str]:
+        """Where the PX4s that are not there are to connect, by UAV."""
+        return {
+            seat.uav: self.address(number)
+            for number, seat in enumerate(self._seats)
+            if not seat.taken
+        }
 
     async def _listen(self, seat: HilSeat, port: int) -> None:
         loop = asyncio.get_running_loop()
@@ -157,6 +179,15 @@ class _Connection(asyncio.Protocol):
             self._seat.leave("its PX4 has left")
         if self._out is not None:
             self._out.close()
+
+
+def how_to_start(count: int, port: int) -> str:
+    """The command that has PX4s connect to `port` and following."""
+    first = port - PORT
+    if first < 0 or first + count > MOST_INSTANCES:
+        return f"PX4's instances connect to ports {PORT} and following"
+    shift = f" --first {first}" if first else ""
+    return f"start with: volery px4 --px4-dir PX4-Autopilot --count {count}{shift}"
 
 
 def _ignore(_data: bytes) -> None:

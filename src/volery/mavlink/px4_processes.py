@@ -32,7 +32,7 @@ _LOOK_S = 0.2
 _FAREWELL_S = 3.0
 """Wall time in which an instance may end by itself."""
 _LINES_TOLD = 5
-_MOST = 254
+MOST_INSTANCES = 254
 """MAVLink's system ids: instance i has i + 1, of which 255 is a ground station's."""
 _ESTABLISHED = "01"
 _log = logging.getLogger(__name__)
@@ -90,8 +90,9 @@ class Px4Instances:
         folder: Path | None = None,
         speed: float | None = None,
     ) -> None:
-        if count < 1 or first < 0 or first + count > _MOST:
-            raise BridgeError(f"instances {first} to {first + count - 1}: 0 to {_MOST - 1} can be")
+        if count < 1 or first < 0 or first + count > MOST_INSTANCES:
+            last = MOST_INSTANCES - 1
+            raise BridgeError(f"instances {first} to {first + count - 1}: 0 to {last} can be")
         self._build = build
         self._numbers = range(first, first + count)
         self._environment = _environment(host, speed)

@@ -12,6 +12,7 @@ import asyncio
 
 from volery.core.errors import BridgeError
 from volery.graph.session import Gateway
+from volery.mavlink.absence import NOTICE_S, Absence
 from volery.mavlink.codec import dialect
 from volery.mavlink.hil_seat import HilSeat
 from volery.mavlink.meetings import PATIENCE, Patience, uavs_with
@@ -26,14 +27,24 @@ _LEAST_BAUD = 230400
 class Px4Serial:
     """Serves the first UAV that no other autopilot door serves.
 
-    path: of the device. baud: its speed.
+    path: of the device. baud: its speed. notice_s: wall time after which it is said that nothing is
+    heard there.
     """
 
     is_for_any_thread = False
 
-    def __init__(self, path: str, baud: int = BAUD, *, patience: Patience = PATIENCE) -> None:
+    def __init__(
+        self,
+        path: str,
+        baud: int = BAUD,
+        *,
+        patience: Patience = PATIENCE,
+        notice_s: float = NOTICE_S,
+    ) -> None:
         self._path, self._baud = path, baud
         self._patience = patience
+        self._notice_s = notice_s
+        self._absence: Absence | None = None
         self._line: SerialLine | None = None
         self._seat: HilSeat | None = None
         self._beats: asyncio.Task[None] | None = None
@@ -64,9 +75,12 @@ class Px4Serial:
         self._seat = HilSeat(gateway, free[0], uavs.index(free[0]) + 1, self._patience)
         self._hear = self._seat.take(self)
         self._beats = asyncio.create_task(self._beat())
+        self._absence = Absence("PX4", self._missing, _how_to_start, self._notice_s)
 
     async def stop(self) -> None:
         """Close the line."""
+        if self._absence is not None:
+            self._absence.cancel()
         if self._beats is not None:
             self._beats.cancel()
             await asyncio.gather(self._beats, return_exceptions=True)
@@ -91,8 +105,19 @@ class Px4Serial:
         if self._seat is not None:
             self._hear(data)
 
+    def _missing(self) -> dict[str, str]:
+        """Where nothing is heard, by UAV."""
+        seat = self._seat
+        if seat is None or seat.has_heard:
+            return {}
+        return {seat.uav: f"{self._path} at {self._baud} baud"}
+
     async def _beat(self) -> None:
         """PX4 opens its side for the simulator that it hears."""
         while self._seat is not None:
             self.send(self._seat.heartbeat())
             await asyncio.sleep(_BEAT_S)
+
+
+def _how_to_start() -> str:
+    return "hardware there needs SYS_HITL = 1 and MAVLink at that speed (see docs/mavlink.md)"

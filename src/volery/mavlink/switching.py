@@ -119,7 +119,7 @@ def rise(pilot: Autopilot) -> None:
 
 def order(pilot: Autopilot, what: str, why_not: str = "") -> None:
     """Note what the UAV was told, and tell people where it did not take it."""
-    pilot.memory.order = what
+    pilot.memory.order, pilot.memory.sinks = what, math.nan
     pilot.memory.ordered_ns = pilot.memory.now_ns
     if why_not:
         pilot.memory.order = ""

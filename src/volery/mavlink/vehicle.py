@@ -66,6 +66,9 @@ class Vehicle(Protocol):
     def land(self) -> str:
         """Straight down, until the rotors stop."""
 
+    def sink(self, speed: float) -> str:
+        """How fast the present landing goes down."""
+
     def stop(self) -> str:
         """Rotors off at once: it falls."""
 

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from volery.autonomy.coverage.plan import CoveragePlan, plan_coverage
+from volery.core.counting import counted
 from volery.report.palette import uav_color
 from volery.world.grid_maps.reading import read_cells
 
@@ -36,7 +37,7 @@ def draw_plan(plan: CoveragePlan, free: NDArray[np.bool_], starts: list[tuple[in
             closed = np.vstack([tour.sub_cells, tour.sub_cells[:1]])
             axes.plot(*((closed[:, ::-1] + 0.5) / 2.0).T, color=colour, lw=1.1)
         row, column = starts[uav]
-        label = f"uav{uav + 1}: {plan.shares[uav]} cells"
+        label = f"uav{uav + 1}: {counted(int(plan.shares[uav]), 'cell')}"
         axes.plot(column + 0.5, row + 0.5, "o", color=colour, mec="black", ms=9, label=label)
     axes.imshow(picture, origin="lower", extent=(0, free.shape[1], 0, free.shape[0]))
     axes.set_aspect("equal")

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 
+from volery.core.counting import counted
 from volery.core.errors import VoleryError
 from volery.report import charts, maps
 from volery.report.flight_data import FlightData, UavTrack
@@ -52,7 +53,7 @@ def page(flight: FlightData) -> str:
     """The whole page as text."""
     title = escape(flight.scenario)
     count = len(flight.uavs)
-    fleet = f"{count} UAV{'s' if count != 1 else ''}"
+    fleet = counted(count, "UAV")
     parts = [
         "<!doctype html>",
         '<html lang="en"><head><meta charset="utf-8">',
@@ -132,8 +133,8 @@ def _figures(flight: FlightData) -> list[str]:
     if flight.lidar is not None and aslant is not None and above is not None:
         found.append("<h2>What the LIDARs saw</h2>")
         numbers = (
-            f"{len(flight.lidar.points_map):,} points, one a voxel of {flight.lidar.voxel_m:g} m, "
-            f"from {flight.lidar.scans:,} scans"
+            f"{counted(len(flight.lidar.points_map), 'point')}, one a voxel of "
+            f"{flight.lidar.voxel_m:g} m, from {counted(flight.lidar.scans, 'scan')}"
         )
         found.append(
             picture(
@@ -223,7 +224,7 @@ def _details(flight: FlightData) -> str:
         ("real-time factor", f"{flight.real_time_factor:.2f}"),
     ]
     if flight.log_path is not None:
-        rows.append(("log", f"{flight.log_path} ({flight.log_messages:,} messages)"))
+        rows.append(("log", f"{flight.log_path} ({counted(flight.log_messages, 'message')})"))
     if flight.digest:
         rows.append(("digest (SHA-256)", flight.digest))
     rows += list(flight.machine.items())

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.counting import counted
 from volery.core.errors import VoleryError
 from volery.report.alignment import (
     TimeShift,
@@ -120,8 +121,8 @@ def _estimate_section(uav: LoggedUav, trunks: TrueTrunks) -> list[str]:
     told = "Trajectory and trunk map."
     if len(uav.trunks):
         told = (
-            f"Trajectory, and {len(uav.trunks)} trunks that the level LIDAR saw three times or "
-            "more, where the estimate puts them."
+            f"Trajectory, and {counted(len(uav.trunks), 'trunk')} that the level LIDAR saw three "
+            "times or more, where the estimate puts them."
         )
         if not uav.is_founded:
             told += (
@@ -142,8 +143,8 @@ def _trunks_text(found: Array, near: TrueTrunks) -> str:
     if not len(near.places):
         return " No tree of the scenario stands within 15 m of the way."
     told = (
-        f" Rings: the {len(near.places)} trees of the scenario within 15 m of the way, by the "
-        "width of their trunks (thin ones wider, so that they can be seen)."
+        f" Rings: {counted(len(near.places), 'tree')} of the scenario within 15 m of the way, by "
+        "the width of trunks (thin ones wider, so that they can be seen)."
     )
     away = near.distances_m(found)
     if len(away):
@@ -260,7 +261,7 @@ def _comparison_section(uav: LoggedUav, laid: _Laid, log: Path, trunks: TrueTrun
 def _lead(flight: LoggedFlight) -> list[str]:
     """What the log tells of the whole flight."""
     count = len(flight.uavs)
-    fleet = f"{count} UAV{'s' if count != 1 else ''}"
+    fleet = counted(count, "UAV")
     scenario = f"Scenario {flight.scenario}, " if flight.scenario else ""
     texts = [flight.description, f"{scenario}{flight.lasts_s:.1f} s with {fleet}."]
     return [f'<p class="lead">{escape(text)}</p>' for text in texts if text]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.control.gains import ControlRates
+from volery.core.counting import counted
 from volery.core.errors import CommandError, DataFileError, ScenarioError
 from volery.runtime.placement import Start, place_uavs
 from volery.runtime.plant_building import plant_of_type
@@ -48,8 +49,9 @@ def airframes_of(scenario: Scenario) -> dict[str, Airframe]:
             )
         if len(kind.wear) not in (0, rotors):
             raise ScenarioError(
-                f"{scenario.name}: types.{name}.wear has {len(kind.wear)} entries; "
-                f"{kind.airframe} has {rotors} rotors, and needs one for each, or none"
+                f"{scenario.name}: types.{name}.wear has "
+                f"{counted(len(kind.wear), 'entry', 'entries')}; {kind.airframe} "
+                f"has {rotors} rotors, and needs one for each, or none"
             )
     return airframes
 

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.clock import ns_from_s, s_from_ns
+from volery.core.counting import counted
 from volery.core.errors import CommandError, ScenarioError
 from volery.runtime.building import place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
@@ -61,7 +62,9 @@ class Copies:
         if seeds is None:
             seeds = range(scenario.seed, scenario.seed + count)
         if len(seeds) != count:
-            raise ScenarioError(f"{count} copies need as many seeds, not {len(seeds)}")
+            raise ScenarioError(
+                f"{counted(count, 'copy', 'copies')}: as many seeds, not {len(seeds)}"
+            )
         self.scenario = scenario
         with compiled(needs_of(scenario, nodes=False)):
             self.terrain = build_terrain(scenario)
@@ -139,7 +142,9 @@ class Copies:
         for seed in seeds or ():
             check_seed(seed)
         if seeds is not None and len(seeds) != len(chosen):
-            raise CommandError(f"{len(chosen)} copies need as many seeds, not {len(seeds)}")
+            raise CommandError(
+                f"{counted(len(chosen), 'copy', 'copies')}: as many seeds, not {len(seeds)}"
+            )
         for block, first in zip(self._blocks, self._first, strict=True):
             here = np.flatnonzero((chosen >= first) & (chosen < first + len(block.seeds)))
             if len(here):

@@ -142,6 +142,10 @@ class Uav:
         """Descend here and stop the rotors on the ground."""
         self._fleet.land(self._row)
 
+    def set_landing_speed(self, speed_m_s: float) -> None:
+        """Sink at this speed, m/s, but no faster than the airframe may, until it has landed."""
+        self._fleet.set_landing_speed(self._row, min(speed_m_s, self.airframe.limits.descent_m_s))
+
     def return_home(self) -> None:
         """Climb, fly back to where it took off and land there."""
         self._fleet.return_home(self._row, self._flight.return_altitude_m)

@@ -6,6 +6,7 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING
 
+from volery.core.counting import counted
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
 from volery.core.geodesy import LocalFrame
 from volery.runtime.geometry import Geometry
@@ -96,8 +97,9 @@ def build_forest(scenario: Scenario, terrain: Terrain, city: City | None = None)
         outside = int(((x < x0) | (x > x1) | (y < y0) | (y > y1)).sum())
         if outside:
             raise ScenarioError(
-                f"{scenario.name}: world.forest: {outside} trees stand beyond the terrain, which "
-                f"reaches from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m; region_m crops an inventory"
+                f"{scenario.name}: world.forest: {counted(outside, 'tree')} beyond the "
+                f"terrain, which reaches from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m; "
+                "region_m crops an inventory"
             )
     return joined(forest, _street_trees(scenario, terrain, city))
 

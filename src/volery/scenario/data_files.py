@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from volery.core.errors import DataFileError
+from volery.core.errors import DataFileError, reason_of
 from volery.scenario.load import describe_validation_error
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -20,7 +20,7 @@ def load_data_file(path: Path, model: type[Model]) -> Model:
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise DataFileError(f"{path}: cannot be read: {error}") from None
+        raise DataFileError(f"{path}: cannot be read: {reason_of(error)}") from None
     except tomllib.TOMLDecodeError as error:
         raise DataFileError(f"{path}: not valid TOML: {error}") from None
     try:

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from volery.core.errors import ScenarioError
+from volery.core.errors import ScenarioError, reason_of
 from volery.scenario import library
 from volery.scenario.schema import Scenario
 
@@ -23,7 +23,7 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: cannot be read: {error}") from None
+        raise ScenarioError(f"{path}: cannot be read: {reason_of(error)}") from None
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

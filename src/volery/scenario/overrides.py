@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from volery.core.errors import ScenarioError
@@ -25,6 +26,8 @@ def apply(
     """
     data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
     if seconds is not None:
+        if not 0.0 < seconds < math.inf:
+            raise ScenarioError(f"--seconds: a run lasts longer than 0 s (found {seconds:g})")
         data["duration_s"] = seconds
     if seed is not None:
         data["seed"] = seed

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.clock import NS_PER_S
+from volery.core.counting import counted
 from volery.core.errors import DataFileError
 
 _NEEDED = ("azimuth_deg", "elevation_deg", "time_s")
@@ -46,7 +47,7 @@ def read_beams(path: Path, longest_s: float, most: int) -> BeamList:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DataFileError(f"{path}: cannot be read: {error}") from None
     if not 2 <= len(rows) <= most:
-        raise DataFileError(f"{path}: {len(rows)} beams; allowed are 2 to {most}")
+        raise DataFileError(f"{path}: {counted(len(rows), 'beam')}; allowed are 2 to {most}")
     table = np.array(rows)
     _check_times(table[:, 2], longest_s, path)
     azimuth, elevation = np.radians(table[:, 0]), np.radians(table[:, 1])

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.counting import counted
 from volery.core.errors import ScenarioError
 from volery.core.rng import generator
 from volery.world.inventory import Inventory, read_inventory
@@ -241,7 +242,7 @@ def _throw(region: Region, count: int, spacing: float, rng: np.random.Generator)
         if len(taken) == count:
             return np.array(list(taken.values())).reshape(count, 2)
     raise ScenarioError(
-        f"only {len(taken)} of {count} trees fit into region {region} "
+        f"only {len(taken)} of {counted(count, 'tree')} fit into region {region} "
         f"at a minimum spacing of {spacing:g} m"
     )
 

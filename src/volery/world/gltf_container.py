@@ -19,6 +19,8 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.counting import counted
+
 _HEAD, _CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -38,7 +40,10 @@ def entry(holder: dict[str, Any], key: str, number: Any) -> dict[str, Any]:
     """Object `number` of the list `key`."""
     entries = field(holder, key, list, [])
     if not isinstance(number, int) or not 0 <= number < len(entries):
-        raise ValueError(f"'{key}' has {len(entries)} entries; there is none of number {number!r}")
+        raise ValueError(
+            f"'{key}' has {counted(len(entries), 'entry', 'entries')}; there is none of "
+            f"number {number!r}"
+        )
     found = entries[number]
     if not isinstance(found, dict):
         raise ValueError(f"'{key}' {number} is no object")

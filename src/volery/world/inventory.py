@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.counting import counted
 from volery.core.errors import DataFileError
 from volery.world.trees import species_names
 
@@ -108,7 +109,7 @@ def _parse(
 ) -> tuple[str, list[float], str]:
     """What is wrong with a row ("" if nothing), x, y, dbh and height in m, species."""
     if len(row) != width:
-        return f"{len(row)} fields, the heading has {width}", [], ""
+        return f"{counted(len(row), 'field')}, the heading has {width}", [], ""
     values: list[float] = []
     for column in ("x_m", "y_m", "dbh_cm", "height_m"):
         text = row[columns[column]].strip() if column in columns else ""

@@ -16,6 +16,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.counting import counted
 from volery.core.errors import DataFileError
 from volery.core.frames import enu_from_gltf
 from volery.world.gltf_reading import Part, read_gltf
@@ -70,7 +71,7 @@ def read_mesh(path: str | Path, *, up: Literal["y", "z"] | None = None) -> MeshF
     mesh = Mesh((enu_from_gltf(points) if is_y_up else points).astype(np.float32), triangles)
     flat = ~(mesh.face_normals != 0.0).any(axis=1)
     if flat.all():
-        raise DataFileError(f"{path}: none of its {count} triangles has an area")
+        raise DataFileError(f"{path}: {counted(count, 'triangle')}, none of which has an area")
     colour = _colour_of_largest(mesh, parts)
     return MeshFile(Mesh(mesh.vertices, mesh.triangles[~flat]), colour, int(flat.sum()))
 
@@ -157,8 +158,8 @@ def _joined(path: Path, parts: list[Part]) -> tuple[NDArray[np.float64], NDArray
     wrong = np.flatnonzero(~(np.abs(corners) < _LARGEST).all(axis=1))
     if len(wrong):
         raise DataFileError(
-            f"{path}: {len(wrong)} of its {len(corners)} vertices are not finite numbers below "
-            f"{_LARGEST:g}; vertex {wrong[0]} is the first"
+            f"{path}: vertices that are not finite numbers below {_LARGEST:g}: {len(wrong)} of "
+            f"{len(corners)}; vertex {wrong[0]} is the first"
         )
     return corners, np.concatenate(triangles).astype(np.uint32)
 

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.compiled import inline_kernel, kernel
+from volery.core.counting import counted
 from volery.core.errors import DataFileError
 from volery.world.mesh import Mesh
 
@@ -223,7 +224,9 @@ def _read_heights(path: Path) -> NDArray[np.float64]:
         fields = line.split(",")
         columns = columns or len(fields)
         if len(fields) != columns:
-            faults.append(f"row {number} has {len(fields)} values, the first row {columns}")
+            faults.append(
+                f"row {number} has {counted(len(fields), 'value')}, the first row {columns}"
+            )
             continue
         try:
             row = [float(field) for field in fields]
@@ -244,7 +247,8 @@ def _read_heights(path: Path) -> NDArray[np.float64]:
         raise DataFileError(f"elevation grid {path}: {shown}")
     if len(rows) < 2 or columns < 2:
         raise DataFileError(
-            f"elevation grid {path} has {len(rows)} rows of {columns} values; at least 2 x 2 needed"
+            f"elevation grid {path} has {counted(len(rows), 'row')} of "
+            f"{counted(columns, 'value')}; at least 2 x 2 needed"
         )
     return np.array(rows)
 

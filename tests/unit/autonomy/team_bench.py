@@ -20,6 +20,7 @@ from volery.graph.messages import (
     PoseWithCovariance,
     Published,
     Quaternion,
+    Range,
     Twist,
     TwistWithCovariance,
     Vector3,
@@ -75,6 +76,8 @@ class FakeUav:
         self.stuck = False
         self.silent = False
         self.charge = 1.0
+        self.reaches_m = np.inf
+        """Height at which a take-off ends, if not at the one that is asked for."""
         self.asked: list[str] = []
         """Flight modes that were asked for."""
         self.paused = False
@@ -90,7 +93,7 @@ class FakeUav:
 
         def take_off(request: Any) -> Any:
             self.asked.append("take_off_to")
-            self.flies, self.place[2] = True, request.altitude
+            self.flies, self.place[2] = True, min(request.altitude, self.reaches_m)
             return rise(True, "")
 
         def hold(_request: Any) -> Any:
@@ -105,6 +108,8 @@ class FakeUav:
         graph.offer(f"/{name}/take_off_to", "volery_interfaces/srv/TakeOffTo", take_off)
         graph.offer(f"/{name}/land", "std_srvs/srv/Trigger", land)
         graph.offer(f"/{name}/hold", "std_srvs/srv/Trigger", hold)
+        self.sonar = graph.advertise(f"/{name}/range", Range)
+        graph.subscribe(f"/{name}/cmd_vel", self._climb, "geometry_msgs/msg/Twist")
         graph.subscribe(f"/{name}/planning/pause", self._pause, "std_msgs/msg/Bool")
         graph.subscribe(f"/{name}/search_area", self._sweep, "geometry_msgs/msg/PolygonStamped")
         graph.subscribe(f"/{name}/planning/goal", self._go, "geometry_msgs/msg/PoseStamped")
@@ -126,6 +131,16 @@ class FakeUav:
     def _go(self, published: Published) -> None:
         p = published.message.pose.position
         self.way = [np.array([p.x, p.y])]
+
+    def _climb(self, published: Published) -> None:
+        if self.flies:
+            self.place[2] += _MOVE_S * published.message.linear.z
+
+    def measure(self, range_m: float) -> None:
+        """Say what the sonar measures."""
+        message = zero_message("sensor_msgs/msg/Range")
+        message.range = range_m
+        self.sonar.publish(message)
 
     def _move(self) -> None:
         step = _MOVE_S * _SPEED_M_S

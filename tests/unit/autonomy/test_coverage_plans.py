@@ -114,7 +114,7 @@ def test_what_cannot_be_planned_is_refused_with_the_reason(free, starts, reason)
 
 
 def test_too_many_uavs_for_a_large_map_are_refused():
-    with pytest.raises(PlanError, match="70 UAVs divide 262,144 cells"):
+    with pytest.raises(PlanError, match="70 UAVs for 262,144 cells"):
         plan_coverage(np.ones((512, 512), bool), [(0, k) for k in range(70)])
 
 

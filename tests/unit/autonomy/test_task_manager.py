@@ -210,6 +210,54 @@ def test_one_that_is_held_waits_and_others_take_its_sector() -> None:
     assert manager.searched.all()
 
 
+def test_one_that_is_held_in_its_climb_climbs_on_before_it_searches() -> None:
+    bench = TeamBench({"uav1": HOMES["uav1"]})
+    uav, manager = bench.uavs["uav1"], bench.managers["uav1"]
+    uav.reaches_m = 0.5  # too low for planners
+    while not uav.flies:
+        bench.run(0.1)
+    assert manager.phase == "rise"
+    bench.order("uav1", "hold")
+    bench.run(5.0)
+    assert (str(manager.phase), uav.place[2]) == ("hold", 0.5)
+    assert bench.order("uav1", "resume") == "searches"
+    bench.run(1.0)
+    assert (str(manager.phase), manager.sector) == ("rise", -1)
+    assert 1.0 < uav.place[2] < 2.0
+    bench.run(3.0)
+    assert manager.phase == "search"
+    assert 2.4 < uav.place[2] < 3.1
+    assert uav.asked == ["take_off_to", "hold", "hold"]
+
+
+@pytest.mark.parametrize(("ground_m", "climbs"), [(0.0, True), (-20.0, False)])
+def test_one_that_goes_on_near_the_ground_climbs_first(ground_m: float, climbs: bool) -> None:
+    bench = TeamBench({"uav1": HOMES["uav1"]})
+    bench.run(10.0)
+    uav, manager = bench.uavs["uav1"], bench.managers["uav1"]
+    bench.order("uav1", "hold")
+    uav.place[2] = 0.8
+    bench.run(1.0)
+    uav.measure(0.8 - ground_m)
+    bench.run(0.3)
+    bench.order("uav1", "resume")
+    bench.run(4.0)
+    assert manager.phase == "search"
+    assert (2.4 < uav.place[2] < 3.1) if climbs else uav.place[2] == 0.8
+
+
+def test_what_a_sonar_said_long_ago_has_nobody_climb() -> None:
+    bench = TeamBench({"uav1": HOMES["uav1"]})
+    bench.run(10.0)
+    uav = bench.uavs["uav1"]
+    bench.order("uav1", "hold")
+    uav.measure(0.5)
+    bench.run(2.0)
+    bench.order("uav1", "resume")
+    bench.run(4.0)
+    assert uav.place[2] == 3.0
+
+
 def test_one_that_is_landed_gives_its_sector_up_and_may_go_on() -> None:
     bench = TeamBench(HOMES)
     bench.run(10.0)

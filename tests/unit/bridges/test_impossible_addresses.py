@@ -1,4 +1,4 @@
-"""Clients of addresses that cannot be: told of as those where nobody answers."""
+"""Clients of addresses that cannot be, and of those where nobody answers."""
 
 from __future__ import annotations
 
@@ -6,13 +6,26 @@ import pytest
 
 from volery.bridges.ros_tcp.client import RosTcpClient
 from volery.bridges.rosbridge.client import RosbridgeClient
-from volery.core.errors import BridgeError
+from volery.core.errors import BridgeError, UnreachableError
 
 
-@pytest.mark.parametrize("url", ["ws://a..b:9090", "ws://localhost:x", "ws://localhost:99999"])
-def test_rosbridge(url: str) -> None:
-    with pytest.raises(BridgeError, match="nobody speaks rosbridge"):
-        RosbridgeClient(url, connect_timeout_s=0.5)
+@pytest.mark.parametrize("url", ["ws://", "ws://localhost:x", "ws://localhost:99999", "ws://:1"])
+def test_what_is_no_address_is_told_at_once(url: str) -> None:
+    with pytest.raises(BridgeError, match=f"'{url}' is no address of a rosbridge"):
+        RosbridgeClient(url, connect_timeout_s=60.0)
+
+
+def test_rosbridge() -> None:
+    with pytest.raises(UnreachableError, match="nobody speaks rosbridge"):
+        RosbridgeClient("ws://a..b:9090", connect_timeout_s=0.5)
+
+
+def test_why_nobody_answers_is_told_in_words() -> None:
+    for client, url in ((RosbridgeClient, "ws://127.0.0.1:1"), (RosTcpClient, "127.0.0.1")):
+        more = {"port": 1} if client is RosTcpClient else {}
+        with pytest.raises(UnreachableError) as told:
+            client(url, connect_timeout_s=1.0, **more)
+        assert str(told.value).endswith("127.0.0.1:1: Connection refused")
 
 
 def test_ros_tcp() -> None:

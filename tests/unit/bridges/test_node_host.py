@@ -8,9 +8,11 @@ import pytest
 from live_graph import LiveGraph
 
 from volery.bridges.nodes.host import NodeHost
+from volery.bridges.nodes.late_link import LateLink
 from volery.core.errors import GraphError, NodeError
 from volery.graph.messages import Clock, String, Time, message_type
 from volery.graph.node import Node
+from volery.graph.reply import Reply
 
 TRIGGER = "std_srvs/srv/Trigger"
 Response = message_type(f"{TRIGGER}_Response")
@@ -84,11 +86,69 @@ def test_topics_and_services_both_ways(world):
     assert node.ask.call().message == "there"
     node.ask.call_async().add_done_callback(lambda a: answers.append(a.result().message))
     other = world.gateway.open("caller")
-    from volery.graph.reply import Reply
 
     other.call("/uav1/do", None, Reply(lambda r: answers.append(r.message), answers.append))
     spin_until(host, lambda: len(answers) == 2)
     assert sorted(answers) == ["hi", "there"]
+
+
+def test_nodes_that_are_there_before_their_graph(world):
+    opened = []
+
+    def open_link():
+        opened.append(world.gateway.open("node"))
+        return opened[-1]
+
+    late = LateLink("node", open_link)
+    host = NodeHost(late)
+    node = Parrot(context=host.context(), namespace="/uav1", parameter_overrides={"word": "hi"})
+    lost = node.create_publisher(String, "lost", 10)
+    lost.publish(String("early"))
+    node.create_subscription(String, "noise", node.on_heard).cancel()
+    host.spin_once(0.0)
+    assert not opened
+    said, early, answers = [], [], []
+    world.do(lambda: world.graph.subscribe("/uav1/said", said.append, String))
+    world.do(lambda: world.graph.subscribe("/uav1/lost", early.append, String))
+    world.do(lambda: world.graph.offer("/there/do", TRIGGER, lambda _r: Response(True, "there")))
+    late.join()
+    late.join()
+    assert len(opened) == 1
+    heard = world.graph.advertise("/uav1/heard", String)
+    world.do(lambda: heard.publish(String("you")))
+    answer = node.ask.call_async()
+    world.do(
+        lambda: world.graph.call_async("/uav1/do", None, Reply(answers.append, answers.append))
+    )
+    spin_until(host, lambda: said and answers and early and answer.done())
+    assert [p.message.data for p in (*early, *said)] == ["early", "hi you"]
+    assert answers[0].message == "hi"
+    assert answer.result().message == "there"
+    assert not any(info.name == "/uav1/noise" and info.subscribers for info in world.graph.topics())
+    node.destroy_node()
+    late.close()
+
+
+def test_who_calls_a_service_at_its_start_has_the_graph_joined(world):
+    world.do(lambda: world.graph.offer("/there/do", TRIGGER, lambda _r: Response(True, "there")))
+
+    class Asking(Parrot):
+        def __init__(self, **options):
+            super().__init__(**options)
+            self.answer = self.ask.call()
+
+    late = LateLink("node", lambda: world.gateway.open("node"))
+    assert Asking(context=NodeHost(late).context(), namespace="/uav1").answer.message == "there"
+    late.close()
+
+
+def test_timers_can_be_put_off(world):
+    host = NodeHost(world.gateway.open("node"), clock="wall")
+    node = Parrot(context=host.context())
+    host.postpone(3 * 10**8)
+    begin = time.monotonic()
+    spin_until(host, lambda: node.times)
+    assert time.monotonic() - begin > 0.75
 
 
 def test_a_service_that_nobody_offers(world):

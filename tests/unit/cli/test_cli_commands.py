@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 import json
+import logging
 import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import typer
 from fake_simulation import FakeSimulation
 from typer.testing import CliRunner
 
@@ -15,8 +17,9 @@ from volery.bench.document import read_results, render
 from volery.bench.machine import describe_machine, describe_versions
 from volery.bench.registry import Result
 from volery.bridges.logs.bag import open_log
-from volery.cli import doctor
+from volery.cli import doctor, start
 from volery.cli.app import app
+from volery.cli.guard import guarded, word_logs
 from volery.core.errors import VoleryError
 from volery.scenario import library
 from volery.scenario.load import load_scenario
@@ -49,6 +52,81 @@ def test_a_folder_without_px4_is_told_before_anything_is_built(tmp_path: Path) -
         result = runner.invoke(app, [*words, "--px4-dir", str(tmp_path)])
         assert result.exit_code == 2
         assert "build it there with `make px4_sitl_default`" in result.stderr
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "inf", "nan"])
+def test_a_run_that_cannot_last_names_its_option(seconds: str) -> None:
+    result = runner.invoke(app, ["run", "hover", "--seconds", seconds])
+    assert result.exit_code == 2
+    assert result.stderr == f"error: --seconds: a run lasts longer than 0 s (found {seconds})\n"
+
+
+def test_an_interrupt_that_a_library_made_an_error_of_is_told_as_one() -> None:
+    def load() -> None:
+        try:
+            try:
+                raise KeyboardInterrupt
+            except KeyboardInterrupt as interrupt:
+                raise ImportError("initialization failed") from interrupt
+        except ImportError as error:
+            raise VoleryError("it is not installed") from error
+
+    def fail() -> None:
+        raise VoleryError("it is not installed")
+
+    told = typer.Typer()
+    for command in (load, fail):
+        told.command()(guarded(command))
+    stopped, failed = (runner.invoke(told, [name]) for name in ("load", "fail"))
+    assert (stopped.exit_code, stopped.stderr) == (130, "stopped\n")
+    assert (failed.exit_code, failed.stderr) == (2, "error: it is not installed\n")
+
+
+@pytest.mark.parametrize("words", [["run", "{}"], ["launch", "{}"]])
+def test_a_file_that_cannot_be_read_is_told_without_numbers(
+    words: list[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "secret.toml"
+    path.symlink_to(path)
+    result = runner.invoke(app, [word.format(path) for word in words])
+    assert result.exit_code == 2
+    assert "Errno" not in result.stderr
+    assert result.stderr.count(str(path)) == 1
+
+
+def test_the_options_of_a_run_are_grouped() -> None:
+    told = runner.invoke(app, ["run", "--help"]).stdout
+    titles = ("The flight", "What is written", "Doors and who may enter", "ROS 2", "Autopilots")
+    groups = [f"─ {title} ─" for title in titles]
+    firsts = ("--uavs", "--record", "--page", "--ros2 ", "--px4-dir")
+    places = [told.index(text) for pair in zip(groups, firsts, strict=True) for text in pair]
+    assert places == sorted(places)
+
+
+def test_what_is_logged_looks_like_what_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    word_logs()
+    assert logging.lastResort is not None
+    for level in (logging.WARNING, logging.ERROR):
+        logging.lastResort.emit(
+            logging.LogRecord("x", level, "", 0, "%s: is gone", ("uav1",), None)
+        )
+    assert capsys.readouterr().err == "warning: uav1: is gone\nerror: uav1: is gone\n"
+
+
+def test_an_interrupt_while_the_command_loads_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Interrupting:
+        def find_spec(self, name: str, *_: object) -> None:
+            if name == "volery.cli.app":
+                raise KeyboardInterrupt
+
+    monkeypatch.delitem(sys.modules, "volery.cli.app")
+    monkeypatch.setattr(sys, "meta_path", [Interrupting(), *sys.meta_path])
+    with pytest.raises(SystemExit) as ended:
+        start.main()
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "stopped\n"
 
 
 def test_version() -> None:

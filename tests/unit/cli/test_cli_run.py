@@ -78,8 +78,8 @@ def test_ros1_log(invoke: Invoke, tmp_path: Path) -> None:
     [
         (("run", "hovr"), "no scenario 'hovr'.*did you mean 'hover'"),
         (("run", "nowhere.toml"), "nowhere.toml: no such file"),
-        (("run", "hover", "--seconds", "-1"), "duration_s"),
-        (("run", "hover", "--seconds", "nan"), "duration_s"),
+        (("run", "hover", "--seconds", "-1"), "--seconds: a run lasts"),
+        (("run", "hover", "--seconds", "nan"), "--seconds: a run lasts"),
         (("run", "hover", "--uavs", "0"), "--uavs.*at least 1"),
         (("run", "hover", "--seed", "-3"), "seed"),
         (("run", "hover", "--speed", "fast"), "--speed.*positive number or max"),

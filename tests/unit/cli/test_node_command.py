@@ -3,7 +3,7 @@
 import pytest
 from typer.testing import CliRunner
 
-from volery.cli import node
+from volery.cli import launching, node
 from volery.cli.app import app
 
 GAPS = "volery.autonomy.gap_following:GapFollowing"
@@ -19,6 +19,9 @@ GAPS = "volery.autonomy.gap_following:GapFollowing"
         ([GAPS, "--lock-step", "-1"], "lock-step"),
         ([GAPS, "--lock-step", "nan"], "lock-step"),
         ([GAPS, "--lock-step", "inf"], "lock-step"),
+        ([GAPS, "-p", "height_m=-3"], "parameter 'height_m' must be 0.1 or more, not -3"),
+        ([GAPS, "-p", "height_m=high"], "parameter 'height_m' must be like 3.0, not 'high'"),
+        ([GAPS, "-p", "hieght_m=3"], "has no parameter hieght_m; known: deceleration_m_s2, "),
     ],
 )
 def test_a_command_that_cannot_run_does_not_wait(words, told, monkeypatch):
@@ -29,3 +32,25 @@ def test_a_command_that_cannot_run_does_not_wait(words, told, monkeypatch):
     result = CliRunner().invoke(app, ["node", *words])
     assert result.exit_code == 2, result.output
     assert told in result.output
+
+
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        ("parameters = { height_m = 0.0 }", "parameter 'height_m' must be 0.1 or more, not 0.0"),
+        ("parameters = { wings = 2 }", "has no parameter wings"),
+    ],
+)
+def test_profiles_are_looked_through_before_it_waits(lines, told, monkeypatch, tmp_path):
+    def wait(*_):
+        raise AssertionError("it waits for a graph")
+
+    for module in (node, launching):
+        monkeypatch.setattr(module, "await_link", wait)
+    profile, several = tmp_path / "one.toml", tmp_path / "several.toml"
+    profile.write_text(lines)
+    several.write_text(f'[[launch]]\nnode = "{GAPS}"\n{lines}\n')
+    for words in (["node", GAPS, "--profile", str(profile)], ["launch", str(several)]):
+        result = CliRunner().invoke(app, words)
+        assert result.exit_code == 2, result.output
+        assert told in result.output

@@ -12,7 +12,7 @@ from volery.autonomy.fixed_joints import LEVEL
 from volery.cli.app import app
 from volery.cli.slam import _advise
 from volery.runtime.slam_run.channels import Channels
-from volery.runtime.slam_run.run import Outcome
+from volery.runtime.slam_run.run import Outcome, SlamRun
 from volery.runtime.slam_run.trajectory import Trajectory
 
 CORNERS = [(0.0, 0.0), (16.0, 0.0)]
@@ -151,6 +151,20 @@ def test_odometry_and_closures_can_be_left_out(text, tmp_path):
     np.testing.assert_allclose(first[1:4], [10.0, 5.0, 0.0], atol=0.05)
     np.testing.assert_allclose(last[1:3], [10.0, 21.0], atol=0.4)
     assert grid_of(tmp_path / "out")[2] == 0.1
+
+
+def test_a_folder_that_cannot_be_written_to_is_told_before_the_work(text, monkeypatch):
+    def work(*_):
+        raise AssertionError("it maps already")
+
+    monkeypatch.setattr(SlamRun, "run", work)
+    layout = ("--layout", text / "layout.toml")
+    result = slam(text / "scans.txt", *layout, "--out", "/proc/nowhere/out")
+    assert result.exit_code == 2
+    assert "error: /proc/nowhere/out: cannot write the map there: " in result.output
+    result = slam(text / "scans.txt", *layout, "--out", text / "scans.txt")
+    assert result.exit_code == 2
+    assert "is no folder" in result.output
 
 
 @pytest.mark.parametrize("most", [40_000, 40])

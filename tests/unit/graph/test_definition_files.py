@@ -198,7 +198,7 @@ BROKEN = {
     "must be a number, a bool or a string": "\nint8[] X=3\n",
     "cannot have a default": "\ngeometry_msgs/Point p 3\n",
     "the default of an array is a list": "\nint8[] p 3\n",
-    "the default has 1 elements, the array 2": "\nint8[2] p [3]\n",
+    "the default has 1 element, the array 2": "\nint8[2] p [3]\n",
     "not the name of a type": "\na/b/c/d p\n",
 }
 

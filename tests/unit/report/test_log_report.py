@@ -151,7 +151,7 @@ def test_the_true_trunks_are_drawn_beside_the_mapped_ones(tmp_path: Path) -> Non
     }
     log = told_log(tmp_path / "flight.mcap", content, tmp_path)
     page = write_log_report(log, tmp_path / "out").path.read_text()
-    assert "Rings: the 3 trees of the scenario within 15 m" in page
+    assert "Rings: 3 trees of the scenario within 15 m" in page
     assert "100% of the mapped trunks stand within 0.5 m of one" in page
     assert ">true trunks<" in page
     (tmp_path / "trees.csv").unlink()

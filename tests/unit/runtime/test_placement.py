@@ -93,7 +93,7 @@ def test_trees_beyond_the_terrain_or_none_at_all(simulate, flat_data, tmp_path):
     trees.write_text("x_m,y_m\n5000,5\n")
     forest = {"kind": "inventory", "file": str(trees), "species": "broadleaf"}
     flat_data["world"] = {"forest": forest}
-    with pytest.raises(ScenarioError, match=r"world\.forest: 1 trees stand beyond"):
+    with pytest.raises(ScenarioError, match=r"world\.forest: 1 tree beyond"):
         simulate(flat_data)
     forest["region_m"] = [0, 0, 10, 10]
     with pytest.raises(ScenarioError, match="no tree there"):

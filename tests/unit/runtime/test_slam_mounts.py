@@ -1,4 +1,4 @@
-"""`volery slam` on a log of a flight: it finds where the LIDARs sit, or asks for it."""
+"""`volery slam` on a log of a flight: it finds where the LIDARs sit and where it began, or asks."""
 
 import json
 import math
@@ -25,8 +25,13 @@ from volery.graph.messages import (
     header,
     stamp_of,
 )
+from volery.graph.zero import zero_message
+from volery.runtime.slam_run.beginning import beginning_of
+from volery.runtime.slam_run.sources import open_source
 
 SECONDS = 6.0
+STANDS_M = 0.12
+"""Height of the body of an F450 on its feet."""
 LEVEL_FRAME, NODDING_FRAME = "uav1/laser_horizontal", "uav1/laser_nodding"
 SENSORS = [
     {"kind": "lidar", "name": name, "model": "utm_30lx", "position_m": place.tolist()}
@@ -36,7 +41,7 @@ CONTENT = {
     "name": "woods",
     "duration_s": 9.0,
     "types": {"surveyor": {"sensors": SENSORS}},
-    "uavs": [{"type": "surveyor", "position_m": [0.0, 0.0]}],
+    "uavs": [{"type": "surveyor", "position_m": [40.0, -30.0], "yaw_deg": 90.0}],
 }
 ORIGIN = {"name": "woods", "seed": 1, "version": "0", "folder": None, "content": CONTENT}
 
@@ -73,7 +78,7 @@ class Flown:
             [(stamp_of(m) / S, p.x, p.y, p.z) for m, p in zip(said, places, strict=True)]
         )
 
-    def write(self, path, *, tells, others=()):
+    def write(self, path, *, tells, others=(), truth=None, later_s=0.0):
         """A log in which `/tf_static`, `/tf`, the scenario or nothing tells of the nodding one."""
         with closing(open_log(path)) as log:
 
@@ -82,6 +87,8 @@ class Flown:
 
             if tells == "scenario":
                 put("/volery/scenario", 0, String(json.dumps(ORIGIN)))
+            if truth is not None:
+                put("/uav1/ground_truth/odom", 0, truth)
             fixed = [joint(0, "uav1/base_link", LEVEL_FRAME, LEVEL)]
             if tells == "static":
                 half = 0.5 * NODDING
@@ -100,7 +107,7 @@ class Flown:
                         nod = nod_angle(when / S)[0]
                         moving.append(joint(when, "uav1/base_link", child, NODDING, nod))
                     put("/tf", when, TFMessage(moving))
-                put(f"/uav1/{topic}", when, message)
+                put(f"/uav1/{topic}", when + round(later_s * S), message)
 
 
 @pytest.fixture(scope="module")
@@ -115,13 +122,61 @@ def slam(log, out, *more):
 @pytest.mark.parametrize("tells", ["static", "moving", "bracket", "scenario"])
 def test_a_log_gives_the_way_that_its_own_slam_told(tells, flown, tmp_path):
     flown.write(tmp_path / "flight.mcap", tells=tells)
-    result = slam(tmp_path / "flight.mcap", tmp_path / "out")
+    result = slam(tmp_path / "flight.mcap", tmp_path / "out", "--start", "0,0,0,0")
     assert result.exit_code == 0, result.output
+    assert "as it tells" not in result.output
     path = np.loadtxt(tmp_path / "out" / "path.tum")
     own = np.stack([np.interp(path[:, 0], flown.own[:, 0], flown.own[:, k]) for k in (1, 2, 3)], 1)
     assert len(path) > 200
     assert np.abs(own[-1] - own[0]).max() > 1.0
     np.testing.assert_allclose(path[:, 1:4], own, atol=0.015)
+
+
+def truth(frame="map"):
+    """At 7, 8, 9 m, nose to the north."""
+    message = zero_message("nav_msgs/msg/Odometry")
+    p, q, message.header.frame_id = message.pose.pose.position, message.pose.pose.orientation, frame
+    p.x, p.y, p.z, q.z, q.w = 7.0, 8.0, 9.0, math.sqrt(0.5), math.sqrt(0.5)
+    return message
+
+
+@pytest.mark.parametrize(
+    ("more", "begins"),
+    [
+        ({}, (40.0, -30.0, STANDS_M, 90.0)),
+        ({"truth": truth()}, (7.0, 8.0, 9.0, 90.0)),
+        ({"truth": truth("uav1/odom")}, (0.0, 0.0, 0.0, 0.0)),
+        ({"later_s": 2.0}, (0.0, 0.0, 0.0, 0.0)),
+    ],
+    ids=["scenario", "truth", "odometry by that name", "recorded from later on"],
+)
+def test_it_begins_where_a_log_of_volerys_tells(more, begins, flown, tmp_path):
+    flown.write(tmp_path / "flight.mcap", tells="scenario", **more)
+    result = slam(tmp_path / "flight.mcap", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert ("as it tells; --start says otherwise" in result.output) == any(begins)
+    told = json.loads((tmp_path / "out" / "summary.json").read_text())["start"]
+    np.testing.assert_allclose(told, begins, atol=0.02)
+    path = np.loadtxt(tmp_path / "out" / "path.tum")[:, 1:4]
+    np.testing.assert_allclose(path[0], begins[:3], atol=0.05)
+    way = path[-1] - path[0]
+    assert (way[1] > 5.0 * abs(way[0])) == any(begins)  # it flew along its own nose
+
+
+def test_a_log_of_a_scenario_that_cannot_be_built_begins_at_the_origin(tmp_path, flown):
+    flown.write(tmp_path / "flight.mcap", tells="scenario")
+    lost = {**ORIGIN, "folder": str(tmp_path / "gone")}
+    lost["content"] = {**CONTENT, "world": {"terrain": {"kind": "grid", "file": "no.csv"}}}
+    with closing(open_log(tmp_path / "lost.mcap")) as log:
+        text = String(json.dumps(lost))
+        log.write(Published("/volery/scenario", text.__msgtype__, 0, text))
+        for _, topic, message in flown.told[:50]:
+            log.write(Published(f"/uav1/{topic}", message.__msgtype__, 0, message))
+    source = open_source(tmp_path / "lost.mcap")
+    assert beginning_of(source, "uav1", "/uav1/laser/horizontal/scan") is None
+    whole = open_source(tmp_path / "flight.mcap")
+    assert beginning_of(whole, "uav1", "/uav1/laser/horizontal/scan") is not None
+    assert beginning_of(whole, "uav2", "/uav1/laser/horizontal/scan") is None
 
 
 def test_a_mount_that_nothing_tells_is_asked_for(flown, tmp_path):

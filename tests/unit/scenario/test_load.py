@@ -146,7 +146,7 @@ def test_overrides():
     assert (scenario.uav_count, scenario.duration_s, scenario.seed) == (5, 3.0, 9)
     with pytest.raises(ScenarioError, match="at least 1 UAV"):
         apply(scenario, uavs=0)
-    with pytest.raises(ScenarioError, match="duration_s"):
+    with pytest.raises(ScenarioError, match="--seconds: a run lasts"):
         apply(scenario, seconds=-1.0)
     two = copy.deepcopy(GOOD)
     two["uavs"] = two["uavs"] * 2

@@ -205,7 +205,7 @@ def test_a_table_of_beams_is_taken_as_it_stands(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        (["0,0,0,1"], "1 beams; allowed are 2"),
+        (["0,0,0,1"], "1 beam; allowed are 2"),
         (["0,0,0,1", "0,x,0,1"], "line 3: every entry must be a number"),
         (["0,0,0,1", "0,91,0,1"], "elevation_deg within"),
         (["0,0,0.02,1", "0,0,0.01,1"], "beam 2: time_s must not"),

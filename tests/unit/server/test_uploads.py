@@ -94,7 +94,7 @@ def test_an_inventory_becomes_a_forest(checked):
     ("kind", "suffix", "content", "why"),
     [
         ("grid_map", ".csv", b"0,1\n0,2\n", "line 2, column 2: '2'"),
-        ("grid_map", ".csv", b"0,1\n0\n", "line 2 has 1 entries"),
+        ("grid_map", ".csv", b"0,1\n0\n", "line 2 has 1 entry"),
         ("grid_map", ".png", b"\x89PNG\r\n\x1a\n broken", "grid_map.png"),
         ("grid_map", ".map", b"type octile\n", "grid_map.map"),
         ("city", ".geojson", b"{", "not valid JSON"),

@@ -190,7 +190,7 @@ def test_no_trees_is_a_forest_too():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"trees": 5000, "minimum_spacing_m": 20.0}, "of 5000 trees fit"),
+        ({"trees": 5000, "minimum_spacing_m": 20.0}, "of 5,000 trees fit"),
         ({"species": "oak"}, "unknown tree species 'oak'"),
         ({"species": {"palm": -1.0}}, "share of species 'palm'"),
         ({"species": {}}, "at least one species"),

@@ -115,8 +115,8 @@ def ascii_stl(corner):
     [
         ("a.ply", b"ply", "meshes are read from"),
         ("a.stl", b"", "cannot be read|no triangle"),
-        ("a.stl", ascii_stl("nan"), "vertices are not finite numbers"),
-        ("a.stl", ascii_stl("1e300"), "vertices are not finite numbers below 1e"),
+        ("a.stl", ascii_stl("nan"), "vertices that are not finite numbers"),
+        ("a.stl", ascii_stl("1e300"), "vertices that are not finite numbers below 1e"),
         ("a.stl", ascii_stl("0"), "has an area"),
         (
             "a.stl",

@@ -2361,6 +2361,15 @@ export interface volery_interfaces_SetGridMap_Response {
   message: string;
 }
 
+export interface volery_interfaces_SetLandingSpeed_Request {
+  speed: number;
+}
+
+export interface volery_interfaces_SetLandingSpeed_Response {
+  success: boolean;
+  message: string;
+}
+
 export interface volery_interfaces_SetPositionTarget_Request {
   target: mavros_msgs_PositionTarget;
 }
@@ -2682,6 +2691,7 @@ export interface Services {
   "volery_interfaces/srv/SetAttitudeTarget": { request: volery_interfaces_SetAttitudeTarget_Request; response: volery_interfaces_SetAttitudeTarget_Response };
   "volery_interfaces/srv/SetCommandTimeout": { request: volery_interfaces_SetCommandTimeout_Request; response: volery_interfaces_SetCommandTimeout_Response };
   "volery_interfaces/srv/SetGridMap": { request: volery_interfaces_SetGridMap_Request; response: volery_interfaces_SetGridMap_Response };
+  "volery_interfaces/srv/SetLandingSpeed": { request: volery_interfaces_SetLandingSpeed_Request; response: volery_interfaces_SetLandingSpeed_Response };
   "volery_interfaces/srv/SetPositionTarget": { request: volery_interfaces_SetPositionTarget_Request; response: volery_interfaces_SetPositionTarget_Response };
   "volery_interfaces/srv/SetSpeed": { request: volery_interfaces_SetSpeed_Request; response: volery_interfaces_SetSpeed_Response };
   "volery_interfaces/srv/SetWeather": { request: volery_interfaces_SetWeather_Request; response: volery_interfaces_SetWeather_Response };

@@ -20,6 +20,7 @@ from volery.autonomy.coverage.cells import Cells, Ints, Mask
 from volery.autonomy.coverage.components import Reach, Shares, level_shares, share_parts
 from volery.autonomy.coverage.darp import divide
 from volery.autonomy.coverage.spanning_tree import Tour, tours
+from volery.core.counting import counted
 from volery.core.errors import PlanError
 
 NOT_TO_VISIT = -2
@@ -129,7 +130,7 @@ def _divide_parts(cells: Cells, labels: Ints, shares: Shares, areas: Ints, seed:
         crew = working[homes == part]
         if len(crew) * int(sizes[part]) > MOST_FIELD_NUMBERS:
             raise PlanError(
-                f"{len(crew)} UAVs divide {sizes[part]:,} cells; their product may be "
+                f"{counted(len(crew), 'UAV')} for {sizes[part]:,} cells; their product may be "
                 f"{MOST_FIELD_NUMBERS:,} at most: use fewer UAVs or larger cells"
             )
         members = np.flatnonzero(labels == part).astype(np.int32)

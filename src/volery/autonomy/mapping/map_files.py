@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.mapping.octomap_stream import Voxels, decode_binary
+from volery.core.counting import counted
 from volery.core.errors import DataFileError
 
 Bytes = NDArray[np.uint8]
@@ -77,7 +78,7 @@ def read_map(path: Path, limits: MapLimits) -> MapFile:
         raise DataFileError(f"{path}: {error}") from None
     said, found = int(_number(path, head, "size")), node_count(data)
     if said != found:
-        raise DataFileError(f"{path}: the head says {said} nodes, the file has {found}")
+        raise DataFileError(f"{path}: the head says {counted(said, 'node')}, the file has {found}")
     _check_size(path, voxels, limits)
     return MapFile(resolution, data, voxels)
 

@@ -17,6 +17,7 @@ from volery.autonomy.planning.search_area import SearchArea
 from volery.autonomy.planning.viewpoints import Viewpoint, next_viewpoint
 from volery.autonomy.scan_points import Pose as Motion
 from volery.core.clock import NS_PER_S
+from volery.core.counting import counted
 from volery.core.errors import PlanError
 from volery.core.kept import keep, put_back
 from volery.graph.messages import (
@@ -236,7 +237,7 @@ class Exploring(Node):
             self._send(np.array([*self._goal.place, place[2]]))
             return
         if next_viewpoint(area, place[:2], heading, self._view, self._visited) is not None:
-            self._become(Searching.BLOCKED, f"{len(self._refused)} places cannot be reached")
+            self._become(Searching.BLOCKED, f"{counted(len(self._refused), 'place')} out of reach")
         else:
             self._become(Searching.DONE, "")
         self._send(place)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rng
+from volery.core.counting import counted
 from volery.core.errors import GraphError
 
 Array = NDArray[np.float64]
@@ -65,7 +66,9 @@ def places_around(place: Array, count: int, apart_m: float, area: Area) -> Array
         found += _on_ring(middle, apart_m * ring, steps, area)
         if len(found) >= count:
             return np.array(found[:count])
-    raise GraphError(f"search: area {list(area)} m has no {count} places {apart_m} m apart")
+    raise GraphError(
+        f"search: area {list(area)} m has no room for {counted(count, 'place')} {apart_m} m apart"
+    )
 
 
 def check_room(count: int, apart_m: float, area: Area) -> None:
@@ -81,8 +84,8 @@ def check_room(count: int, apart_m: float, area: Area) -> None:
     least = 2.0 * rings * apart_m
     if min(area.x_max - area.x_min, area.y_max - area.y_min) < least:
         raise GraphError(
-            f"search: {count} UAVs {apart_m} m apart need an area of {least:g} m a side at least, "
-            f"without its borders, not {list(area)} m"
+            f"search: {counted(count, 'UAV')} {apart_m} m apart need an area of {least:g} m a side "
+            f"at least, without its borders, not {list(area)} m"
         )
 
 

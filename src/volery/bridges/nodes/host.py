@@ -100,6 +100,11 @@ class NodeHost:
         """Call `action` once, at `time_ns` or as soon as possible."""
         self._set(_Alarm(time_ns, next(self._numbers), 0, action))
 
+    def postpone(self, by_ns: int) -> None:
+        """Have all that is due come so much later."""
+        for alarm in self._alarms:
+            alarm.due_ns += by_ns
+
     def _set(self, alarm: _Alarm) -> None:
         heapq.heappush(self._alarms, alarm)
 

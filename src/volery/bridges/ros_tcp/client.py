@@ -26,7 +26,7 @@ from volery.bridges.ros_tcp.dial import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUS
 from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.wire import Frame, FrameParser, Generation, number_field
-from volery.core.errors import BridgeError, GraphError
+from volery.core.errors import BridgeError, GraphError, reason_of
 from volery.graph.reply import Reply
 from volery.graph.session import SessionInfo
 
@@ -135,7 +135,7 @@ class RosTcpClient(RemoteClient):
             try:
                 await self._serve(await dial(*self._address))
             except (OSError, TimeoutError, UnicodeError) as error:  # or no such name can be
-                self._why = str(error) or "no answer"
+                self._why = reason_of(error)
             self._lose(f"the connection to {self._where} is broken")
             if self._closed:
                 return

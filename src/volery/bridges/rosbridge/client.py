@@ -16,14 +16,15 @@ import itertools
 import time
 
 from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import WebSocketException
+from websockets.exceptions import InvalidURI, WebSocketException
+from websockets.uri import parse_uri
 
 from volery.bridges.doors import wake_of
 from volery.bridges.remote_client import RemoteClient
 from volery.bridges.rosbridge.client_state import ClientState
 from volery.bridges.rosbridge.forms import Generation
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES, Frame
-from volery.core.errors import BridgeError
+from volery.core.errors import BridgeError, reason_of
 from volery.graph.session import SessionInfo
 
 _FIRST_PAUSE_S = 0.1
@@ -68,7 +69,11 @@ class RosbridgeClient(RemoteClient):
         generation: Generation = "ros2",
     ) -> None:
         if not url.startswith(("ws://", "wss://")):
-            raise BridgeError(f"'{url}' is no address of a rosbridge: ws://HOST:PORT")
+            raise _no_address(url)
+        try:
+            parse_uri(url)
+        except (InvalidURI, ValueError):
+            raise _no_address(url) from None
         super().__init__(name, url)
         self.url = url
         self._most_bytes = max_message_bytes
@@ -111,7 +116,7 @@ class RosbridgeClient(RemoteClient):
                 await self._connect_once()
                 self._why = "the server has closed the connection"
             except (WebSocketException, OSError, ValueError) as error:  # or no such address can be
-                self._why = str(error) or type(error).__name__
+                self._why = reason_of(error)
             finally:
                 self._lose(f"the connection to {self.url} is broken")
             lasted = time.monotonic() - began_s > _LONGEST_PAUSE_S
@@ -151,3 +156,7 @@ class RosbridgeClient(RemoteClient):
                 if next(turns) % 32 == 0:
                     await asyncio.sleep(0)
             await self._wanted.wait()
+
+
+def _no_address(url: str) -> BridgeError:
+    return BridgeError(f"'{url}' is no address of a rosbridge: ws://HOST:PORT")

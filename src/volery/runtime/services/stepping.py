@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from volery.core.counting import counted
 from volery.core.errors import CommandError
 from volery.engine.stepping import StepRequest
 from volery.graph.actions import Goal
@@ -80,7 +81,7 @@ def _interrupted(steps: StepRequest) -> RefusedError | None:
     """Why not all steps were made; None where they were."""
     if not steps.left:
         return None
-    reason = f"{steps.made} of {steps.steps} steps were made: {steps.reason}"
+    reason = f"{steps.made} of {counted(steps.steps, 'step')} made: {steps.reason}"
     return RefusedError(Code.OPERATION_FAILED, reason)
 
 

@@ -37,6 +37,11 @@ def offer_uav_services(graph: Graph, uav: Uav) -> list[Close]:
             lambda request: turn_to_message(uav, request.target),
         ),
         (
+            "set_landing_speed",
+            f"{_OURS}/SetLandingSpeed",
+            lambda request: uav.set_landing_speed(request.speed),
+        ),
+        (
             "set_command_timeout",
             f"{_OURS}/SetCommandTimeout",
             lambda request: uav.set_command_timeout(request.seconds),

@@ -20,14 +20,18 @@ _BODIES = ("base_link", "base_footprint", "base")
 _STRING = "std_msgs/msg/String"
 
 
-class _Log(Protocol):
+class Log(Protocol):
+    """What is asked of a log here."""
+
     @property
-    def topics(self) -> dict[str, str]: ...
+    def topics(self) -> dict[str, str]:
+        """Types by topic."""
 
-    def messages(self, wanted: set[str]) -> Iterator[Heard]: ...
+    def messages(self, wanted: set[str]) -> Iterator[Heard]:
+        """Those of some topics in the order of the file."""
 
 
-def frames_of(source: _Log, topics: dict[str, str]) -> dict[str, str]:
+def frames_of(source: Log, topics: dict[str, str]) -> dict[str, str]:
     """Frames of scanners, topics by name, as their first messages have them.
 
     Names whose topics say nothing are left out.
@@ -41,7 +45,7 @@ def frames_of(source: _Log, topics: dict[str, str]) -> dict[str, str]:
     return frames
 
 
-def read_joints(source: _Log, frames: set[str]) -> tuple[FixedJoints, set[str]]:
+def read_joints(source: Log, frames: set[str]) -> tuple[FixedJoints, set[str]]:
     """Joints between frames of scanners and the body, and the frames of which nothing tells.
 
     First counts `/tf_static`, then `/tf`, of whose moving joints the place alone is taken (what
@@ -75,7 +79,7 @@ def _is_in_body(joints: FixedJoints, frame: str) -> bool:
     return any(map(_is_body, _chain(joints, frame)))
 
 
-def _join_moving(source: _Log, joints: FixedJoints, frames: set[str]) -> None:
+def _join_moving(source: Log, joints: FixedJoints, frames: set[str]) -> None:
     """Add what `/tf` tells of these frames, or of those that they hang on.
 
     Where no frame goes by a body's name, a joint of the frame itself counts alone: those before it
@@ -100,7 +104,7 @@ def _join_moving(source: _Log, joints: FixedJoints, frames: set[str]) -> None:
         joints.joints |= {name: both.joints[name] for name in names if name in both.joints}
 
 
-def _join_by_scenario(source: _Log, joints: FixedJoints, frames: set[str]) -> None:
+def _join_by_scenario(source: Log, joints: FixedJoints, frames: set[str]) -> None:
     """Add the mounts of the scenario that was flown."""
     for _, _, message in source.messages({ORIGIN_TOPIC}):
         try:

@@ -17,6 +17,7 @@ from volery.autonomy.fixed_joints import FixedJoints, Mount
 from volery.core.clock import NS_PER_S
 from volery.core.errors import RecordingError
 from volery.graph.messages import LaserScan, stamp_of
+from volery.runtime.slam_run.beginning import beginning_of
 from volery.runtime.slam_run.channels import LEVEL, NODDING, Asked, Channels, choose
 from volery.runtime.slam_run.log_host import LogHost
 from volery.runtime.slam_run.mounts import frames_of, read_joints
@@ -42,7 +43,7 @@ class SlamOptions:
 
     asked: Asked = field(default_factory=Asked)
     start: tuple[float, float, float, float] | None = None
-    """x, y, z in m and yaw in rad."""
+    """x, y, z in m and yaw in rad; None: as a log of Volery's tells it, else the map's origin."""
     level_mount: tuple[float, float, float] | None = None
     nodding_mount: tuple[float, float, float] | None = None
     reach_m: float = 30.0
@@ -85,6 +86,8 @@ class SlamRun:
     def __init__(self, source: LogSource | TextSource, options: SlamOptions) -> None:
         self._source, self._options = source, options
         self.channels = choose(source.path, source.topics, options.asked)
+        self.start = options.start or beginning_of(source, self.channels.uav, self.channels.scan)
+        """Where it begins; None: at the map's origin."""
         self._joints = FixedJoints()
         self._frames: dict[str, str] = {}
         """Of the LIDARs, level and nodding, that the node hears."""
@@ -150,8 +153,8 @@ class SlamRun:
     def _start_node(self) -> None:
         o, uav = self._options, self.channels.uav
         parameters: dict[str, Any] = {"reach_m": o.reach_m, "loop_closures": o.loop_closures}
-        if o.start is not None:
-            parameters["start"] = list(o.start)
+        if self.start is not None:
+            parameters["start"] = list(self.start)
         level = None if o.level_mount is None else list(o.level_mount)
         options = {"context": self._host.context(), "namespace": f"/{uav}"}
         if not self.channels.has_imu:

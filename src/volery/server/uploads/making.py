@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from volery.core.counting import counted
 from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.server.uploads.kinds import FARTHEST_M, MOST_CELLS, MOST_TREES, MOST_TRIANGLES
@@ -119,7 +120,9 @@ def _mesh(path: Path) -> _Part:
 def _forest(path: Path) -> _Part:
     inventory = read_inventory(path)
     if not 0 < len(inventory) <= MOST_TREES:
-        raise DataFileError(f"{path}: {len(inventory)} trees; allowed are 1 to {MOST_TREES}")
+        raise DataFileError(
+            f"{path}: {counted(len(inventory), 'tree')}; allowed are 1 to {MOST_TREES}"
+        )
     low, high = inventory.position.min(axis=0), inventory.position.max(axis=0)
     world = (
         f'[world.forest]\nkind = "inventory"\nfile = {json.dumps(path.name)}\n'

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.counting import counted
 from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.world.city.buildings import Building, solids_of, stand
@@ -63,8 +64,9 @@ def build_city(
     if beyond.any():
         first = outlines[int(np.argmax(beyond))].id
         raise DataFileError(
-            f"{path}: {int(beyond.sum())} buildings, {first} for one, reach beyond the terrain, "
-            f"which ends at ({x0:g}, {y0:g}) and ({x1:g}, {y1:g}) m; region_m crops the outlines"
+            f"{path}: {counted(int(beyond.sum()), 'building')}, {first} for one, "
+            f"beyond the terrain, which ends at ({x0:g}, {y0:g}) and ({x1:g}, {y1:g}) m; "
+            "region_m crops the outlines"
         )
     rule = furniture or FurnitureRule()
     buildings = stand(outlines, terrain)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.counting import counted
 from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.world.city.geojson import Feature, Ring, read_features
@@ -60,7 +61,8 @@ class Report:
 
     def summary(self) -> str:
         """One line."""
-        text = f"{self.file}: {self.buildings} buildings of {self.outlines} outlines"
+        buildings = counted(self.buildings, "building")
+        text = f"{self.file}: {buildings} of {counted(self.outlines, 'outline')}"
         parts = [
             f"{count} {what}"
             for count, what in (

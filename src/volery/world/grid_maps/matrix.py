@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.counting import counted
 from volery.core.errors import DataFileError
 from volery.world.grid_maps.grid_map import MOST_CELLS
 
@@ -27,7 +28,8 @@ def parse_matrix(data: bytes, where: str) -> NDArray[np.bool_]:
         row = _row(line, f"{where}, line {number}")
         if rows and len(row) != len(rows[0]):
             raise DataFileError(
-                f"{where}, line {number} has {len(row)} entries; the lines before it {len(rows[0])}"
+                f"{where}, line {number} has {counted(len(row), 'entry', 'entries')}; "
+                f"the lines before it {len(rows[0])}"
             )
         cells += len(row)
         if cells > MOST_CELLS:

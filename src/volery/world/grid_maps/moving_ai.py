@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.counting import counted
 from volery.core.errors import DataFileError
 from volery.world.grid_maps.grid_map import MOST_CELLS
 
@@ -30,12 +31,14 @@ def parse_moving_ai(data: bytes, where: str) -> NDArray[np.bool_]:
     while len(rows) > height and not rows[-1].strip():
         rows.pop()
     if len(rows) != height:
-        raise DataFileError(f"{where}: {len(rows)} rows follow the head, which says {height}")
+        raise DataFileError(
+            f"{where}: {counted(len(rows), 'row')} after the head, which says {height}"
+        )
     cells = np.empty((height, width), dtype=np.uint8)
     for k, row in enumerate(rows):
         line = f"{where}, line {_HEAD_LINES + k + 1}"
         if len(row) != width:
-            raise DataFileError(f"{line} has {len(row)} cells; the head says {width}")
+            raise DataFileError(f"{line} has {counted(len(row), 'cell')}; the head says {width}")
         cells[k] = np.frombuffer(row, dtype=np.uint8)
     blocked = np.isin(cells, np.frombuffer(BLOCKED, dtype=np.uint8))
     unknown = np.argwhere(~blocked & ~np.isin(cells, np.frombuffer(FREE, dtype=np.uint8)))

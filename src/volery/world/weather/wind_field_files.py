@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.counting import counted
 from volery.core.errors import DataFileError
 from volery.scenario.wind import MAX_WIND_M_S
 
@@ -136,7 +137,7 @@ def _rows_of(path: Path) -> tuple[list[int], Array]:
 def _parse(row: list[str], order: list[int]) -> tuple[str, list[float]]:
     """What is wrong with a row ("" if nothing), and its numbers in the order of `_COLUMNS`."""
     if len(row) != len(order):
-        return f"{len(row)} fields, the heading has {len(order)}", []
+        return f"{counted(len(row), 'field')}, the heading has {len(order)}", []
     values = []
     for name, column in zip(_COLUMNS, order, strict=True):
         text = row[column].strip()

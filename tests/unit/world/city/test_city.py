@@ -168,7 +168,7 @@ def test_the_same_seed_makes_the_same_city(helsinki, terrain):
 def test_buildings_beyond_the_terrain_are_refused(terrain):
     small = Terrain.flat(200.0, origin=(-100.0, -100.0))
     frame = LocalFrame.from_degrees(LATITUDE, LONGITUDE, 0.0)
-    with pytest.raises(DataFileError, match=r"buildings, \d+ for one, reach beyond the terrain"):
+    with pytest.raises(DataFileError, match=r"buildings, \d+ for one, beyond the terrain"):
         build_city(FILE, frame, small)
     with pytest.raises(DataFileError, match="no building is left"):
         build_city(FILE, frame, terrain, region=(800.0, 800.0, 801.0, 801.0))

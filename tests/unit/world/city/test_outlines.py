@@ -47,7 +47,7 @@ def test_a_square_becomes_itself(read):
     (outline,), report = read(feature(square(20.0, -30.0)))
     assert outline.footprint.area == pytest.approx(100.0, rel=1e-6)
     np.testing.assert_allclose(outline.footprint.bounds, (20, -30, 30, -20), atol=1e-6)
-    assert report.summary() == "town.geojson: 1 buildings of 1 outlines"
+    assert report.summary() == "town.geojson: 1 building of 1 outline"
 
 
 def test_courtyards_stay_open(read):

@@ -11,6 +11,7 @@ import {
 import { TextInput } from "@mantine/core";
 import { Circle, Download, Play, Square, Upload } from "lucide-react";
 import { useState } from "react";
+import { counted } from "../../lib/counted.ts";
 import { clockText } from "../../lib/time.ts";
 import { bytesText } from "../../lib/traffic.ts";
 import {
@@ -138,7 +139,7 @@ function Recorder({ onChange, whyNot }: RecorderProps) {
   };
   const stop = async () => {
     const told = await attempt("Recording was refused", stopRecording());
-    if (told !== null) tellSuccess(`${told.messages} messages recorded`);
+    if (told !== null) tellSuccess(`${counted(told.messages, "message")} recorded`);
     onChange();
   };
 

@@ -1,6 +1,7 @@
 import { ActionIcon, Group, Text, TextInput, Tooltip } from "@mantine/core";
 import { Plus, Search } from "lucide-react";
 import { useState } from "react";
+import { counted } from "../../lib/counted.ts";
 import { openPanel } from "../../state/layout.ts";
 import { useConnection } from "../../state/connection.ts";
 import { select, useVehicles } from "../../state/vehicles.ts";
@@ -23,7 +24,7 @@ export default function Vehicles() {
     <div className="column">
       <Group px="sm" pb={6} gap="xs" justify="space-between" wrap="nowrap">
         <Text size="sm" c="dimmed" aria-label="Number of UAVs">
-          {list.length} {list.length === 1 ? "UAV" : "UAVs"}
+          {counted(list.length, "UAV")}
         </Text>
         {volery && (
           <Tooltip label="Add UAVs">

@@ -10,9 +10,8 @@ their user data.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
-from volery.bridges.ros2.dds.qos import user_data_of
+from volery.bridges.ros2.dds.announced import Announced
 
 CLIENT, SERVER = "clientid", "serviceid"
 FOREIGN = (
@@ -25,10 +24,10 @@ _MOST_KNOWN = 10_000
 class Counterparts:
     """The matched endpoints of one side, by their instance handles.
 
-    look_up: `get_matched_publication_data` of a reader, or the like of a writer.
+    look_up: what an endpoint tells of itself; None once it has left.
     """
 
-    def __init__(self, word: str, look_up: Callable[[int], Any]) -> None:
+    def __init__(self, word: str, look_up: Callable[[int], Announced | None]) -> None:
         self._mark = f"{word}=".encode()
         self._look_up = look_up
         self._known: dict[int, bool] = {}
@@ -38,9 +37,9 @@ class Counterparts:
         known = self._known.get(handle)
         if known is None:
             found = self._look_up(handle)
-            if found is None:
+            if found is None or found.terms is None:
                 return True
             if len(self._known) >= _MOST_KNOWN:
                 self._known.clear()
-            known = self._known[handle] = self._mark in user_data_of(found.qos)
+            known = self._known[handle] = self._mark in found.terms.user_data
         return known

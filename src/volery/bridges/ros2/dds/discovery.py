@@ -5,18 +5,14 @@ from __future__ import annotations
 import re
 import threading
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from cyclonedds.builtin import (
-    BuiltinDataReader,
-    BuiltinTopicDcpsPublication,
-    BuiltinTopicDcpsSubscription,
-)
+from cyclonedds.builtin import BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
 from cyclonedds.domain import DomainParticipant
 
+from volery.bridges.ros2.dds.announced import Announced, announcements
 from volery.bridges.ros2.dds.counterparts import CLIENT
 from volery.bridges.ros2.dds.listening import Ear
-from volery.bridges.ros2.dds.qos import profile_of, user_data_of
 from volery.bridges.ros2.middleware import Profile, RemotePublisher
 from volery.bridges.ros2.names import ros_type, service_of, topic_of
 
@@ -41,17 +37,17 @@ class Discovery:
     """Keeps track of the endpoints of others."""
 
     def __init__(self, participant: DomainParticipant, ear: Ear) -> None:
-        self._own = participant.guid
+        self._own = participant.guid.bytes
         self._lock = threading.Lock()
-        self._writers: dict[Any, Endpoint] = {}
-        self._readers: dict[Any, Endpoint] = {}
+        self._writers: dict[bytes, Endpoint] = {}
+        self._readers: dict[bytes, Endpoint] = {}
         self._told: list[Callable[[], None]] = []
         self._sources = []
         for topic, known in (
             (BuiltinTopicDcpsPublication, self._writers),
             (BuiltinTopicDcpsSubscription, self._readers),
         ):
-            source = BuiltinDataReader(participant, topic)
+            source = announcements(participant, topic)
             self._sources.append(source)
             ear.listen(source, self._taker(known))
 
@@ -107,8 +103,8 @@ class Discovery:
         named = (service_of(w.dds_topic) for w in writers if mark not in w.user_data)
         return {service for service in named if service}
 
-    def _taker(self, known: dict[Any, Endpoint]) -> Callable[[list[Any]], None]:
-        def take(samples: list[Any]) -> None:
+    def _taker(self, known: dict[bytes, Endpoint]) -> Callable[[list[Announced]], None]:
+        def take(samples: list[Announced]) -> None:
             changed = False
             for sample in samples:
                 alive = sample.sample_info.instance_state == _ALIVE
@@ -123,15 +119,13 @@ class Discovery:
 
         return take
 
-    def _meet(self, known: dict[Any, Endpoint], sample: Any) -> bool:
-        msgtype = ros_type(sample.type_name or "")
-        if sample.participant_key == self._own or msgtype is None:
+    def _meet(self, known: dict[bytes, Endpoint], met: Announced) -> bool:
+        msgtype = ros_type(met.type_name or "")
+        if met.participant_key == self._own or msgtype is None or met.terms is None:
             return False
-        endpoint = Endpoint(
-            sample.topic_name, msgtype, profile_of(sample.qos), user_data_of(sample.qos)
-        )
+        endpoint = Endpoint(met.dds_topic or "", msgtype, *met.terms)
         with self._lock:
-            known[sample.key] = endpoint
+            known[met.key] = endpoint
         return True
 
 

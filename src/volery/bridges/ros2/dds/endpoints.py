@@ -9,6 +9,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from cyclonedds.domain import DomainParticipant
@@ -18,6 +19,7 @@ from cyclonedds.topic import Topic
 
 from volery.bridges.ros2.complaints import Complaints
 from volery.bridges.ros2.dds import library
+from volery.bridges.ros2.dds.announced import matched_reader, matched_writer
 from volery.bridges.ros2.dds.counterparts import CLIENT, FOREIGN, SERVER, Counterparts
 from volery.bridges.ros2.dds.idl_types import message_struct, request_struct
 from volery.bridges.ros2.dds.listening import Ear
@@ -101,7 +103,7 @@ class DdsServer:
         self._missed = (0, 0)
         self._complaints = Complaints()
         self._reader = self._half.reader(requests, qos, self._on_request)
-        self._clients = Counterparts(CLIENT, self._reader.get_matched_publication_data)
+        self._clients = Counterparts(CLIENT, partial(matched_writer, self._reader))
 
     def close(self) -> None:
         """Offer it no more."""
@@ -163,7 +165,7 @@ class DdsCaller:
         self._waiting: dict[int, tuple[TakeMessage, Callable[[], None]]] = {}
         self._lock = threading.Lock()
         self._reader = self._half.reader(replies, qos, self._on_reply)
-        self._servers = Counterparts(SERVER, self._writer.get_matched_subscription_data)
+        self._servers = Counterparts(SERVER, partial(matched_reader, self._writer))
 
     @property
     def ready(self) -> bool:
@@ -177,7 +179,7 @@ class DdsCaller:
         return f"its server {FOREIGN}" if found and not any(found) else ""
 
     def _understood(self) -> list[bool]:
-        return [self._servers.understands(h) for h in self._writer.get_matched_subscriptions()]
+        return [self._servers.understands(h) for h in library.readers_of(self._writer)]
 
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
         """Send a request."""

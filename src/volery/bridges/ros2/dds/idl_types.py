@@ -40,13 +40,19 @@ _lock = threading.RLock()
 def message_struct(msgtype: str) -> type[Any]:
     """Structure of a message; its samples have their bytes in `cdr`."""
     with _lock:
-        return _struct(msgtype, headed=False)
+        return _complete(_struct(msgtype, headed=False))
 
 
 def request_struct(msgtype: str) -> type[Any]:
     """Structure of a service's request or response with what comes before it."""
     with _lock:
-        return _struct(msgtype, headed=True)
+        return _complete(_struct(msgtype, headed=True))
+
+
+def _complete(struct: type[Any]) -> type[Any]:
+    """Have its description made, which the package does when a first topic is, without a lock."""
+    struct.__idl__.fill_type_data()
+    return struct
 
 
 @cache

@@ -17,10 +17,10 @@ _library = ctypes.CDLL(str(library_path))
 _entity, _result = ctypes.c_int32, ctypes.c_int32
 
 
-def _function(name: str, *arguments: Any) -> Any:
+def _function(name: str, *arguments: Any, result: Any = _result) -> Any:
     found = getattr(_library, name)
     found.argtypes = arguments
-    found.restype = _result
+    found.restype = result
     return found
 
 
@@ -47,7 +47,27 @@ _served = _function(
     ctypes.POINTER(ctypes.c_uint64),
     ctypes.c_size_t,
 )
+_free = _function("dds_free", ctypes.c_void_p, result=None)
+_user_data = _function(
+    "dds_qget_userdata",
+    ctypes.c_void_p,
+    ctypes.POINTER(ctypes.c_void_p),
+    ctypes.POINTER(ctypes.c_size_t),
+    result=ctypes.c_bool,
+)
+_reliability = _function(
+    "dds_qget_reliability",
+    ctypes.c_void_p,
+    ctypes.POINTER(ctypes.c_int),
+    ctypes.POINTER(ctypes.c_int64),
+    result=ctypes.c_bool,
+)
+_durability = _function(
+    "dds_qget_durability", ctypes.c_void_p, ctypes.POINTER(ctypes.c_int), result=ctypes.c_bool
+)
 
+_BEST_EFFORT, _VOLATILE = 0, 0
+"""DDS_RELIABILITY_BEST_EFFORT, DDS_DURABILITY_VOLATILE."""
 _MOST_AT_ONCE = 256
 _ALIGNMENT = 4
 
@@ -88,6 +108,37 @@ def subscriptions(writer: Any) -> int:
     return max(int(_matched(writer._ref, None, 0)), 0)
 
 
+def readers_of(writer: Any) -> list[int]:
+    """Instance handles of a writer's readers, some hundreds at most; none once it is deleted."""
+    found = (ctypes.c_uint64 * _MOST_AT_ONCE)()
+    count = int(_matched(writer._ref, found, _MOST_AT_ONCE))
+    return found[: min(max(count, 0), _MOST_AT_ONCE)]
+
+
 def publications(reader: Any) -> int:
     """How many writers a reader has."""
     return max(int(_served(reader._ref, None, 0)), 0)
+
+
+def user_data(qos: int) -> bytes:
+    """User data in a `dds_qos_t`, by its address."""
+    value, size = ctypes.c_void_p(), ctypes.c_size_t()
+    if not _user_data(qos, ctypes.byref(value), ctypes.byref(size)) or not value:
+        return b""
+    try:
+        return ctypes.string_at(value, size.value)
+    finally:
+        _free(value)
+
+
+def is_reliable(qos: int) -> bool:
+    """Whether a `dds_qos_t` does not say best effort."""
+    kind = ctypes.c_int()
+    told = _reliability(qos, ctypes.byref(kind), ctypes.byref(ctypes.c_int64()))
+    return not (told and kind.value == _BEST_EFFORT)
+
+
+def is_latched(qos: int) -> bool:
+    """Whether a `dds_qos_t` says that a writer keeps samples for readers that come late."""
+    kind = ctypes.c_int()
+    return bool(_durability(qos, ctypes.byref(kind))) and kind.value != _VOLATILE

@@ -75,10 +75,16 @@ class Ear:
                 return
             if time.monotonic() > due_s:
                 due_s = time.monotonic() + _PERIOD_S
-                self._now_and_then()
+                self._look_around()
             for number in ready:
                 if number and not self._closing:
                     self._serve(number)
+
+    def _look_around(self) -> None:
+        try:
+            self._now_and_then()
+        except Exception:  # nor must that end the thread
+            _log.exception("ROS 2: what is due now and then failed")
 
     def _serve(self, number: int) -> None:
         found = self._readers.get(number)

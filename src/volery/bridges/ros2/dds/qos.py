@@ -1,4 +1,4 @@
-"""Quality of service as rmw_cyclonedds sets it, and as others offer it."""
+"""Quality of service as rmw_cyclonedds sets it."""
 
 from __future__ import annotations
 
@@ -32,19 +32,3 @@ def qos_of(profile: Profile, user_data: bytes = b"") -> Qos:
     if user_data:
         policies.append(Policy.Userdata(data=user_data))
     return Qos(*policies)
-
-
-def profile_of(qos: Qos) -> Profile:
-    """What a writer of somebody else offers."""
-    reliability = qos[Policy.Reliability]
-    durability = qos[Policy.Durability]
-    return Profile(
-        reliable=reliability is not Policy.Reliability.BestEffort,
-        latched=durability not in (None, Policy.Durability.Volatile),
-    )
-
-
-def user_data_of(qos: Qos) -> bytes:
-    """Words that came with an endpoint: `typehash=...;`."""
-    found = qos[Policy.Userdata]
-    return b"" if found is None else bytes(found.data)

@@ -1,0 +1,143 @@
+"""A link for nodes that are started before their graph is there.
+
+So a node's own complaints, as of its parameters, come at once and not after a wait for the graph.
+
+    link = LateLink("watcher", lambda: await_link(via, "watcher"))
+    host = NodeHost(link)
+    node = Watcher(context=host.context())      # what is wrong with it is told here
+    link.join()                                 # here the graph is waited for
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from volery.graph.link import HostsNodes, Link
+from volery.graph.mailbox import Mailbox, Wake
+from volery.graph.messages import Published
+from volery.graph.parameters import Parameters
+from volery.graph.qos import DEFAULT_DEPTH
+from volery.graph.reply import Reply
+from volery.graph.session import Handler
+
+Action = Callable[[Link], None]
+
+_MOST_PUBLISHED = 1000
+"""The newest so many messages are kept until the graph is there (modelling choice)."""
+
+
+class LateLink:
+    """As of `Link`: announces at `join` what was announced before, then publishes what was.
+
+    open_link: joins the graph. Who calls a service before `join` has it joined then.
+    """
+
+    def __init__(self, name: str, open_link: Callable[[], Link]) -> None:
+        self.name = name
+        self._open_link = open_link
+        self._link: Link | None = None
+        self._announced: list[Action] = []
+        self._published: deque[Action] = deque(maxlen=_MOST_PUBLISHED)
+        self._lock = threading.RLock()
+
+    def join(self) -> Link:
+        """Join the graph, unless that is done; the link to it."""
+        if self._link is None:
+            link = self._open_link()
+            with self._lock:
+                for action in (*self._announced, *self._published):
+                    action(link)
+                self._announced.clear()
+                self._published.clear()
+                self._link = link
+        return self._link
+
+    def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
+        """As of `Link`."""
+        self._announce(lambda link: link.advertise(topic, msgtype, latched=latched))
+
+    def publish(self, topic: str, message: Any) -> None:
+        """As of `Link`."""
+        with self._lock:
+            if self._link is None:
+                self._published.append(lambda link: link.publish(topic, message))
+                return
+        self._link.publish(topic, message)
+
+    def unadvertise(self, topic: str) -> None:
+        """As of `Link`."""
+        self._announce(lambda link: link.unadvertise(topic))
+
+    def subscribe(
+        self,
+        topic: str,
+        msgtype: str | None = None,
+        *,
+        depth: int = DEFAULT_DEPTH,
+        reliable: bool = False,
+        wake: Wake,
+    ) -> Mailbox:
+        """As of `Link`; the mailbox is empty until there is a graph."""
+        mailbox = _LateMailbox(topic, depth, wake, reliable=reliable)
+
+        def fill(link: Link) -> None:
+            mailbox.real = link.subscribe(topic, msgtype, depth=depth, reliable=reliable, wake=wake)
+
+        self._announce(fill)
+        return mailbox
+
+    def unsubscribe(self, mailbox: Mailbox) -> None:
+        """As of `Link`."""
+
+        def empty(link: Link) -> None:
+            if isinstance(mailbox, _LateMailbox) and mailbox.real is not None:
+                link.unsubscribe(mailbox.real)
+
+        self._announce(empty)
+
+    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+        """As of `Link`."""
+        self.join().call(service, request, reply)
+
+    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+        """As of `Link`."""
+        self._announce(lambda link: link.offer(service, srvtype, handler))
+
+    def host_node(self, name: str, parameters: Parameters, post: Callable[[Any], Any]) -> None:
+        """As of `HostsNodes`, where the link to the graph is one."""
+
+        def host(link: Link) -> None:
+            if isinstance(link, HostsNodes):
+                link.host_node(name, parameters, post)
+
+        self._announce(host)
+
+    def close(self) -> None:
+        """As of `Link`; without a graph nothing happens."""
+        if self._link is not None:
+            self._link.close()
+
+    def _announce(self, action: Action) -> None:
+        with self._lock:
+            if self._link is None:
+                self._announced.append(action)
+                return
+        action(self._link)
+
+
+class _LateMailbox(Mailbox):
+    """Stands for one that a link to the graph fills."""
+
+    real: Mailbox | None = None
+
+    @property
+    def failure(self) -> str | None:
+        """As of `Mailbox`."""
+        return None if self.real is None else self.real.failure
+
+    def take_numbered(self, most: int | None = None) -> list[tuple[int, Published]]:
+        """As of `Mailbox`."""
+        return [] if self.real is None else self.real.take_numbered(most)

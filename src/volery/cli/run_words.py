@@ -1,0 +1,80 @@
+"""The options of `volery run` alone, as its help groups them; those of several: `cli.options`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from volery.cli.options import DOORS, FILES, FLIGHT
+
+# What is flown.
+Scenario = Annotated[str, typer.Argument(help="Name from `volery list`, or a TOML file.")]
+Uavs = Annotated[int | None, typer.Option(help="Number of UAVs.", rich_help_panel=FLIGHT)]
+Seconds = Annotated[
+    float | None, typer.Option(help="Simulated seconds to fly.", rich_help_panel=FLIGHT)
+]
+Seed = Annotated[
+    int | None, typer.Option(help="Seed of everything random.", rich_help_panel=FLIGHT)
+]
+NoNodes = Annotated[
+    bool,
+    typer.Option(
+        "--no-nodes",
+        help="Without the scenario's nodes: they run elsewhere.",
+        rich_help_panel=FLIGHT,
+    ),
+]
+Speed = Annotated[
+    str | None,
+    typer.Option(
+        help="Factor of real time, such as 1 or 2.5, or max; 1 where doors are open.",
+        rich_help_panel=FLIGHT,
+    ),
+]
+ReplayCommands = Annotated[
+    Path | None,
+    typer.Option(
+        help="Give every command again that clients gave in this recorded flight.",
+        rich_help_panel=FLIGHT,
+    ),
+]
+
+# What is left of it.
+Record = Annotated[
+    Path | None,
+    typer.Option(help="Write a log: .mcap (ROS 2) or .bag (ROS 1).", rich_help_panel=FILES),
+]
+Report = Annotated[
+    Path | None,
+    typer.Option(help="Write an illustrated report into this folder.", rich_help_panel=FILES),
+]
+Recordings = Annotated[
+    Path | None,
+    typer.Option(
+        help="Folder in which clients may record: /volery/start_recording.",
+        rich_help_panel=FILES,
+    ),
+]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace an existing log.", rich_help_panel=FILES)
+]
+Digest = Annotated[
+    bool,
+    typer.Option(
+        "--digest",
+        help="Print the SHA-256 over all states and messages.",
+        rich_help_panel=FILES,
+    ),
+]
+
+# Who looks on.
+Page = Annotated[
+    str | None,
+    typer.Option(
+        metavar="[=HOST:PORT]",
+        help="Show the flight on a page in the browser; at 127.0.0.1:8080 unless said.",
+        rich_help_panel=DOORS,
+    ),
+]

@@ -1,0 +1,153 @@
+"""What DDS endpoints tell of themselves is read whole, however many threads read at once."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import pytest
+from cyclonedds.builtin import BuiltinTopicDcpsSubscription
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import _CQos
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from ros2_bench import DOMAIN
+from ros_tcp_client import until
+
+from volery.bridges.ros2.dds import library
+from volery.bridges.ros2.dds.announced import (
+    Terms,
+    announcements,
+    matched_reader,
+    matched_writer,
+    terms_at,
+)
+from volery.bridges.ros2.dds.domain import join_domain, leave_domain
+from volery.bridges.ros2.dds.idl_types import message_struct
+from volery.bridges.ros2.dds.qos import qos_of
+from volery.bridges.ros2.middleware import Profile
+
+STRING = "std_msgs/msg/String"
+ENOUGH_S = 0.5
+"""By then the package's own reading has been wrong, 20 times of 20."""
+
+
+class Pair(NamedTuple):
+    """A writer and a reader of two participants that have met."""
+
+    writer: DataWriter
+    reader: DataReader
+    terms: Terms
+
+
+@pytest.fixture(scope="module")
+def pairs():
+    """Four, each of terms of its own."""
+    here, there = join_domain(DOMAIN, ()), join_domain(DOMAIN, ())
+    struct, made = message_struct(STRING), []
+    for number in range(4):
+        terms = Terms(
+            Profile(reliable=number % 2 == 0, latched=number >= 2),
+            b"" if number == 3 else f"clientid={number};".encode() * (number + 1),
+        )
+        qos = qos_of(terms.profile, terms.user_data)
+        writer = DataWriter(here, Topic(here, f"pair{number}", struct), qos=qos)
+        reader = DataReader(there, Topic(there, f"pair{number}", struct), qos=qos)
+        until(writer.get_matched_subscriptions)
+        until(reader.get_matched_publications)
+        made.append(Pair(writer, reader, terms))
+    yield made
+    made.clear()
+    for participant in (here, there):
+        leave_domain(DOMAIN, participant)
+
+
+@pytest.fixture
+def hasty():
+    """Threads that take turns as often as they can."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+def test_either_end_tells_its_own(pairs):
+    for writer, reader, terms in pairs:
+        (reader_handle,) = writer.get_matched_subscriptions()
+        (writer_handle,) = reader.get_matched_publications()
+        for found, entity in (
+            (matched_reader(writer, reader_handle), reader),
+            (matched_writer(reader, writer_handle), writer),
+        ):
+            assert found.terms == terms
+            assert found.key == entity.guid.bytes
+            assert found.dds_topic == entity.topic.name
+            assert found.type_name == "std_msgs::msg::dds_::String_"
+    assert matched_reader(pairs[0].writer, 12345) is None
+    assert matched_writer(pairs[0].reader, 12345) is None
+
+
+def test_threads_that_read_at_once_get_each_their_own(pairs, hasty):
+    """A client took a server for a stranger's, for good, when another thread read beside it."""
+    gate = threading.Barrier(len(pairs))
+
+    def wrong(pair):
+        (handle,) = pair.writer.get_matched_subscriptions()
+        gate.wait()
+        end_s, found = time.monotonic() + ENOUGH_S, []
+        while time.monotonic() < end_s and not found:
+            terms = matched_reader(pair.writer, handle).terms
+            found += [terms] if terms != pair.terms else []
+        return found
+
+    with ThreadPoolExecutor(len(pairs)) as pool:
+        assert list(pool.map(wrong, pairs)) == [[]] * len(pairs)
+
+
+@pytest.mark.parametrize("function", ["_user_data", "_reliability", "_durability"])
+def test_a_reading_in_the_midst_of_another_changes_nothing(monkeypatch, function):
+    ours, others = Terms(Profile(latched=True), b"typehash=RIHS01_1;"), Terms(Profile(False), b"")
+    here, there = (_CQos.qos_to_cqos(qos_of(*terms)) for terms in (ours, others))
+    original, seen = getattr(library, function), []
+
+    def interrupted(*arguments):
+        told = original(*arguments)
+        if not seen:
+            seen.append(None)
+            seen[0] = terms_at(there)
+        return told
+
+    monkeypatch.setattr(library, function, interrupted)
+    assert terms_at(here) == ours
+    assert seen == [others]
+    for qos in (here, there):
+        _CQos.cqos_destroy(qos)
+
+
+def test_who_leaves_is_told_of_without_terms(pairs):
+    writer = pairs[0].writer
+    source = announcements(writer.topic.participant, BuiltinTopicDcpsSubscription)
+    there = pairs[0].reader.topic.participant
+    reader = DataReader(there, Topic(there, "brief", message_struct(STRING)))
+    key = reader.guid.bytes
+    heard = {}
+
+    def hears():
+        heard.update((sample.key, sample) for sample in source.take(100))
+        return heard.get(key)
+
+    assert until(hears).terms is not None
+    heard.clear()
+    library.delete(reader)
+    gone = until(hears)
+    assert not gone.sample_info.valid_data
+    assert (gone.terms, gone.dds_topic) == (None, None)
+
+
+def test_types_are_handed_out_with_their_description():
+    """Else two threads that make the first topics of a type disturb each other."""
+    described = message_struct("sensor_msgs/msg/Joy").__idl__
+    assert all(described._xt_bytedata)

@@ -1,0 +1,55 @@
+"""Endpoints over DDS when other threads close them, or what is due beside them fails."""
+
+from __future__ import annotations
+
+import queue
+
+import pytest
+from ros2_bench import DOMAIN, Other
+from ros_tcp_client import until
+
+from volery.bridges.ros2.environment import Ros2Terms
+from volery.bridges.ros2.middleware import ServiceSpec
+from volery.graph.messages import String
+
+STRING = "std_msgs/msg/String"
+TRIGGER = "std_srvs/srv/Trigger"
+
+
+@pytest.fixture
+def two():
+    """Two participants."""
+    made = [Other(Ros2Terms(domain_id=DOMAIN)) for _ in range(2)]
+    yield made
+    for one in made:
+        one.close()
+
+
+def test_a_client_that_is_closed_is_not_ready_and_in_no_trouble(two):
+    """The participant's thread looks at it at any time."""
+    here, there = two
+    there.participant.server(ServiceSpec(there.node, "/do", TRIGGER), lambda _data, _answer: None)
+    caller = here.participant.caller(ServiceSpec(here.node, "/do", TRIGGER))
+    until(lambda: caller.ready)
+    caller.close()
+    assert not caller.ready
+    assert caller.trouble == ""
+
+
+def test_what_is_due_and_fails_does_not_end_hearing(two, caplog):
+    here, there = two
+    failed = queue.Queue()
+
+    def fail():
+        failed.put(None)
+        raise RuntimeError("no such luck")
+
+    heard = here.hear("/in", STRING)
+    here.participant._ear._now_and_then = fail
+    for _ in range(2):
+        failed.get(timeout=10.0)
+    assert "no such luck" in caplog.text
+    writer, publish = there.speak("/in", STRING)
+    until(lambda: writer.matched)
+    publish(String("still there"))
+    assert heard.get(timeout=10.0).data == "still there"

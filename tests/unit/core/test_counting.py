@@ -1,0 +1,19 @@
+"""Numbers of things in words."""
+
+import pytest
+
+from volery.core.counting import counted
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ((0, "scan"), "0 scans"),
+        ((1, "scan"), "1 scan"),
+        ((1600, "scan"), "1,600 scans"),
+        ((1, "entry", "entries"), "1 entry"),
+        ((2, "entry", "entries"), "2 entries"),
+    ],
+)
+def test_one_is_singular(words, told):
+    assert counted(*words) == told
