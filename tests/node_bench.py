@@ -51,6 +51,10 @@ class NodeBench:
         return self.heard[topic]
 
     def send(self, topic, message):
+        """Publish it; its arrays become read-only, as those of the simulation are."""
+        for value in vars(message).values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
         self.graph.advertise(topic, type(message)).publish(message)
         self.graph.deliver()
 

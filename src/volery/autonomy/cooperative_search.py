@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -81,6 +82,13 @@ class CooperativeSearch(TeamFlight):
         "_finishing",
         "_to_tell",
     )
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """What compiles its kernels."""
+        from volery.autonomy.search import warm_up
+
+        return (warm_up.colours,)
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)

@@ -7,6 +7,7 @@ that way lies beyond the picture's edge the UAV first turns and looks.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,13 @@ class DepthAvoidance(DepthCourse):
     """
 
     STATE = ("_obstacles", "_steering")
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """What compiles its kernels."""
+        from volery.autonomy import warm_up
+
+        return warm_up.depth_points, warm_up.gaps
 
     def __init__(self, **options: Any) -> None:
         super().__init__("depth_avoidance", **options)

@@ -11,6 +11,7 @@ Height above ground is held by the sonar and the slope ahead.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,13 @@ class GapFlight(Node):
         "_nodding_filter",
     )
     """Everything that changes in flight."""
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """What compiles its kernels."""
+        from volery.autonomy import warm_up
+
+        return warm_up.scan_points, warm_up.ground, warm_up.gaps
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,13 @@ class TargetDetection(Node):
 
     STATE = ("_mates", "_frame", "_pose", "_range", "_intrinsics", "_tracks")
     """Everything that changes."""
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """What compiles its kernels."""
+        from volery.autonomy.search import warm_up
+
+        return (warm_up.colours,)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("target_detection", **options)

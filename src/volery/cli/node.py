@@ -40,6 +40,7 @@ def run_node(options: NodeOptions) -> None:
     from volery.bridges.nodes.profile import Profile, absolute_names, load_profile
     from volery.graph.messages import add_definitions
     from volery.runtime.node_loading import start_node
+    from volery.runtime.warm_up.sharing import compile_all
     from volery.scenario.schema import NodeEntry
 
     profile = Profile() if options.profile is None else load_profile(options.profile)
@@ -65,6 +66,7 @@ def run_node(options: NodeOptions) -> None:
         context = host.context(absolute_names(profile.remap, namespace))
         node = start_node(entry, context, namespace, "volery node", folder)
         try:
+            compile_all(node.warm_ups())  # before the graph, or a clock in lock step, waits for it
             link = join_late(late, host)
             if options.lock_step_s is not None:
                 host.join_lock_step(node.get_name(), options.lock_step_s)

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Any, Protocol
@@ -99,6 +99,18 @@ class Node:
         context.graph.enter(self.full_name)
 
     # ------------------------------------------------------------------------------ the contract
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """Functions that let the kernels compile that the node calls, each some of them.
+
+        A node with kernels overrides it. The functions are a module's, not made on the spot, and
+        call what the node calls, with input made up for it, whose arrays have the types and layouts
+        of the real ones. They are called before the clock of a run starts, in any order and maybe
+        in another process, for what is compiled later stops the flight; those of Volery's own nodes
+        once after an installation, for all is kept on disk, others at each start.
+        """
+        return ()
 
     def get_name(self) -> str:
         """Name without namespace."""

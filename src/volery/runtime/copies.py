@@ -32,7 +32,8 @@ from volery.runtime.building import place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.copy_block import CopyBlock, CopyEvent, Reading
 from volery.runtime.uav import Uav
-from volery.runtime.warm_up import compiled_kernels
+from volery.runtime.warm_up.needs import needs_of
+from volery.runtime.warm_up.sharing import compiled
 from volery.runtime.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.scenario.schema import Scenario
 from volery.vehicle.fleet import FleetState
@@ -65,7 +66,7 @@ class Copies:
                 f"{counted(count, 'copy', 'copies')}: as many seeds, not {len(seeds)}"
             )
         self.scenario = scenario
-        with compiled_kernels():
+        with compiled(needs_of(scenario, nodes=False)):
             self.terrain = build_terrain(scenario)
             self.city = build_city(scenario, self.terrain)
             self.forest = build_forest(scenario, self.terrain, self.city)

@@ -20,7 +20,6 @@ from volery.runtime.assembly import Assembly, assemble
 from volery.runtime.command_door import open_commands
 from volery.runtime.flight_states import FlightStates
 from volery.runtime.graph_building import announce_sensors, start_nodes, start_system_nodes
-from volery.runtime.message_loading import learn_messages
 from volery.runtime.outlet import Outlet
 from volery.runtime.placement import Start
 from volery.runtime.pose_aids import PoseAids
@@ -79,7 +78,6 @@ class Crew:
         self.flight_states.start(self.engine.every)
         self.pose_aids.start(self.engine.every)
         self._take_over(parts, self.starts)
-        learn_messages(self.scenario)
         self.start_nodes()
 
     def regroup(self, starts: Sequence[Start]) -> None:

@@ -21,8 +21,7 @@ def start_node(
 
     Modules are also looked for in the scenario's `folder` and in the working folder.
     """
-    with _also_from(folder or Path(), Path()):
-        node_class = _find_class(entry.node, where)
+    node_class = find_node(entry, where, folder)
     try:
         node: Node = node_class(
             context=context, namespace=namespace, parameter_overrides=entry.parameters
@@ -36,6 +35,12 @@ def start_node(
             f"known: {', '.join(node.declared_parameters())}"
         )
     return node
+
+
+def find_node(entry: NodeEntry, where: str, folder: Path | None) -> type[Any]:
+    """Import a node's class, as `start_node` does."""
+    with _also_from(folder or Path(), Path()):
+        return _find_class(entry.node, where)
 
 
 @contextmanager

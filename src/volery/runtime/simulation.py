@@ -35,6 +35,7 @@ from volery.runtime.graph_building import all_down, plan_faults
 from volery.runtime.grid_world import GridWorld
 from volery.runtime.keeping import Keeper
 from volery.runtime.lock_step import open_lock_step
+from volery.runtime.message_loading import learn_messages
 from volery.runtime.origin import tell_origin
 from volery.runtime.outlet import Outlet
 from volery.runtime.pilots import Pilots
@@ -52,7 +53,8 @@ from volery.runtime.spawning import Spawner
 from volery.runtime.telling import LiveTopics
 from volery.runtime.telling.status import Told
 from volery.runtime.uav import Uav
-from volery.runtime.warm_up import compiled_kernels
+from volery.runtime.warm_up.needs import needs_of
+from volery.runtime.warm_up.sharing import compiled
 from volery.runtime.weather_messages import WeatherTopics
 from volery.runtime.worlds import build_world
 from volery.scenario.faults import Fault, parse_fault
@@ -99,8 +101,7 @@ class Simulation:
         if threads < 1:
             raise ScenarioError(f"threads must be at least 1 (found {threads})")
         self.scenario = scenario
-        with compiled_kernels():
-            self.terrain, self.city, self.forest, self.scene = build_world(scenario, threads)
+        self._build_world(threads)
         self._closed = False
         self._pacer = Pacer()
 
@@ -604,6 +605,13 @@ class Simulation:
         return self.outlet.digest.hexdigest()
 
     # ----------------------------------------------------------------------------------- building
+
+    def _build_world(self, threads: int) -> None:
+        """Build the world; a first start compiles what the flight calls."""
+        scenario = self.scenario
+        learn_messages(scenario)  # which the modules of nodes may ask for
+        with compiled(needs_of(scenario)):
+            self.terrain, self.city, self.forest, self.scene = build_world(scenario, threads)
 
     def _keep_time(self, publisher: GraphPublisher) -> None:
         """Publish the clock, and take fingerprints, while somebody wants them."""

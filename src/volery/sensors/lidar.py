@@ -65,10 +65,11 @@ def make_batch(
     uavs = np.atleast_1d(np.asarray(uav, dtype=np.int64))
 
     def column(values: ArrayLike, kind: type) -> NDArray[Any]:
-        return np.ascontiguousarray(np.broadcast_to(np.asarray(values, dtype=kind), uavs.shape))
+        # Of its own, as kernels are compiled for: a single scan's would be a read-only view.
+        return np.array(np.broadcast_to(np.asarray(values, dtype=kind), uavs.shape))
 
     return LidarBatch(
-        uav=np.ascontiguousarray(uavs),
+        uav=column(uavs, np.int64),
         mount=column(mount, np.int64),
         sweep_start_ns=column(sweep_start_ns, np.int64),
         key=column(key, np.uint64),

@@ -28,7 +28,8 @@ def balance(
     """
     count, robots = owner.shape[0], starts.shape[0]
     surplus = np.empty(robots, np.int64)
-    surplus[:] = -targets
+    for r in range(robots):
+        surplus[r] = -targets[r]
     for k in range(count):
         surplus[owner[k]] += 1
     closed = np.zeros((robots, robots), np.bool_)

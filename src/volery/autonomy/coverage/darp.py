@@ -105,7 +105,8 @@ def _iterate(
             wrong += lost[r] + abs(sizes[r] - targets[r])
         if wrong < best:
             best = wrong
-            owner[:] = here
+            for k in range(count):
+                owner[k] = here[k]
         if wrong <= near:
             return iteration
         for r in range(robots):

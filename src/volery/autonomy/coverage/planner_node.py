@@ -7,6 +7,7 @@ falls silent or gets nowhere, what is not yet covered is divided anew.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,13 @@ class CoveragePlanner(Node):
     seed: of the division's random numbers.
 
     """
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """What compiles its kernels."""
+        from volery.autonomy.coverage import warm_up
+
+        return (warm_up.coverage_plans,)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("coverage", **options)

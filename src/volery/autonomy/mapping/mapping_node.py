@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -71,6 +72,21 @@ class Mapping(Node):
     map_file: a map in `folder` to begin with.
 
     """
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """What compiles its kernels."""
+        from volery.autonomy import warm_up as seeing
+        from volery.autonomy.mapping import warm_up
+
+        return (
+            warm_up.growing_map,
+            warm_up.read_maps,
+            seeing.scan_returns,
+            seeing.scan_repeats,
+            seeing.scan_rays,
+            seeing.ground,
+        )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("mapping", **options)

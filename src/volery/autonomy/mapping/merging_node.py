@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,13 @@ class MapMerging(Node):
     max_cells: bound of all maps' known cells together.
 
     """
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """What compiles its kernels."""
+        from volery.autonomy.mapping import warm_up
+
+        return warm_up.read_maps, warm_up.merged_maps
 
     def __init__(self, **options: Any) -> None:
         super().__init__("map_merging", **options)

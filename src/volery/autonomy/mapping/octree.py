@@ -136,7 +136,8 @@ def _choose(
         if hits[k]:
             if not abs(z) <= above:
                 continue
-            chosen[count] = ends[k]
+            for i in range(3):
+                chosen[count, i] = ends[k, i]
         elif abs(z) <= _FREE_ABOVE_M and length > reach - 0.5:
             chosen[count, 0] = origin[0] + (x / length) * (reach + 0.5)
             chosen[count, 1] = origin[1] + (y / length) * (reach + 0.5)

@@ -27,19 +27,26 @@ def _measure(occupied: NDArray[np.bool_], far: int, square: Squares, spare: Squa
         for j in range(ny):
             _along_column(occupied[i, j], far, square[i, j])
     for i in range(nx):
-        spare[i] = square[i]
+        _copy(square[i], spare[i])
         for j in range(ny):
             for other in range(max(j - far, 0), min(j + far + 1, ny)):
                 away = np.int16((other - j) * (other - j))
                 for k in range(nz):
                     spare[i, j, k] = min(spare[i, j, k], np.int16(square[i, other, k] + away))
     for i in range(nx):
-        square[i] = spare[i]
+        _copy(spare[i], square[i])
         for other in range(max(i - far, 0), min(i + far + 1, nx)):
             away = np.int16((other - i) * (other - i))
             for j in range(ny):
                 for k in range(nz):
                     square[i, j, k] = min(square[i, j, k], np.int16(spare[other, j, k] + away))
+
+
+@inner_kernel
+def _copy(square: NDArray[np.int16], into: NDArray[np.int16]) -> None:
+    for j in range(square.shape[0]):  # an assignment of arrays takes seconds to compile
+        for k in range(square.shape[1]):
+            into[j, k] = square[j, k]
 
 
 @inner_kernel

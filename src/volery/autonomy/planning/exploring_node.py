@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from typing import Any
 
@@ -88,6 +89,13 @@ class Exploring(Node):
     cell_m: of the area.
 
     """
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """What compiles its kernels."""
+        from volery.autonomy.planning import warm_up
+
+        return (warm_up.searched_area,)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("exploration", **options)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,14 @@ class GlobalPlanner(Node):
     iterations: bound of the search. seed: of its random numbers.
 
     """
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """What compiles its kernels."""
+        from volery.autonomy.mapping import warm_up as mapping
+        from volery.autonomy.planning import warm_up
+
+        return warm_up.ways, mapping.read_maps
 
     def __init__(self, **options: Any) -> None:
         super().__init__("global_planner", **options)

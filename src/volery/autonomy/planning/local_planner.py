@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -70,6 +70,14 @@ class LocalPlanner(Node):
     separation_m: to keep in plan from the UAVs that are heard on `radio/team`.
 
     """
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """What compiles its kernels."""
+        from volery.autonomy import warm_up as seeing
+        from volery.autonomy.planning import warm_up
+
+        return warm_up.plans, seeing.scan_repeats, seeing.scan_rays, seeing.ground
 
     def __init__(self, **options: Any) -> None:
         super().__init__("local_planner", **options)

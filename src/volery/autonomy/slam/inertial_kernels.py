@@ -138,9 +138,11 @@ def remember(times: NDArray[np.int64], states: Array, time_ns: int, state: Array
     last = len(times) - 1
     for k in range(last):
         times[k] = times[k + 1]
-        states[k] = states[k + 1]
+        for i in range(STATE_NUMBERS):
+            states[k, i] = states[k + 1, i]
     times[last] = time_ns
-    states[last] = state
+    for i in range(STATE_NUMBERS):
+        states[last, i] = state[i]
 
 
 @brief_kernel

@@ -175,6 +175,12 @@ def _place_of(i: int) -> int:
     return i if i < 3 else i + 3
 
 
+@inner_kernel
+def _copy(state: Array, into: Array) -> None:
+    for i in range(len(state)):  # an assignment of arrays takes seconds to compile
+        into[i] = state[i]
+
+
 @kernel
 def update(
     state: Array,
@@ -219,13 +225,13 @@ def update(
                 for j in range(6):
                     left[i, k] += trust * information[i, j] * covariance[_place_of(j), _place_of(k)]
         if not eliminate(left, right):
-            state[:] = prior
+            _copy(prior, state)
             return False
         for i in range(STATES):
             error[i] = 0.0
             for k in range(6):
                 error[i] += covariance[i, _place_of(k)] * right[k, 0]
-        state[:] = prior
+        _copy(prior, state)
         add_error(state, error)
     return _shrink(covariance, information, trust)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,13 @@ class PlanarSlam(Node):
         "_path_ns",
         "_path_of",
     )
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """What compiles its kernels."""
+        from volery.autonomy.slam.planar import warm_up
+
+        return warm_up.walls, warm_up.told_places
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)

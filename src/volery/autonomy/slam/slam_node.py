@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -72,6 +73,14 @@ class Slam(Node):
     """
 
     _PLAIN = ("_nod", "_omega", "_told", "_taken_ns", "_odom_ns", "_refused", "_resets", "_shown")
+
+    @classmethod
+    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+        """What compiles its kernels."""
+        from volery.autonomy import warm_up as seeing
+        from volery.autonomy.slam import warm_up
+
+        return warm_up.motion, warm_up.known_places, warm_up.lost_motion, seeing.scan_returns
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)

@@ -114,6 +114,7 @@ def unskew(
         wx += keep * one[P] + share * two[P] - now[P]
         wy += keep * one[P + 1] + share * two[P + 1] - now[P + 1]
         wz += keep * one[P + 2] + share * two[P + 2] - now[P + 2]
-        points[count] = rotate_vector(-now[Q], -now[Q + 1], -now[Q + 2], now[Q + 3], wx, wy, wz)
+        bx, by, bz = rotate_vector(-now[Q], -now[Q + 1], -now[Q + 2], now[Q + 3], wx, wy, wz)
+        points[count, 0], points[count, 1], points[count, 2] = bx, by, bz
         count += 1
     return count

@@ -342,7 +342,7 @@ class Estimator:
         variances: ArrayLike,
         valid: ArrayLike | None,
     ) -> None:
-        variances = np.ascontiguousarray(np.broadcast_to(variances, (len(rows), 6)), np.float64)
+        variances = np.array(np.broadcast_to(variances, (len(rows), 6)), np.float64, order="C")
         finite = np.isfinite(values).all(axis=1)
         told = np.atleast_1d(finite & (variances >= 0.0).all(axis=1))
         if valid is not None:

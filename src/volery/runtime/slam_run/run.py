@@ -23,6 +23,7 @@ from volery.runtime.slam_run.log_host import LogHost
 from volery.runtime.slam_run.mounts import frames_of, read_joints
 from volery.runtime.slam_run.sources import LogSource, TextSource
 from volery.runtime.slam_run.trajectory import Trajectory, corrected, way_m
+from volery.runtime.warm_up.sharing import compile_all
 
 Array = NDArray[np.float64]
 
@@ -159,12 +160,14 @@ class SlamRun:
         if not self.channels.has_imu:
             from volery.autonomy.slam.planar_node import PlanarSlam
 
+            compile_all(PlanarSlam.warm_ups())
             if level is not None:
                 parameters["mount"] = [*level, 0.0, 0.0, 0.0]
             PlanarSlam(**options, parameter_overrides=parameters)
             return
         from volery.autonomy.slam.slam_node import Slam
 
+        compile_all(Slam.warm_ups())
         self._find_mounts()
         for name, frame in self._frames.items():
             parameters[f"{name}_mount"] = [float(v) for v in self._mount(frame).position]

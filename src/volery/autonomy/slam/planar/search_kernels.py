@@ -115,7 +115,9 @@ def search(
     for k in np.argsort(-first[:, 0]):
         if first[k, 0] <= found or looked > _MOST_NODES:
             break
-        stack[0], held = first[k], 1
+        for n in range(5):
+            stack[0, n] = first[k, n]
+        held = 1
         while held > 0:
             held -= 1
             score, i, j = stack[held, 0], int(stack[held, 3]), int(stack[held, 4])

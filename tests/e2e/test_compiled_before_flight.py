@@ -1,0 +1,77 @@
+"""A first start compiles everything before its clock starts: nothing in flight."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+_TESTS = Path(__file__).parent.parent
+_FLY = """
+import json, sys
+from compile_watch import CompileWatch
+from volery import Simulation, load_scenario
+from volery.graph.messages import String
+
+watch, told = CompileWatch(), {}
+with Simulation(load_scenario(sys.argv[1])) as simulation:
+    before = len(watch.compiled)
+    for uav in simulation.uav_names:
+        for name in ("slam/status", "planning/goal_status"):
+            note = lambda p: told.update({p.topic: p.message.data})
+            simulation.graph.subscribe(f"/{uav}/{name}", note, String)
+    simulation.run(float(sys.argv[2]))
+print(json.dumps([before, watch.compiled[before:], told]))
+"""
+_REASON = "a `warm_ups` of a node, or `runtime.warm_up`, lacks what compiles these"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_nothing_is_compiled_in_flight(tmp_path: Path) -> None:
+    """On a fresh machine; the search flies until places were seen again and ways planned anew."""
+    flights = (("forest_search", 60), ("forest_survey", 8), ("coverage", 8), ("obstacle_field", 6))
+    told: dict[str, dict[str, str]] = {}
+    for scenario, seconds in flights:
+        printed = _run(tmp_path, "-c", _FLY, scenario, str(seconds))
+        before, in_flight, told[scenario] = json.loads(printed.splitlines()[-1])
+        assert in_flight == [], f"{scenario}: {_REASON}"
+        assert before > 50 or scenario != "forest_search"
+    states = {topic: json.loads(text) for topic, text in told["forest_search"].items()}
+    assert sum(s["closures"] for t, s in states.items() if t.endswith("/slam/status")) > 0
+    assert max(s["plans"] for t, s in states.items() if t.endswith("/goal_status")) > 3
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_what_happens_rarely_in_flight_is_compiled_too(tmp_path: Path) -> None:
+    """Motion and places lost and found, many divisions of maps: what unit tests have nodes do."""
+    _run(tmp_path, "-m", "volery.runtime.warm_up")
+    folder = _TESTS / "unit" / "autonomy"
+    names = ("slam_node", "slam_way", "planar_slam", "coverage_plans", "local_planning")
+    files = [str(folder / f"test_{name}.py") for name in names]
+    _run(tmp_path, "-m", "pytest", "-q", "-p", "compile_watch", "-m", "not slow", *files)
+    assert json.loads((tmp_path / "compiled.json").read_text()) == [], _REASON
+
+
+def _run(cache: Path, *command: str) -> str:
+    paths = [str(_TESTS), os.environ.get("PYTHONPATH", "")]
+    done = subprocess.run(
+        [sys.executable, *command],
+        env={
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+            "VOLERY_CACHE_DIR": str(cache),
+            "COMPILED_TO": str(cache / "compiled.json"),
+        },
+        cwd=_TESTS.parent,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
