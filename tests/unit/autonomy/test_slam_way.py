@@ -8,6 +8,7 @@ import pytest
 from volery.autonomy.slam.keyframes import Keyframe
 from volery.autonomy.slam.loop_closing import Closure
 from volery.autonomy.slam.pose_graph import Edge
+from volery.autonomy.slam.relocation import Guess, chosen
 from volery.autonomy.slam.settings import Matching
 from volery.autonomy.slam.tracker import Tracker
 from volery.autonomy.slam.way import Way
@@ -94,27 +95,42 @@ def test_keyframes_of_a_session_that_was_never_placed_are_not_tried():
     assert set(closer.asked) == set(range(9))
 
 
+def guess(older, x, margin, newer=26):
+    """A guess that the keyframe `newer` lies at (x, 0, 0)."""
+    edge = Edge(older, newer, np.array([x - 7.0 * older, 0.0, 0.0, 0.0]), np.ones(4), True)
+    return Guess(edge, margin, np.array([x, 0.0, 0.0, 0.0]))
+
+
 @pytest.mark.parametrize(
-    ("second", "step", "is_found"),
+    ("guesses", "at"),
     [
-        (4, [2.0, 0.0, 0.0, 0.0], True),  # both see it at x = 30
-        (8, [-26.0, 0.0, 0.0, 0.0], False),  # so near to the first one that it says the same
-        (4, [2.0, 0.8, 0.0, 0.0], False),
-        (4, [2.0, 0.0, 0.0, 0.1], False),
+        ([], None),
+        ([guess(11, 30.0, 0.2)], 30.0),
+        ([guess(11, 30.0, 0.1)], None),
+        ([guess(11, 30.0, 0.1), guess(4, 30.4, 0.08)], 30.0),
+        ([guess(11, 30.0, 0.1), guess(8, 30.4, 0.1)], None),  # they have returns in common
+        ([guess(11, 30.0, 0.1), guess(4, 30.6, 0.1)], None),
+        ([guess(11, 30.0, 0.2), guess(4, 50.0, 0.12)], None),  # which contradict each other
+        ([guess(11, 30.0, 0.2), guess(4, 50.0, 0.12), guess(3, 30.1, 0.1)], 30.0),
+        ([guess(11, 30.0, 0.2, newer=25)], None),  # it was seen before: is it still?
+        ([guess(11, 30.0, 0.2, newer=25), guess(10, 30.2, 0.06)], 30.2),
     ],
 )
-def test_two_guesses_from_afar_that_agree_are_a_find(second, step, is_found):
-    way, _ = lost_after(24)
-    way._closer = Guesser({11: [-47.0, 0.0, 0.0, 0.0], second: step})
-    edges = find(way, 6)
-    assert bool(edges) == is_found
-    assert all(edge.measured[0] in (-47.0, step[0]) for edge in edges)
+def test_guesses_that_agree_and_are_not_contradicted_are_a_find(guesses, at):
+    found = chosen(guesses, 26, np.zeros(4))
+    if at is None:
+        assert found is None
+    else:
+        assert found.to == 26
+        assert 7.0 * found.origin + found.measured[0] == pytest.approx(at)
 
 
-def test_one_that_is_sure_needs_no_other():
+def test_a_find_is_of_the_newest_keyframe():
     way, _ = lost_after(24)
     way._closer = Guesser({11: [1.0, 0.0, 0.0, 0.0]}, margin=0.2)
-    assert find(way, 6)
+    found = find(way, 6)
+    assert found
+    assert {(edge.origin, edge.to) for edge in found} == {(11, 26)}
 
 
 def test_one_that_is_lost_and_holds_still_looks_around_more_often():

@@ -25,13 +25,13 @@ _BEFORE, AROUND = 2, 3
 _LEAST_SHARE, _LEAST_MET = 0.42, 30.0
 """Share and number of uprights that must be met again, each counted by how well."""
 _LEAST_SHARE_LOST, _LEAST_MET_LOST = 0.2, 80.0
-_SURE_MARGIN, _GUESSED_MARGIN = 0.15, 0.05
-"""By how much its place must fit better than all others for one that is lost to be sure; to guess.
+_LEAST_MARGIN_LOST = 0.05
+"""By how much its place must fit better than all others.
 
 Of 480 pairs of keyframes of flights through the forest, matched within 12 m and 0.2 rad, those that
 lay so near had margins of 0.22 in the median, nine of ten above 0.12, and nine of ten a share of
 0.21; those farther apart, which fitted somewhere all the same, had margins of 0.10 at the most, but
-shares of up to 0.39, in a thicket. One wrong place with 0.15 and a share of 0.2 has been seen.
+shares of up to 0.39, in a thicket.
 """
 _APART_M = 1.5
 """A place so far from the best one is another one."""
@@ -49,11 +49,6 @@ class Closure(NamedTuple):
     met: float
     margin: float
     """By how much it fits better than any other place that was tried."""
-
-    @property
-    def is_sure(self) -> bool:
-        """Whether it needs no other one that agrees, where nothing else is known of the place."""
-        return self.margin >= _SURE_MARGIN
 
 
 class _Trial(NamedTuple):
@@ -135,7 +130,7 @@ class LoopCloser:
             closure is not None
             and closure.share >= _LEAST_SHARE_LOST
             and closure.met >= _LEAST_MET_LOST
-            and margin >= _GUESSED_MARGIN
+            and margin >= _LEAST_MARGIN_LOST
         )
         return closure if fits else None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,24 @@ _TRIES, _LEAP = 6, 3
 """Keyframes tried at each new one; so many apart, as neighbours look alike."""
 _FRESH = 3
 """Keyframes since it was lost from which on they are matched."""
-_AGREED = np.array([0.5, 0.5, 0.5, 0.05])
-"""m and rad within which guesses from two keyframes are of one place."""
+_SAME = np.array([0.5, 0.5, 0.5, 0.05])
+_OTHER = 4.0 * _SAME
+"""m and rad within which guesses are of one place, and beyond which they contradict each other."""
+_SURE, _CLEARLY = 0.15, 2.0
+"""What the margins of all guesses of a place must sum up to, and how often those of any other one.
+
+One guess alone may be sure. Where few things stand any of them may be taken for any other, and the
+guesses contradict each other.
+"""
+
+
+class Guess(NamedTuple):
+    """Where a keyframe that fits would put the present session."""
+
+    edge: Edge
+    margin: float
+    moved: Array
+    """(4,) what would move the session there."""
 
 
 class Relocation:
@@ -33,8 +50,7 @@ class Relocation:
         self.doubted: set[int] = set()
         """Keyframes of which it is not sure where they are."""
         self._cursor = 0
-        self._guesses: list[tuple[int, Array]] = []
-        """Keyframes that fit roughly, and what would move the session to where they say."""
+        self._guesses: list[Guess] = []
 
     def begin(self, doubted: set[int]) -> None:
         """It was lost just now, and so is where some more keyframes are."""
@@ -45,7 +61,7 @@ class Relocation:
     def find(
         self, closer: LoopCloser, frames: Sequence[Keyframe], poses: Sequence[Array]
     ) -> Edge | None:
-        """Some of the keyframes of earlier sessions, in turn, the latest of them first."""
+        """Try some keyframes of earlier sessions, in turn, the latest of them first."""
         newest = len(frames) - 1
         session = frames[newest].session
         old = [
@@ -55,32 +71,55 @@ class Relocation:
         old = [row for first in range(_LEAP) for row in old[first::_LEAP]]
         if not old or sum(frame.session == session for frame in frames) < _FRESH:
             return None
-        best = None
         for _ in range(min(_TRIES, len(old))):
             row = old[self._cursor % len(old)]
             turn = _TURN_RAD if self._cursor < len(old) else math.pi
             self._cursor += 1
             found = closer.find(frames, poses, newest, row, (_REACH_M, turn))
-            if found is None or not (found.is_sure or self._is_confirmed(found.edge, poses)):
-                continue
-            if best is None or found.margin > best.margin:
-                best = found
-        return None if best is None else best.edge
-
-    def _is_confirmed(self, guess: Edge, poses: Sequence[Array]) -> bool:
-        """Whether a guess from elsewhere puts the newest keyframe there, too; this one is kept."""
-        newest = poses[guess.to]
-        place = compose(poses[guess.origin], guess.measured)
-        confirmed = any(
-            abs(row - guess.origin) > 2 * AROUND and _is_same(compose(moved, newest), place)
-            for row, moved in self._guesses
-        )
-        self._guesses.append((guess.origin, compose(place, between(newest, np.zeros(4)))))
-        return confirmed
+            if found is not None:
+                place = compose(poses[row], found.edge.measured)
+                moved = compose(place, between(poses[newest], np.zeros(4)))
+                self._guesses.append(Guess(found.edge, found.margin, moved))
+        return chosen(self._guesses, newest, poses[newest])
 
 
-def _is_same(one: Array, other: Array) -> bool:
-    """Whether two poses (4,) are nearly the same."""
+def chosen(guesses: Sequence[Guess], newest: int, pose: Array) -> Edge | None:
+    """The best guess of the newest keyframe, whose pose is (4,), if its place is beyond doubt."""
+    if not guesses:
+        return None
+    places = [compose(guess.moved, pose) for guess in guesses]
+    alike = [
+        [
+            guess
+            for guess, other in zip(guesses, places, strict=True)
+            if _within(place, other, _SAME)
+        ]
+        for place in places
+    ]
+    weights = [_weight(group) for group in alike]
+    best = int(np.argmax(weights))
+    others = [
+        weight
+        for weight, place in zip(weights, places, strict=True)
+        if not _within(place, places[best], _OTHER)
+    ]
+    fresh = [guess for guess in alike[best] if guess.edge.to == newest]
+    if not fresh or weights[best] < max(_SURE, _CLEARLY * max(others, default=0.0)):
+        return None
+    return max(fresh, key=lambda guess: guess.margin).edge
+
+
+def _weight(guesses: Sequence[Guess]) -> float:
+    """The sum of margins of those guesses whose older keyframes have no returns in common."""
+    counted: list[Guess] = []
+    for guess in sorted(guesses, key=lambda guess: -guess.margin):
+        if all(abs(guess.edge.origin - other.edge.origin) > 2 * AROUND for other in counted):
+            counted.append(guess)
+    return sum(guess.margin for guess in counted)
+
+
+def _within(one: Array, other: Array, limits: Array) -> bool:
+    """Whether two poses (4,) differ by no more than that."""
     apart = one - other
     apart[3] = math.remainder(float(apart[3]), math.tau)
-    return bool((np.abs(apart) < _AGREED).all())
+    return bool((np.abs(apart) < limits).all())

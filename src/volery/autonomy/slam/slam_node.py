@@ -80,7 +80,13 @@ class Slam(Node):
         from volery.autonomy import warm_up as seeing
         from volery.autonomy.slam import warm_up
 
-        return warm_up.motion, warm_up.known_places, warm_up.lost_motion, seeing.scan_returns
+        return (
+            warm_up.motion,
+            warm_up.known_places,
+            warm_up.lost_motion,
+            warm_up.sight,
+            seeing.scan_returns,
+        )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)

@@ -12,6 +12,7 @@ from volery.autonomy.slam.loop_closing import LoopCloser
 from volery.autonomy.slam.matching_kernels import GROUND, UPRIGHT
 from volery.autonomy.slam.recovery import Recovery
 from volery.autonomy.slam.settings import GRAVITY_M_S2, Matching
+from volery.autonomy.slam.sight import Sight
 from volery.autonomy.slam.sweep import Sweep
 from volery.autonomy.slam.tracker import Tracker
 from volery.autonomy.warm_up import fixed
@@ -52,6 +53,15 @@ def known_places() -> None:
     ]
     poses = [np.zeros(4) for _ in frames]
     LoopCloser(Matching()).match(frames, poses, len(frames) - 1, 0, (0.4, 0.01))
+
+
+def sight() -> None:
+    """Kernels that notice a displacement: half of what is seen is somewhere else."""
+    before = np.column_stack([np.linspace(-20.0, 20.0, 80), np.zeros(80)])
+    now = before + np.where(np.arange(80) % 2, 3.0, 0.0)[:, None] * np.array([0.0, 1.0])
+    eyes = Sight()
+    for time_ns, places in ((0, before), (NS_PER_S // 4, now)):
+        eyes.take(time_ns, places, np.zeros(2), is_level=True)
 
 
 def lost_motion() -> None:
