@@ -26,7 +26,7 @@ _FRESH = 3
 _SAME = np.array([0.5, 0.5, 0.5, 0.05])
 _OTHER = 4.0 * _SAME
 """m and rad within which guesses are of one place, and beyond which they contradict each other."""
-_SURE, _CLEARLY = 0.15, 2.0
+_SURE, _CLEARLY = 0.2, 2.0
 """What the margins of all guesses of a place must sum up to, and how often those of any other one.
 
 One guess alone may be sure. Where few things stand any of them may be taken for any other, and the
