@@ -57,6 +57,10 @@ def test_one_that_is_displaced_sees_something_else(moved, rng):
     flight.moved = np.array(moved)
     flight.fly(0.3)
     assert flight.sight.is_broken
+    if np.hypot(*moved) < 6.0:
+        assert np.abs(flight.sight.moved - moved).max() < 0.5
+    else:
+        assert flight.sight.moved is None
 
 
 def test_things_that_come_into_sight_are_no_displacement(rng):

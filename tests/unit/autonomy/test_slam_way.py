@@ -125,6 +125,12 @@ def test_guesses_that_agree_and_are_not_contradicted_are_a_find(guesses, at):
         assert 7.0 * found.origin + found.measured[0] == pytest.approx(at)
 
 
+@pytest.mark.parametrize(("hint", "is_found"), [((29.6, -0.5), True), ((27.0, 0.0), False)])
+def test_a_hint_makes_a_weak_guess_sure(hint, is_found):
+    found = chosen([guess(11, 30.0, 0.1)], 26, np.zeros(4), np.array(hint))
+    assert (found is not None) == is_found
+
+
 def test_a_find_is_of_the_newest_keyframe():
     way, _ = lost_after(24)
     way._closer = Guesser({11: [1.0, 0.0, 0.0, 0.0]}, margin=0.25)

@@ -24,10 +24,12 @@ _TRIES, _LEAP = 6, 3
 _FRESH = 3
 """Keyframes since it was lost from which on they are matched."""
 _SAME = np.array([0.5, 0.5, 0.5, 0.05])
-_OTHER = 4.0 * _SAME
-"""m and rad within which guesses are of one place, and beyond which they contradict each other."""
-_SURE, _CLEARLY = 0.2, 2.0
-"""What the margins of all guesses of a place must sum up to, and how often those of any other one.
+_OTHER, _HINT = 4.0 * _SAME, np.array([1.0, 1.0, 2.0, 0.1])
+"""m and rad within which guesses are of one place, beyond which they contradict each other, and
+within which they are of the place that was hinted."""
+_SURE, _HINTED, _CLEARLY = 0.2, 0.12, 2.0
+"""What the margins of all guesses of a place must sum up to; what a hint of it adds to them; how
+much more that must be than the sum of any other place.
 
 One guess alone may be sure. Where few things stand any of them may be taken for any other, and the
 guesses contradict each other.
@@ -51,12 +53,17 @@ class Relocation:
         """Keyframes of which it is not sure where they are."""
         self._cursor = 0
         self._guesses: list[Guess] = []
+        self._hint: Array | None = None
 
-    def begin(self, doubted: set[int]) -> None:
-        """It was lost just now, and so is where some more keyframes are."""
+    def begin(self, doubted: set[int], hint: Array | None = None) -> None:
+        """It was lost just now, and so is where some more keyframes are.
+
+        `hint`: (2,) m in the map, by how much it may have been displaced.
+        """
         self.doubted |= doubted
         self._cursor = 0
         self._guesses = []
+        self._hint = hint
 
     def find(
         self, closer: LoopCloser, frames: Sequence[Keyframe], poses: Sequence[Array]
@@ -80,11 +87,16 @@ class Relocation:
                 place = compose(poses[row], found.edge.measured)
                 moved = compose(place, between(poses[newest], np.zeros(4)))
                 self._guesses.append(Guess(found.edge, found.margin, moved))
-        return chosen(self._guesses, newest, poses[newest])
+        return chosen(self._guesses, newest, poses[newest], self._hint)
 
 
-def chosen(guesses: Sequence[Guess], newest: int, pose: Array) -> Edge | None:
-    """The best guess of the newest keyframe, whose pose is (4,), if its place is beyond doubt."""
+def chosen(
+    guesses: Sequence[Guess], newest: int, pose: Array, hint: Array | None = None
+) -> Edge | None:
+    """The best guess of the newest keyframe, whose pose is (4,), if its place is beyond doubt.
+
+    `hint`: see `Relocation.begin`.
+    """
     if not guesses:
         return None
     places = [compose(guess.moved, pose) for guess in guesses]
@@ -96,7 +108,10 @@ def chosen(guesses: Sequence[Guess], newest: int, pose: Array) -> Edge | None:
         ]
         for place in places
     ]
-    weights = [_weight(group) for group in alike]
+    weights = [
+        _weight(group) + _HINTED * _is_hinted(place, pose, hint)
+        for group, place in zip(alike, places, strict=True)
+    ]
     best = int(np.argmax(weights))
     others = [
         weight
@@ -116,6 +131,10 @@ def _weight(guesses: Sequence[Guess]) -> float:
         if all(abs(guess.edge.origin - other.edge.origin) > 2 * AROUND for other in counted):
             counted.append(guess)
     return sum(guess.margin for guess in counted)
+
+
+def _is_hinted(place: Array, pose: Array, hint: Array | None) -> bool:
+    return hint is not None and _within(place, pose + np.append(hint, [0.0, 0.0]), _HINT)
 
 
 def _within(one: Array, other: Array, limits: Array) -> bool:

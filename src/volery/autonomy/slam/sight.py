@@ -75,6 +75,8 @@ class Sight:
 
     def __init__(self) -> None:
         self.is_broken = False
+        self.moved: Array | None = None
+        """(2,) m by which it was displaced then, in the frame of the odometry, if that is known."""
         self._glances: deque[_Glance] = deque()
 
     def take(self, time_ns: int, places: Array, here: Array, *, is_level: bool) -> None:
@@ -83,32 +85,38 @@ class Sight:
         while self._glances[0].time_ns <= time_ns - _NOW_NS - _BEFORE_NS:
             self._glances.popleft()
         if is_level and not self.is_broken:
-            self.is_broken = self._is_exchanged(time_ns - _NOW_NS, here)
+            self._compare(time_ns - _NOW_NS, here)
 
-    def _is_exchanged(self, since_ns: int, here: Array) -> bool:
+    def _compare(self, since_ns: int, here: Array) -> None:
         now = [glance for glance in self._glances if glance.time_ns > since_ns]
         before = [glance for glance in self._glances if glance.time_ns <= since_ns]
         last = [glance for glance in before if glance.time_ns > since_ns - _NOW_NS]
         new, old = _level(now, here), _level(last, here)
         if len(new) < _ENOUGH or len(old) < _ENOUGH:
-            return False
-        return _is_of_another_place(
-            _View(new, _picture(now, here)), _View(old, _picture(before, here))
-        )
+            return
+        views = _View(new, _picture(now, here)), _View(old, _picture(before, here))
+        shares = _shares(*views)
+        if max(shares) < _MOST:
+            self.moved = _only_other_place(*views, 0.5 * sum(shares))
+            self.is_broken = self.moved is not None or max(shares) < _NOTHING
 
 
-def _is_of_another_place(now: _View, before: _View) -> bool:
+def _shares(now: _View, before: _View) -> tuple[float, float]:
+    """Of what is seen now that was seen before, and of what was seen before that is seen now."""
     onwards = count_drawn(now.places, _CELL_M, before.picture) / len(now.places)
     back = count_drawn(before.places, _CELL_M, now.picture) / len(before.places)
-    most = max(onwards, back)
-    if most >= _MOST or most < _NOTHING:
-        return most < _NOTHING
+    return onwards, back
+
+
+def _only_other_place(now: _View, before: _View, here: float) -> Array | None:
+    """Step (2,) m to where it fits far better than `here`, and than anywhere else."""
     shares = np.empty(len(_STEPS))
     shares_around(now.places, before.picture, before.places, now.picture, _CELL_M, _STEPS, shares)
     best = int(np.argmax(shares))
     away = np.hypot(*(_STEPS - _STEPS[best]).T)
-    here, third = 0.5 * (onwards + back), float(shares[away > _NEAREST_M].max())
-    return bool(shares[best] > max(here + _BETTER, max(here, third) + _ALONE))
+    third = max(here, float(shares[away > _NEAREST_M].max()))
+    is_clear = shares[best] > max(here + _BETTER, third + _ALONE)
+    return _STEPS[best].copy() if is_clear else None
 
 
 def _level(glances: list[_Glance], here: Array) -> Array:

@@ -274,7 +274,8 @@ class Slam(Node):
         self, speed_sigma: float, turn_sigma: float, wrong_since_ns: int | None = None
     ) -> None:
         """Begin new maps; where in the old one they lie must be found out."""
+        moved = self._tracker.sight.moved
         self._tracker.begin_anew(speed_sigma, turn_sigma)
         self._health.begin_anew()
         if self._way.frames:
-            self._way.begin_anew(wrong_since_ns)
+            self._way.begin_anew(wrong_since_ns, moved)

@@ -95,11 +95,12 @@ class Way:
         self._correct(place[2])
         return True
 
-    def begin_anew(self, doubted_since_ns: int | None = None) -> None:
+    def begin_anew(self, doubted_since_ns: int | None = None, moved: Array | None = None) -> None:
         """The motion was lost: from now on nobody knows where in the map the odometry is.
 
         Keyframes since then may be of another place than they say already, and so are all those of
-        a session that has never found its place.
+        a session that has never found its place. `moved`: (2,) m in the odometry's frame, by how
+        much it seems to have been displaced.
         """
         doubted = {
             k
@@ -107,7 +108,10 @@ class Way:
             if frame.session == self.session
             and (not self.is_placed or _is_since(frame, doubted_since_ns))
         }
-        self.relocation.begin(doubted)
+        hint = None
+        if moved is not None and self.is_placed:
+            hint = rotations.rotate(self.correction.attitude, np.array([*moved, 0.0]))[:2]
+        self.relocation.begin(doubted, hint)
         self.session += 1
         self.is_placed = False
         self._gathering = Gathering()
