@@ -63,7 +63,7 @@ class Copies:
             seeds = range(scenario.seed, scenario.seed + count)
         if len(seeds) != count:
             raise ScenarioError(
-                f"{counted(count, 'copy', 'copies')}: as many seeds, not {len(seeds)}"
+                f"{counted(count, 'copy', 'copies')} with {counted(len(seeds), 'seed')}: each needs one"
             )
         self.scenario = scenario
         with compiled(needs_of(scenario, nodes=False)):
@@ -143,7 +143,7 @@ class Copies:
             check_seed(seed)
         if seeds is not None and len(seeds) != len(chosen):
             raise CommandError(
-                f"{counted(len(chosen), 'copy', 'copies')}: as many seeds, not {len(seeds)}"
+                f"{counted(len(chosen), 'copy', 'copies')} with {counted(len(seeds), 'seed')}: each needs one"
             )
         for block, first in zip(self._blocks, self._first, strict=True):
             here = np.flatnonzero((chosen >= first) & (chosen < first + len(block.seeds)))

@@ -237,7 +237,9 @@ class Exploring(Node):
             self._send(np.array([*self._goal.place, place[2]]))
             return
         if next_viewpoint(area, place[:2], heading, self._view, self._visited) is not None:
-            self._become(Searching.BLOCKED, f"{counted(len(self._refused), 'place')} out of reach")
+            self._become(
+                Searching.BLOCKED, f"{counted(len(self._refused), 'place')} cannot be reached"
+            )
         else:
             self._become(Searching.DONE, "")
         self._send(place)
