@@ -62,9 +62,7 @@ class Copies:
         if seeds is None:
             seeds = range(scenario.seed, scenario.seed + count)
         if len(seeds) != count:
-            raise ScenarioError(
-                f"{counted(count, 'copy', 'copies')} with {counted(len(seeds), 'seed')}: each needs one"
-            )
+            raise ScenarioError(_without_seeds(count, len(seeds)))
         self.scenario = scenario
         with compiled(needs_of(scenario, nodes=False)):
             self.terrain = build_terrain(scenario)
@@ -142,9 +140,7 @@ class Copies:
         for seed in seeds or ():
             check_seed(seed)
         if seeds is not None and len(seeds) != len(chosen):
-            raise CommandError(
-                f"{counted(len(chosen), 'copy', 'copies')} with {counted(len(seeds), 'seed')}: each needs one"
-            )
+            raise CommandError(_without_seeds(len(chosen), len(seeds)))
         for block, first in zip(self._blocks, self._first, strict=True):
             here = np.flatnonzero((chosen >= first) & (chosen < first + len(block.seeds)))
             if len(here):
@@ -254,3 +250,7 @@ def _spread(what: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
     if not np.isfinite(spread).all():
         raise CommandError(f"{what} must be finite")
     return spread
+
+
+def _without_seeds(copies: int, seeds: int) -> str:
+    return f"{counted(copies, 'copy', 'copies')} with {counted(seeds, 'seed')}: each needs one"
