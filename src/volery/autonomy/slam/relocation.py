@@ -99,27 +99,19 @@ def chosen(
     """
     if not guesses:
         return None
-    places = [compose(guess.moved, pose) for guess in guesses]
-    alike = [
-        [
-            guess
-            for guess, other in zip(guesses, places, strict=True)
-            if _within(place, other, _SAME)
-        ]
-        for place in places
-    ]
-    weights = [
-        _weight(group) + _HINTED * _is_hinted(place, pose, hint)
-        for group, place in zip(alike, places, strict=True)
-    ]
+    places = np.array([compose(guess.moved, pose) for guess in guesses])
+    same = _within(places[:, None], places, _SAME)
+    weights = np.array(
+        [_weight([guesses[k] for k in np.flatnonzero(row).tolist()]) for row in same]
+    )
+    if hint is not None:
+        weights += _HINTED * _within(places, pose + np.append(hint, [0.0, 0.0]), _HINT)
     best = int(np.argmax(weights))
-    others = [
-        weight
-        for weight, place in zip(weights, places, strict=True)
-        if not _within(place, places[best], _OTHER)
+    others = weights[~_within(places, places[best], _OTHER)]
+    fresh = [
+        guesses[k] for k in np.flatnonzero(same[best]).tolist() if guesses[k].edge.to == newest
     ]
-    fresh = [guess for guess in alike[best] if guess.edge.to == newest]
-    if not fresh or weights[best] < max(_SURE, _CLEARLY * max(others, default=0.0)):
+    if not fresh or weights[best] < max(_SURE, _CLEARLY * others.max(initial=0.0)):
         return None
     return max(fresh, key=lambda guess: guess.margin).edge
 
@@ -133,12 +125,8 @@ def _weight(guesses: Sequence[Guess]) -> float:
     return sum(guess.margin for guess in counted)
 
 
-def _is_hinted(place: Array, pose: Array, hint: Array | None) -> bool:
-    return hint is not None and _within(place, pose + np.append(hint, [0.0, 0.0]), _HINT)
-
-
-def _within(one: Array, other: Array, limits: Array) -> bool:
-    """Whether two poses (4,) differ by no more than that."""
+def _within(one: Array, other: Array, limits: Array) -> NDArray[np.bool_]:
+    """Whether poses (..., 4) differ by no more than that."""
     apart = one - other
-    apart[3] = math.remainder(float(apart[3]), math.tau)
-    return bool((np.abs(apart) < limits).all())
+    apart[..., 3] = np.remainder(apart[..., 3] + math.pi, math.tau) - math.pi
+    return np.asarray((np.abs(apart) < limits).all(-1))

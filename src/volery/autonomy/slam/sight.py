@@ -26,7 +26,7 @@ _MOST, _NOTHING = 0.8, 0.15
 _BETTER, _ALONE = 0.25, 0.13
 """By how much one other place must fit better than the present one, and than any third one.
 
-What is seen of a slope moves along it as the vehicle tilts, and then fits at many places. In 31,000
+What is seen of a slope moves along it as the vehicle tilts, and then fits at many places. In 30,000
 instants of flights through forests, dense and sparse, no other place fitted so; the share fell to
 0.20 at the least. In the dense one 84 of 90 displacements by 2.8 to 5 m and 35 of 36 by 1.5 m were
 noticed at once, in the sparse one 60 of 75 and 26 of 33, as long as enough was in reach.
