@@ -125,7 +125,7 @@ def test_logs_cut_off_anywhere_are_read_as_far_as_they_go(tmp_path, suffix):
     whole = write(tmp_path / f"whole{suffix}", [("/a", k) for k in range(60)]).read_bytes()
     path = tmp_path / f"cut{suffix}"
     lengths = set()
-    for size in range(14, len(whole), 37):
+    for size in (*range(14, len(whole), 37), *range(len(whole) - 150, len(whole))):
         path.write_bytes(whole[:size])
         log = open_chunks(path)
         assert log.trouble

@@ -18,6 +18,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
+from volery.bridges.logs.bag_writer import CHUNK_BYTES, bag_writer
 from volery.bridges.logs.disk_file import DiskFile
 from volery.core.errors import GraphError, RecordingError
 
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
     from volery.graph.messages import Published
 
-CHUNK_BYTES = 1 << 20
 CHUNK_WALL_S = 2.0
 """A chunk is closed by the first message that finds it this old, however small it is."""
 LIBRARY = "volery"
@@ -198,17 +198,12 @@ class BagLog(Log):
     """ROS 1 bag, format 2.0."""
 
     def __init__(self, path: Path, compression: Compression = "lz4") -> None:
-        from rosbags.rosbag1 import Writer
-
         from volery.graph.ros1 import ros1_codec
 
         super().__init__(path)
         if compression == "zstd":
             raise RecordingError(f"{path}: a .bag is compressed with lz4 or not at all")
-        writer = Writer(path)
-        writer.chunk_threshold = CHUNK_BYTES
-        if compression == "lz4":
-            writer.set_compression(Writer.CompressionFormat.LZ4)
+        writer = bag_writer(path, compressed=compression == "lz4")
         writer.open()
         if writer.bio is not None:
             writer.bio.close()

@@ -14,12 +14,13 @@ from volery.bridges.logs.records import (
     BAG_MAGIC,
     CUT_OFF,
     PART_CHUNK,
+    BagIndex,
     LogTopic,
     bag_fields,
 )
 from volery.core.clock import NS_PER_S
 
-_MESSAGE, _HEADER, _INDEX, _CHUNK, _CONNECTION = b"\x02", b"\x03", b"\x04", b"\x05", b"\x07"
+_MESSAGE, _INDEX, _CHUNK, _CONNECTION = b"\x02", b"\x04", b"\x05", b"\x07"
 _LENGTH = struct.Struct("<I")
 _TIME = struct.Struct("<II")
 
@@ -35,7 +36,7 @@ class BagChunks(ChunkedLog):
         span: Span | None = None
         counts: dict[int, int] = {}
         stamps: list[NDArray[Any]] = []
-        indexed = False
+        index = BagIndex()
 
         def end_chunk() -> None:
             nonlocal span
@@ -51,10 +52,9 @@ class BagChunks(ChunkedLog):
                 self.trouble = PART_CHUNK
                 break
             fields, body, after = record
+            index.pass_record(fields)
             kind = fields.get(b"op")
-            if kind == _HEADER:
-                indexed = any(fields.get(b"index_pos", b""))
-            elif kind == _CHUNK:
+            if kind == _CHUNK:
                 end_chunk()
                 span = Span(position, after - position)
             elif kind == _INDEX and span is not None:
@@ -67,7 +67,7 @@ class BagChunks(ChunkedLog):
                 self._learn(fields, self._read(body, after - body))
             position = after
         end_chunk()
-        if not indexed and not self.trouble:
+        if not index.is_whole and not self.trouble:
             self.trouble = CUT_OFF
 
     def _record(self, position: int) -> tuple[dict[bytes, bytes], int, int] | None:

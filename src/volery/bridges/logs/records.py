@@ -134,17 +134,15 @@ class LogWalk:
     def _bag(self, file: BinaryIO) -> Iterator[LogRecord]:
         size = self.path.stat().st_size
         file.seek(len(BAG_MAGIC))
-        indexed = False
+        index = BagIndex()
         while file.tell() < size:
             record = _bag_record(file, size)
             if record is None:
                 self.trouble = PART_CHUNK
                 return
             head, data = record
-            kind = head.get(b"op")
-            if kind == b"\x03":
-                indexed = any(head.get(b"index_pos", b""))
-            elif kind == b"\x05":
+            index.pass_record(head)
+            if head.get(b"op") == b"\x05":
                 try:
                     chunk = decompressors[head[b"compression"].decode()](data)
                     messages = list(self._bag_messages(chunk))
@@ -152,7 +150,7 @@ class LogWalk:
                     self.damaged_chunks += 1
                     continue
                 yield from messages
-        if not indexed:
+        if not index.is_whole:
             self.trouble = CUT_OFF
 
     def _bag_messages(self, chunk: bytes) -> Iterator[LogRecord]:
@@ -167,6 +165,28 @@ class LogWalk:
                 seconds, nanoseconds = struct.unpack("<II", head[b"time"])
                 time_ns = seconds * 1_000_000_000 + nanoseconds
                 yield LogRecord(self._topics[number], time_ns, data, 0)
+
+
+class BagIndex:
+    """Finds out whether a bag's index is there and has a record of every chunk."""
+
+    def __init__(self) -> None:
+        self._is_begun = False
+        self._missing = 0
+
+    def pass_record(self, fields: dict[bytes, bytes]) -> None:
+        """Takes the header fields of the next record of the file."""
+        kind = fields.get(b"op")
+        if kind == b"\x03":
+            self._is_begun = any(fields.get(b"index_pos", b""))
+            self._missing = int.from_bytes(fields.get(b"chunk_count", b""), "little")
+        elif kind == b"\x06":
+            self._missing -= 1
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all of it has been passed."""
+        return self._is_begun and self._missing <= 0
 
 
 _WALKS = {"mcap": LogWalk._mcap, "bag": LogWalk._bag}

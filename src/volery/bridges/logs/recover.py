@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from volery.bridges.logs.bag import CHUNK_BYTES, LIBRARY
+from volery.bridges.logs.bag import LIBRARY
+from volery.bridges.logs.bag_writer import CHUNK_BYTES, bag_writer
 from volery.bridges.logs.disk_file import DiskFile
 from volery.bridges.logs.records import LogRecord, LogTopic, LogWalk, log_format
 from volery.core.errors import RecordingError
@@ -93,11 +94,7 @@ def _to_mcap(records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
 
 
 def _to_bag(records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
-    from rosbags.rosbag1 import Writer
-
-    writer = Writer(out)
-    writer.chunk_threshold = CHUNK_BYTES
-    writer.set_compression(Writer.CompressionFormat.LZ4)
+    writer = bag_writer(out)
     connections: dict[LogTopic, Any] = {}
     count = end_ns = 0
     with writer:
