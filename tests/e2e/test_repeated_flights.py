@@ -507,3 +507,36 @@ def test_what_a_service_outside_answered_is_answered_again(tmp_path):
     assert kinds.count("answer") > 10
     assert {"offer", "withdraw", "failure"} <= set(kinds)
     assert repeated(path) == digest
+
+
+def test_a_flight_past_its_scenarios_end_is_repeated(tmp_path):
+    path = tmp_path / "flight.mcap"
+    log = open_log(path)
+    with Simulation(parse_scenario({**DATA, "duration_s": 0.2}), threads=1) as simulation:
+        simulation.enable_digest()
+        simulation.graph.subscribe_all(log.write)
+        session = simulation.gateway.open("client")
+        simulation.run()
+
+        def call(service):
+            message = zero_message(f"{simulation.graph.services()[service]}_Request")
+            session.call(service, message, Reply(_ignore, _ignore))
+
+        simulation.wait_at_end(lambda: call("/volery/continue_run"))
+        simulation.run(0.1)
+        call("/uav1/land")
+        simulation.run(0.1)
+        session.call(
+            "/reset_simulation",
+            zero_message("simulation_interfaces/srv/ResetSimulation_Request"),
+            Reply(_ignore, _ignore),
+        )
+        simulation.run(0.15)
+        simulation.commands.end()
+        log.close()
+        digest = simulation.digest()
+    assert repeated(path) == digest
+
+
+def _ignore(_answer):
+    """The answer does not matter."""

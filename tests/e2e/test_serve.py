@@ -186,24 +186,21 @@ def test_a_scenario_that_ends_stays_and_one_that_cannot_be_leads_back(server):
         (made / "scenario.toml").write_text(OWN.format(name=name, height=height))
     with Ros(server) as ros:
         assert ros.load("short")["result"] == 1
-    server.wait_for(state="flying", scenario="short")
+    server.wait_for(state="ended", scenario="short")
     with Ros(server) as ros:
-
-        def state():
-            answer = ros.call("/get_simulation_state", "simulation_interfaces/GetSimulationState")
-            return answer["state"]["state"]
-
-        end = time.monotonic() + 120
-        while state() != 2 and time.monotonic() < end:
-            time.sleep(0.05)
-        assert state() == 2  # paused, at its end
-        assert ros.call("/uav1/land", "std_srvs/Trigger")  # it is there
+        state = ros.call("/get_simulation_state", "simulation_interfaces/GetSimulationState")
+        assert state["state"]["state"] == 2  # paused
+        with pytest.raises(roslibpy.core.ServiceException, match="continue_run"):
+            ros.call("/uav1/land", "std_srvs/Trigger")
+        assert ros.call("/volery/continue_run", "std_srvs/Trigger")["success"]
+        assert server.status["state"] == "flying"
+        assert ros.call("/uav1/land", "std_srvs/Trigger")["success"]
         reset = ros.call("/reset_simulation", "simulation_interfaces/ResetSimulation", scope=255)
         assert reset["result"]["result"] == 1
         assert ros.load("nowhere")["result"] != 1
         assert ros.load("buried")["result"] == 1
     server.wait_until(lambda told: told["message"].startswith("buried: "))
-    server.wait_for(state="flying", scenario="short")
+    server.wait_for(state="ended", scenario="short")
     assert server.status["message"].startswith("buried: ")
     with Ros(server) as ros:
         unloaded = ros.call("/unload_world", "simulation_interfaces/UnloadWorld")

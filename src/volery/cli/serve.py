@@ -188,11 +188,7 @@ class _Host:
             while not simulation.quitting:
                 simulation.run(speed=speed, on_progress=self._look)
                 speed = simulation.speed
-                while simulation.finished and not simulation.quitting:
-                    self._look()
-                    simulation.pause()
-                    simulation.take_in()
-                    time.sleep(_GLANCE_S)
+                simulation.wait_at_end(self._look)
         except _StoppedError:
             return
         time.sleep(_FAREWELL_S)

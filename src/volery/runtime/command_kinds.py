@@ -25,6 +25,21 @@ _PACE = {
 }
 _SET_STATE = "simulation_interfaces/srv/SetSimulationState"
 _ASKING = {"simulation_interfaces": ("Get",), "volery_interfaces": ("Get", "List")}
+_AT_THE_END = {
+    "simulation_interfaces/srv/ResetSimulation",
+    _SET_STATE,
+    "volery_interfaces/srv/TakeControl",
+    "volery_interfaces/srv/ReleaseControl",
+    "volery_interfaces/srv/HandOver",
+}
+"""Services that lead away from the end of a scenario, or that are about people."""
+CONTINUE_RUN = "/volery/continue_run"
+_AT_THE_END_BY_NAME = {
+    CONTINUE_RUN,
+    "/volery/snapshot",
+    "/volery/restore",
+    "/volery/forget_snapshot",
+}
 _SETS_PARAMETERS = {"rosapi_msgs/srv/SetParam", "rosapi_msgs/srv/DeleteParam"}
 
 
@@ -34,6 +49,13 @@ class Weight(Enum):
     ASKS = "nothing: it only asks"
     PACES = "its pace, its files, its end, its audience, but no result"
     CHANGES = "its results"
+
+
+def restarts(taken: Taken) -> bool:
+    """Return whether a command has effect where a scenario has ended."""
+    if taken.kind == "call" and (taken.type in _AT_THE_END or taken.name in _AT_THE_END_BY_NAME):
+        return True
+    return weight_of(taken) is not Weight.CHANGES
 
 
 def weight_of(taken: Taken) -> Weight:

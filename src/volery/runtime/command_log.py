@@ -7,7 +7,7 @@ which `runtime.repetition` takes it again.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from volery.core.errors import GraphError
@@ -49,12 +49,16 @@ class CommandLog:
         self._ended = False
         self.repeats = False
         """Whether a recorded flight is repeated: clients may look on, and change nothing."""
+        self.refuse: Callable[[Taken], str] = _accept
+        """Returns why a command is refused at present; empty: it is not."""
 
     def watch(self, taken: Taken) -> None:
         """Note what a client does. `GraphError` where that must not be."""
         weight = weight_of(taken)
         if self.repeats and weight is Weight.CHANGES:
             raise GraphError("a recorded flight is repeated; nothing else may change it")
+        if reason := self.refuse(taken):
+            raise GraphError(reason)
         if weight is not Weight.ASKS:
             self.note(taken, weight)
 
@@ -96,6 +100,11 @@ class CommandLog:
         if self._kept_bytes > MOST_KEPT_BYTES:
             self._kept.clear()
         self._kept.append(kept)
+
+
+def _accept(_taken: Taken) -> str:
+    """Refuse nothing."""
+    return ""
 
 
 def _whole(kept: _Kept) -> object:

@@ -144,6 +144,7 @@ class Keeper:
             "digest": None if digest is None else digest.get_state(),
             "events": list(self.outlet.events),
             "owed_ns": self.loop.owed_ns,
+            "past_end": self.loop.past_end,
             "grid_map": self.grid_world.get_state(),
             "radio": None if self.radio is None else self.radio.get_state(),
         }
@@ -159,5 +160,6 @@ class Keeper:
             self.outlet.digest.set_state(state["digest"])
         self.outlet.events[:] = state["events"]
         self.loop.owed_ns = state["owed_ns"]
+        self.loop.past_end = state["past_end"]
         if self.radio is not None:
             self.radio.set_state(state["radio"])

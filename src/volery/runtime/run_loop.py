@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 
 from volery.core.clock import ns_from_s, s_from_ns
@@ -15,7 +16,8 @@ class RunLoop:
     """Advances `engine` at the pace of `pacer` until `duration_s`, or until `has_ended()`.
 
     `has_ended` must follow from the simulated world alone. `look` is called between two pieces and
-    all along while the run is held; it must change nothing.
+    all along while the run is held; it must change nothing. With `past_end` or `replays` set, the
+    duration does not end the run.
     """
 
     def __init__(
@@ -30,12 +32,15 @@ class RunLoop:
         """Parts of physics steps that runs have asked for and not got yet."""
         self.quitting = False
         """Whether runs are to end at once, now and later."""
+        self.past_end = False
+        """Whether runs continue past the scenario's end, until another state is restored."""
+        self.replays = False
+        """Whether recorded commands decide where the run ends."""
 
     @property
     def finished(self) -> bool:
         """Whether the end has come, or somebody quit."""
-        over = s_from_ns(self._engine.time_ns) >= self._duration_s
-        return over or self.quitting or self._has_ended()
+        return self.quitting or self._has_come()
 
     def quit(self) -> None:
         """End the present run and all later ones at their start; any thread may call it."""
@@ -52,16 +57,20 @@ class RunLoop:
         """Advance by `seconds`, None: to the end."""
         engine, pacer = self._engine, self._pacer
         start_ns = engine.time_ns
-        left = self._duration_s - s_from_ns(start_ns) if seconds is None else seconds
-        end_step = engine.fleet.step + self._whole_steps(left, seconds is None)
-        until = self._ends_here if seconds is None else None
+        if seconds is None:
+            left = math.inf if self._has_no_end else self._duration_s - s_from_ns(start_ns)
+            find_end, until = self._last_step, self._ends_here
+        else:
+            left, until = seconds, None
+            end_step = engine.fleet.step + self._whole_steps(seconds)
+            find_end = lambda: end_step  # noqa: E731
         pacer.begin(speed, start_ns)
         teller = ProgressTeller(on_progress, left, pacer)
-        over = engine.fleet.step >= end_step or self.quitting
+        over = engine.fleet.step >= find_end() or self.quitting
         while not over:
-            self._advance(end_step, until)
+            self._advance(find_end(), until)
             self.look()
-            over = engine.fleet.step >= end_step or (until is not None and until())
+            over = engine.fleet.step >= find_end() or (until is not None and until())
             over = over or self.quitting
             while pacer.wait(engine.time_ns) and not (over and pacer.paused):
                 engine.take_in()
@@ -77,7 +86,7 @@ class RunLoop:
     def _ends_here(self) -> bool:
         """Whether the run has ended, a recorded one by the last of its commands."""
         self._engine.take_repeats()
-        return self._has_ended()
+        return self._has_come()
 
     def _advance(self, end_step: int, until: Callable[[], bool] | None) -> None:
         fleet = self._engine.fleet
@@ -87,11 +96,25 @@ class RunLoop:
             self._engine.advance_to(min(end_step, before + steps), until=until, in_pieces=True)
             self._pacer.made(max(0, min(fleet.step - before, steps)))
 
-    def _whole_steps(self, seconds: float, to_the_end: bool) -> int:
-        dt_ns = self._engine.dt_ns
-        if to_the_end:
-            return math.ceil(ns_from_s(max(seconds, 0.0)) / dt_ns)
-        steps, self.owed_ns = divmod(self.owed_ns + ns_from_s(seconds), dt_ns)
+    @property
+    def _has_no_end(self) -> bool:
+        return self.past_end or self.replays
+
+    def _has_come(self) -> bool:
+        """Whether the duration is over, or the world says so."""
+        if self.past_end:
+            return False
+        over = s_from_ns(self._engine.time_ns) >= self._duration_s and not self.replays
+        return over or self._has_ended()
+
+    def _last_step(self) -> int:
+        """Physics step at which the duration is over."""
+        if self._has_no_end:
+            return sys.maxsize
+        return -(-ns_from_s(self._duration_s) // self._engine.dt_ns)
+
+    def _whole_steps(self, seconds: float) -> int:
+        steps, self.owed_ns = divmod(self.owed_ns + ns_from_s(seconds), self._engine.dt_ns)
         return steps
 
 

@@ -30,6 +30,7 @@ from volery.runtime.building import place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
 from volery.runtime.command_log import CommandLog
 from volery.runtime.crew import Crew
+from volery.runtime.end_of_run import EndOfRun
 from volery.runtime.geometry import Geometry, WorldTopic
 from volery.runtime.graph_building import all_down, plan_faults
 from volery.runtime.grid_world import GridWorld
@@ -86,6 +87,8 @@ class Simulation:
     `ScenarioError` where the scenario cannot be built.
     """
 
+    end: EndOfRun
+    """What clients meet where the scenario has ended."""
     _geometry: Geometry | None = None
     """The last answer of `geometry`."""
 
@@ -155,7 +158,11 @@ class Simulation:
         self._live = LiveTopics(
             self,
             self._engine,
-            Told(lambda: self._services.state, lambda: self._services.recording),
+            Told(
+                lambda: self._services.state,
+                lambda: self._services.recording,
+                lambda: self.end.waits,
+            ),
         )
         self._weather_topics = WeatherTopics(
             self.graph, scenario.world, lambda: self.weather, self.set_weather
@@ -165,6 +172,7 @@ class Simulation:
         plan_faults(self._faults, scenario)
         self._loop = RunLoop(self._engine, self._pacer, scenario.duration_s, self._has_ended)
         self._loop.look = self._live.look
+        self.end = EndOfRun(self._engine, self._pacer, self._loop, self.commands)
         self._relocator = Relocator(self._engine, self.scene, self.terrain, self._crew)
         open_lock_step(self)
         self._services: Services = open_services(
@@ -227,6 +235,18 @@ class Simulation:
         if seconds is not None:
             check_seconds(seconds)
         self._loop.run(seconds, speed, on_progress)
+
+    def wait_at_end(self, on_wait: Callable[[], None]) -> None:
+        """Stay paused at the end for clients, until they reset, continue or quit; see `end`.
+
+        `on_wait` is called about fifty times a second and may raise.
+        """
+
+        def process() -> None:
+            on_wait()
+            self.take_in()
+
+        self.end.wait(process)
 
     # From here to `post`, everything may be called by any thread, while the simulation runs or not.
 
@@ -338,7 +358,7 @@ class Simulation:
         self._repetition = self._engine.repeats = Repetition(
             flight, self.gateway, self._engine, self._pacer, self.commands
         )
-        self.commands.repeats = True
+        self.commands.repeats = self._loop.replays = True
 
     def take_in(self) -> None:
         """Do what other threads have posted, and hand out what that published, without a step.
@@ -428,6 +448,7 @@ class Simulation:
         self._pacer.drop_steps("another state was restored")
         self._pacer.jumped(self.time_ns)
         self._live.jumped()
+        self.end.left()
 
     def reset(self, seed: int | None = None) -> None:
         """Go back to the start, with the scenario's seed or another one.
@@ -443,6 +464,7 @@ class Simulation:
         self._pacer.drop_steps("the simulation was reset")
         self._pacer.jumped(self.time_ns)
         self._live.jumped()
+        self.end.left()
 
     def reset_uav(self, name: str) -> None:
         """Put one UAV back to its start while the others fly on: as it was, mended, charged, new.

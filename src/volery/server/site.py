@@ -18,6 +18,7 @@ from volery.bridges.rosbridge.protocol import Shared
 from volery.bridges.rosbridge.rosapi import RosApi
 from volery.graph.graph import Graph
 from volery.graph.session import Gateway
+from volery.runtime.end_of_run import EndOfRun
 from volery.runtime.geometry import Geometry
 from volery.runtime.pilots import Pilots
 from volery.scenario.schema import Scenario
@@ -33,6 +34,8 @@ class State(StrEnum):
 
     BUILDING = "building"
     FLYING = "flying"
+    ENDED = "ended"
+    """A simulation waits at the end of its scenario."""
     LOBBY = "lobby"
     FAILED = "failed"
     """As in the lobby, because the scenario could not be built."""
@@ -81,6 +84,12 @@ class JoinedWorld:
         """What stands there at present; None: nothing that could be shown."""
         geometry: Geometry | None = getattr(self._world, "geometry", None)
         return geometry
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether a simulation waits at the end of its scenario."""
+        end: EndOfRun | None = getattr(self._world, "end", None)
+        return end is not None and end.waits
 
     def leave(self) -> None:
         """Take back what is offered to clients."""

@@ -9,7 +9,7 @@ from starlette.responses import JSONResponse, Response
 
 from volery import __version__
 from volery.server.rights import Role
-from volery.server.site import Site
+from volery.server.site import Site, State
 
 
 async def status(request: Request) -> Response:
@@ -27,7 +27,7 @@ def _told(site: Site, role: Role | None) -> dict[str, Any]:
     now, world = site.situation, site.world
     geometry = None if world is None else world.geometry
     return {
-        "state": now.state,
+        "state": State.ENDED if world is not None and world.has_ended else now.state,
         "scenario": now.scenario,
         "description": now.description,
         "message": now.message,

@@ -14,15 +14,18 @@ import { useConnection } from "../state/connection.ts";
 import { useSimulation } from "../state/simulation.ts";
 import { openWindow } from "../state/windows.ts";
 import { Banner } from "./Banner.tsx";
+import { Ended } from "./Ended.tsx";
 
 /** What stands between the user and a flight, if anything does: told over the scene. */
 export function Situation() {
   const server = useSimulation((simulation) => simulation.server);
+  const ended = useSimulation(({ status }) => status?.ended ?? false);
   const link = useConnection((connection) => connection.state);
   if (server?.token_needed === true || link === "refused") return <TokenNeeded />;
   if (server?.state === "building") return <Building />;
   if (server?.state === "failed") return <Failed />;
   if (server?.state === "lobby") return <Lobby />;
+  if (link === "open" && ended) return <Ended />;
   return <Banner />;
 }
 

@@ -2054,6 +2054,7 @@ export interface volery_interfaces_SimulationStatus {
   clients: number;
   dropped: number | bigint;
   replaying: boolean;
+  ended: boolean;
 }
 
 export interface volery_interfaces_Target {

@@ -5,7 +5,7 @@ import type { volery_interfaces_SimulationStatus } from "../messages/generated.t
 
 /** What the server says of itself over HTTP (`./api/status`). */
 export interface ServerStatus {
-  state: "flying" | "building" | "lobby" | "failed";
+  state: "flying" | "ended" | "building" | "lobby" | "failed";
   scenario: string;
   description: string;
   message: string;

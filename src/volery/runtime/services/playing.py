@@ -6,7 +6,15 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 from volery.core.errors import SnapshotError
-from volery.runtime.services.offering import Code, Fields, RefusedError, filled, offer_result
+from volery.runtime.command_kinds import CONTINUE_RUN
+from volery.runtime.services.offering import (
+    Code,
+    Fields,
+    RefusedError,
+    filled,
+    offer_command,
+    offer_result,
+)
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
@@ -45,6 +53,11 @@ class Playing:
             ("reset_simulation", "ResetSimulation", self._reset),
         ):
             offer_result(graph, f"/{name}", f"{_SRV}/{srvtype}", handler)
+        offer_command(graph, CONTINUE_RUN, "std_srvs/srv/Trigger", self._continue)
+
+    def _continue(self, _request: Any) -> Fields:
+        self._simulation.end.fly_on()
+        return {"message": "the flight continues past the scenario's end"}
 
     @property
     def state(self) -> State:
@@ -67,6 +80,8 @@ class Playing:
         if state is State.QUITTING:
             raise RefusedError(WRONG_TRANSITION, "the simulation quits")
         if wanted == State.PLAYING:
+            if self._simulation.end.waits:
+                raise RefusedError(WRONG_TRANSITION, self._simulation.end.notice)
             self._stopped = False
             self._simulation.resume()
         elif wanted == State.PAUSED:

@@ -47,6 +47,8 @@ def offer_steps(simulation: Simulation) -> None:
 def _begin(simulation: Simulation, steps: int, tell: Any) -> StepRequest:
     if not 1 <= steps <= _MOST_STEPS:
         raise RefusedError(Code.OPERATION_FAILED, f"steps must be 1 to {_MOST_STEPS}, not {steps}")
+    if simulation.end.waits:
+        raise RefusedError(Code.INCORRECT_STATE, simulation.end.notice)
     if not simulation.paused:
         raise RefusedError(Code.INCORRECT_STATE, "steps are made while paused; pause it first")
     try:

@@ -74,6 +74,7 @@ class Told:
 
     state: Callable[[], int]
     recording: Callable[[], str]
+    ended: Callable[[], bool]
 
 
 class Status:
@@ -121,4 +122,5 @@ class Status:
             len(gateway.sessions()),
             gateway.dropped,
             simulation.replaying,
+            self._told.ended(),
         )

@@ -18,6 +18,11 @@ export async function setPlaying(playing: boolean): Promise<void> {
   });
 }
 
+/** Fly on past the scenario's end. */
+export async function continueRun(): Promise<void> {
+  await order("/volery/continue_run", "std_srvs/srv/Trigger", {});
+}
+
 /** Physics steps of a paused simulation; done when they are made. */
 export async function step(steps: number): Promise<void> {
   const type = "simulation_interfaces/srv/StepSimulation";

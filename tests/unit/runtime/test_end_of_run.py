@@ -1,0 +1,140 @@
+"""A scenario that ends while clients are connected: it waits, says so, and continues if asked."""
+
+import pytest
+from asking import ask, code_of, request_of
+
+from volery.core.errors import GraphError
+from volery.graph.reply import Reply
+from volery.runtime.services.playing import State
+
+STANDARD_REFUSALS = (
+    ("/set_simulation_state", {"state": {"state": int(State.PLAYING)}}),
+    ("/step_simulation", {"steps": 5}),
+)
+
+
+class EndedError(Exception):
+    """Ends the wait."""
+
+
+class Client:
+    """Calls services from outside, while a simulation waits at its end."""
+
+    def __init__(self, simulation):
+        self.simulation = simulation
+        self.session = simulation.gateway.open("test")
+
+    def at_end(self, *calls):
+        """Answers to calls that are made while the simulation waits; then the wait ends."""
+        answers = []
+
+        def look():
+            if len(answers) < len(calls):
+                service, fields = calls[len(answers)]
+                reply = Reply(answers.append, answers.append)
+                request = request_of(self.simulation.graph, service, **fields)
+                self.session.call(service, request, reply)
+                self.simulation.take_in()
+            elif self.simulation.finished:
+                raise EndedError
+
+        try:
+            self.simulation.wait_at_end(look)
+        except EndedError:
+            pass
+        assert len(answers) == len(calls)
+        return answers
+
+
+@pytest.fixture
+def ended(simulate, flat_data):
+    simulation = simulate(flat_data | {"duration_s": 0.05})
+    simulation.run()
+    assert simulation.finished
+    return simulation
+
+
+@pytest.mark.parametrize(("service", "fields"), STANDARD_REFUSALS)
+def test_services_of_the_standard_refuse_with_a_reason(ended, service, fields):
+    (answer,) = Client(ended).at_end((service, fields))
+    assert code_of(answer) != 1
+    assert "the scenario ended at 0.1 s" in answer.result.error_message
+    assert ended.time_ns == 50_000_000
+
+
+@pytest.mark.parametrize(
+    ("service", "fields"),
+    [
+        ("/uav1/land", {}),
+        ("/uav1/go_to", {"position": {"x": 1.0, "y": 0.0, "z": 5.0}}),
+        ("/volery/set_weather", {}),
+        ("/volery/inject_fault", {}),
+    ],
+)
+def test_commands_without_effect_are_refused(ended, service, fields):
+    (answer,) = Client(ended).at_end((service, fields))
+    assert isinstance(answer, GraphError)
+    assert "/volery/continue_run" in str(answer)
+
+
+def test_what_only_asks_is_answered(ended):
+    (state,) = Client(ended).at_end(("/get_simulation_state", {}))
+    assert state.state.state == State.PAUSED
+
+
+def test_the_status_says_so(ended):
+    seen = []
+    mailbox = ended.gateway.open("page").subscribe("/volery/status", wake=lambda: None)
+
+    def look():
+        seen.extend(published.message.ended for published in mailbox.take())
+        if True in seen:
+            raise EndedError
+
+    with pytest.raises(EndedError):
+        ended.wait_at_end(look)
+    assert not ended.end.waits
+
+
+def test_it_flies_on_where_asked(ended):
+    client = Client(ended)
+    (answer,) = client.at_end(("/volery/continue_run", {}))
+    assert answer.success
+    assert not ended.paused
+    ended.run(0.02)
+    assert not ended.finished
+    assert ended.time_ns == 70_000_000
+    assert ask(ended, "/uav1/take_off").success
+
+
+def test_a_run_to_the_end_past_the_end_lasts_until_somebody_quits(ended):
+    Client(ended).at_end(("/volery/continue_run", {}))
+
+    def look(progress):
+        if progress.time_s > 0.5:
+            ended.quit()
+
+    ended.run(on_progress=look)
+    assert ended.time_s > 0.5
+
+
+def test_a_reset_brings_the_end_back(ended):
+    client = Client(ended)
+    client.at_end(("/volery/continue_run", {}))
+    ended.run(0.1)
+    ended.reset()
+    ended.run()
+    assert ended.time_ns == 50_000_000
+
+
+def test_a_reset_ends_the_wait(ended):
+    (answer,) = Client(ended).at_end(("/reset_simulation", {"scope": 255}))
+    assert code_of(answer) == 1
+    assert not ended.finished
+    assert not ended.end.waits
+
+
+def test_only_an_ended_run_is_continued(simulate, flat_data):
+    answer = ask(simulate(flat_data), "/volery/continue_run")
+    assert not answer.success
+    assert "has not ended" in answer.message
