@@ -23,7 +23,7 @@ def banner(browsing, served):
     page = browsing.open(served.url + LOOK, viewport=SMALL)
     banner = page.get_by_role("status").filter(has_text="The scenario ended")
     banner.wait_for(timeout=120_000)
-    yield banner
+    return banner
 
 
 def time_s(served):
