@@ -240,7 +240,7 @@ class _Link:
         self.hand = HandGraph()
         self.hand.graph.advertise("/uav1/odom", m.Odometry)
         self.session = self.hand.gateway.open("fuzz")
-        self.commands = Commands(self.hand.gateway, self.session)
+        self.commands = Commands(self.session)
 
 
 def sensor_link_commands(mutator):

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import heapq
+import math
 import threading
+import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from concurrent.futures import Future
 from typing import Any, NamedTuple, Protocol
+
+from volery.core.errors import CommandError
+from volery.engine.call_budget import CallBudget
+
+_MAX_ROUND_S = 0.02
+"""CPU time of clients' commands between two ticks, where the engine has no time to spare."""
 
 
 class Moment(NamedTuple):
@@ -30,42 +39,185 @@ class Repeats(Protocol):
         """Do what was done at the engine's present moment; whether that was anything."""
 
 
+class _Command(NamedTuple):
+    number: int
+    """Of all posted commands, in the order of arrival."""
+    action: Callable[[], Any]
+    future: Future[Any]
+
+
+class ClientQueue:
+    """Commands of one external client, taken in their order; `None` names no client: all else."""
+
+    def __init__(self, inbox: Inbox, client: Hashable = None) -> None:
+        self._inbox = inbox
+        self.client = client
+        self.commands: deque[_Command] = deque()
+        self.is_deferred = False
+        """Whether the client waits for its turn because it has spent its budget."""
+        self.after_s = 0.0
+        """CPU time that is expected to follow on a command, for what it published."""
+
+    def post(self, action: Callable[[], Any]) -> Future[Any]:
+        """Have `action()` called before a tick; the future holds its result or error."""
+        return self._inbox.put(self, action)
+
+
 class Inbox:
     """What outside clients want done. Any thread may post; the engine's thread works it off.
 
-    Code that runs in the engine's own thread between ticks (nodes, a user's script) commands the
-    fleet directly: that too takes effect with the next physics step.
+    Commands are taken in the order of arrival. Those of an external client (`open_queue`) are
+    charged to it by the CPU time that they take; where the engine has no time to spare, a client
+    that has spent its budget waits for its turn (`engine.call_budget`). Code that runs in the
+    engine's own thread between ticks (nodes, a user's script) commands the fleet directly: that too
+    takes effect with the next physics step.
+
+    on_post: called, in the thread that posts, after each command.
     """
 
-    def __init__(self) -> None:
-        self._waiting: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
+    def __init__(
+        self,
+        *,
+        budget: CallBudget | None = None,
+        cpu_s: Callable[[], float] = time.thread_time,
+        now_s: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self.on_post: Callable[[], None] = _nothing
+        self._budget = budget or CallBudget(now_s)
+        self._cpu_s = cpu_s
+        self._now_s = now_s
+        self._own = ClientQueue(self)
+        self._occupied: dict[ClientQueue, None] = {}
+        self._next_number = 0
+        self._lock = threading.Lock()
         self._news = threading.Event()
+        self._closed: str | None = None
+        self._charged: list[tuple[ClientQueue, float]] = []
+        self._mark_s = 0.0
+
+    def open_queue(self) -> ClientQueue:
+        """A queue for the commands of one external client."""
+        return ClientQueue(self, object())
 
     def post(self, action: Callable[[], Any]) -> Future[Any]:
         """Have `action()` called before the next tick; the future holds its result or error."""
+        return self._own.post(action)
+
+    def put(self, queue: ClientQueue, action: Callable[[], Any]) -> Future[Any]:
+        """Add a command; used by `ClientQueue`."""
         future: Future[Any] = Future()
-        self._waiting.append((action, future))
+        with self._lock:
+            closed = self._closed
+            if closed is None:
+                queue.commands.append(_Command(self._next_number, action, future))
+                self._next_number += 1
+                self._occupied[queue] = None
+        if closed is not None:
+            future.set_exception(CommandError(closed))
+            return future
         self._news.set()
+        self.on_post()
         return future
+
+    def close(self, reason: str) -> None:
+        """Take no more commands: those that wait, and later ones, fail with `reason`."""
+        with self._lock:
+            self._closed = reason
+            left = [command for queue in self._occupied for command in queue.commands]
+            self._occupied.clear()
+        for command in sorted(left):
+            if command.future.set_running_or_notify_cancel():
+                command.future.set_exception(CommandError(reason))
+
+    @property
+    def has_waiting(self) -> bool:
+        """Whether a command waits, be it for its client's turn."""
+        return bool(self._occupied)
 
     def wake(self) -> None:
         """End a `wait` although nothing was posted."""
         self._news.set()
 
     def wait(self, timeout_s: float) -> None:
-        """Wait until something is posted after the last wait, or `wake` is called."""
-        self._news.wait(timeout_s)
+        """Wait while no command waits, until one is posted or `wake` is called."""
+        if not self._occupied:
+            self._news.wait(timeout_s)
         self._news.clear()
 
-    def work_off(self) -> bool:
-        """Call everything that waits, in the order of arrival; whether there was anything."""
-        waiting = len(self._waiting)
-        for _ in range(waiting):
-            action, future = self._waiting.popleft()
-            if not future.set_running_or_notify_cancel():
+    def work_off(self, idle_s: float = math.inf) -> bool:
+        """Call what waits and whose turn it is; whether there was anything.
+
+        idle_s: wall time that the engine has to spare; what runs in it is charged to no client.
+        """
+        if not self._occupied:
+            return False
+        earned = self._budget.earn()
+        with self._lock:
+            limit = self._next_number
+            if not (earned or idle_s) and all(queue.is_deferred for queue in self._occupied):
+                return False
+            heads = [_head(queue) for queue in self._occupied]
+        heapq.heapify(heads)
+        until_s = self._now_s() + idle_s
+        worked, round_s = False, 0.0
+        while heads:
+            queue = heapq.heappop(heads)[-1]
+            free = queue.client is None or until_s == math.inf or self._now_s() < until_s
+            if not free and (round_s > _MAX_ROUND_S or not self._budget.may_spend(queue.client)):
+                queue.is_deferred = True
                 continue
-            try:
-                future.set_result(action())
-            except Exception as error:  # the sender's business, not the engine's
-                future.set_exception(error)
-        return waiting > 0
+            command = self._pop(queue, limit)
+            if command is None:
+                continue
+            worked = True
+            round_s += self._call(command, None if free else queue)
+            with self._lock:
+                if queue.commands and queue.commands[0].number < limit:
+                    heapq.heappush(heads, _head(queue))
+        self._mark_s = self._cpu_s()
+        return worked
+
+    def end_round(self) -> None:
+        """Charge the clients whose commands `work_off` called for what has followed since."""
+        charged, self._charged = self._charged, []
+        if charged:
+            each_s = (self._cpu_s() - self._mark_s) / len(charged)
+            for queue, expected_s in charged:
+                self._budget.spend(queue.client, each_s - expected_s)
+                queue.after_s += 0.5 * (each_s - queue.after_s)
+
+    def _pop(self, queue: ClientQueue, limit: int) -> _Command | None:
+        """The next command of a queue that was posted before `limit`."""
+        with self._lock:
+            if not queue.commands or queue.commands[0].number >= limit:
+                return None
+            command = queue.commands.popleft()
+            if not queue.commands:
+                self._occupied.pop(queue, None)
+                queue.is_deferred = False
+            return command
+
+    def _call(self, command: _Command, payer: ClientQueue | None) -> float:
+        """Call a command and charge it to a client, None: to none; CPU time with what follows."""
+        if not command.future.set_running_or_notify_cancel():
+            return 0.0
+        before_s = 0.0 if payer is None else self._cpu_s()
+        try:
+            command.future.set_result(command.action())
+        except Exception as error:  # the sender's business, not the engine's
+            command.future.set_exception(error)
+        if payer is None:
+            return 0.0
+        cost_s = self._cpu_s() - before_s + payer.after_s
+        self._budget.spend(payer.client, cost_s)
+        self._charged.append((payer, payer.after_s))
+        return cost_s
+
+
+def _head(queue: ClientQueue) -> tuple[bool, int, ClientQueue]:
+    """Order in which queues are served: those that were not deferred first, then by arrival."""
+    return queue.is_deferred, queue.commands[0].number, queue
+
+
+def _nothing() -> None:
+    """Nobody needs to know of posts."""

@@ -187,10 +187,14 @@ class Engine:
             if in_pieces and self.fleet.step < before:
                 return
 
-    def take_in(self) -> None:
-        """Do what was posted and hand out what that published; between ticks."""
-        if self.inbox.work_off():
+    def take_in(self, idle_s: float = 0.0) -> None:
+        """Do what was posted and hand out what that published; between ticks.
+
+        idle_s: wall time to spare, in which clients may do more than their budget; see `Inbox`.
+        """
+        if self.inbox.work_off(idle_s):
             self._hand_out()
+            self.inbox.end_round()
         self.take_repeats()
 
     def take_repeats(self) -> None:

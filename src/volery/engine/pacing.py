@@ -158,6 +158,15 @@ class Pacer:
             self._woken = False
             return self._must_wait()
 
+    def idle_s(self) -> float:
+        """Wall seconds to spare before the run must go on, at most a moment."""
+        with self._changed:
+            if self._paused:
+                return 0.0 if self._steps else _LONGEST_WAIT_S
+            if self._speed is None:
+                return 0.0
+            return min(max(self._ahead_s(self._speed), 0.0), _LONGEST_WAIT_S)
+
     def _must_wait(self) -> bool:
         if self._paused:
             return not self._steps

@@ -28,6 +28,8 @@ Action = Callable[[], Any]
 
 _LOOK_S = 0.1
 """Wall time between two looks whether a partner is still there."""
+_SPARE_S = 0.01
+"""Wall time for what clients want done between two looks whether a partner has answered."""
 
 
 class Partner:
@@ -154,8 +156,8 @@ def check_terms(period_s: float, timeout_s: float, on_timeout: str, dt_ns: int) 
 class Waiting(Protocol):
     """How the engine waits: it does meanwhile what others post, the partners' own messages too."""
 
-    def take_in(self) -> None:
-        """Do what was posted."""
+    def take_in(self, idle_s: float) -> None:
+        """Do what was posted; `idle_s` of wall time are to spare for it."""
 
     def wait(self, timeout_s: float) -> None:
         """Wait for a post or a wake."""
@@ -176,7 +178,7 @@ def meet(partners: Sequence[Partner], time_ns: int, engine: Waiting) -> None:
             if left_s <= 0.0:
                 break
             engine.wait(min(left_s, _LOOK_S))
-            engine.take_in()
+            engine.take_in(_SPARE_S)
     for partner in waited_for:
         for action in partner.collect():
             action()

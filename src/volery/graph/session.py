@@ -71,10 +71,23 @@ class SessionInfo:
 class Gateway:
     """Where doors open sessions for their clients; `watch` is told what those do."""
 
-    def __init__(self, graph: Graph, post: Post, watch: Watch | None = None) -> None:
+    def __init__(
+        self,
+        graph: Graph,
+        post: Post,
+        watch: Watch | None = None,
+        *,
+        open_queue: Callable[[], Post] | None = None,
+    ) -> None:
+        """Take how sessions post: `open_queue()` is asked for each client, else all use `post`.
+
+        What one client posts through its queue is done in its order, at its own expense: a client
+        that costs the simulation's thread too much time waits for its turn.
+        """
         self.graph = graph
         self.watch: Watch = watch or _look_away
         self._post = post
+        self._open_queue = open_queue
         self._sessions: list[Session] = []
         self._lock = threading.Lock()
         self._lost = 0
@@ -88,7 +101,8 @@ class Gateway:
 
         inside: it is no client but a part of Volery, whose doings follow from those of clients.
         """
-        session = Session(self, name, None if inside else self.watch)
+        post = self._post if inside or self._open_queue is None else self._open_queue()
+        session = Session(self, name, None if inside else self.watch, post)
         with self._lock:
             self._sessions.append(session)
         return session
@@ -136,8 +150,12 @@ class Gateway:
 class Session:
     """One outside client's part in the graph; `close` takes everything back."""
 
-    def __init__(self, gateway: Gateway, name: str, watch: Watch | None) -> None:
+    def __init__(self, gateway: Gateway, name: str, watch: Watch | None, post: Post) -> None:
         self.name = name
+        self._post = post
+        self._posted = itertools.count(1)
+        self._last_posted = 0
+        self._taken = 0
         self._watch = watch or _look_away
         self._note = _look_away if watch is None else gateway.note_command
         self._gateway = gateway
@@ -152,6 +170,28 @@ class Session:
     def graph(self) -> Graph:
         """The graph, for questions about topics and services."""
         return self._graph
+
+    def post(self, action: Callable[[], Any]) -> Future[Any]:
+        """Have `action()` called by the simulation's thread, in the order of the client's posts.
+
+        It may have to wait for the client's turn (`waiting`); whatever a client causes there is
+        posted like this.
+        """
+
+        def act() -> Any:
+            self._taken += 1  # in the simulation's thread alone
+            return action()
+
+        self._last_posted = next(self._posted)
+        return self._post(act)
+
+    @property
+    def waiting(self) -> int:
+        """How much the client has posted that the simulation has not taken yet.
+
+        A bridge that reads no more of a client while this is large bounds the client's memory.
+        """
+        return max(0, self._last_posted - self._taken)
 
     # ------------------------------------------------------------------------------------ topics
 
@@ -201,7 +241,7 @@ class Session:
                 publisher.publish_posted(message)
 
         if known:
-            self._gateway.post(publish)
+            self.post(publish)
 
     def _publisher(self, topic: str) -> Publisher:
         publisher = self._publishers.get(topic)
@@ -253,7 +293,7 @@ class Session:
             except GraphError as error:
                 reply.fail(error)
 
-        self._gateway.post(ask).add_done_callback(lambda asked: _tell_failure(asked, reply))
+        self.post(ask).add_done_callback(lambda asked: _tell_failure(asked, reply))
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
         """Offer a service. `GraphError` if somebody does so already.
@@ -306,7 +346,7 @@ class Session:
             if threading.get_ident() == here:
                 take()
             else:
-                self._gateway.post(take)
+                self.post(take)
 
         return Reply(
             lambda response: come(lambda: reply.answer(response), "answer", response),
@@ -319,9 +359,7 @@ class Session:
         self, kind: str, name: str, msgtype: str, content: Any = None, *, latched: bool = False
     ) -> None:
         """Have the watch told what the client does, where that is not posted anyway."""
-        self._gateway.post(
-            lambda: self._watch(Taken(self.name, kind, name, msgtype, content, latched))
-        )
+        self.post(lambda: self._watch(Taken(self.name, kind, name, msgtype, content, latched)))
 
     def close(self) -> None:
         """Take back everything; a second time nothing happens."""

@@ -72,8 +72,8 @@ class RunLoop:
             self.look()
             over = engine.fleet.step >= find_end() or (until is not None and until())
             over = over or self.quitting
-            while pacer.wait(engine.time_ns) and not (over and pacer.paused):
-                engine.take_in()
+            while self._is_held() and not (over and pacer.paused):
+                engine.take_in(pacer.idle_s())
                 self.look()
                 teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns))
                 if self.quitting:
@@ -82,6 +82,12 @@ class RunLoop:
             teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns), last=over)
         if self.finished:
             pacer.drop_steps("the scenario has come to its end")
+
+    def _is_held(self) -> bool:
+        """Whether the run must wait; it does so for a moment, unless commands wait already."""
+        if self._engine.inbox.has_waiting:
+            self._pacer.wake()
+        return self._pacer.wait(self._engine.time_ns)
 
     def _ends_here(self) -> bool:
         """Whether the run has ended, a recorded one by the last of its commands."""

@@ -24,7 +24,7 @@ from volery.engine.stepping import OnSteps, StepRequest
 from volery.graph.graph import Graph
 from volery.graph.node import Node
 from volery.graph.publishing import GraphPublisher
-from volery.graph.session import Gateway
+from volery.graph.session import Gateway, Post
 from volery.runtime.assembly import assemble
 from volery.runtime.building import place
 from volery.runtime.checks import check_seconds, check_seed, check_steps
@@ -111,7 +111,7 @@ class Simulation:
         starts = place(scenario, self.scene, self.terrain)
         parts = assemble(scenario, starts, self.scene)
         self.graph = Graph(lambda: self.time_ns, self.post)
-        self.gateway = Gateway(self.graph, self.post)
+        self.gateway = Gateway(self.graph, self.post, open_queue=self._open_queue)
         """Where clients of other threads join the graph."""
         publisher = GraphPublisher(self.graph)
         self.outlet = Outlet(parts.fleet, self.graph, publisher)
@@ -126,6 +126,7 @@ class Simulation:
             crash_on_contact=scenario.physics.on_contact == "crash",
             estimation=parts.estimation,
         )
+        self._engine.inbox.on_post = self._pacer.wake
         self.commands = CommandLog(self.graph, self._engine)
         """What clients do, told on `/volery/log`."""
         self.gateway.watch = self.commands.watch
@@ -330,11 +331,9 @@ class Simulation:
         """Have `action()` called by the simulation's thread before its next tick, or while paused.
 
         The only way for other threads to touch what is simulated; the future holds the action's
-        result or error.
+        result or error, a `CommandError` where the simulation is closed first.
         """
-        future = self._engine.inbox.post(action)
-        self._pacer.wake()
-        return future
+        return self._engine.inbox.post(action)
 
     def play(self, replay: Replay) -> None:
         """Let a recorded log speak into the graph, beginning now, in simulated time."""
@@ -366,7 +365,7 @@ class Simulation:
         For the thread that owns the simulation; `run` and `step` do it by themselves.
         """
         self._check_open()
-        self._engine.take_in()
+        self._engine.take_in(math.inf)
         self._live.look()
 
     def inject(self, fault: Fault | Mapping[str, Any]) -> None:
@@ -422,6 +421,7 @@ class Simulation:
             for partner in self._partners:
                 partner.leave()
             self._crew.end_nodes()
+            self._engine.inbox.close("the simulation is closed")
             self.scene.close()
 
     def __enter__(self) -> Simulation:
@@ -644,6 +644,10 @@ class Simulation:
             wanted=lambda: publisher.clock_wanted,
         )
         every(_DIGEST_PERIOD_S, outlet.take_fingerprint, wanted=lambda: outlet.digest is not None)
+
+    def _open_queue(self) -> Post:
+        """Where the commands of one external client are posted, at its own expense."""
+        return self._engine.inbox.open_queue().post
 
     def _check_open(self) -> None:
         if self._closed:

@@ -6,18 +6,15 @@ import threading
 from collections import deque
 from typing import Any
 
-from volery.graph.session import Gateway, Session
+from volery.graph.session import Session
 
 
 class Inlet:
     """Publishes for a peer; while the simulation is busy the newest `depth` messages wait."""
 
-    def __init__(
-        self, gateway: Gateway, session: Session, topic: str, msgtype: str, depth: int
-    ) -> None:
+    def __init__(self, session: Session, topic: str, msgtype: str, depth: int) -> None:
         self.topic = topic
         self.msgtype = msgtype
-        self._gateway = gateway
         self._session = session
         self._waiting: deque[Any] = deque(maxlen=depth)
         self._depth = depth
@@ -37,7 +34,7 @@ class Inlet:
 
     def _publish(self, message: Any) -> None:
         self._session.publish(self.topic, message)
-        self._gateway.post(self._arrived)  # posts are done in order: the message is there by then
+        self._session.post(self._arrived)  # posts are done in order: the message is there by then
 
     def _arrived(self) -> None:
         with self._lock:

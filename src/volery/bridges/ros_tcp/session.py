@@ -51,7 +51,6 @@ class EndpointSession:
         depth: int,
         wake: Wake,
     ) -> None:
-        self._gateway = gateway
         self._payloads = payloads_of(generation)
         self._session = gateway.open(name)
         self._depth = depth
@@ -115,7 +114,7 @@ class EndpointSession:
         self._check_room(self._inlets, name)
         self._session.advertise(topic, msgtype, latched=bool(fields.get("latch", False)))
         self._payloads.learn(msgtype)
-        self._inlets[name] = Inlet(self._gateway, self._session, topic, msgtype, depth)
+        self._inlets[name] = Inlet(self._session, topic, msgtype, depth)
 
     def _remove_publisher(self, fields: Fields) -> None:
         inlet = self._inlets.pop(text_field(fields, "topic"), None)

@@ -67,7 +67,6 @@ class UnitySession:
         note: Callable[[str], None],
         wake: Wake,
     ) -> None:
-        self._gateway = gateway
         self._selection = selection
         self._depth = depth
         self._note = note
@@ -164,9 +163,7 @@ class UnitySession:
 
     def _receive(self, topic: TopicInfo) -> None:
         self._session.advertise(topic.name, topic.msgtype)
-        self._inlets[topic.name] = Inlet(
-            self._gateway, self._session, topic.name, topic.msgtype, self._depth
-        )
+        self._inlets[topic.name] = Inlet(self._session, topic.name, topic.msgtype, self._depth)
         self._command("subscribe", topic=topic.name, message_name=self._short(topic.msgtype))
 
     def _send(self, topic: TopicInfo) -> None:

@@ -94,7 +94,7 @@ class Actions:
             return
         asked = _Asked(action, action_type, tell, operation.get("feedback") is True)
         self._asked[key] = asked
-        self._graph.post(lambda: self._begin(key, asked, request))
+        self._session.post(lambda: self._begin(key, asked, request))
 
     def _check(self, operation: Operation, action: str, key: Id) -> str:
         name = absolute(action)
@@ -148,7 +148,7 @@ class Actions:
         if asked is None:
             raise BridgeError("cancel_action_goal: no open goal has this 'id'")
         self._session.tell("cancel", absolute(asked.action), asked.action_type)
-        self._graph.post(lambda: _cancel(asked))
+        self._session.post(lambda: _cancel(asked))
 
     # ------------------------------------------------------------------------------------ acting
 
@@ -233,7 +233,7 @@ class Actions:
         for acting in tuple(self._acting.values()):
             _abort(acting)
         for asked in tuple(self._asked.values()):
-            self._graph.post(lambda left=asked: _cancel(left))  # type: ignore[misc]
+            self._session.post(lambda left=asked: _cancel(left))  # type: ignore[misc]
         self._offers.clear()
         self._acting.clear()
         self._asked.clear()

@@ -75,7 +75,6 @@ class SensorLinkClient:
 
     async def start(self, gateway: Gateway) -> None:
         """Connect. `BridgeError` where nobody listens."""
-        self._gateway = gateway
         self._session: Session = gateway.open(self.name)
         self._wake = wake_of(asyncio.get_running_loop(), self._send_commands)
         ports = [self._port] if self._image_port is None else [self._port, self._image_port]
@@ -152,7 +151,7 @@ class SensorLinkClient:
         inlet = self._inlets.get(topic)
         if inlet is None or inlet.msgtype != msgtype:
             self._session.advertise(topic, msgtype)
-            inlet = Inlet(self._gateway, self._session, topic, msgtype, _DEPTH)
+            inlet = Inlet(self._session, topic, msgtype, _DEPTH)
             self._inlets[topic] = inlet
         return inlet
 

@@ -9,7 +9,7 @@ from volery.bridges.ros_tcp.inlet import Inlet
 from volery.bridges.sensor_link.payloads import PAYLOADS, decode_payload
 from volery.bridges.sensor_link.wire import Frame, Kind
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.session import Gateway, Session
+from volery.graph.session import Session
 
 COMMAND_TOPICS = {Kind.POSE_COMMAND: "pose_command", Kind.GOAL_POSE: "goal_pose"}
 """Topics below the UAV's."""
@@ -22,8 +22,7 @@ _UNIT_TOLERANCE = 0.01
 class Commands:
     """Publishes one client's commands through its session."""
 
-    def __init__(self, gateway: Gateway, session: Session) -> None:
-        self._gateway = gateway
+    def __init__(self, session: Session) -> None:
         self._session = session
         self._inlets: dict[tuple[int, int], Inlet] = {}
 
@@ -50,7 +49,7 @@ class Commands:
             self._session.advertise(name, msgtype)
         except GraphError as error:
             raise BridgeError(str(error)) from None
-        return Inlet(self._gateway, self._session, name, msgtype, _DEPTH)
+        return Inlet(self._session, name, msgtype, _DEPTH)
 
 
 def _check_pose(stamped: Any, *, may_keep_heading: bool) -> None:

@@ -206,7 +206,7 @@ class _Client(asyncio.Protocol):
             transport.close()
             return
         self._session = self._gateway.open(self._name)
-        self._commands = Commands(self._gateway, self._session)
+        self._commands = Commands(self._session)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
         self._port.forget(self)
