@@ -313,6 +313,19 @@ BENCHES: dict[str, Bench] = {
             has_quick=True,
         ),
         Bench(
+            "hostile",
+            "Hostile clients: a run in real time while clients attack its doors, each attack a "
+            "process of its own on one core; real-time factor, delay of another client's service "
+            "call, memory that stays; the worst of all attacks, and of each",
+            {
+                "rtf_under_attack": Bound(0.95),
+                "other_client_delay_p99_ms": Bound(50.0, at_most=True),
+                "memory_growth_mb": Bound(50.0, at_most=True),
+            },
+            in_all=False,  # nothing else can be measured beside it
+            has_quick=True,
+        ),
+        Bench(
             "peers",
             "Peers: other simulators beside Volery, in turns on one core; what each includes is "
             "told in [peers.md](peers.md)",

@@ -27,7 +27,7 @@ def measure_and_show(
             raise VoleryError(f"{path}: there is no folder {path.parent}")
     with _progress_told():
         if name == "all" and quick:
-            raise VoleryError("--quick is for one bench: forest_search or load")
+            raise VoleryError("--quick is for one bench: forest_search, load or hostile")
         if name == "all":
             results = [_in_own_process(each) for each, bench in BENCHES.items() if bench.in_all]
         else:

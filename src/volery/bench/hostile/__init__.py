@@ -1,0 +1,12 @@
+"""Clients that ask for too much of a simulation, and what that leaves for others."""
+
+from __future__ import annotations
+
+from volery.bench.registry import Measured
+
+
+def measure(*, quick: bool = False) -> Measured:
+    """Returns the figures of the bench `hostile`."""
+    from volery.bench.hostile.measuring import measure as measure_all
+
+    return measure_all(quick=quick)

@@ -1,0 +1,155 @@
+"""A simulation in real time while clients attack its doors.
+
+The victim is `volery run hover --speed 1` with rosbridge and ROS-TCP, attackers are a process each,
+pinned to the last core of the machine, so that the figures measure the server and not that the
+attackers, too, compute. An ordinary client in a third process tells what is left for others.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from volery.bench.hostile.attackers import ATTACKS
+from volery.bench.hostile.witness import PERIOD_S
+from volery.bench.registry import Measured
+from volery.core.errors import VoleryError
+
+_log = logging.getLogger(__name__)
+
+ATTACK_S = 8.0
+_QUICK_ATTACK_S = 1.5
+_LEAD_S = 1.0
+"""An attack begins so long before the witness looks."""
+_SETTLE_S = 1.0
+_START_S = 120.0
+_ENDING_S = 20.0
+_NOT_ANSWERED_S = 10.0
+"""Delay that calls without an answer count with."""
+
+
+def measure(*, quick: bool = False) -> Measured:
+    """Figures of the bench `hostile`."""
+    figures: dict[str, float] = {}
+    seconds = _QUICK_ATTACK_S if quick else ATTACK_S
+    for name in ("none", *ATTACKS):
+        _log.info("hostile: %s", name)
+        with _victim() as (pid, rosbridge, ros_tcp):
+            _result(_start("witness", rosbridge, _LEAD_S), _LEAD_S)  # what happens only once
+            figures |= _attack(name, pid, rosbridge, ros_tcp, seconds)
+    return Measured(figures | worst_figures(figures))
+
+
+def worst_figures(figures: dict[str, float]) -> dict[str, float]:
+    """What the attacks do at worst."""
+
+    def of_attacks(figure: str) -> list[float]:
+        return [figures[f"{attack}_{figure}"] for attack in ATTACKS]
+
+    return {
+        "rtf_under_attack": min(of_attacks("rtf")),
+        "other_client_delay_p99_ms": max(of_attacks("delay_p99_ms")),
+        "memory_growth_mb": max(of_attacks("memory_mb")),
+    }
+
+
+def call_figures(answers: list[tuple[float, float, float]], asked: int) -> dict[str, float]:
+    """Real-time factor and delay of what the witness noted."""
+    if len(answers) < 2:
+        return {"rtf": 0.0, "delay_p99_ms": 1e3 * _NOT_ANSWERED_S}
+    due, came, sim = np.array(answers).T
+    delays = np.full(max(asked, len(answers)), _NOT_ANSWERED_S)
+    delays[: len(answers)] = came - due
+    first, last = int(came.argmin()), int(came.argmax())
+    return {
+        "rtf": float((sim[last] - sim[first]) / (came[last] - came[first])),
+        "delay_p99_ms": 1e3 * float(np.percentile(delays, 99)),
+    }
+
+
+def _attack(name: str, pid: int, rosbridge: int, ros_tcp: int, seconds: float) -> dict[str, float]:
+    """Figures of one attack, named after it; `none` is none."""
+    before = _resident_mb(pid)
+    attacker = None
+    if name in ATTACKS:
+        attacker = _start("attackers", name, rosbridge, ros_tcp, seconds + 2 * _LEAD_S)
+        time.sleep(_LEAD_S)
+    witness = _start("witness", rosbridge, seconds)
+    found = call_figures(_result(witness, seconds), round(seconds / PERIOD_S))
+    if attacker is not None:
+        found["sent"] = float(_result(attacker, seconds)["sent"])
+    time.sleep(_SETTLE_S)
+    found["memory_mb"] = _resident_mb(pid) - before
+    return {f"{name}_{figure}": value for figure, value in found.items()}
+
+
+def _start(module: str, *words: object) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", f"volery.bench.hostile.{module}", *map(str, words)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+
+def _result(process: subprocess.Popen[str], seconds: float) -> Any:
+    try:
+        out, _ = process.communicate(timeout=seconds + _START_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+        raise VoleryError("hostile: a client did not end") from None
+    if process.returncode:
+        raise VoleryError(f"hostile: a client ended with status {process.returncode}")
+    return json.loads(out)
+
+
+@contextmanager
+def _victim() -> Iterator[tuple[int, int, int]]:
+    """Process id, rosbridge port and ROS-TCP port of a run in real time."""
+    rosbridge, ros_tcp = _free_port(), _free_port()
+    command = [sys.executable, "-m", "volery.cli.app", "run", "hover", "--speed", "1"]
+    command += ["--seconds", "100000"]
+    command += ["--door", f"rosbridge={rosbridge}", "--door", f"ros-tcp={ros_tcp}"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        _wait_until_open(process, rosbridge)
+        yield process.pid, rosbridge, ros_tcp
+    finally:
+        process.terminate()
+        try:
+            process.wait(_ENDING_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait(_ENDING_S)
+
+
+def _wait_until_open(process: subprocess.Popen[bytes], port: int) -> None:
+    ends = time.monotonic() + _START_S
+    while time.monotonic() < ends and process.poll() is None:
+        try:
+            socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
+        except OSError:
+            time.sleep(0.1)
+        else:
+            return
+    raise VoleryError("hostile: the simulation under attack did not start")
+
+
+def _free_port() -> int:
+    with socket.socket() as sock:
+        sock.bind(("127.0.0.1", 0))
+        return int(sock.getsockname()[1])
+
+
+def _resident_mb(pid: int) -> float:
+    for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+        if line.startswith("VmRSS:"):
+            return float(line.split()[1]) / 1024.0
+    raise VoleryError("hostile: the simulation under attack has ended")
