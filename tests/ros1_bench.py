@@ -118,7 +118,7 @@ def end(process):
             process.wait(3.0)
 
 
-def tool(*command, seconds=15.0):
+def tool(*command, seconds=15.0, **environment):
     """What a command of ROS prints."""
     process = subprocess.Popen(
         command,
@@ -126,6 +126,7 @@ def tool(*command, seconds=15.0):
         stderr=subprocess.STDOUT,
         text=True,
         start_new_session=True,
+        env={**os.environ, **environment},
     )
     try:
         return process.communicate(timeout=seconds)[0]
@@ -139,9 +140,14 @@ def tool(*command, seconds=15.0):
 class Program:
     """A program that prints JSON values, one a line; use it as a context manager."""
 
-    def __init__(self, *command):
+    def __init__(self, *command, **environment):
         self.process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=HERE
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=HERE,
+            env={**os.environ, **environment},
         )
         self._lines = queue.SimpleQueue()
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -181,9 +187,9 @@ def peer(*arguments):
     return Program(SYSTEM_PYTHON, str(HERE / "peer.py"), *arguments)
 
 
-def ours(script):
+def ours(script, **environment):
     """A program of this project in a process of its own."""
-    return Program(sys.executable, str(HERE / script))
+    return Program(sys.executable, str(HERE / script), **environment)
 
 
 class WallGraph(LiveGraph):

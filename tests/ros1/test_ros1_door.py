@@ -10,6 +10,7 @@ import threading
 import numpy as np
 import pytest
 from ros1_bench import (
+    SYSTEM_PYTHON,
     WallGraph,
     ours,
     peer,
@@ -25,8 +26,11 @@ from volery.bridges.ros1.door import Ros1Door
 from volery.bridges.ros1.environment import load_rospy
 from volery.bridges.ros1.node import join_ros1
 from volery.core.errors import BridgeError, GraphError
+from volery.graph.definition_files import find_definition_files
+from volery.graph.interface_packages import DEFINITIONS, write_generator, write_package
 from volery.graph.messages import (
     Header,
+    Point,
     String,
     TFMessage,
     Time,
@@ -35,6 +39,8 @@ from volery.graph.messages import (
     message_type,
 )
 from volery.graph.reply import Reply
+from volery.graph.ros1 import ros1_codec
+from volery.graph.zero import zero_message
 
 require_ros1()
 pytestmark = [  # rospy uses what is deprecated and forgets to close sockets
@@ -46,6 +52,8 @@ STRING = "std_msgs/msg/String"
 HEADER = "std_msgs/msg/Header"
 TWIST = "geometry_msgs/msg/Twist"
 TRIGGER = "std_srvs/srv/Trigger"
+GO_TO = "volery_interfaces/srv/GoTo"
+FLIGHT_STATE = "volery_interfaces/msg/FlightState"
 Triggered = message_type(f"{TRIGGER}_Response")
 UNICODE = "Grüße, 無人機 🚁"
 
@@ -66,7 +74,7 @@ def live(master):
 
 @pytest.fixture(scope="module")
 def door(live, master):
-    door = Ros1Door(use_sim_time=True, remote_services={"/remote": TRIGGER})
+    door = Ros1Door(remote_services={"/remote": TRIGGER})
     with Doors(live.gateway) as doors:
         doors.open(door)
         yield door
@@ -275,6 +283,62 @@ def test_services_of_the_graph(live, registered):
     assert wait_until(lambda: "/broken" not in tool("rosservice", "list"))
 
 
+@pytest.fixture(scope="module")
+def own_types(tmp_path_factory):
+    """Environment in which ROS 1 knows the types that come with Volery, made without catkin."""
+    folder = tmp_path_factory.mktemp("ros1_packages")
+    for name in ("volery_interfaces", "mavros_msgs", "simulation_interfaces", "octomap_msgs"):
+        write_package(name, folder, ros1=True)
+    paths = dict(
+        line.removeprefix("export ").split("=", 1)
+        for line in tool(SYSTEM_PYTHON, str(write_generator(folder)), seconds=60.0).splitlines()
+    )
+    return {name: path.replace(":$PYTHONPATH", "") for name, path in paths.items()}
+
+
+def test_rostopic_and_rosservice_know_our_own_types(live, registered, own_types):
+    request, response = (message_type(f"{GO_TO}_{part}") for part in ("Request", "Response"))
+    asked = []
+
+    def go_to(question):
+        asked.append(question)
+        return response(True, "on the way")
+
+    live.graph.offer("/uav1/go_to", GO_TO, go_to)
+    state = zero_message(FLIGHT_STATE)
+    state.mode, state.battery_charge = "HOLD", 0.5
+    live.publisher("/uav1/flight_state", FLIGHT_STATE, latched=True)(state)
+    registered("/uav1/flight_state")
+    registered("/uav1/go_to", "lookupService")
+    heard = tool("rostopic", "echo", "-n1", "/uav1/flight_state", **own_types)
+    assert 'mode: "HOLD"' in heard
+    assert "battery_charge: 0.5" in heard
+    wanted = "{position: {x: 1.0, y: -2.0, z: 3.0}, yaw: 0.5}"
+    assert "on the way" in tool("rosservice", "call", "/uav1/go_to", wanted, **own_types)
+    assert asked == [request(Point(1.0, -2.0, 3.0), 0.5, False)]
+
+
+def test_packages_for_ros1_have_the_sums_of_the_bridge(own_types):
+    """All of them: ROS 1 refuses connections of other sums."""
+    names = [
+        file.base
+        for package in ("volery_interfaces", "mavros_msgs", "simulation_interfaces")
+        for file in find_definition_files(DEFINITIONS / package)
+        if file.kind != "action"
+    ]
+    asked = [
+        f"{name.partition('/')[0]}.{name.split('/')[1]}:{name.split('/')[2]}" for name in names
+    ]
+    program = (
+        "import importlib, sys\n"
+        "for text in sys.argv[1:]:\n"
+        "    module, name = text.split(':')\n"
+        "    print(getattr(importlib.import_module(module), name)._md5sum)\n"
+    )
+    sums = tool(SYSTEM_PYTHON, "-c", program, *asked, **own_types).split()
+    assert dict(zip(names, sums, strict=True)) == {name: ros1_codec().md5(name) for name in names}
+
+
 def test_services_of_ros1_for_the_graph(live, door):
     def call():
         come, got = threading.Event(), []
@@ -351,6 +415,15 @@ def test_a_program_of_ours(live, registered):
         assert "answered" in tool("rosservice", "call", "/program")
         program.tell("end")
         assert program.next() == []
+
+
+def test_a_node_with_the_hostname_localhost_hears(live, registered):
+    """rosgraph then looks up the addresses of this machine, with a package that may be missing."""
+    publish = live.publisher("/to_localhost", STRING, latched=True)
+    publish(String("heard"))
+    registered("/to_localhost")
+    with ours("localhost_program.py", ROS_HOSTNAME="localhost") as program:
+        assert program.next(20.0) == "heard"
 
 
 def test_a_master_that_began_anew_is_told_everything(live, master, registered):

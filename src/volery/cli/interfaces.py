@@ -1,4 +1,4 @@
-"""`volery interfaces`: message types as packages for ROS 2's own tools."""
+"""`volery interfaces`: message types as packages for ROS's own tools."""
 
 from __future__ import annotations
 
@@ -7,21 +7,24 @@ from pathlib import Path
 import typer
 
 from volery.core.errors import VoleryError
-from volery.graph.interface_packages import OWN, needs, packages, write_package
+from volery.graph.interface_packages import OWN, needs, packages, write_generator, write_package
 
 
-def write_and_tell(folder: Path, names: list[str], *, overwrite: bool) -> None:
-    """Write packages into a folder of a colcon workspace, and say what they need."""
+def write_and_tell(folder: Path, names: list[str], *, overwrite: bool, ros1: bool) -> None:
+    """Write packages into a folder of a workspace, and say what they need."""
     if not folder.is_dir():
         raise VoleryError(f"{folder}: there is no such folder; `mkdir -p {folder}` makes it")
     wanted = list(dict.fromkeys(names)) or [OWN]
     for name in wanted:
-        typer.echo(write_package(name, folder, overwrite=overwrite))
-    needed = sorted({other for name in wanted for other in needs(name)} - set(wanted))
+        typer.echo(write_package(name, folder, overwrite=overwrite, ros1=ros1))
+    needed = sorted({other for name in wanted for other in needs(name, ros1=ros1)} - set(wanted))
     if needed:
         typer.echo(f"needs   {', '.join(needed)}")
     ours = [name for name in needed if name in packages()]
     if ours:
         typer.echo(
-            f"Where your ROS 2 lacks {' or '.join(ours)}: --package writes what Volery knows of it"
+            f"Where your ROS {1 if ros1 else 2} lacks {' or '.join(ours)}: --package writes what "
+            "Volery knows of it"
         )
+    if ros1:
+        typer.echo(f"Without catkin: python3 {write_generator(folder)} makes Python modules")

@@ -38,14 +38,17 @@ def export(
 
 @guarded
 def interfaces(
-    folder: Annotated[Path, typer.Argument(help="To write into: src of a colcon workspace.")],
+    folder: Annotated[Path, typer.Argument(help="Write into this folder: src of a workspace.")],
     package: Annotated[
         list[str] | None,
         typer.Option(help="Package to write, repeatable; volery_interfaces unless said."),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace older ones.")] = False,
+    ros1: Annotated[
+        bool, typer.Option("--ros1", help="Write packages of ROS 1, for catkin or genpy.")
+    ] = False,
 ) -> None:
-    """Write Volery's message types as ROS 2 packages, which colcon builds for ros2cli and rclpy."""
+    """Write Volery's message types as packages for the tools of ROS 2 or, with --ros1, ROS 1."""
     from volery.cli.interfaces import write_and_tell
 
-    write_and_tell(folder, package or [], overwrite=overwrite)
+    write_and_tell(folder, package or [], overwrite=overwrite, ros1=ros1)

@@ -1,6 +1,7 @@
-"""Writes the message types that come with Volery as ROS 2 packages, which colcon builds.
+"""Writes the message types that come with Volery as packages of ROS 2, or of ROS 1.
 
-With them built and sourced, ROS 2's own tools know those types.
+With them built and sourced, ROS's own tools know those types. colcon builds those of ROS 2, catkin
+those of ROS 1; without catkin, `generate_python.py` beside them makes their Python modules.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from volery.core.errors import GraphError
+from volery.graph import ros1_package
 from volery.graph.definition_files import (
     DefinitionFile,
     find_definition_files,
@@ -19,6 +21,7 @@ from volery.graph.definition_files import (
 OWN = "volery_interfaces"
 """The package that nobody else has."""
 DEFINITIONS = Path(__file__).parent / "definitions"
+_ROS2_ALONE = ("action_msgs", "rcl_interfaces")
 _ACTIONS_NEED = "action_msgs"
 """What rosidl adds to packages with actions."""
 
@@ -28,9 +31,14 @@ def packages() -> list[str]:
     return sorted(folder.name for folder in DEFINITIONS.iterdir() if folder.is_dir())
 
 
-def needs(package: str) -> list[str]:
-    """Other packages that a package's definitions name, sorted. `GraphError` where it is none."""
+def needs(package: str, *, ros1: bool = False) -> list[str]:
+    """Other packages that a package's definitions name, sorted. `GraphError` where it is none.
+
+    ros1: as ROS 1 has them.
+    """
     files = _files(package)
+    if ros1:
+        return ros1_package.needs(files)
     nested = {
         name.partition("/")[0]
         for file in files
@@ -42,13 +50,29 @@ def needs(package: str) -> list[str]:
     return sorted(nested - {package})
 
 
-def write_package(package: str, folder: Path, *, overwrite: bool = False) -> Path:
+def write_package(
+    package: str, folder: Path, *, overwrite: bool = False, ros1: bool = False
+) -> Path:
     """Write a package into a new folder of its name below `folder`, and return that.
 
-    `GraphError` where there is no such package, or where its folder exists and holds anything that
-    is not to be replaced.
+    Parameters
+    ----------
+    package, folder
+        Which, and where to; `folder` exists.
+    overwrite
+        Replaces an older package.
+    ros1
+        Writes it for ROS 1: without actions, in the spelling of that generation.
+
+    Raises
+    ------
+    GraphError
+        There is no such package, or its folder exists and holds anything that is not to be
+        replaced, or it cannot be written.
+
     """
-    files, target = _files(package), folder / package
+    contents = _ros1_contents(package) if ros1 else _ros2_contents(package)
+    target = folder / (ros1_package.package_name(package) if ros1 else package)
     if target.exists() and not overwrite:
         raise GraphError(f"{target}: exists already; --overwrite replaces it")
     if target.exists() and not (target / "package.xml").is_file():
@@ -56,16 +80,41 @@ def write_package(package: str, folder: Path, *, overwrite: bool = False) -> Pat
     try:
         if target.exists():
             shutil.rmtree(target)
-        for file in files:
-            place = target / file.kind
-            place.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(file.path, place / file.path.name)
-        others = needs(package)
-        (target / "package.xml").write_text(_manifest(package, others), encoding="utf-8")
-        (target / "CMakeLists.txt").write_text(_build(package, files, others), encoding="utf-8")
+        for name, text in contents.items():
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            (target / name).write_text(text, encoding="utf-8")
     except OSError as error:
         raise GraphError(f"{target}: cannot be written: {error.strerror}") from None
     return target
+
+
+def write_generator(folder: Path) -> Path:
+    """Write the program that makes Python modules of the ROS 1 packages in `folder`; return it.
+
+    `GraphError` where it cannot be written.
+    """
+    target = folder / "generate_python.py"
+    try:
+        shutil.copyfile(ros1_package.GENERATOR, target)
+    except OSError as error:
+        raise GraphError(f"{target}: cannot be written: {error.strerror}") from None
+    return target
+
+
+def _ros2_contents(package: str) -> dict[str, str]:
+    """Texts of a ROS 2 package's files, by their paths in it."""
+    files, others = _files(package), needs(package)
+    return {
+        **{f"{file.kind}/{file.path.name}": file.path.read_text("utf-8") for file in files},
+        "package.xml": _manifest(package, others),
+        "CMakeLists.txt": _build(package, files, others),
+    }
+
+
+def _ros1_contents(package: str) -> dict[str, str]:
+    if package in _ROS2_ALONE:
+        raise GraphError(f"{package} is a package of ROS 2 alone: leave out --ros1")
+    return ros1_package.contents(package, _files(package), version("volery"))
 
 
 def _files(package: str) -> list[DefinitionFile]:

@@ -163,15 +163,25 @@ class Ros1Codec:
         """
         if msgtype in _BASIC:
             return f"{_BASIC[msgtype]} data\n"
-        parts = self._parts(msgtype)
-        nested: list[str] = []
-        for part in parts:
-            self._collect(part, nested)
-        own = "---\n".join(_ended(self._text(part)) for part in parts)
         others = [
-            f"{'=' * 80}\nMSG: {ros1_name(name)}\n{_ended(self._text(name))}" for name in nested
+            f"{'=' * 80}\nMSG: {ros1_name(name)}\n{_ended(self._text(name))}"
+            for name in self.nested_types(msgtype)
         ]
-        return own + "".join(others)
+        return self.own_definition_text(msgtype) + "".join(others)
+
+    def own_definition_text(self, msgtype: str) -> str:
+        """Returns the ROS 1 definition of a type without what it nests: that of its file.
+
+        `GraphError` where the type is unknown.
+        """
+        return "---\n".join(_ended(self._text(part)) for part in self._parts(msgtype))
+
+    def nested_types(self, msgtype: str) -> list[str]:
+        """Returns the ROS 2 names of all message types in a type. `GraphError` as above."""
+        nested: list[str] = []
+        for part in self._parts(msgtype):
+            self._collect(part, nested)
+        return nested
 
     def _parts(self, msgtype: str) -> list[str]:
         """The message types behind a name: the type itself, or a service's two."""

@@ -4,11 +4,16 @@ import re
 from xml.etree import ElementTree
 
 import pytest
+from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
 from volery.cli.app import app
 from volery.core.errors import GraphError
+from volery.graph import ros1_package
+from volery.graph.definition_files import find_definition_files
+from volery.graph.definition_store import DefinitionStore
 from volery.graph.interface_packages import DEFINITIONS, needs, packages, write_package
+from volery.graph.ros1 import Ros1Codec, ros1_codec
 
 
 def test_the_package_is_whole(tmp_path):
@@ -63,3 +68,60 @@ def test_the_command_says_what_is_needed(tmp_path):
     result = invoke(app, ["interfaces", str(tmp_path / "missing")])
     assert result.exit_code == 2
     assert "mkdir -p" in result.output
+
+
+def test_a_package_for_ros1_is_whole(tmp_path):
+    folder = write_package("volery_interfaces", tmp_path, ros1=True)
+    root = ElementTree.parse(folder / "package.xml").getroot()
+    assert root.get("format") == "2"
+    assert root.findtext("buildtool_depend") == "catkin"
+    depends = [element.text for element in root.findall("depend")]
+    assert depends == ["geometry_msgs", "mavros_msgs", "std_msgs"]
+    build = (folder / "CMakeLists.txt").read_text()
+    assert "generate_messages(DEPENDENCIES geometry_msgs mavros_msgs std_msgs)" in build
+    there = {path.name for path in folder.glob("*/*")}
+    assert set(re.findall(r"^  (\w+\.\w+)$", build, re.MULTILINE)) == there
+    assert there == {path.name for path in (DEFINITIONS / "volery_interfaces").glob("*/*")}
+
+
+def test_definitions_are_spelled_as_in_ros1(tmp_path):
+    (tmp_path / "farm" / "srv").mkdir(parents=True)
+    path = tmp_path / "farm" / "srv" / "Feed.srv"
+    path.write_text(
+        "# Of the feeding.\nbuiltin_interfaces/Time stamp\nstring<=10 name\n"
+        "uint8 CORN=3  # yellow\n"
+        "\nfloat64[<=4] weights [1.0]  # kg\nbool whole true\n---\n# Of the end.\n"
+        "std_msgs/Header header\n"
+    )
+    store = DefinitionStore(get_typestore(Stores.ROS2_JAZZY), "nowhere")
+    store.add_folder(tmp_path)
+    text = ros1_package.definition(find_definition_files(tmp_path)[0], Ros1Codec(store))
+    assert text == (
+        "# Of the feeding.\ntime stamp\nstring name\nuint8 CORN=3\n"
+        "\nfloat64[] weights\nbool whole\n---\n# Of the end.\nstd_msgs/Header header\n"
+    )
+
+
+@pytest.mark.parametrize("package", ["volery_interfaces", "simulation_interfaces", "std_srvs"])
+def test_definitions_of_ros1_mean_the_same(tmp_path, package):
+    """Read again as files of the user's own they have the sums that the bridge tells."""
+    codec = ros1_codec()
+    write_package(package, tmp_path, ros1=True)
+    for file in find_definition_files(tmp_path / package):
+        lines = file.path.read_text().splitlines()
+        own = [line for line in lines if line and not line.startswith("#")]
+        wanted = codec.own_definition_text(file.base).splitlines()
+        assert sorted(own) == sorted(wanted)
+
+
+def test_packages_of_ros2_alone_are_refused_for_ros1(tmp_path):
+    with pytest.raises(GraphError, match="of ROS 2 alone"):
+        write_package("rcl_interfaces", tmp_path, ros1=True)
+
+
+def test_the_command_for_ros1_names_the_next_step(tmp_path):
+    result = CliRunner().invoke(app, ["interfaces", str(tmp_path), "--ros1"])
+    assert result.exit_code == 0, result.output
+    assert "needs   geometry_msgs, mavros_msgs, std_msgs" in result.output
+    assert f"python3 {tmp_path / 'generate_python.py'}" in result.output.replace("\n", "")
+    assert (tmp_path / "generate_python.py").read_text() == ros1_package.GENERATOR.read_text()

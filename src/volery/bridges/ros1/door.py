@@ -47,7 +47,8 @@ class Ros1Door:
     remote_services
         ROS 1 services that the graph can call, and their types (`std_srvs/srv/Trigger`).
     use_sim_time
-        Sets that parameter while the door is open, so that nodes that start follow `/clock`.
+        Whether to set that parameter while the bridge is open, so that nodes that start meanwhile
+        follow the simulation's `/clock`. Its earlier value comes back afterwards.
 
     """
 
@@ -59,7 +60,7 @@ class Ros1Door:
         topics: Sequence[str] = ("*",),
         commands: Sequence[str] = COMMANDS,
         remote_services: Mapping[str, str] | None = None,
-        use_sim_time: bool = False,
+        use_sim_time: bool = True,
         host: str | None = None,
         anywhere: bool = False,
     ) -> None:

@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from volery.bridges.ros1.local_addresses import provide_local_addresses
 from volery.core.errors import BridgeError
 
 _DEBIAN = Path("/usr/lib/python3/dist-packages")
@@ -44,12 +45,15 @@ def _load() -> Any:
     sys.path.extend(added)
     logger_class = logging.getLoggerClass()
     try:
-        return importlib.import_module("rospy")
+        rospy = importlib.import_module("rospy")
+        provide_local_addresses()
     except ImportError as error:
         raise BridgeError(
             f"ROS 1 needs rospy, which cannot be loaded ({error}); on Debian: "
             f"apt-get install --no-install-recommends {_PACKAGES}"
         ) from None
+    else:
+        return rospy
     finally:
         logging.setLoggerClass(logger_class)  # rospy's own is meant for its nodes alone
         for folder in added:
