@@ -5,6 +5,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 SCENARIO ?= forest_survey
 OUT ?= runs/$(SCENARIO)
+RUN_OPTIONS ?= --speed 3
 PAGE := src/volery/server/static/index.html
 PAGE_SOURCES := web/index.html web/package.json web/tsconfig.json web/vite.config.ts \
 	$(shell find web/src web/public -type f)
@@ -50,9 +51,9 @@ web: $(PAGE) ## build the page of the browser into the package (needs Node.js 20
 page: # the page where it can be built; without it everything else works
 	@.ci/node_fits && $(MAKE) --no-print-directory web || echo "going on without the page"
 
-run: $(VENV)/.installed page ## fly the main job, shown on a page, and leave a log and a report under runs/
+run: $(VENV)/.installed page ## fly the main job on a page that stays until Ctrl-C, leave a log and a report under runs/
 	@mkdir -p $(OUT)
-	$(BIN)/volery run $(SCENARIO) --record $(OUT)/flight.mcap --overwrite --report $(OUT)/report --page
+	$(BIN)/volery run $(SCENARIO) --record $(OUT)/flight.mcap --overwrite --report $(OUT)/report --page $(RUN_OPTIONS)
 
 serve: $(VENV)/.installed page ## serve the page until Ctrl-C: http://127.0.0.1:8080/
 	$(BIN)/volery serve

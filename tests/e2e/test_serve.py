@@ -217,11 +217,27 @@ def test_ctrl_c_ends_it(server):
     assert not [line for line in server.lines if "Traceback" in line or "ERROR" in line]
 
 
-def test_a_run_shows_its_flight_and_ends_by_itself(tmp_path):
-    words = ("run", "hover", "--seconds", 3, "--speed", 1, "--page=0", "--threads", 1)
+def test_a_run_shows_its_flight_and_ends_by_itself_where_asked(tmp_path):
+    words = ("run", "hover", "--seconds", 3, "--page=0", "--threads", 1, "--exit-at-end")
     server = Server(*words, cwd=tmp_path)
     server.wait_for(state="flying", scenario="hover")
     assert server.end(0) == 0
+
+
+def test_a_run_with_a_page_writes_its_files_and_stays(tmp_path):
+    log, report = tmp_path / "flight.mcap", tmp_path / "report" / "index.html"
+    files = ("--record", log, "--report", report.parent)
+    words = ("run", "hover", "--seconds", 1, "--page=0", "--threads", 1, *files)
+    server = Server(*words, cwd=tmp_path)
+    server.wait_for(state="ended", scenario="hover")
+    assert report.is_file()
+    size = log.stat().st_size
+    with Ros(server) as ros:
+        assert ros.call("/volery/continue_run", "std_srvs/Trigger")["success"]
+        ros.first("/clock", "rosgraph_msgs/Clock", lambda m: m["clock"]["sec"] >= 2)
+    assert log.stat().st_size == size
+    assert server.end() == 0
+    assert not [line for line in server.lines if "Traceback" in line or "ERROR" in line]
 
 
 def test_a_first_scenario_that_is_wrong_ends_the_command(tmp_path):

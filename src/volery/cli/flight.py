@@ -20,6 +20,7 @@ from volery.core.errors import RecordingError, VoleryError
 
 if TYPE_CHECKING:
     from volery.bridges.logs.bag import Log
+    from volery.graph.graph import Subscription
     from volery.report.collect import FlightCollector
     from volery.scenario.changes import Changes
 
@@ -54,6 +55,8 @@ class RunOptions:
     """To the scenario, by the client that loaded it."""
     page: str | None = None
     """`HOST:PORT`, `PORT` or, for the usual place, nothing; None: no page."""
+    exit_at_end: bool = False
+    """Whether a run with a page ends with its scenario."""
     replay_commands: Path | None = None
     px4_dir: Path | None = None
     """Of PX4's sources: instances are run beside the flight; None: by somebody else, or none."""
@@ -86,6 +89,7 @@ class Flight:
         self._keys = Keys()
         self._wall_s = self._before_s = 0.0
         self._log: Log | None = None
+        self._recorded: Subscription | None = None
         self._collector: FlightCollector | None = None
         if options.digest:
             simulation.enable_digest()
@@ -97,7 +101,7 @@ class Flight:
             from volery.bridges.logs.bag import open_log
 
             self._log = open_log(options.record, overwrite=options.overwrite)
-            simulation.graph.subscribe_all(self._log.write)
+            self._recorded = simulation.graph.subscribe_all(self._log.write)
 
     def fly(self) -> int:
         """Run to the end, to Ctrl-C or to an error; then write what is left to write."""
@@ -123,11 +127,31 @@ class Flight:
         if not closed and not code:
             code, trouble = USER_ERROR, "The log could not be written"
         report_written = self._write_report(trouble)
-        return code if report_written else code or USER_ERROR
+        code = code if report_written else code or USER_ERROR
+        if not code and self._options.page is not None and not self._options.exit_at_end:
+            self._stay()
+        return code
 
-    def _on_progress(self, progress: Any) -> None:
+    def _stay(self) -> None:
+        """Keep the page open until Ctrl-C; what is flown past the end leaves no files."""
+        simulation = self._simulation
+        if simulation.quitting:
+            return
+        typer.echo("the page stays open; Ctrl-C ends it", err=True)
+        try:
+            with self._keys:
+                while not simulation.quitting:
+                    simulation.wait_at_end(self._stop_if_pressed)
+                    simulation.run(speed=simulation.speed, on_progress=self._on_progress)
+        except _StoppedError:
+            return
+
+    def _stop_if_pressed(self) -> None:
         if self._interrupts.pressed:
             raise _StoppedError
+
+    def _on_progress(self, progress: Any) -> None:
+        self._stop_if_pressed()
         for key in self._keys.pressed():
             steer(self._simulation, key, progress.real_time_factor)
         self._before_s = progress.before_s
@@ -136,10 +160,11 @@ class Flight:
         )
 
     def _close_log(self) -> bool:
-        if self._log is None:
+        if self._log is None or self._recorded is None:
             return True
         try:
             self._simulation.commands.end()
+            self._recorded.cancel()
             self._log.close()
         except RecordingError as error:
             complain(str(error))

@@ -29,7 +29,8 @@ NoNodes = Annotated[
 Speed = Annotated[
     str | None,
     typer.Option(
-        help="Factor of real time, such as 1 or 2.5, or max; 1 where doors are open.",
+        help="Set the factor of real time, such as 1 or 2.5, or max [default: 1 with doors or a "
+        "page, else max].",
         rich_help_panel=FLIGHT,
     ),
 ]
@@ -74,7 +75,16 @@ Page = Annotated[
     str | None,
     typer.Option(
         metavar="[=HOST:PORT]",
-        help="Show the flight on a page in the browser; at 127.0.0.1:8080 unless said.",
+        help="Show the flight on a page in the browser, at 127.0.0.1:8080 by default; the page "
+        "stays open at the end until Ctrl-C.",
+        rich_help_panel=DOORS,
+    ),
+]
+ExitAtEnd = Annotated[
+    bool,
+    typer.Option(
+        "--exit-at-end",
+        help="End a run with a page where its scenario ends.",
         rich_help_panel=DOORS,
     ),
 ]

@@ -30,6 +30,7 @@ from volery.report.structures import seen_from_above
 from volery.report.voxels import VoxelSet
 
 if TYPE_CHECKING:
+    from volery.graph.graph import Subscription
     from volery.graph.messages import Published
 
 Array = NDArray[np.float64]
@@ -71,9 +72,9 @@ class FlightCollector:
         self._voxels = VoxelSet(VOXEL_M)
         self._scans = 0
         self._uavs = {name: _Uav() for name in simulation.uav_names}
-        graph = simulation.graph
+        self._subscriptions: list[Subscription] = []
         for name, uav in self._uavs.items():
-            graph.subscribe(f"/{name}/ground_truth/odom", self._track(uav), "nav_msgs/msg/Odometry")
+            self._subscribe(f"/{name}/ground_truth/odom", self._track(uav), "nav_msgs/msg/Odometry")
         mounts: Mapping[str, Any] = simulation.mounts
         clouds: Mapping[str, Any] = simulation.cloud_mounts
         weights = {t: NODDING_WEIGHT if m.nods else 1.0 for t, m in mounts.items()}
@@ -81,11 +82,14 @@ class FlightCollector:
             uav = self._uavs[topic.split("/")[1]]
             rate_hz = SCANS_PER_S * weights[topic] / sum(weights.values())
             receive = self._scan(uav, mount, round(NS_PER_S / rate_hz))
-            graph.subscribe(topic, receive, "sensor_msgs/msg/LaserScan")
+            self._subscribe(topic, receive, "sensor_msgs/msg/LaserScan")
         for topic, mount in clouds.items():
             uav = self._uavs[topic.split("/")[1]]
             receive = self._scan(uav, mount, round(NS_PER_S * len(clouds) / CLOUDS_PER_S))
-            graph.subscribe(topic, receive, "sensor_msgs/msg/PointCloud2")
+            self._subscribe(topic, receive, "sensor_msgs/msg/PointCloud2")
+
+    def _subscribe(self, topic: str, receive: Callable[[Published], None], msgtype: str) -> None:
+        self._subscriptions.append(self._simulation.graph.subscribe(topic, receive, msgtype))
 
     def _track(self, uav: _Uav) -> Callable[[Published], None]:
         def receive(published: Published) -> None:
@@ -136,7 +140,9 @@ class FlightCollector:
         machine: Mapping[str, str] | None = None,
         versions: Mapping[str, str] | None = None,
     ) -> FlightData:
-        """Everything up to now; call it before the simulation is closed."""
+        """Return everything up to now and stop; call it before the simulation is closed."""
+        for subscription in self._subscriptions:
+            subscription.cancel()
         simulation = self._simulation
         scenario = simulation.scenario
         grid = simulation.terrain.grid

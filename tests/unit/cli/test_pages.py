@@ -30,8 +30,8 @@ def page_of(monkeypatch):
     ("words", "page", "speed"),
     [
         (["hover"], None, None),
-        (["hover", "--page"], "", None),
-        (["--page", "hover"], "", None),
+        (["hover", "--page"], "", 1.0),
+        (["--page", "hover"], "", 1.0),
         (["hover", "--page=127.0.0.1:8081", "--speed", "2"], "127.0.0.1:8081", 2.0),
         (["hover", "--page", "--door", "rosbridge"], "", 1.0),
     ],

@@ -12,6 +12,7 @@ import pytest
 from volery.core import rotations
 from volery.engine.events import Event, EventKind
 from volery.graph import messages as m
+from volery.graph.graph import Subscription
 from volery.report.collect import FlightCollector
 from volery.report.scan_placing import scan_points
 from volery.sensors.mount import make_mount
@@ -24,8 +25,10 @@ class FakeGraph:
     def __init__(self) -> None:
         self.callbacks: dict[str, list[Callable[[m.Published], None]]] = {}
 
-    def subscribe(self, topic: str, callback: Callable[[m.Published], None], msgtype: str) -> None:
-        self.callbacks.setdefault(topic, []).append(callback)
+    def subscribe(self, topic: str, callback: Callable[[m.Published], None], msgtype: str) -> Any:
+        callbacks = self.callbacks.setdefault(topic, [])
+        callbacks.append(callback)
+        return Subscription(callbacks, callback)
 
     def send(self, topic: str, time_ns: int, message: Any) -> None:
         for callback in self.callbacks.get(topic, []):
