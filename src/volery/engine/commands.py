@@ -78,12 +78,12 @@ class Inbox:
     def __init__(
         self,
         *,
-        budget: CallBudget | None = None,
+        on_post: Callable[[], None] | None = None,
         cpu_s: Callable[[], float] = time.thread_time,
         now_s: Callable[[], float] = time.perf_counter,
     ) -> None:
-        self.on_post: Callable[[], None] = _nothing
-        self._budget = budget or CallBudget(now_s)
+        self._on_post = on_post or _nothing
+        self._budget = CallBudget(now_s)
         self._cpu_s = cpu_s
         self._now_s = now_s
         self._own = ClientQueue(self)
@@ -116,7 +116,7 @@ class Inbox:
             future.set_exception(CommandError(closed))
             return future
         self._news.set()
-        self.on_post()
+        self._on_post()
         return future
 
     def close(self, reason: str) -> None:

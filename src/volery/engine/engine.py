@@ -85,13 +85,14 @@ class Engine:
         crash_on_contact: bool,
         copies: int = 1,
         estimation: Estimation | None = None,
+        on_post: Callable[[], None] | None = None,
     ) -> None:
         self.fleet = fleet
         self.scene = scene
         self.ground = terrain
         self.terrain = terrain.grid
         self.sink = sink
-        self.inbox = Inbox()
+        self.inbox = Inbox(on_post=on_post)
         self.repeats: Repeats | None = None
         """Recorded commands to be taken again."""
         self.turn = 0

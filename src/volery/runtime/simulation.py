@@ -125,8 +125,8 @@ class Simulation:
             self.outlet,
             crash_on_contact=scenario.physics.on_contact == "crash",
             estimation=parts.estimation,
+            on_post=self._pacer.wake,
         )
-        self._engine.inbox.on_post = self._pacer.wake
         self.commands = CommandLog(self.graph, self._engine)
         """What clients do, told on `/volery/log`."""
         self.gateway.watch = self.commands.watch
