@@ -87,6 +87,18 @@ class Simulation:
     `ScenarioError` where the scenario cannot be built.
     """
 
+    uavs: Mapping[str, Uav]
+    """In fleet order."""
+    pilots: Pilots
+    """Who steers which UAV."""
+    commands: CommandLog
+    """What clients do, told on `/volery/log`."""
+    gateway: Gateway
+    """Where clients of other threads join the graph."""
+    outlet: Outlet
+    """Where steps, measurements and events go."""
+    grid_world: GridWorld
+    """The grid map whose blocks stand in the world, and how it is changed."""
     end: EndOfRun
     """What clients meet where the scenario has ended."""
     _geometry: Geometry | None = None
@@ -112,10 +124,8 @@ class Simulation:
         parts = assemble(scenario, starts, self.scene)
         self.graph = Graph(lambda: self.time_ns, self.post)
         self.gateway = Gateway(self.graph, self.post, open_queue=self._open_queue)
-        """Where clients of other threads join the graph."""
         publisher = GraphPublisher(self.graph)
         self.outlet = Outlet(parts.fleet, self.graph, publisher)
-        """Where steps, measurements and events go."""
         self._engine = Engine(
             parts.fleet,
             self.scene,
@@ -128,12 +138,10 @@ class Simulation:
             on_post=self._pacer.wake,
         )
         self.commands = CommandLog(self.graph, self._engine)
-        """What clients do, told on `/volery/log`."""
         self.gateway.watch = self.commands.watch
         self._repetition: Repetition | None = None
         tell_origin(self.graph, scenario)
         self.grid_world = GridWorld(scenario, self._engine)
-        """The grid map whose blocks stand in the world, and how it is changed."""
         self._world_topic = WorldTopic(self.graph, lambda: self.geometry)
         self.grid_world.on_blocks = lambda: self.post(self._world_topic.tell)
         self.radio = build_radio(scenario, self.graph, self._engine, self.forest)
@@ -149,10 +157,8 @@ class Simulation:
             starts,
             self.radio,
         )
-        self.uavs: Mapping[str, Uav] = MappingProxyType(self._crew.uavs)
-        """In fleet order."""
+        self.uavs = MappingProxyType(self._crew.uavs)
         self.pilots = Pilots(lambda: self.uav_names)
-        """Who steers which UAV."""
         self._partners: list[Partner] = []
         self._replays: list[Replay] = []
         self._keep_time(publisher)
