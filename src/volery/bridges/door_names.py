@@ -31,6 +31,8 @@ class Terms(NamedTuple):
     """ROS 2 domain; None: that of ROS_DOMAIN_ID."""
     interfaces: tuple[str, ...] = ()
     """Of the network, for ROS 2 over DDS; none: this machine alone."""
+    report: Callable[[str], None] | None = None
+    """Called by any thread with lines for people: connections begin or end. None: logged."""
 
 
 class DoorKind(NamedTuple):
@@ -104,10 +106,10 @@ def _ros_tcp_endpoint(address: Address, terms: Terms, generation: Literal["ros1"
     return WithRosApi(RosTcpEndpoint(*address, generation=generation, anywhere=terms.anywhere))
 
 
-def _ros_tcp_connector(address: Address, _terms: Terms) -> Door:
+def _ros_tcp_connector(address: Address, terms: Terms) -> Door:
     from volery.bridges.ros_tcp.connector import RosTcpConnector
 
-    return RosTcpConnector(*address)
+    return RosTcpConnector(*address, report=terms.report)
 
 
 def _ros1(address: Address, terms: Terms) -> Door:

@@ -59,7 +59,13 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
     from volery.bridges.doors import Doors
 
     patience, key = _patience_of(options), _key_of(options)
-    terms = Terms(options.allow_remote, options.token, options.domain_id, options.interfaces)
+    terms = Terms(
+        options.allow_remote,
+        options.token,
+        options.domain_id,
+        options.interfaces,
+        report=lambda text: typer.echo(text, err=True),
+    )
     more = {
         "comms": DoorKind(10200, _comms),
         "mavlink": DoorKind(14540, lambda address, terms: _mavlink(address, terms, key)),

@@ -184,6 +184,35 @@ def test_it_may_start_before_the_endpoint(here, there):
     until(lambda: connector.state == "ros1")
 
 
+def test_connections_are_reported(here, there):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    reports = []
+    connector = RosTcpConnector(port=port, report=reports.append)
+    here.doors.open(connector)
+    target = f"ROS-TCP to 127.0.0.1:{port}"
+    assert len(reports) == 1
+    assert reports[0].startswith(f"{target}: cannot connect: ")
+    assert reports[0].endswith("; it connects when an endpoint is there")
+    endpoint = RosTcpEndpoint(port=port, generation="ros2")
+    there.doors.open(endpoint)
+    until(lambda: len(reports) == 2)
+    assert reports[1] == f"{target}: connected, messages of ROS 2"
+    there.doors.call(endpoint.stop())
+    until(lambda: len(reports) >= 3)
+    assert "the connection has ended" in reports[2]
+    there.doors.open(RosTcpEndpoint(port=port))
+    until(lambda: reports[-1] == f"{target}: connected again, messages of ROS 1")
+
+
+def test_opening_waits_for_an_endpoint_that_is_there(here, there):
+    endpoint = RosTcpEndpoint(port=0)
+    there.doors.open(endpoint)
+    connector = RosTcpConnector(port=endpoint.port)
+    here.doors.open(connector)
+    assert connector.name == f"ROS-TCP to 127.0.0.1:{endpoint.port} (ros1)"
+
+
 def test_large_messages_cross(here, there):
     from volery.graph.messages import header
 
@@ -294,6 +323,28 @@ def test_what_the_endpoint_cannot_take_is_sent_once(here, meet):
     text = "Not registered to publish topic '/out'! Valid publish topics are: dict_keys([]) "
     endpoint.sock.sendall(frame("__error", json.dumps({"text": text}).encode()))
     until(lambda: not here.gateway.sessions()[0].mailboxes)
+
+
+def test_types_that_the_endpoint_does_not_know_are_named_once(here, meet):
+    for name in ("/maps/one", "/maps/two"):
+        here.graph.advertise(name, "octomap_msgs/msg/Octomap")
+    here.graph.advertise("/out", STRING)
+    reports = []
+    endpoint, _ = meet(handshake('{"protocol": "ROS1"}'), report=reports.append)
+    until(lambda: len(endpoint.commands("publish")) == 3)
+    text = "SysCommand.publish - Unknown message class 'octomap_msgs/Octomap'"
+    for _ in range(2):
+        endpoint.sock.sendall(frame("__error", json.dumps({"text": text}).encode()))
+    until(lambda: len(reports) == 2)
+    assert reports[1].endswith(
+        ": the endpoint does not know octomap_msgs/Octomap, which /maps/one, /maps/two need: not "
+        "shared; install the package octomap_msgs where the endpoint runs"
+    )
+    assert {m.topic for m in here.gateway.sessions()[0].mailboxes} == {"/out"}
+    here.graph.advertise("/maps/three", "octomap_msgs/msg/Octomap")
+    until(lambda: len(reports) == 3)
+    assert "'/maps/three' is not shared" in reports[2]
+    assert len(endpoint.commands("publish")) == 3
 
 
 def test_keepalives_each_idle_second(here, meet):

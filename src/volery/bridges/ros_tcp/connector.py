@@ -2,12 +2,14 @@
 
     doors.open(RosTcpConnector("127.0.0.1", 10000))
 
-It need not be there yet: the door connects when it can, and again when the connection is lost.
+It need not be there yet: the bridge connects when it can, and again when the connection is lost. It
+reports both, and what the endpoint complains of.
 """
 
 from __future__ import annotations
 
 import asyncio
+import logging
 import socket
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -18,7 +20,7 @@ from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.dial import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUSE_S, dial
 from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.unity import Selection, UnitySession
-from volery.bridges.ros_tcp.wire import FrameParser
+from volery.bridges.ros_tcp.wire import FrameParser, Generation
 from volery.core.errors import BridgeError
 from volery.graph.mailbox import Wake
 from volery.graph.qos import DEFAULT_DEPTH
@@ -26,6 +28,13 @@ from volery.graph.session import Gateway
 
 _REFRESH_S = 0.5
 _NOTES = 100
+_MOST_REPORTS = 100
+"""Different notes that are reported; an endpoint that complains without end fills no terminal."""
+_FIRST_ATTEMPT_S = 1.0
+"""So long does `start` wait for the outcome of the first attempt."""
+_SPOKEN = {"ros1": "ROS 1", "ros2": "ROS 2"}
+
+_log = logging.getLogger(__name__)
 
 
 class RosTcpConnector:
@@ -41,6 +50,9 @@ class RosTcpConnector:
         Messages of one topic that wait while the endpoint does not keep up; the newest are kept.
     handshake_s
         Endpoints before 0.7 send no handshake: after so long this one counts as one of ROS 1.
+    report
+        Called in the bridges' thread with a line for people, whenever a connection begins or ends
+        and for each new complaint; without it they are logged.
 
     """
 
@@ -54,6 +66,7 @@ class RosTcpConnector:
         services: Sequence[str] = Selection.services,
         depth: int = DEFAULT_DEPTH,
         handshake_s: float = 2.0,
+        report: Callable[[str], None] | None = None,
     ) -> None:
         if not 1 <= port <= 65535:
             raise BridgeError(f"ROS-TCP: port must be 1 to 65535, not {port}")
@@ -64,12 +77,21 @@ class RosTcpConnector:
         self._task: asyncio.Task[None] | None = None
         self._session: UnitySession | None = None
         self._notes: deque[str] = deque(maxlen=_NOTES)
+        self._report = report or _log.warning
+        self._reported: set[str] = set()
+        self._is_known = asyncio.Event()
+        """Whether the outcome of the first attempt is known."""
+        self._was_lost = False
 
     @property
     def name(self) -> str:
         """What it is, where to, and how that goes."""
+        return f"{self._target} ({self.state})"
+
+    @property
+    def _target(self) -> str:
         host, port = self._address
-        return f"ROS-TCP to {host}:{port} ({self.state})"
+        return f"ROS-TCP to {host}:{port}"
 
     @property
     def state(self) -> str:
@@ -85,8 +107,13 @@ class RosTcpConnector:
         return tuple(self._notes)
 
     async def start(self, gateway: Gateway) -> None:
-        """Begin to connect; returns at once."""
+        """Begin to connect; returns when the outcome is known, after a second at the latest."""
         self._task = asyncio.get_running_loop().create_task(self._stay_connected(gateway))
+        try:
+            async with asyncio.timeout(_FIRST_ATTEMPT_S):
+                await self._is_known.wait()
+        except TimeoutError:
+            return
 
     async def stop(self) -> None:
         """Disconnect."""
@@ -101,10 +128,15 @@ class RosTcpConnector:
             try:
                 sock = await dial(*self._address)
             except (OSError, TimeoutError) as error:
-                self._note(f"cannot connect: {error or 'no answer'}")
+                self._note(
+                    f"cannot connect: {error or 'no answer'}; it connects when an endpoint is there"
+                )
+                self._is_known.set()
             else:
+                began_s = asyncio.get_running_loop().time()
                 if await self._serve(gateway, sock):
-                    pause_s = FIRST_PAUSE_S
+                    lasted_s = asyncio.get_running_loop().time() - began_s
+                    pause_s = FIRST_PAUSE_S if lasted_s > LONGEST_PAUSE_S else pause_s
             await asyncio.sleep(pause_s)
             pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
 
@@ -113,7 +145,13 @@ class RosTcpConnector:
         host, port = self._address
         note = self._note
         open_session = partial(
-            UnitySession, gateway, f"ros-tcp to {host}:{port}", self._selection, self._depth, note
+            UnitySession,
+            gateway,
+            f"ros-tcp to {host}:{port}",
+            self._selection,
+            self._depth,
+            note,
+            begun=self._begun,
         )
         try:
             connection = _Connection(sock, open_session, note)
@@ -127,11 +165,23 @@ class RosTcpConnector:
             self._session = None
             connection.pipe.close("the door was closed")
         note(f"the connection has ended: {connection.ended.result()}")
+        self._was_lost = True
         return connection.session.generation is not None
 
+    def _begun(self, generation: Generation) -> None:
+        """The endpoint has said what it speaks, or is taken for one that does not say it."""
+        again = " again" if self._was_lost else ""
+        self._report(f"{self._target}: connected{again}, messages of {_SPOKEN[generation]}")
+        self._reported.clear()
+        self._is_known.set()
+
     def _note(self, text: str) -> None:
+        """Keep a line, and report it the first time in a connection or between two."""
         if not self._notes or self._notes[-1] != text:
             self._notes.append(text)
+        if text not in self._reported and len(self._reported) < _MOST_REPORTS:
+            self._reported.add(text)
+            self._report(f"{self._target}: {text}")
 
 
 class _Connection:

@@ -25,6 +25,9 @@ from volery.graph.session import Gateway
 
 _REFUSED = re.compile(r"Not registered to publish topic '([^']+)'")
 """What endpoints say to each message whose type they do not know."""
+_UNKNOWN = re.compile(r"Unknown (?:message|service) class '([^']+)'")
+"""What they say to the registration of a type of which they have no package."""
+_MOST_NAMED = 5
 _NOTES = ("__error", "__warn", "__log")
 
 
@@ -55,7 +58,8 @@ class Selection:
 class UnitySession:
     """One connection to an endpoint. All but the wake belongs to the door's thread.
 
-    note: told, by any thread, what the other side complains of.
+    note: called, by any thread, with what the other side complains of and with what is not sent.
+    begun: called once it is known which messages the endpoint speaks.
     """
 
     def __init__(
@@ -66,16 +70,22 @@ class UnitySession:
         depth: int,
         note: Callable[[str], None],
         wake: Wake,
+        begun: Callable[[Generation], None] | None = None,
     ) -> None:
         self._selection = selection
         self._depth = depth
         self._note = note
+        self._begun = begun
         self._session = gateway.open(name)
         self.outbox = Outbox(self._session, payloads_of("ros1"), wake, note)
         self._calls = Calls(self._session, self.outbox, note)
         self._inlets: dict[str, Inlet] = {}
         self._sent: set[str] = set()
         self._served: dict[str, str] = {}
+        self._registered: dict[str, list[str]] = {}
+        """Topics and services by their types, as the endpoint spells those."""
+        self._unknown: set[str] = set()
+        """Types that the endpoint does not know."""
         self._request: int | None = None
         self.generation: Generation | None = None
         """What the endpoint speaks; None before its handshake."""
@@ -86,6 +96,8 @@ class UnitySession:
         self.generation = generation
         self.outbox.payloads = payloads_of(generation)
         self.outbox.ends_in_nul = generation == "ros2"  # that endpoint cuts off the last byte
+        if self._begun is not None:
+            self._begun(generation)
         self.refresh()
 
     def refresh(self) -> None:
@@ -100,7 +112,7 @@ class UnitySession:
         for name, srvtype in self._session.graph.services().items():
             if self._served.get(name) != srvtype and _matches(name, self._selection.services):
                 self._served[name] = srvtype
-                self._command("unity_service", topic=name, message_name=self._short(srvtype))
+                self._register("unity_service", name, srvtype)
 
     def _new_topics(self) -> list[tuple[TopicInfo, Callable[[TopicInfo], None]]]:
         """Topics not registered yet, and what does that.
@@ -150,10 +162,29 @@ class UnitySession:
 
     def _hear(self, text: str) -> None:
         """Keep what the endpoint says, and send no more of what it cannot take."""
-        refused = _REFUSED.search(text)
-        if refused:
-            self.outbox.end_stream(refused[1])
-        self._note(text[:1000])
+        unknown, refused = _UNKNOWN.search(text), _REFUSED.search(text)
+        if unknown is not None and unknown[1] in self._registered:
+            self._leave_out(unknown[1])
+        elif refused is not None and refused[1] in self._sent:
+            if self.outbox.end_stream(refused[1]):
+                self._note(f"'{refused[1]}' is not sent any more: {text[:200]}")
+        else:
+            self._note(text[:1000])
+
+    def _leave_out(self, msgtype: str) -> None:
+        """Send nothing of a type that the endpoint does not know, and say what that concerns."""
+        if msgtype in self._unknown:
+            return
+        self._unknown.add(msgtype)
+        names = self._registered[msgtype]
+        for name in names:
+            self.outbox.end_stream(name)
+        more = len(names) - _MOST_NAMED
+        listed = ", ".join(names[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+        self._note(
+            f"the endpoint does not know {msgtype}, which {listed} need: not shared; install "
+            f"the package {msgtype.partition('/')[0]} where the endpoint runs"
+        )
 
     def _message(self, frame: Frame) -> None:
         inlet = self._inlets.get(frame.destination)
@@ -164,18 +195,24 @@ class UnitySession:
     def _receive(self, topic: TopicInfo) -> None:
         self._session.advertise(topic.name, topic.msgtype)
         self._inlets[topic.name] = Inlet(self._session, topic.name, topic.msgtype, self._depth)
-        self._command("subscribe", topic=topic.name, message_name=self._short(topic.msgtype))
+        self._register("subscribe", topic.name, topic.msgtype)
 
     def _send(self, topic: TopicInfo) -> None:
         self._sent.add(topic.name)
-        self._command(
-            "publish",
-            topic=topic.name,
-            message_name=self._short(topic.msgtype),
-            queue_size=self._depth,
-            latch=topic.latched,
-        )
-        self.outbox.stream(topic.name, topic.name, topic.msgtype, self._depth)
+        if self._register(
+            "publish", topic.name, topic.msgtype, queue_size=self._depth, latch=topic.latched
+        ):
+            self.outbox.stream(topic.name, topic.name, topic.msgtype, self._depth)
+
+    def _register(self, command: str, name: str, msgtype: str, **fields: str | int) -> bool:
+        """Tell the endpoint of a topic or service; false where it is known not to have the type."""
+        short = self._short(msgtype)
+        if short in self._unknown:
+            self._note(f"'{name}' is not shared: the endpoint does not know {short}")
+            return False
+        self._registered.setdefault(short, []).append(name)
+        self._command(command, topic=name, message_name=short, **fields)
+        return True
 
     def _command(self, name: str, **fields: str | int) -> None:
         self.outbox.put(ros_tcp.command(name, nul=self.outbox.ends_in_nul, **fields))
