@@ -20,7 +20,7 @@ from volery.comms.router import Router
 from volery.comms.settings import RouterSettings
 from volery.comms.statistics import Statistics
 from volery.core.errors import CommsError
-from volery.core.listening import check_address, check_token, tend
+from volery.core.listening import check_address, check_token, tend, write_while_open
 
 PORT = 10200
 _TICK_S = 0.05
@@ -142,7 +142,7 @@ class CommsServer:
     def _send(self, link: _StationLink) -> None:
         now_ns = time.monotonic_ns()
         while not link.paused and (data := self.router.take(link.number, now_ns)):
-            link.transport.write(data)
+            write_while_open(link.transport, data)
         if self.router.closing(link.number):
             self._closed(link)
             link.transport.close()

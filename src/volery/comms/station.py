@@ -21,7 +21,7 @@ from volery.comms.protocol import Frame, Kind
 from volery.comms.server import PORT
 from volery.comms.station_core import StationCore
 from volery.core.errors import CommsError
-from volery.core.listening import tend
+from volery.core.listening import tend, write_while_open
 
 _AGAIN_S = 0.2
 _CONNECT_S = 1.0
@@ -213,7 +213,7 @@ class Station:
         self._sends = False
         pipe = self._pipe
         if pipe is not None and not pipe.paused and (data := self.core.take()):
-            pipe.transport.write(data)
+            write_while_open(pipe.transport, data)
 
 
 class _Pipe(asyncio.Protocol):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import socket
 from typing import Any
@@ -39,6 +40,16 @@ def shows_token(given: Any, token: str | None) -> bool:
     return isinstance(given, str) and hmac.compare_digest(
         given.encode(errors="replace"), token.encode(errors="replace")
     )
+
+
+def write_while_open(transport: asyncio.WriteTransport, data: bytes) -> None:
+    """Write to a connection that has not ended.
+
+    After a failed write asyncio tells its protocol only in the loop's next turn, and meanwhile
+    prints a warning of each further write.
+    """
+    if not transport.is_closing():
+        transport.write(data)
 
 
 def tend(sock: socket.socket) -> None:

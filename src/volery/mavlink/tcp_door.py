@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 from volery.core.errors import BridgeError
-from volery.core.listening import check_address, tend
+from volery.core.listening import check_address, tend, write_while_open
 from volery.graph.session import Gateway
 from volery.mavlink import ports
 from volery.mavlink.codec import dialect
@@ -120,7 +120,7 @@ class _TcpClient(asyncio.Protocol):
     def send(self, data: bytes) -> None:
         """Send frames, whole or not at all."""
         if not self._full:
-            self.transport.write(self.party.sign(data))
+            write_while_open(self.transport, self.party.sign(data))
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """As of asyncio."""

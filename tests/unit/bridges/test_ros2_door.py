@@ -19,6 +19,7 @@ from ros_tcp_client import until
 from volery.bridges.doors import Doors
 from volery.bridges.ros2.client import Ros2Client
 from volery.bridges.ros2.dds import library
+from volery.bridges.ros2.dds.counterparts import why_foreign
 from volery.bridges.ros2.dds.idl_types import message_struct, request_struct
 from volery.bridges.ros2.dds.qos import qos_of
 from volery.bridges.ros2.dds.records import TYPE as RECORD
@@ -457,8 +458,16 @@ def test_everything_is_given_back():
     made.close()
 
 
+def test_what_is_not_understood_is_named_by_the_vendor_of_its_dds():
+    rest = bytes(14)
+    assert "as rmw_fastrtps does" in why_foreign("clientid", b"\x01\x0f" + rest)
+    assert "fastrtps" not in why_foreign("clientid", b"\x01\x10" + rest)
+    assert "RTI Connext DDS and lacks 'serviceid=" in why_foreign("serviceid", b"\x01\x01" + rest)
+    assert "a DDS of vendor 01.77" in why_foreign("clientid", b"\x01\x77" + rest)
+
+
 def test_clients_and_servers_of_another_kind_are_told_and_not_misread(world, other, caplog):
-    """rmw_fastrtps calls the topics the same, but begins neither requests nor responses alike."""
+    """Those without the user data of rmw_cyclonedds, whatever DDS they are of."""
     inner = other.participant._participant
     asked = []
     world.graph.offer("/strange", TRIGGER, asked.append)
@@ -466,7 +475,12 @@ def test_clients_and_servers_of_another_kind_are_told_and_not_misread(world, oth
     quality = qos_of(Profile())  # without the user data of rmw_cyclonedds
     writer = DataWriter(inner, Topic(inner, "rq/strangeRequest", request), qos=quality)
     until(lambda: library.subscriptions(writer))
-    until(lambda: "/strange: a client is not answered: it speaks as rmw_fast" in caplog.text)
+    until(
+        lambda: (
+            "/strange: a client is not answered: it is of Cyclone DDS and lacks 'clie"
+            in caplog.text
+        )
+    )
     for _ in range(20):
         library.write(writer, b"\0\1\0\0" + bytes(20))
         time.sleep(0.01)
@@ -477,7 +491,7 @@ def test_clients_and_servers_of_another_kind_are_told_and_not_misread(world, oth
     server = DataReader(inner, Topic(inner, "rq/foreignRequest", request), qos=quality)
     answers = DataWriter(inner, Topic(inner, "rr/foreignReply", response), qos=quality)
     link = Ros2Client(Ros2Terms(domain_id=DOMAIN), "/asker")
-    with pytest.raises(GraphError, match="its server speaks as rmw_fastrtps"):
+    with pytest.raises(GraphError, match="its server is of Cyclone DDS and lacks 'serviceid="):
         call_and_wait(link, "/foreign", None, 15.0)
     link.close()
     library.delete(server)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 import socket
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -128,9 +129,8 @@ class RosTcpConnector:
             try:
                 sock = await dial(*self._address)
             except (OSError, TimeoutError) as error:
-                self._note(
-                    f"cannot connect: {error or 'no answer'}; it connects when an endpoint is there"
-                )
+                why = os.strerror(error.errno) if error.errno else str(error) or "no answer"
+                self._note(f"cannot connect: {why}; it connects when an endpoint is there")
                 self._is_known.set()
             else:
                 began_s = asyncio.get_running_loop().time()

@@ -27,6 +27,7 @@ from volery.bridges.sensor_link.payloads import (
 from volery.bridges.sensor_link.server import IMAGE_PORT, PORT
 from volery.bridges.sensor_link.wire import Frame, FrameParser, Kind, encode_frame
 from volery.core.errors import BridgeError, GraphError
+from volery.core.listening import write_while_open
 from volery.graph.mailbox import Mailbox
 from volery.graph.session import Gateway, Session
 
@@ -189,4 +190,4 @@ class SensorLinkClient:
             self.unsent += 1
             return
         self._sent += 1
-        writer.write(frame)
+        write_while_open(writer.transport, frame)

@@ -1,10 +1,10 @@
-"""Who at the other end of a service speaks as rmw_cyclonedds does.
+"""Which endpoints of others speak of services as rmw_cyclonedds does, and why the rest does not.
 
 Both that and rmw_fastrtps call a service's topics the same, but rmw_cyclonedds begins each request
 and response with who asked and a number. rmw_fastrtps tells both in the parameters of RTPS samples
 (PID_RELATED_SAMPLE_IDENTITY), which Cyclone DDS neither hands over nor lets set, so that a
 stranger's bytes would be misread. Endpoints of rmw_cyclonedds have `clientid=` or `serviceid=` in
-their user data.
+their user data. The first two bytes of a GUID name the vendor of the DDS (RTPS 2.5, 9.3.1.5).
 """
 
 from __future__ import annotations
@@ -14,10 +14,28 @@ from collections.abc import Callable
 from volery.bridges.ros2.dds.announced import Announced
 
 CLIENT, SERVER = "clientid", "serviceid"
-FOREIGN = (
-    "speaks as rmw_fastrtps does, not as rmw_cyclonedds; start it with "
-    "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp"
-)
+_FAST_DDS = b"\x01\x0f"
+_VENDORS = {b"\x01\x10": "Cyclone DDS", b"\x01\x01": "RTI Connext DDS", b"\x01\x03": "OpenDDS"}
+
+
+def why_foreign(word: str, key: bytes) -> str:
+    """Returns why an endpoint without `word` in its user data is not understood.
+
+    key: its GUID.
+    """
+    if key.startswith(_FAST_DDS):
+        return (
+            "speaks as rmw_fastrtps does, not as rmw_cyclonedds; start it with "
+            "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp"
+        )
+    vendor = _VENDORS.get(key[:2], f"a DDS of vendor {key[:2].hex('.')}")
+    return (
+        f"is of {vendor} and lacks '{word}=...;' in its user data, by which endpoints of "
+        "rmw_cyclonedds are known: add it to a plain DDS program whose requests and responses "
+        "begin as those of rmw_cyclonedds do"
+    )
+
+
 _MOST_KNOWN = 10_000
 
 
@@ -28,18 +46,21 @@ class Counterparts:
     """
 
     def __init__(self, word: str, look_up: Callable[[int], Announced | None]) -> None:
+        self._word = word
         self._mark = f"{word}=".encode()
         self._look_up = look_up
-        self._known: dict[int, bool] = {}
+        self._known: dict[int, str] = {}
 
-    def understands(self, handle: int) -> bool:
-        """Whether it speaks as we do; who has left already gets the benefit of the doubt."""
+    def trouble(self, handle: int) -> str:
+        """Why an endpoint is not understood; empty if it is, and for one that has left already."""
         known = self._known.get(handle)
         if known is None:
             found = self._look_up(handle)
             if found is None or found.terms is None:
-                return True
+                return ""
             if len(self._known) >= _MOST_KNOWN:
                 self._known.clear()
-            known = self._known[handle] = self._mark in found.terms.user_data
+            is_marked = self._mark in found.terms.user_data
+            known = "" if is_marked else why_foreign(self._word, found.key)
+            self._known[handle] = known
         return known

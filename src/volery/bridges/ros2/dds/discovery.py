@@ -11,7 +11,7 @@ from cyclonedds.builtin import BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubs
 from cyclonedds.domain import DomainParticipant
 
 from volery.bridges.ros2.dds.announced import Announced, announcements
-from volery.bridges.ros2.dds.counterparts import CLIENT
+from volery.bridges.ros2.dds.counterparts import CLIENT, why_foreign
 from volery.bridges.ros2.dds.listening import Ear
 from volery.bridges.ros2.middleware import Profile, RemotePublisher
 from volery.bridges.ros2.names import ros_type, service_of, topic_of
@@ -95,13 +95,13 @@ class Discovery:
                 found[service] = reader.msgtype[: -len(_REQUEST)]
         return found
 
-    def foreign_clients(self) -> set[str]:
-        """Services with clients that do not speak as rmw_cyclonedds does."""
+    def foreign_clients(self) -> dict[str, str]:
+        """Services with clients that do not speak as rmw_cyclonedds does, and what they are."""
         with self._lock:
-            writers = tuple(self._writers.values())
+            writers = tuple(self._writers.items())
         mark = f"{CLIENT}=".encode()
-        named = (service_of(w.dds_topic) for w in writers if mark not in w.user_data)
-        return {service for service in named if service}
+        named = ((service_of(w.dds_topic), k) for k, w in writers if mark not in w.user_data)
+        return {service: why_foreign(CLIENT, key) for service, key in named if service}
 
     def _taker(self, known: dict[bytes, Endpoint]) -> Callable[[list[Announced]], None]:
         def take(samples: list[Announced]) -> None:

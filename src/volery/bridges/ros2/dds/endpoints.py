@@ -8,7 +8,7 @@ import random
 import struct
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -20,7 +20,7 @@ from cyclonedds.topic import Topic
 from volery.bridges.ros2.complaints import Complaints
 from volery.bridges.ros2.dds import library
 from volery.bridges.ros2.dds.announced import matched_reader, matched_writer
-from volery.bridges.ros2.dds.counterparts import CLIENT, FOREIGN, SERVER, Counterparts
+from volery.bridges.ros2.dds.counterparts import CLIENT, SERVER, Counterparts
 from volery.bridges.ros2.dds.idl_types import message_struct, request_struct
 from volery.bridges.ros2.dds.listening import Ear
 from volery.bridges.ros2.dds.qos import qos_of
@@ -109,13 +109,14 @@ class DdsServer:
         """Offer it no more."""
         self._half.close()
 
-    def look_at(self, foreign: set[str]) -> None:
-        """Warn if it is among the services that others ask in vain.
+    def look_at(self, foreign: Mapping[str, str]) -> None:
+        """Warn if it is among the services that others ask in vain; foreign: why, by service.
 
         Their requests may be too short for Cyclone DDS to hand them over.
         """
-        if self._name in foreign:
-            self._complaints.tell(self._name, f"a client is not answered: it {FOREIGN}")
+        why = foreign.get(self._name)
+        if why:
+            self._complaints.tell(self._name, f"a client is not answered: it {why}")
 
     def look_at_types(self, asked: set[tuple[str, str]]) -> None:
         """Warn of those who take it for a service of another type, and wait in vain."""
@@ -125,8 +126,9 @@ class DdsServer:
                 self._complaints.tell(name, text)
 
     def _on_request(self, data: bytes, client: int) -> None:
-        if not self._clients.understands(client):
-            self.look_at({self._name})
+        trouble = self._clients.trouble(client)
+        if trouble:
+            self.look_at({self._name: trouble})
             return
         header = data[_CDR_HEADER : _CDR_HEADER + _HEADER.size]
 
@@ -170,16 +172,16 @@ class DdsCaller:
     @property
     def ready(self) -> bool:
         """Whether a server is there, both halves of it."""
-        return library.publications(self._reader) > 0 and any(self._understood())
+        return library.publications(self._reader) > 0 and "" in self._troubles()
 
     @property
     def trouble(self) -> str:
         """Why nobody answers though a server is there."""
-        found = self._understood()
-        return f"its server {FOREIGN}" if found and not any(found) else ""
+        found = self._troubles()
+        return f"its server {found[0]}" if found and all(found) else ""
 
-    def _understood(self) -> list[bool]:
-        return [self._servers.understands(h) for h in library.readers_of(self._writer)]
+    def _troubles(self) -> list[str]:
+        return [self._servers.trouble(h) for h in library.readers_of(self._writer)]
 
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
         """Send a request."""
