@@ -4,6 +4,7 @@ volery run plug_in --uavs 1 --door mavlink --door rosbridge
 python examples/13_mavros_offboard.py            # pip install roslibpy
 """
 
+import math
 import sys
 import time
 
@@ -25,28 +26,30 @@ def call(name, kind, **fields):
     return roslibpy.Service(ros, f"/mavros/{name}", kind).call(roslibpy.ServiceRequest(fields))
 
 
-def place():
+def position():
     return [heard["local_position/pose"]["pose"]["position"][axis] for axis in "xyz"]
 
 
-def stream(goal, seconds):
-    """Tell the setpoint 20 times a second, as offboard flight needs it."""
-    x, y, z = goal
+def stream(goal, seconds, near_m=0.0):
+    """Publish a setpoint at 20 Hz for so long, or until the UAV is within `near_m` of it."""
+    setpoint = roslibpy.Message({"pose": {"position": dict(zip("xyz", goal, strict=True))}})
     for _ in range(round(20 * seconds)):
-        setpoints.publish(roslibpy.Message({"pose": {"position": {"x": x, "y": y, "z": z}}}))
+        if math.dist(position(), goal) < near_m:
+            return
+        setpoints.publish(setpoint)
         time.sleep(0.05)
 
 
 while not heard.get("state", {}).get("connected") or "local_position/pose" not in heard:
     time.sleep(0.1)
-x, y, z = place()
-stream((x, y, z + 2.0), 1.0)
+x, y, z = position()
+stream((x, y, z + 2.0), 1.0)  # offboard mode needs a stream of setpoints before it begins
 call("set_mode", "mavros_msgs/SetMode", base_mode=0, custom_mode="OFFBOARD")
 call("cmd/arming", "mavros_msgs/CommandBool", value=True)
-stream((x, y, z + 2.0), 6.0)
-print(f"{heard['state']['mode']}, {place()[2] - z:.1f} m up")
-stream((x + 3.0, y, z + 2.0), 5.0)
-print(f"{place()[0] - x:.1f} m ahead")
+stream((x, y, z + 2.0), 60.0, near_m=0.04)
+print(f"{heard['state']['mode']}, {position()[2] - z:.1f} m up")
+stream((x + 3.0, y, z + 2.0), 60.0, near_m=0.04)
+print(f"{position()[0] - x:.1f} m ahead")
 call("set_mode", "mavros_msgs/SetMode", base_mode=0, custom_mode="AUTO.LAND")
 while heard["state"]["armed"]:
     time.sleep(0.1)

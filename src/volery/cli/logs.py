@@ -10,20 +10,18 @@ from volery.cli.guard import complain, warn
 from volery.cli.tables import print_table
 from volery.core.clock import NS_PER_S
 from volery.core.counting import counted
-from volery.core.errors import RecordingError
 
 _FORMATS = {"mcap": "MCAP", "bag": "ROS 1 bag"}
 
 
 def show_log(path: Path) -> bool:
-    """Print what is in a log; False, after one line on stderr, where it is broken or no log."""
+    """Print what is in a log; False, after one line on stderr, where it is damaged.
+
+    Raises `RecordingError` where it is no log.
+    """
     from volery.bridges.logs.reader import summarize
 
-    try:
-        summary = summarize(path)
-    except RecordingError as error:
-        complain(str(error))
-        return False
+    summary = summarize(path)
     start, end = summary.start_ns / NS_PER_S, summary.end_ns / NS_PER_S
     typer.echo(f"file      {path}")
     typer.echo(f"format    {_FORMATS[summary.format]}, {summary.size_bytes / 1e6:.2f} MB")

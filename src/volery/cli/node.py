@@ -8,13 +8,18 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from volery.cli.asking import topic_types
+from volery.cli.guard import warn
 from volery.cli.links import DEFAULT_VIA, ROS2_WAYS, LinkTold, await_link, join_late
 from volery.cli.yaml_form import from_yaml
 from volery.core.errors import BridgeError
+
+if TYPE_CHECKING:
+    from volery.graph.link import Link
 
 
 @dataclass(frozen=True)
@@ -71,9 +76,20 @@ def run_node(options: NodeOptions) -> None:
             if options.lock_step_s is not None:
                 host.join_lock_step(node.get_name(), options.lock_step_s)
             typer.echo(f"{node.get_name()} runs on {via}; Ctrl-C ends it", err=True)
+            _check_namespace(link, namespace)
             host.spin(LinkTold(link, via))
         finally:
             node.destroy_node()
+
+
+def _check_namespace(link: Link, namespace: str) -> None:
+    """Warn where the graph has no topic of the node's UAV."""
+    uav = namespace.strip("/")
+    topics = topic_types(link)
+    names = sorted({topic.split("/")[1] for topic in topics if topic.count("/") > 1})
+    if uav and uav not in names and topics:
+        uavs = [name for name in names if f"/{name}/odom" in topics]
+        warn(f"the graph has no topic below /{uav}; its UAVs: {', '.join(uavs) or 'none'}")
 
 
 def _folder_of(name: str, profile: Path | None) -> Path:

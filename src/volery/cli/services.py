@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from contextlib import closing
+from typing import Any
 
 import typer
 
 from volery.cli.asking import service_names, type_of_service
 from volery.cli.links import open_link
 from volery.cli.yaml_form import read_message, to_yaml
+from volery.core.errors import BridgeError
 from volery.graph.link import call_and_wait
+
+_RESULT = "simulation_interfaces/msg/Result"
 
 
 def list_services(via: str, *, types: bool) -> None:
@@ -26,9 +30,29 @@ def show_type(via: str, service: str) -> None:
 
 
 def call(via: str, service: str, values: str | None, *, timeout_s: float) -> None:
-    """Call a service with a request typed as YAML and print the response as YAML."""
+    """Call a service with a request typed as YAML and print the response as YAML.
+
+    Raises `BridgeError` where the response says that the request is refused.
+    """
     with closing(open_link(via, "volery_service_call")) as link:
         srvtype = type_of_service(link, service)
         request = read_message(values or "{}", f"{srvtype}_Request")
         response = call_and_wait(link, service, request, timeout_s)
-        typer.echo(to_yaml(response, whole=True) or "(an empty response)")
+    typer.echo(to_yaml(response, whole=True) or "(an empty response)")
+    reason = refusal_of(response)
+    if reason is not None:
+        raise BridgeError(f"{service} refuses: {reason or 'no reason is given'}")
+
+
+def refusal_of(response: Any) -> str | None:
+    """Return why a response refuses its request; None: it does not.
+
+    Known are `success` with `message` (std_srvs and Volery's services) and the `Result` of
+    simulation_interfaces.
+    """
+    if getattr(response, "success", True) is False:
+        return str(getattr(response, "message", ""))
+    result = getattr(response, "result", None)
+    if getattr(result, "__msgtype__", "") == _RESULT and result is not None:
+        return None if result.result == result.RESULT_OK else str(result.error_message)
+    return None

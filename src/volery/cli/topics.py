@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import typer
 
 from volery.cli.asking import topic_types, type_of_topic
-from volery.cli.links import open_link
+from volery.cli.links import LinkTold, open_link
 from volery.cli.yaml_form import read_message, to_yaml
 from volery.core.errors import BridgeError
 from volery.graph.link import Link
@@ -59,12 +59,20 @@ class Window:
     most: int
     times: list[float] = field(default_factory=list)
     sizes: list[int] = field(default_factory=list)
+    is_fresh: bool = False
+    """Whether a message has arrived since `take_line`."""
 
     def add(self, time_s: float, size: int) -> None:
         """Note a message; the oldest is forgotten where there are too many."""
         self.times.append(time_s)
         self.sizes.append(size)
         del self.times[: -self.most], self.sizes[: -self.most]
+        self.is_fresh = True
+
+    def take_line(self, line: Callable[[Window], str]) -> str:
+        """Return `line(self)`; where nothing has arrived since the last time, say that instead."""
+        fresh, self.is_fresh = self.is_fresh, False
+        return line(self) if fresh else "no new messages"
 
     def rate_line(self) -> str:
         """Rate and periods, as `rostopic hz` has them."""
@@ -102,7 +110,7 @@ def measure(via: str, topic: str, *, window: int, line: Callable[[Window], str])
             seen.add(now, len(published.cdr) if sizes else 0)
         if now - told >= 1.0:
             told = now
-            typer.echo(line(seen))
+            typer.echo(seen.take_line(line))
 
 
 def publish(
@@ -131,11 +139,12 @@ def _repeat(link: Link, topic: str, message: object, period_s: float, times: int
 def _messages(via: str, topic: str, name: str) -> Iterator[Published | None]:
     """Messages of a topic without an end, and None at least five times a second."""
     with closing(open_link(via, name)) as link:
-        come = threading.Event()
+        come, told = threading.Event(), LinkTold(link, via)
         mailbox = link.subscribe(topic, type_of_topic(link, topic), depth=_DEPTH, wake=come.set)
         while True:
             come.wait(0.2)
             come.clear()
+            told()
             yield from mailbox.take()
             yield None
 

@@ -8,9 +8,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from volery.comms.radio.net import RadioNet
-from volery.core.errors import CommandError
+from volery.core.errors import CommandError, PlacementError
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
 from volery.graph.graph import Graph
@@ -21,13 +22,17 @@ from volery.runtime.command_door import open_commands
 from volery.runtime.flight_states import FlightStates
 from volery.runtime.graph_building import announce_sensors, start_nodes, start_system_nodes
 from volery.runtime.outlet import Outlet
-from volery.runtime.placement import Start
+from volery.runtime.placement import Start, check_room
 from volery.runtime.pose_aids import PoseAids
 from volery.runtime.sensor_fitting import Fitted
 from volery.runtime.services.offering import Close
 from volery.runtime.services.uav_services import offer_uav_services
 from volery.runtime.uav import Uav
 from volery.scenario.schema import Scenario, Sensor
+from volery.vehicle.airframe import Airframe
+from volery.world.terrain import Terrain
+
+Array = NDArray[np.float64]
 
 _ROOT = "/"
 """Namespace of the nodes of the whole system."""
@@ -58,6 +63,7 @@ class Crew:
     faults: FaultPlan
     starts: tuple[Start, ...]
     """In fleet order."""
+    terrain: Terrain
     radio: RadioNet | None = None
     fitted: list[Fitted] = field(default_factory=list)
     uavs: dict[str, Uav] = field(default_factory=dict)
@@ -149,7 +155,7 @@ class Crew:
 
     def _enlist(self, start: Start, row: int) -> None:
         flight = self.scenario.types[start.type_name].flight
-        uav = Uav(self.engine.fleet, row, start.name, flight, start.type_name)
+        uav = Uav(self.engine.fleet, row, start.name, flight, start.type_name, self._check_goal)
         self.uavs[start.name] = uav
         closes = self._closes[start.name] = [
             *open_commands(self.graph, uav, self._now_ns),
@@ -159,6 +165,15 @@ class Crew:
         ]
         if self.radio is not None and self.scenario.types[start.type_name].radio:
             closes.append(self.radio.join(start.name))
+
+    def _check_goal(self, position: Array, airframe: Airframe) -> None:
+        """`CommandError` for a goal under the ground or in an obstacle."""
+        at = ", ".join(f"{coordinate:.2f}" for coordinate in position)
+        scene, terrain = self.engine.scene, self.terrain
+        try:
+            check_room(position, airframe, scene, terrain, f"the goal ({at}) m")
+        except PlacementError as error:
+            raise CommandError(str(error)) from None
 
     def _sensors_of(self, start: Start) -> Sequence[Sensor]:
         return self.scenario.types[start.type_name].sensors

@@ -166,22 +166,8 @@ def check_place(
             f"{where}: {at} lies beyond the terrain, which reaches from ({x0:g}, {y0:g}) to "
             f"({x1:g}, {y1:g}) m"
         )
-    standing = float(_standing(place[:2], airframe, terrain)[2])
-    if place[2] < standing - _SINK_M:
-        raise PlacementError(
-            f"{where}: {at} lies {standing - place[2]:.2f} m under the ground or with its feet in "
-            f"it; z must be at least {standing:.2f} there"
-        )
-    around = int(scene.enclosing(place[None])[0])
-    if around >= 0:
-        raise PlacementError(f"{where}: {at} lies inside {scene.instance_name(around)}{hint}")
+    check_room(place, airframe, scene, terrain, f"{where}: {at}", hint=hint)
     radius = airframe.body.collision_radius_m
-    look = scene.clearance(place[None], radius, include_terrain=False)
-    if look.instance[0] >= 0:
-        raise PlacementError(
-            f"{where}: {at} lies in {scene.instance_name(int(look.instance[0]))}, "
-            f"{look.distance[0]:.2f} m from it; at least {radius:.2f} m is needed{hint}"
-        )
     for other in others:
         distance = float(np.linalg.norm(place - other.position_map))
         needed = radius + other.airframe.body.collision_radius_m
@@ -190,3 +176,28 @@ def check_place(
                 f"{where}: {at} overlaps {other.name}, {distance:.2f} m away; "
                 f"at least {needed:.2f} m is needed"
             )
+
+
+def check_room(
+    place: Array, airframe: Airframe, scene: Scene, terrain: Terrain, what: str, *, hint: str = ""
+) -> None:
+    """`PlacementError` where a position (3,) m, map, is under the ground or in an obstacle.
+
+    what: what the message begins with. hint: what a user may do about it.
+    """
+    standing = float(_standing(place[:2], airframe, terrain)[2])
+    if place[2] < standing - _SINK_M:
+        raise PlacementError(
+            f"{what} lies {standing - place[2]:.2f} m under the ground or with its feet in "
+            f"it; z must be at least {standing:.2f} there"
+        )
+    around = int(scene.enclosing(place[None])[0])
+    if around >= 0:
+        raise PlacementError(f"{what} lies inside {scene.instance_name(around)}{hint}")
+    radius = airframe.body.collision_radius_m
+    look = scene.clearance(place[None], radius, include_terrain=False)
+    if look.instance[0] >= 0:
+        raise PlacementError(
+            f"{what} lies in {scene.instance_name(int(look.instance[0]))}, "
+            f"{look.distance[0]:.2f} m from it; at least {radius:.2f} m is needed{hint}"
+        )

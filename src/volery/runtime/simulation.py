@@ -155,6 +155,7 @@ class Simulation:
             self.outlet,
             self._faults,
             starts,
+            self.terrain,
             self.radio,
         )
         self.uavs = MappingProxyType(self._crew.uavs)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -14,19 +16,28 @@ from volery.scenario.schema import Flight
 from volery.vehicle.airframe import Airframe
 
 Array = NDArray[np.float64]
+CheckGoal = Callable[[Array, Airframe], None]
+"""Raises `CommandError` where a UAV cannot be at a position (3,) m, map."""
 
 
 class Uav:
     """Reads the true state of a UAV and commands it; commands act from the next physics step."""
 
     def __init__(
-        self, fleet: Fleet, row: int, name: str, flight: Flight, type_name: str = ""
+        self,
+        fleet: Fleet,
+        row: int,
+        name: str,
+        flight: Flight,
+        type_name: str = "",
+        check_goal: CheckGoal | None = None,
     ) -> None:
         self._place: tuple[Fleet, int] | None = (fleet, row)
         self._flight = flight
         self.name = name
         self.type_name = type_name
         """Its type in the scenario."""
+        self._check_goal = check_goal
 
     def move_to(self, place: tuple[Fleet, int] | None) -> None:
         """Take over where the fleet has changed: fleet and row, or None where it was deleted."""
@@ -131,7 +142,12 @@ class Uav:
         self._fleet.hold(self._row)
 
     def go_to(self, position_map: ArrayLike, yaw: float | None = None) -> None:
-        """Fly to `position_map` (3,) m and hold there; `yaw` in rad, None keeps the heading."""
+        """Fly to `position_map` (3,) m and hold there; `yaw` in rad, None keeps the heading.
+
+        `CommandError` for a position under the ground or in an obstacle.
+        """
+        if self._check_goal is not None:
+            self._check_goal(checked("position", position_map, (3,), MAX_COORDINATE), self.airframe)
         self._fleet.command_position(self._row, position_map, yaw)
 
     def follow(self, trajectory: Trajectory) -> None:

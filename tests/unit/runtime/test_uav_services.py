@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from asking import ask
 
+from volery.core.errors import CommandError
 from volery.graph.messages import (
     Point,
     Pose,
@@ -247,3 +248,31 @@ def test_applied_commands_are_the_same_in_equal_runs(simulate, flat_data):
         return simulation.digest()
 
     assert digest() == digest()
+
+
+@pytest.mark.parametrize("z", [-3.0, 0.0])
+def test_a_goal_below_the_ground_is_refused(pair, z):
+    response = ask(pair, "/uav2/go_to", position={"x": 10.0, "y": 3.0, "z": z})
+    assert not response.success
+    assert "under the ground" in response.message
+    assert "z must be at least 0.1" in response.message
+    pair.run(2.0)
+    assert pair.uavs["uav2"].position_map == pytest.approx([20.0, 0.0, 5.0], abs=0.3)
+
+
+def test_a_goal_inside_an_obstacle_is_refused(simulate, wood_data):
+    wood = simulate(wood_data)
+    trunk = wood.forest.position_map[0] + [0.0, 0.0, 1.0]
+    x, y, z = trunk.tolist()
+    response = ask(wood, "/uav1/go_to", position={"x": x, "y": y, "z": z})
+    assert not response.success
+    assert "tree" in response.message
+    with pytest.raises(CommandError, match="the goal .* lies in"):
+        wood.uavs["uav1"].go_to(trunk)
+
+
+def test_a_goal_that_is_a_message_is_checked_too(pair, caplog):
+    goal = PoseStamped(header(0, "map"), Pose(Point(5.0, 0.0, -2.0), Quaternion(0, 0, 0, 1.0)))
+    pair.graph.advertise("/uav2/goal_pose", PoseStamped).publish(goal)
+    pair.graph.deliver()
+    assert "under the ground" in caplog.text
