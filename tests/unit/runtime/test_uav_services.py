@@ -267,7 +267,7 @@ def test_a_goal_inside_an_obstacle_is_refused(simulate, wood_data):
     response = ask(wood, "/uav1/go_to", position={"x": x, "y": y, "z": z})
     assert not response.success
     assert "tree" in response.message
-    with pytest.raises(CommandError, match="the goal .* lies in"):
+    with pytest.raises(CommandError, match=r"the goal .* lies in"):
         wood.uavs["uav1"].go_to(trunk)
 
 
