@@ -2,9 +2,10 @@
 
     python tests/fuzz/long_run.py --seconds 60
     python tests/fuzz/long_run.py --seconds 600 --seed 7 cdr ros1
+    python tests/fuzz/long_run.py --checks 1000 files      # each kind of file that is loaded or flown
 
 Prints, for each parser, frames, frames a second, the slowest check and how far memory grew after
-the first tenth. Ends with 1 and the number of the failing check; `--seed S --only N` repeats it.
+the first tenth, and what became of files that were loaded and flown. Ends with 1 and the number of the failing check; `--seed S --only N` repeats it.
 """
 
 from __future__ import annotations
@@ -22,12 +23,16 @@ from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 from mutation import Mutator  # noqa: E402
-from targets import TARGETS  # noqa: E402
+from flight_check import OUTCOMES  # noqa: E402
+from targets import BUILT, LOADED, TARGETS  # noqa: E402
 
 _HUNG_S = 120.0
-"""For a hundred checks."""
+"""For a hundred checks; for each of those that fly, as for them in all, a hang is"""
+_FLIGHT_HUNG_S = 20.0
 _SLOW_S = 2.0
 _MOST_GROWTH_MB = 40.0
+_FILES = "files"
+"""Word for all kinds of files that are loaded or flown."""
 _MOST_MEMORY_BYTES = 3 << 30
 
 
@@ -36,16 +41,18 @@ def random_of(seed, name, number):
     return random.Random(f"{seed} {name} {number}")
 
 
-def run(name, seconds, seed):
-    """Feed one parser for a while; one line about it, and whether all was well."""
+def run(name, seconds, checks, seed):
+    """Feed one parser for a while, or so often; one line about it, and whether all was well."""
+    OUTCOMES.clear()
+    flies = name in BUILT
     check, slowest_s, frames, number = TARGETS[name], 0.0, 0, 0
     begin = time.monotonic()
     settled = None
-    while (now := time.monotonic()) < begin + seconds:
-        if settled is None and now > begin + 0.1 * seconds:
+    while _goes_on(now := time.monotonic(), begin, seconds, number, checks):
+        if settled is None and (number > 0.1 * checks if checks else now > begin + 0.1 * seconds):
             settled = _resident_mb()
-        if number % 100 == 0:
-            faulthandler.dump_traceback_later(_HUNG_S, exit=True)
+        if flies or number % 100 == 0:
+            faulthandler.dump_traceback_later(_FLIGHT_HUNG_S if flies else _HUNG_S, exit=True)
         began_s = time.process_time()  # others may have the processor meanwhile
         try:
             frames += check(Mutator(random_of(seed, name, number)))
@@ -55,13 +62,22 @@ def run(name, seconds, seed):
         slowest_s = max(slowest_s, time.process_time() - began_s)
         number += 1
     faulthandler.cancel_dump_traceback_later()
-    grown = _resident_mb() - (settled or 0.0)
-    well = slowest_s < _SLOW_S and grown < _MOST_GROWTH_MB
+    grown, taken_s = _resident_mb() - (settled or 0.0), time.monotonic() - begin
+    well = slowest_s < (_FLIGHT_HUNG_S if flies else _SLOW_S) and grown < _MOST_GROWTH_MB
     return (
-        f"{name}: {frames} frames, {frames / seconds:.0f}/s, slowest {1000 * slowest_s:.0f} ms, "
-        f"memory {grown:+.1f} MB{'' if well else ' FAILED'}",
+        f"{name}: {frames} frames, {frames / taken_s:.0f}/s, slowest {1000 * slowest_s:.0f} ms, "
+        f"memory {grown:+.1f} MB{_told_outcomes()}{'' if well else ' FAILED'}",
         well,
     )
+
+
+def _goes_on(now, begin, seconds, number, checks):
+    return number < checks if checks else now < begin + seconds
+
+
+def _told_outcomes():
+    told = ", ".join(f"{count} {what}" for what, count in sorted(OUTCOMES.items()))
+    return f" ({told})" if told else ""
 
 
 def _resident_mb():
@@ -71,20 +87,26 @@ def _resident_mb():
     return pages * resource.getpagesize() / 1e6
 
 
+def _named(name):
+    return (*BUILT, *LOADED) if name == _FILES else (name,)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("targets", nargs="*", default=list(TARGETS), metavar="PARSER")
     parser.add_argument("--seconds", type=float, default=60.0, help="for each parser")
+    parser.add_argument("--checks", type=int, default=0, help="so many of each, however long")
     parser.add_argument("--seed", default="0")
     parser.add_argument("--only", type=int, help="this check alone")
     options = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY_BYTES, _MOST_MEMORY_BYTES))
     well = True
-    for name in options.targets:
+    names = [each for name in options.targets for each in _named(name)]
+    for name in names:
         if options.only is not None:
             TARGETS[name](Mutator(random_of(options.seed, name, options.only)))
             continue
-        line, good = run(name, options.seconds, options.seed)
+        line, good = run(name, options.seconds, options.checks, options.seed)
         sys.stdout.write(f"{line}\n")
         sys.stdout.flush()
         well = well and good

@@ -1,4 +1,4 @@
-"""Every parser of bytes from outside, by name.
+"""Every parser of bytes from outside, by name, and what is built and flown of files.
 
 A target takes a `Mutator`, feeds its parser, checks what must hold and returns how many frames that
 were. What it must not let out: any exception but those that its parser documents.
@@ -6,6 +6,7 @@ were. What it must not let out: any exception but those that its parser document
 
 import city_targets
 import comms_targets
+import data_file_targets
 import grid_map_targets
 import log_targets
 import mavlink_targets
@@ -13,6 +14,7 @@ import mesh_targets
 import message_targets
 import ros2_targets
 import rosbridge_targets
+import scenario_targets
 import socket_targets
 
 TARGETS = {
@@ -51,4 +53,29 @@ TARGETS = {
     "mesh_gltf": mesh_targets.gltf,
     "mesh_obj": mesh_targets.obj,
     "mesh_stl": mesh_targets.stl,
+    "scenario_flights": scenario_targets.flights,
+    "scenario_files": scenario_targets.files,
+    "scenario_changes": scenario_targets.changes,
+    "launch_profiles": scenario_targets.profiles,
+    "airframes": data_file_targets.airframes,
+    "identified_models": data_file_targets.identified_models,
+    "sensor_models": data_file_targets.sensor_models,
+    "beam_tables": data_file_targets.beam_tables,
+    "wind_tables": data_file_targets.wind_tables,
+    "tree_tables": data_file_targets.tree_tables,
+    "height_tables": data_file_targets.height_tables,
+    "tree_species": data_file_targets.species_files,
 }
+BUILT = (
+    "scenario_flights",
+    "airframes",
+    "identified_models",
+    "sensor_models",
+    "beam_tables",
+    "wind_tables",
+    "tree_tables",
+    "height_tables",
+)
+"""Those that build simulations and fly them: some tenths of a second a check."""
+LOADED = ("scenario_files", "scenario_changes", "launch_profiles", "tree_species")
+"""Those that load files of schemas: some milliseconds a check."""

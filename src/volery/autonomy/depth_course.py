@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.autonomy.number_lists import declare_numbers
 from volery.autonomy.scan_points import Pose
 from volery.core.kept import keep, put_back
 from volery.graph.messages import CameraInfo, Image, Odometry, String, Twist, Vector3
@@ -50,11 +51,11 @@ class DepthCourse(Node):
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
-        self._distance = float(self.declare_parameter("distance_m", 50.0).value)
-        self._height = float(self.declare_parameter("height_m", 2.0).value)
-        self.speed = float(self.declare_parameter("speed_m_s", 2.0).value)
+        self._distance = float(self.declare_parameter("distance_m", 50.0, least=0.0, most=1e5).value)
+        self._height = float(self.declare_parameter("height_m", 2.0, least=0.1, most=1e4).value)
+        self.speed = float(self.declare_parameter("speed_m_s", 2.0, least=0.01, most=100.0).value)
         camera = self.declare_parameter("camera", "camera").value
-        self.mount = self.declare_parameter("mount", [0.0, 0.0, 0.0]).value
+        self.mount = declare_numbers(self, "mount", [0.0, 0.0, 0.0], "[x, y, z]")
 
         self.phase = Phase.START
         self.pose: Pose | None = None

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.gap_flight import GapFlight
+from volery.autonomy.number_lists import declare_points
 from volery.autonomy.scan_points import Pose
 from volery.graph.messages import String
 
@@ -44,7 +45,7 @@ class GapFollowing(GapFlight):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("gap_following", **options)
-        route = self.declare_parameter("route", [[50.0, 0.0]]).value
+        route = declare_points(self, "route", [[50.0, 0.0]])
         self._route = [np.array(point, dtype=np.float64) for point in route]
         self._phase = Phase.START
         self._home = np.zeros(3)

@@ -8,6 +8,7 @@ from typing import Any
 from volery.core.errors import NodeError
 from volery.graph.node import Node
 
+_FARTHEST_M = 1e6
 
 def declare_numbers(
     node: Node, name: str, default: list[float], form: str, *, or_empty: bool = False
@@ -24,6 +25,19 @@ def declare_numbers(
     raise NodeError(
         f"{name} is {form}, finite numbers{', or empty' if or_empty else ''}, not {told!r}"
     )
+
+
+def declare_points(node: Node, name: str, default: list[list[float]]) -> list[list[float]]:
+    """Declare a parameter of points [x, y] in the map, m. `NodeError` for everything else."""
+    told = node.declare_parameter(name, default).value
+    if all(
+        isinstance(point, list | tuple)
+        and len(point) == len("xy")
+        and all(_is_number(x) and abs(x) <= _FARTHEST_M for x in point)
+        for point in told
+    ):
+        return [[float(x) for x in point] for point in told]
+    raise NodeError(f"{name} is a list of [x, y], m, within +-{_FARTHEST_M:g}, not {told!r}")
 
 
 def declare_mount(node: Node, lidar: str) -> list[float]:

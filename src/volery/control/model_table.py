@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.gains import ControlRates, gains_of
+from volery.control.stability import check_stability
 from volery.control.step import MODEL
 from volery.core.counting import counted
 from volery.core.errors import CommandError
@@ -31,7 +32,8 @@ def model_table(
 ) -> tuple[NDArray[np.void], list[int]]:
     """Distinct airframes, plants and wears as `MODEL` rows, and each UAV's row.
 
-    Gains are those of the new vehicle: controllers know nothing of wear.
+    Gains are those of the new vehicle: controllers know nothing of wear. Raises `DataFileError`
+    where a vehicle's motion cannot be computed with steps of `dt` s.
     """
     numbers: dict[tuple[str, Plant, tuple[RotorWear, ...]], int] = {}
     distinct: list[tuple[Airframe, Plant, tuple[RotorWear, ...]]] = []
@@ -45,6 +47,7 @@ def model_table(
     models = np.zeros(len(distinct), MODEL)
     period = BATTERY_TICKS * control.guidance_steps(dt) * dt
     for row, (airframe, plant, wear) in enumerate(distinct):
+        check_stability(airframe, plant, dt)
         models["plant"][row] = plant_of(airframe, dt, period, wear)[0]
         models["gains"][row] = gains_of(airframe, dt, control)[0]
         models["kind"][row] = kind_of(plant)

@@ -62,6 +62,15 @@ class CommandError(VoleryError):
     """A command is refused: not finite, out of range, or impossible in the present mode."""
 
 
+class DivergenceError(VoleryError):
+    """The state of a UAV is not physical: not finite, too fast, too far away."""
+
+    def __init__(self, uav: str, time_s: float, message: str) -> None:
+        super().__init__(message)
+        self.uav = uav
+        self.time_s = time_s
+
+
 class SnapshotError(VoleryError):
     """A state cannot be kept or taken back: something in the run does not offer its state."""
 

@@ -24,6 +24,7 @@ from volery.engine.partners import Partner
 from volery.engine.regrouping import common_rows, continue_bank
 from volery.engine.restart import Keys, restart_sensors
 from volery.engine.stages import STAGES, Tick, take_commands
+from volery.engine.state_check import StateCheck
 from volery.engine.thing_contacts import ThingLooks
 from volery.sensors.bank import Bank
 from volery.sensors.faults import FaultTable
@@ -111,6 +112,7 @@ class Engine:
             None if self.things is None else ThingLooks(self.things, compiled=scene.compiled)
         )
         self.collisions = self._new_collisions(copies)
+        self.state_check = StateCheck(fleet)
         self.banks = tuple(banks)
         self.estimation = estimation
         """Estimators that listen to the sensors, where there are any."""
@@ -297,6 +299,7 @@ class Engine:
         step = self.fleet.step
         measured = (self.sensor_agenda.next_step() or step) > step if step else False
         self.fleet, self.names = fleet, names
+        self.state_check = StateCheck(fleet)
         self.collisions = self._new_collisions(copies=1)
         self.collisions.continue_from(collisions, kept)
         self.banks = tuple(banks)
@@ -386,6 +389,9 @@ class Engine:
                 self.stage_seconds[stage.__name__] += after - before
                 self.stage_cpu_s[stage.__name__] += cpu_after - cpu_before
                 before, cpu_before = after, cpu_after
+        except (ArithmeticError, ValueError):
+            self.state_check.look()  # NaN breaks what reads it: say what is behind it
+            raise
         finally:
             self.stands = True
             self.turn += 1

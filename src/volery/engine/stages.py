@@ -42,6 +42,7 @@ def advance_vehicles(engine: Engine, tick: Tick) -> None:
     if steps > 0:
         engine.fleet.advance(steps, engine.terrain, event_ends=True)
         engine.turn = 0
+        engine.state_check.advanced()
         engine.sink.advanced(first + 1, engine.fleet.step)
 
 
@@ -62,7 +63,10 @@ def sample_sensors(engine: Engine, _tick: Tick) -> None:
 
 def raise_events(engine: Engine, _tick: Tick) -> None:
     """Landings, impacts and mode changes that the compiled steps noted, then all new events."""
-    for event in engine.collect_events():
+    events = engine.collect_events()
+    if events:
+        engine.state_check.look()
+    for event in events:
         engine.sink.happened(event)
 
 

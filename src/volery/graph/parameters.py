@@ -1,5 +1,8 @@
 """Parameters that nodes have declared, by node and name, for who asks from outside.
 
+Numbers are finite, in lists and tables too, and lie within the bounds of the quantity that the name
+tells (`height_m`: see `core.quantities`), besides those that the node declares.
+
 What is set takes effect when the node reads `Parameter.value` next. A node that reads a value only
 once, at its start, declares it read-only, and setting it is refused rather than without effect.
 """
@@ -12,6 +15,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from volery.core.errors import GraphError
+from volery.core.quantities import fault_in
 
 
 class Within(NamedTuple):
@@ -73,6 +77,9 @@ class Parameter:
     def _check(self, value: Any) -> None:
         if not same_kind(value, self._like):
             raise GraphError(f"parameter '{self.name}' must be like {self._like!r}, not {value!r}")
+        fault = fault_in(self.name, value)
+        if fault is not None:
+            raise GraphError(f"parameter '{self.name}': {fault}")
         if self._within is not None and not self._within.holds(value):
             raise GraphError(f"parameter '{self.name}' must be {self._within}, not {value!r}")
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.clock import NS_PER_S
-from volery.core.errors import CommandError
+from volery.core.errors import CommandError, DivergenceError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.runtime.building import add_bodies, build_fleet
@@ -114,8 +114,12 @@ class CopyBlock:
         return (self.time_ns - self._began_ns) / NS_PER_S
 
     def advance_to(self, step: int) -> None:
-        """Advance all copies."""
-        self._engine.advance_to(step)
+        """Advance all copies. `DivergenceError` names the copy whose state is not physical."""
+        try:
+            self._engine.advance_to(step)
+            self._engine.state_check.glance()
+        except DivergenceError as error:
+            raise self._of_copy(error) from None
 
     def reset(self, copies: NDArray[np.int64], seeds: Sequence[int] | None) -> None:
         """Put some copies back to their start."""
@@ -135,6 +139,10 @@ class CopyBlock:
 
     def get_state(self) -> dict[str, Any]:
         """Everything that changes."""
+        try:
+            self._engine.state_check.look()
+        except DivergenceError as error:
+            raise self._of_copy(error) from None
         return {
             "engine": self._engine.get_state(),
             "latest": list(self._latest),
@@ -197,6 +205,13 @@ class CopyBlock:
         """Nothing is queued."""
 
     # ------------------------------------------------------------------------------------- inside
+
+    def _of_copy(self, error: DivergenceError) -> DivergenceError:
+        """The error with the number that the copy has among all, not in this block."""
+        number, name = error.uav.split("/")
+        copy = self._first + int(number)
+        text = str(error).replace(error.uav, f"{name} of copy {copy}", 1)
+        return DivergenceError(f"{copy}/{name}", error.time_s, text)
 
     def _renew(self, samples: Samples, rows: NDArray[np.int64]) -> None:
         """Put the measurements of restarted sensors in the place of those of their former life."""

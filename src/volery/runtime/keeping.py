@@ -72,6 +72,7 @@ class Keeper:
     def snapshot(self) -> Snapshot:
         """The present state."""
         self._check("a snapshot", self.crew.nodes)
+        self.engine.state_check.look()
         return Snapshot(self.engine.time_ns, id(self), self.crew.starts, self._state())
 
     def restore(self, snapshot: Snapshot) -> None:

@@ -80,6 +80,7 @@ class RunLoop:
                     over = True
                     break
             teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns), last=over)
+        engine.state_check.look()
         if self.finished:
             pacer.drop_steps("the scenario has come to its end")
 

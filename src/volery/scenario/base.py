@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from functools import cache
+from typing import Annotated, Any, ClassVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field
+from annotated_types import Ge, Gt
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+
+from volery.core.quantities import Quantity, fault_in
 
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
@@ -15,12 +20,76 @@ NonNegative = Annotated[float, Field(ge=0.0)]
 Rate = Annotated[float, Field(gt=0.0, le=1000.0)]
 
 
-class Data(BaseModel):
-    """Frozen data; unknown keys and numbers that are not finite are refused."""
+class Bounded(BaseModel):
+    """Frozen data whose numbers lie within the bounds of the quantities that their keys name.
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, str_strip_whitespace=True
-    )
+    Unknown keys and numbers that are not finite are refused. See `core.quantities`.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    quantities: ClassVar[Mapping[str, Quantity]] = {}
+    """Bounds that hold for the keys of this kind of data instead of the common ones."""
+
+    @field_validator("*")
+    @classmethod
+    def _is_plausible(cls, value: Any, info: ValidationInfo) -> Any:
+        fault = _fault_of(cls, str(info.field_name), value)
+        if fault is not None:
+            raise ValueError(fault)
+        return value
+
+
+def implausible(data: BaseModel, place: str = "") -> tuple[str, str] | None:
+    """The first key of data of any model, and what is wrong with its number; None: nothing is.
+
+    For models that are not `Bounded`, which refuse such numbers themselves.
+    """
+    for key in type(data).model_fields:
+        value, where = getattr(data, key), f"{place}.{key}" if place else key
+        if isinstance(value, BaseModel):
+            inner = implausible(value, where)
+            if inner is not None:
+                return inner
+            continue
+        fault = _fault_of(type(data), key, value)
+        if fault is not None:
+            return where, fault
+    return None
+
+
+def _fault_of(model: type[BaseModel], key: str, value: Any) -> str | None:
+    low, positive = _lower_bound(model, key)
+    special = model.quantities if issubclass(model, Bounded) else None
+    return fault_in(key, value, special=special, low=low, positive=positive)
+
+
+@cache
+def _lower_bound(model: type[BaseModel], key: str) -> tuple[float | None, bool]:
+    """The lower bound that a key's type states, and whether it takes only numbers above it."""
+    field = model.model_fields[key]
+    for word in (*field.metadata, *_metadata(field.annotation)):
+        if isinstance(word, Gt) and word.gt == 0:
+            return 0.0, True
+        if isinstance(word, Ge) and isinstance(word.ge, int | float):
+            return float(word.ge), False
+    return None, False
+
+
+def _metadata(annotation: Any) -> list[Any]:
+    """What is said of the numbers of a type, in lists and unions too."""
+    found = list(getattr(annotation, "__metadata__", ()))
+    for word in tuple(found):
+        found += getattr(word, "metadata", ())
+    for inner in get_args(annotation):
+        found += _metadata(inner)
+    return found
+
+
+class Data(Bounded):
+    """What scenarios are made of."""
+
+    model_config = ConfigDict(str_strip_whitespace=True)
 
 
 class SensorData(Data):
@@ -32,6 +101,8 @@ class SensorData(Data):
 
 class MountedSensor(SensorData):
     """A sensor with a place on the UAV."""
+
+    quantities = {"position_m": Quantity("m", 100.0, 0.0, {"mm": 1e-3})}
 
     position_m: Vector3 = (0.0, 0.0, 0.0)
     """Place of the sensor frame in the body, FLU."""

@@ -10,6 +10,7 @@ from typing import TypeVar
 from pydantic import BaseModel, ValidationError
 
 from volery.core.errors import DataFileError, reason_of
+from volery.scenario.base import Bounded, implausible
 from volery.scenario.load import describe_validation_error
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -24,9 +25,13 @@ def load_data_file(path: Path, model: type[Model]) -> Model:
     except tomllib.TOMLDecodeError as error:
         raise DataFileError(f"{path}: not valid TOML: {error}") from None
     try:
-        return model.model_validate(data)
+        value = model.model_validate(data)
     except ValidationError as error:
         raise DataFileError(describe_validation_error(error, str(path), model, data)) from None
+    fault = None if isinstance(value, Bounded) else implausible(value)
+    if fault is not None:
+        raise DataFileError(f"{path}: key '{fault[0]}': {fault[1]}")
+    return value
 
 
 def find_data_file(name: str, shipped: Path, what: str, folder: Path | None = None) -> Path:

@@ -5,17 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeVar
 
-from pydantic import BaseModel, ConfigDict
-
+from volery.scenario.base import Bounded
 from volery.scenario.data_files import find_data_file, load_data_file
 
 _SHIPPED = Path(__file__).parent / "models"
 
 
-class SensorModel(BaseModel):
-    """Numbers of a sensor as its data file states them; unknown keys are refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+class SensorModel(Bounded):
+    """Numbers of a sensor as its data file states them."""
 
 
 Model = TypeVar("Model", bound=SensorModel)

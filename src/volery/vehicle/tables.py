@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from volery.core.quantities import Quantity
+from volery.scenario.base import Bounded
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -13,7 +16,21 @@ Vector = tuple[float, float, float]
 PositiveVector = tuple[Positive, Positive, Positive]
 
 
-class Table(BaseModel):
-    """A table of a data file: frozen, finite, without keys that nobody knows."""
+_BANDWIDTH = Quantity("rad/s", 1e4, 1e-4)
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+class Table(Bounded):
+    """A table of a vehicle's data file."""
+
+    quantities = {
+        "m": Quantity("m", 100.0, 1e-6, {"mm": 1e-3}),
+        "rise_time_s": Quantity("s", 10.0, 1e-6, {"ms": 1e-3}),
+        "fall_time_s": Quantity("s", 10.0, 1e-6, {"ms": 1e-3}),
+        "torque_m": Quantity("m", 10.0, 1e-7, {"mm": 1e-3}),
+        "axis": Quantity("", 1e6),
+        "zeta": Quantity("", 100.0, 1e-3),
+        "epsilon": Quantity("", 1000.0, 1e-3),
+        **dict.fromkeys(
+            ("rate", "attitude", "yaw", "velocity", "vertical", "position", "wn", "ki"), _BANDWIDTH
+        ),
+    }

@@ -32,6 +32,8 @@ _LARGEST = 1e15
 FORMATS = (".glb", ".gltf", ".obj", ".stl")
 _GLTF = (".glb", ".gltf")
 _MOST_MATERIAL_BYTES = 4_000_000
+_STL_HEAD, _STL_TRIANGLE = 84, 50
+"""Bytes of a binary STL: a free text and the number of triangles, then each of them."""
 _GREY = (0.5, 0.5, 0.5)
 
 
@@ -93,6 +95,7 @@ def _read_other(path: Path) -> list[Part]:
     """OBJ and STL, by trimesh."""
     import trimesh
 
+    _check_text(path)
     materials: Any = _Materials(path.parent)
     scene = trimesh.load_scene(path, process=False, resolver=materials)
     meshes = [part for part in scene.geometry.values() if isinstance(part, trimesh.Trimesh)]
@@ -139,7 +142,24 @@ class _Materials:
             raise FileNotFoundError(name)
         if path.stat().st_size > _MOST_MATERIAL_BYTES:
             raise OSError(f"{name} is too large")
-        return path.read_bytes()
+        return path.read_bytes().decode("utf-8", "replace").encode()
+
+
+def _check_text(path: Path) -> None:
+    """ValueError for an OBJ or STL file that is neither text nor binary STL of its size.
+
+    trimesh would guess at the encoding of such a file.
+    """
+    data = path.read_bytes()
+    if path.suffix.lower() == ".stl" and len(data) >= _STL_HEAD:
+        triangles = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
+        if len(data) == _STL_HEAD + _STL_TRIANGLE * triangles:
+            return
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        binary = ", and no binary STL of its size" if path.suffix.lower() == ".stl" else ""
+        raise ValueError(f"it is no text in UTF-8{binary} (byte {error.start})") from None
 
 
 def _joined(path: Path, parts: list[Part]) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:

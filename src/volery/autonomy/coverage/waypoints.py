@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 from volery.autonomy.coverage.cells import Cells
 from volery.autonomy.coverage.field import Field
 from volery.autonomy.coverage.spanning_tree import Tour
+from volery.core.errors import PlanError
 
 Array = NDArray[np.float64]
+
+_HIGHEST = 1e4
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,13 @@ class Heights:
     cover: float
     layer: float
     over: float
+
+    def __post_init__(self) -> None:
+        """`PlanError` for heights at which nothing is flown."""
+        low = {"height_m": (self.cover, -_HIGHEST), "layer_m": (self.layer, 0.0)}
+        for key, (height, least) in {**low, "over_m": (self.over, 0.0)}.items():
+            if not least <= height <= _HIGHEST:
+                raise PlanError(f"{key} must be {least:g} to {_HIGHEST:g} m, not {height:g}")
 
     def transit(self, uav: int, *, over: bool) -> float:
         """Of UAV number `uav` on its way between areas, over blocked cells or not."""

@@ -6,21 +6,21 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from volery.scenario.base import Bounded
 
 Vector = tuple[float, float, float]
 NonNegativeVector = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
 Quaternion = tuple[float, float, float, float]
 
 
-class EstimatorSettings(BaseModel):
+class EstimatorSettings(Bounded):
     """Noise models and limits of one UAV's filter.
 
     The keys of the IMU are those of an IMU's data file, so that a sensor's own numbers can be
     passed on; the defaults are the ADIS16448's as RotorS simulates it.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     gyro_noise_density_rad_s_sqrt_hz: PositiveFloat = 3.394e-4
     gyro_random_walk_rad_s2_sqrt_hz: NonNegativeFloat = 3.879e-5

@@ -9,7 +9,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from volery.core.quantities import Quantity
+from volery.scenario.base import Bounded
 
 Array = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -19,10 +22,18 @@ _M_PER_FOOT = 0.3048
 _CM_PER_INCH = 2.54
 
 
-class Data(BaseModel):
-    """Base of what a species file holds: nothing unknown, nothing changed later."""
+_EXPONENT = Quantity("", 20.0)
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+
+class Data(Bounded):
+    """Base of what a species file holds."""
+
+    quantities = {
+        **dict.fromkeys(("b", "p4", "c0", "c1", "c2", "e", "sigma_ln"), _EXPONENT),
+        "taper": Quantity("", 20.0),
+        "flare": Quantity("", 20.0),
+        "cm": Quantity("cm", 1500.0, 0.1, {"mm": 0.1}),
+    }
 
 
 class MichaelisMentenHeight(Data):

@@ -5,16 +5,16 @@ A new species that grows like one of the known forms needs a file and no code.
 
 from __future__ import annotations
 
-import tomllib
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from volery.core.errors import DataFileError, ScenarioError
+from volery.core.errors import ScenarioError
+from volery.scenario.data_files import load_data_file
 from volery.world.trees.allometry import (
     CrownWidth,
     Data,
@@ -150,8 +150,4 @@ def load_species(name: str) -> Species:
     """The species `name`; raises ScenarioError that lists the known ones, or DataFileError."""
     if name not in species_names():
         raise ScenarioError(f"unknown tree species {name!r}; known: {', '.join(species_names())}")
-    path = _FOLDER / f"{name}.toml"
-    try:
-        return Species.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (tomllib.TOMLDecodeError, ValidationError) as error:
-        raise DataFileError(f"species file {path}: {error}") from None
+    return load_data_file(_FOLDER / f"{name}.toml", Species)

@@ -1,0 +1,116 @@
+"""Ends a run whose state is not physical: not finite, too fast, too far away.
+
+What is computed after that means nothing, and NaN breaks what reads it. The look is cheap: every
+20 ms of simulated time one product of numbers over the newest row of the pose history, which NaN,
+infinity and far places make large; the whole state once a second, where the product is large, and
+before anything that happened is told.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.fleet import Fleet
+from volery.control.setpoints import MAX_COORDINATE
+from volery.control.stability import terms_of
+from volery.core.errors import DivergenceError
+
+MAX_SPEED_M_S = 1e4
+"""Above it, whatever moves so is no UAV."""
+_MAX_RATE_RAD_S = 1e5
+_GLANCE_S, _LOOK_S = 0.02, 1.0
+_LARGE = MAX_COORDINATE**2
+_NOTABLE = 0.1
+"""Share of the motion from which a term is named as the likely cause."""
+
+
+class StateCheck:
+    """Looks at the state of `fleet` as it advances."""
+
+    def __init__(self, fleet: Fleet) -> None:
+        self._fleet = fleet
+        position = fleet.history.position
+        self._rows: NDArray[np.float64] = position.reshape(len(position), -1)
+        dt = fleet.dt_ns * 1e-9
+        self._period, self._long = round(_GLANCE_S / dt), round(_LOOK_S / dt)
+        self._glanced = self._looked = fleet.step
+
+    def advanced(self) -> None:
+        """Look, if it is time to; `DivergenceError` for a state that is not physical."""
+        if not 0 <= self._fleet.step - self._glanced < self._period:
+            self.glance()
+
+    def glance(self) -> None:
+        """Look at the positions now, and at everything where they are large or it is time to."""
+        self._glanced = step = self._fleet.step
+        row = self._rows[step % len(self._rows)]
+        if not row.dot(row) < _LARGE or not 0 <= step - self._looked < self._long:
+            self.look()
+
+    def look(self) -> None:
+        """Look at the whole state now; `DivergenceError` names UAV, time and likely cause."""
+        fleet = self._fleet
+        self._looked = fleet.step
+        state = fleet.state
+        well = (
+            _within(state.position_map, MAX_COORDINATE)
+            & _within(state.velocity_map, MAX_SPEED_M_S)
+            & _within(state.attitude, 1.5)
+            & _within(state.omega_body, _MAX_RATE_RAD_S)
+        )
+        if not well.all():
+            raise self._error(int(np.argmin(well)))
+
+    def _error(self, row: int) -> DivergenceError:
+        fleet, state = self._fleet, self._fleet.state
+        name, time_s = fleet.names[row], fleet.time_ns * 1e-9
+        speed = float(np.linalg.norm(state.velocity_map[row]))
+        position = state.position_map[row]
+        if np.isfinite(position).all() and math.isfinite(speed):
+            what = (
+                f"it is at ({', '.join(f'{x:.3g}' for x in position)}) m, moves at {speed:.3g} "
+                f"m/s and turns at {np.linalg.norm(state.omega_body[row]):.3g} rad/s"
+            )
+        else:
+            what = "its position or velocity is not finite"
+        cause = self._cause(row)
+        return DivergenceError(
+            name, time_s, f"the state of {name} is not physical at {time_s:.3f} s: {what}; {cause}"
+        )
+
+    def _cause(self, row: int) -> str:
+        """The largest term of the motion at the fastest that the UAV moved of late, in words."""
+        fleet = self._fleet
+        dt = fleet.dt_ns * 1e-9
+        speed = max(self._fastest(row), fleet.airframes[row].limits.speed_m_s)
+        terms = terms_of(fleet.airframes[row], fleet.plants[row], dt, speed)
+        if terms and terms[0].share > _NOTABLE:
+            worst = terms[0]
+            return (
+                f"the likely cause is {worst.key} of {worst.owner}, which takes {worst.share:.3g} "
+                f"of its motion in each step of {1e3 * dt:g} ms at {speed:.3g} m/s; less than 1 is "
+                "stable"
+            )
+        return (
+            "no term of its model is too stiff for the physics step; look at what commands it, at "
+            "its faults, wind and data files"
+        )
+
+    def _fastest(self, row: int) -> float:
+        """Largest possible speed between two rows of the pose history, m/s."""
+        history, step = self._fleet.history.position, self._fleet.step
+        newest = step % len(history)
+        path = np.roll(history[:, row], -newest - 1, axis=0)
+        with np.errstate(all="ignore"):
+            way = np.linalg.norm(np.diff(path, axis=0), axis=1)
+        speed = way / (self._fleet.dt_ns * 1e-9)
+        return float(speed[speed <= MAX_SPEED_M_S].max(initial=0.0))
+
+
+def _within(values: NDArray[np.float64], limit: float) -> NDArray[np.bool_]:
+    """Rows all of whose numbers lie within +-limit; NaN lies nowhere."""
+    well: NDArray[np.bool_] = (np.abs(values) <= limit).all(axis=1)
+    return well
