@@ -6,7 +6,7 @@ import functools
 import logging
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import ParamSpec
 
 import typer
@@ -16,6 +16,7 @@ from volery.core.errors import VoleryError
 P = ParamSpec("P")
 
 USER_ERROR = 2
+_SMALLEST, _LARGEST = 1e-9, 1e9
 INTERRUPTED = 130
 """128 + SIGINT, as shells have it."""
 
@@ -51,12 +52,23 @@ def _was_interrupted(error: BaseException | None) -> bool:
     return error is not None
 
 
+def _check_numbers(options: Mapping[str, object]) -> None:
+    """`VoleryError` for an option whose number is not finite, or of no size that means anything."""
+    for name, value in options.items():
+        if isinstance(value, float) and value and not _SMALLEST <= abs(value) <= _LARGEST:
+            flag = name.replace("_", "-")
+            raise VoleryError(
+                f"--{flag}: 0, or a number from {_SMALLEST:g} to {_LARGEST:g}, not {value:g}"
+            )
+
+
 def guarded(command: Callable[P, None]) -> Callable[P, None]:
     """Turn a user's mistakes and Ctrl-C into a line and an exit code."""
 
     @functools.wraps(command)
     def run(*arguments: P.args, **options: P.kwargs) -> None:
         try:
+            _check_numbers(options)
             command(*arguments, **options)
         except (VoleryError, KeyboardInterrupt) as error:
             if _was_interrupted(error):

@@ -42,8 +42,8 @@ def parse_speed(text: str) -> float | None:
         speed = float(text)
     except ValueError:
         speed = math.nan
-    if not (math.isfinite(speed) and speed > 0.0):
-        raise ScenarioError(f"--speed: a positive number or max, not '{text}'")
+    if not 1e-6 <= speed < 1e6:
+        raise ScenarioError(f"--speed: a positive number, 1e-06 to 1e+06, or max, not '{text}'")
     return speed
 
 

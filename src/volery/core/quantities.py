@@ -19,7 +19,7 @@ class Quantity(NamedTuple):
     most: float
     """Largest magnitude."""
     least: float = 0.0
-    """Smallest number of a key that takes only numbers above 0: it is divided by."""
+    """Smallest number above 0 of a key that takes none below it: it may be divided by."""
     others: Mapping[str, float] = {}
     """Units that are taken for this one by mistake, as factors of it."""
 
@@ -63,7 +63,7 @@ _QUANTITIES: dict[str, Quantity] = {
     "w": Quantity("W", 1e5, 0.0, {"mW": 1e-3}),
     "damping": Quantity("", 100.0, 1e-3),
     # what sensors measure, and their noise
-    "pa": Quantity("Pa", 1e6),
+    "pa": Quantity("Pa", 1e4, 0.0, {"mPa": 1e-3}),
     "t": Quantity("T", 1.0, 0.0, {"uT": 1e-6, "nT": 1e-9}),
     "ut": Quantity("uT", 1e6, 1e-6),
     "rad_s_sqrt_hz": Quantity("rad/s/sqrt(Hz)", 10.0, 1e-12),
@@ -79,11 +79,11 @@ _QUANTITIES: dict[str, Quantity] = {
 
 
 def quantity_of(key: str, special: Mapping[str, Quantity] | None = None) -> Quantity | None:
-    """The quantity that a key ends with; the longest ending counts, those of `special` first."""
+    """The quantity that a key ends with; the longest ending counts, and `special` before the common ones."""
     parts = key.split("_")
     endings = ["_".join(parts[k:]) for k in range(len(parts))]
-    for table in (special or {}, _QUANTITIES):
-        for ending in endings:
+    for ending in endings:
+        for table in (special or {}, _QUANTITIES):
             if ending in table:
                 return table[ending]
     return None
@@ -112,8 +112,10 @@ def fault_in(
                 continue  # counts and seeds have bounds of their own
         elif not math.isfinite(number):
             return f"{place}{number} is not finite"
-        if abs(number) > quantity.most or (positive and 0 < number < quantity.least):
-            return place + _beyond(number, quantity, quantity.least if positive else low)
+        tiny = (positive or low == 0.0) and 0 < number < quantity.least
+        if tiny or abs(number) > quantity.most:
+            least = quantity.least if positive or tiny else low
+            return place + _beyond(number, quantity, least)
     return None
 
 

@@ -27,7 +27,9 @@ def start_node(
             context=context, namespace=namespace, parameter_overrides=entry.parameters
         )
     except Exception as error:
+        _check_base(getattr(error, "obj", None), entry, where)
         raise ScenarioError(f"{where}: node '{entry.node}' does not start: {error}") from error
+    _check_base(node, entry, where)
     unused = node.unused_overrides()
     if unused:
         raise ScenarioError(
@@ -35,6 +37,17 @@ def start_node(
             f"known: {', '.join(node.declared_parameters())}"
         )
     return node
+
+
+def _check_base(node: object, entry: NodeEntry, where: str) -> None:
+    """`ScenarioError` for a node whose `__init__` does not call that of `Node`, or calls it late."""
+    if isinstance(node, Node) and not hasattr(node, "_context"):
+        name = type(node).__name__
+        raise ScenarioError(
+            f"{where}: node '{entry.node}' does not start: {name}.__init__ does not call the one of "
+            f'Node before it does anything else; begin it with: super().__init__("{name.lower()}", '
+            "**options)"
+        )
 
 
 def find_node(entry: NodeEntry, where: str, folder: Path | None) -> type[Any]:

@@ -29,6 +29,8 @@ _log = logging.getLogger(__name__)
 
 DEFAULT_PORT = 9090
 MOST_CLIENTS = 1000
+_ONCE = ("Host", "Origin", "Authorization")
+"""Headers that say where a request comes from: two of them say nothing."""
 
 
 class RosbridgeServer:
@@ -163,6 +165,9 @@ class RosbridgeServer:
         url = urlsplit(request.path)
         if self._path is not None and url.path.rstrip("/") != self._path.rstrip("/"):
             return connection.respond(HTTPStatus.NOT_FOUND, f"rosbridge is at {self._path}\n")
+        for name in _ONCE:
+            if len(request.headers.get_all(name)) > 1:
+                return connection.respond(HTTPStatus.BAD_REQUEST, f"{name} is given more than once\n")
         origin = request.headers.get("Origin")
         if not self._origins.let_in(origin, request.headers.get("Host", "")):
             return connection.respond(

@@ -6,13 +6,16 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 
 from volery.scenario.base import Bounded
 
 Vector = tuple[float, float, float]
 NonNegativeVector = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
 Quaternion = tuple[float, float, float, float]
+_LEAST_DENSITY = 1e-9
+Density = Annotated[NonNegativeFloat, AfterValidator(lambda value: max(value, _LEAST_DENSITY))]
+"""Of white noise; a sensor without any is taken to have a little, so that the filter is regular."""
 
 
 class EstimatorSettings(Bounded):
@@ -22,11 +25,11 @@ class EstimatorSettings(Bounded):
     passed on; the defaults are the ADIS16448's as RotorS simulates it.
     """
 
-    gyro_noise_density_rad_s_sqrt_hz: PositiveFloat = 3.394e-4
+    gyro_noise_density_rad_s_sqrt_hz: Density = 3.394e-4
     gyro_random_walk_rad_s2_sqrt_hz: NonNegativeFloat = 3.879e-5
     gyro_bias_correlation_s: PositiveFloat = 1000.0
     gyro_turn_on_bias_rad_s: NonNegativeFloat = 0.00873
-    accel_noise_density_m_s2_sqrt_hz: PositiveFloat = 0.004
+    accel_noise_density_m_s2_sqrt_hz: Density = 0.004
     accel_random_walk_m_s3_sqrt_hz: NonNegativeFloat = 0.006
     accel_bias_correlation_s: PositiveFloat = 300.0
     accel_turn_on_bias_m_s2: NonNegativeFloat = 0.196

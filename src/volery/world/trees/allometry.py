@@ -5,11 +5,12 @@ Diameters are at breast height in m; each law converts to the units of its sourc
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from volery.core.quantities import Quantity
 from volery.scenario.base import Bounded
@@ -22,6 +23,7 @@ _M_PER_FOOT = 0.3048
 _CM_PER_INCH = 2.54
 
 
+_LEAST_SHARE = 1e-6
 _EXPONENT = Quantity("", 20.0)
 
 
@@ -123,13 +125,26 @@ class DiameterSpread(Data):
     largest_cm: Positive
     source: str
 
+    @model_validator(mode="after")
+    def _holds_some(self) -> Self:
+        low, high = self._ends()
+        if not high - low > _LEAST_SHARE:
+            raise ValueError("no tree has a diameter from smallest_cm to largest_cm by this spread")
+        return self
+
+    def _ends(self) -> tuple[float, float]:
+        """Shares of the whole distribution below the smallest and below the largest diameter."""
+        from statistics import NormalDist
+
+        normal = NormalDist(math.log(self.median_cm), self.sigma_ln)
+        return normal.cdf(math.log(self.smallest_cm)), normal.cdf(math.log(self.largest_cm))
+
     def draw(self, rng: np.random.Generator, count: int) -> Array:
         """`count` diameters in m."""
         from statistics import NormalDist
 
         normal = NormalDist(float(np.log(self.median_cm)), self.sigma_ln)
-        low = normal.cdf(float(np.log(self.smallest_cm)))
-        high = normal.cdf(float(np.log(self.largest_cm)))
+        low, high = self._ends()
         # the quantile function on a grid: one table serves all draws
         grid = np.log(np.geomspace(self.smallest_cm, self.largest_cm, 513))
         table = (np.array([normal.cdf(float(g)) for g in grid]) - low) / (high - low)
