@@ -54,7 +54,10 @@ def airframes(mutator):
     """Airframes, flown as rigid bodies, identified and kinematic."""
     text = mutator.pick(_texts("vehicle/airframes"))
     write(path_of("airframe.toml"), changed_text(mutator, text))
-    kind = {"airframe": "airframe.toml", "plant": mutator.pick(("rigid_body",) * 4 + ("kinematic",))}
+    kind = {
+        "airframe": "airframe.toml",
+        "plant": mutator.pick(("rigid_body",) * 4 + ("kinematic",)),
+    }
     return _flown(kind)
 
 
@@ -133,7 +136,9 @@ def height_tables(mutator):
     terrain = refused_or_read(lambda: Terrain.from_csv(path, spacing))
     if terrain is None or mutator.chance(0.9):
         return 1
-    return 1 + _flown({}, {"terrain": {"kind": "grid", "file": "heights.csv", "spacing_m": spacing}})
+    return 1 + _flown(
+        {}, {"terrain": {"kind": "grid", "file": "heights.csv", "spacing_m": spacing}}
+    )
 
 
 def species_files(mutator):
@@ -145,7 +150,8 @@ def species_files(mutator):
         diameters = species.spread().draw(np.random.default_rng(1), 5)
         heights = species.heights(diameters, np.random.default_rng(1))
         radii = [species.crown_width.radius(d) for d in diameters.tolist()]
-        assert np.isfinite(diameters).all() and np.isfinite(heights).all(), (diameters, heights)
+        assert np.isfinite(diameters).all(), diameters
+        assert np.isfinite(heights).all(), heights
         assert np.isfinite(radii).all(), radii
     return 1
 

@@ -2,10 +2,11 @@
 
     python tests/fuzz/long_run.py --seconds 60
     python tests/fuzz/long_run.py --seconds 600 --seed 7 cdr ros1
-    python tests/fuzz/long_run.py --checks 1000 files      # each kind of file that is loaded or flown
+    python tests/fuzz/long_run.py --checks 1000 files   # each kind of file that is loaded or flown
 
 Prints, for each parser, frames, frames a second, the slowest check and how far memory grew after
-the first tenth, and what became of files that were loaded and flown. Ends with 1 and the number of the failing check; `--seed S --only N` repeats it.
+the first tenth, and what became of files that were loaded and flown. Ends with 1 and the number of
+the failing check; `--seed S --only N` repeats it.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ import traceback
 from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
-from mutation import Mutator  # noqa: E402
 from flight_check import OUTCOMES  # noqa: E402
+from mutation import Mutator  # noqa: E402
 from targets import BUILT, LOADED, TARGETS  # noqa: E402
 
 _HUNG_S = 120.0

@@ -117,7 +117,7 @@ sensors = [
 ]
 [[types.surveyor.nodes]]
 node = "volery.autonomy.gap_following:GapFollowing"
-parameters = {route = [[30.0, 0.0]], height_m = 3.0, speed_m_s = 2.0, level_mount = [0.0, 0.0, 0.18]}
+parameters = {route = [[30.0, 0.0]], height_m = 3.0, level_mount = [0.0, 0.0, 0.18]}
 [[uavs]]
 type = "surveyor"
 position_m = [0.0, 0.0]

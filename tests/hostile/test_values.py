@@ -26,6 +26,7 @@ from volery.vehicle.identified import load_identified
 from volery.world.mesh_files import read_mesh
 from volery.world.weather.wind_field_files import read_wind_field
 
+_FAR = {"kind": "outside", "position_m": [1e300, 0.0]}
 PACKAGE = Path(volery.__file__).parent
 NAN, INF = math.nan, math.inf
 
@@ -46,7 +47,11 @@ def changed(tmp_path, file, key, value):
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("drag_area_m2", "[20000.0, 0.02, 0.05]", r"20000 m2 is beyond 0 to 100 m2; given in mm2\?"),
+        (
+            "drag_area_m2",
+            "[20000.0, 0.02, 0.05]",
+            r"20000 m2 is beyond 0 to 100 m2; given in mm2\?",
+        ),
         ("mass_kg", "2065", r"body.mass_kg': 2065 kg is beyond .*; given in g\?"),
         ("mass_kg", "1e-308", "body.mass_kg"),
         ("inertia_kg_m2", "[1e300, 1e300, 1e300]", "body.inertia_kg_m2"),
@@ -131,7 +136,7 @@ def test_a_wind_field_that_unpacks_to_too_much_is_not_unpacked(tmp_path, monkeyp
                 "species": {"broadleaf": 1.0},
             }
         },
-        {"things": [{"name": "car", "shape": "car", "motion": {"kind": "outside", "position_m": [1e300, 0]}}]},
+        {"things": [{"name": "c", "shape": "car", "motion": _FAR}]},
         {"gnss_denied_areas": [{"kind": "box", "region_m": [-1e308, -1e308, 1e308, 1e308]}]},
     ],
 )  # fmt: skip
@@ -193,7 +198,7 @@ def test_parameters_set_in_flight_are_finite(simulate, wood_data, value):
     assert height.value == 3.0
 
 
-_BASELESS = '''
+_BASELESS = """
 from volery.graph.node import Node
 
 class Silent(Node):
@@ -204,7 +209,7 @@ class Late(Node):
     def __init__(self, **options):
         self.create_timer(1.0, print)
         super().__init__("late", **options)
-'''
+"""
 
 
 @pytest.mark.parametrize("name", ["Silent", "Late"])
@@ -225,9 +230,10 @@ def test_log_and_report_of_a_flight_that_diverges_can_be_read(tmp_path, monkeypa
     """The check before the flight is taken away: the one in flight must do alone."""
     monkeypatch.setattr("volery.control.model_table.check_stability", lambda *_: None)
     path = changed(tmp_path, "vehicle/airframes/f450.toml", "drag_area_m2", "[99.0, 99.0, 99.0]")
+    gust = "{amplitude_m_s = [60.0, 0.0, 0.0], start_s = 0.5, rise_s = 0.001}"
     (tmp_path / "s.toml").write_text(
         'name = "stiff"\nduration_s = 5.0\n'
-        "world = {wind = {gusts = [{amplitude_m_s = [60.0, 0.0, 0.0], start_s = 0.5, rise_s = 0.001}]}}\n"
+        f"world = {{wind = {{gusts = [{gust}]}}}}\n"
         f'types = {{f = {{airframe = "{path.name}", sensors = [{{kind = "ground_truth"}}]}}}}\n'
         'uavs = [{type = "f", position_m = [0.0, 0.0, 50.0]}]\n'
     )

@@ -64,8 +64,12 @@ class RegionAvoidance(DepthCourse):
         self._region = declare_numbers(self, "region", [0.3, 0.2], "[width, height]")
         if not all(0.0 < share <= 1.0 for share in self._region):
             raise NodeError(f"region is [width, height], above 0 to 1, not {self._region}")
-        self._sidestep = float(self.declare_parameter("sidestep_m_s", 0.8, least=0.0, most=100.0).value)
-        self._margin_ns = round(1e9 * self.declare_parameter("margin_s", 1.0, least=0.0, most=1e4).value)
+        self._sidestep = float(
+            self.declare_parameter("sidestep_m_s", 0.8, least=0.0, most=100.0).value
+        )
+        self._margin_ns = round(
+            1e9 * self.declare_parameter("margin_s", 1.0, least=0.0, most=1e4).value
+        )
         self._state = State.FORWARD
         self._mean = 1.0
         self._sides = (1.0, 1.0)

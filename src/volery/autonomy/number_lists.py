@@ -10,6 +10,7 @@ from volery.graph.node import Node
 
 _FARTHEST_M = 1e6
 
+
 def declare_numbers(
     node: Node, name: str, default: list[float], form: str, *, or_empty: bool = False
 ) -> list[float]:

@@ -79,7 +79,10 @@ _QUANTITIES: dict[str, Quantity] = {
 
 
 def quantity_of(key: str, special: Mapping[str, Quantity] | None = None) -> Quantity | None:
-    """The quantity that a key ends with; the longest ending counts, and `special` before the common ones."""
+    """The quantity that a key ends with, None without one.
+
+    The longest ending counts; of two that are alike that of `special`.
+    """
     parts = key.split("_")
     endings = ["_".join(parts[k:]) for k in range(len(parts))]
     for ending in endings:

@@ -112,5 +112,4 @@ class StateCheck:
 
 def _within(values: NDArray[np.float64], limit: float) -> NDArray[np.bool_]:
     """Rows all of whose numbers lie within +-limit; NaN lies nowhere."""
-    well: NDArray[np.bool_] = (np.abs(values) <= limit).all(axis=1)
-    return well
+    return np.asarray((np.abs(values) <= limit).all(axis=1))

@@ -40,13 +40,13 @@ def start_node(
 
 
 def _check_base(node: object, entry: NodeEntry, where: str) -> None:
-    """`ScenarioError` for a node whose `__init__` does not call that of `Node`, or calls it late."""
+    """`ScenarioError` for a node whose `__init__` does not call that of `Node` first."""
     if isinstance(node, Node) and not hasattr(node, "_context"):
         name = type(node).__name__
         raise ScenarioError(
-            f"{where}: node '{entry.node}' does not start: {name}.__init__ does not call the one of "
-            f'Node before it does anything else; begin it with: super().__init__("{name.lower()}", '
-            "**options)"
+            f"{where}: node '{entry.node}' does not start: {name}.__init__ does not call the one "
+            f'of Node before it does anything else; begin it with: super().__init__("{name.lower()}'
+            '", **options)'
         )
 
 

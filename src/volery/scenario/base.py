@@ -102,7 +102,9 @@ class SensorData(Data):
 class MountedSensor(SensorData):
     """A sensor with a place on the UAV."""
 
-    quantities = {"position_m": Quantity("m", 100.0, 0.0, {"mm": 1e-3})}
+    quantities: ClassVar[Mapping[str, Quantity]] = {
+        "position_m": Quantity("m", 100.0, 0.0, {"mm": 1e-3})
+    }
 
     position_m: Vector3 = (0.0, 0.0, 0.0)
     """Place of the sensor frame in the body, FLU."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
@@ -22,7 +23,7 @@ _BANDWIDTH = Quantity("rad/s", 1e4, 1e-4)
 class Table(Bounded):
     """A table of a vehicle's data file."""
 
-    quantities = {
+    quantities: ClassVar[Mapping[str, Quantity]] = {
         "m": Quantity("m", 100.0, 1e-6, {"mm": 1e-3}),
         "rise_time_s": Quantity("s", 10.0, 1e-6, {"ms": 1e-3}),
         "fall_time_s": Quantity("s", 10.0, 1e-6, {"ms": 1e-3}),

@@ -50,7 +50,5 @@ def test_a_stiff_identified_model_is_refused_with_its_number():
 def test_kinematic_uavs_have_nothing_stiff():
     airframe = with_body("f450", drag_area_m2=(90.0, 90.0, 90.0))
     assert terms_of(airframe, Kinematic(), 1e-3, 70.0) == []
-    fleet = Fleet(
-        [airframe], [[0.0, 0.0, 5.0]], [[0.0, 0.0, 0.0, 1.0]], plants=Kinematic()
-    )
+    fleet = Fleet([airframe], [[0.0, 0.0, 5.0]], [[0.0, 0.0, 0.0, 1.0]], plants=Kinematic())
     assert np.isfinite(fleet.state.position_map).all()

@@ -21,7 +21,9 @@ def flying(simulate, flat_data):
 @pytest.mark.parametrize("number", [math.nan, math.inf, -1e7])
 def test_a_run_ends_with_uav_and_time(flying, part, number):
     getattr(flying._engine.fleet.state, part)[1] = number
-    with pytest.raises(DivergenceError, match=r"the state of uav2 is not physical at 1\.0") as caught:
+    with pytest.raises(
+        DivergenceError, match=r"the state of uav2 is not physical at 1\.0"
+    ) as caught:
         flying.run(1.0)
     assert caught.value.uav == "uav2"
     assert 1.0 <= caught.value.time_s <= 1.03
@@ -34,7 +36,7 @@ def test_a_run_ends_with_uav_and_time(flying, part, number):
 
 def test_what_is_fast_but_finite_is_found_at_the_end_of_a_run(flying):
     flying._engine.fleet.state.velocity_map[0, 2] = 5e4
-    with pytest.raises(DivergenceError, match="uav1.*m/s and turns"):
+    with pytest.raises(DivergenceError, match=r"uav1.*m/s and turns"):
         flying.run(0.002)
 
 

@@ -167,7 +167,9 @@ class RosbridgeServer:
             return connection.respond(HTTPStatus.NOT_FOUND, f"rosbridge is at {self._path}\n")
         for name in _ONCE:
             if len(request.headers.get_all(name)) > 1:
-                return connection.respond(HTTPStatus.BAD_REQUEST, f"{name} is given more than once\n")
+                return connection.respond(
+                    HTTPStatus.BAD_REQUEST, f"{name} is given more than once\n"
+                )
         origin = request.headers.get("Origin")
         if not self._origins.let_in(origin, request.headers.get("Host", "")):
             return connection.respond(

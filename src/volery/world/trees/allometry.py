@@ -6,7 +6,8 @@ Diameters are at breast height in m; each law converts to the units of its sourc
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ _EXPONENT = Quantity("", 20.0)
 class Data(Bounded):
     """Base of what a species file holds."""
 
-    quantities = {
+    quantities: ClassVar[Mapping[str, Quantity]] = {
         **dict.fromkeys(("b", "p4", "c0", "c1", "c2", "e", "sigma_ln"), _EXPONENT),
         "taper": Quantity("", 20.0),
         "flare": Quantity("", 20.0),
