@@ -43,7 +43,7 @@ def parse_speed(text: str) -> float | None:
     except ValueError:
         speed = math.nan
     if not 1e-6 <= speed < 1e6:
-        raise ScenarioError(f"--speed: a positive number, 1e-06 to 1e+06, or max, not '{text}'")
+        raise ScenarioError(f"--speed: a positive number or max, 1e-06 to 1e+06, not '{text}'")
     return speed
 
 

@@ -77,11 +77,11 @@ class Parameter:
     def _check(self, value: Any) -> None:
         if not same_kind(value, self._like):
             raise GraphError(f"parameter '{self.name}' must be like {self._like!r}, not {value!r}")
+        if self._within is not None and not self._within.holds(value):
+            raise GraphError(f"parameter '{self.name}' must be {self._within}, not {value!r}")
         fault = fault_in(self.name, value)
         if fault is not None:
             raise GraphError(f"parameter '{self.name}': {fault}")
-        if self._within is not None and not self._within.holds(value):
-            raise GraphError(f"parameter '{self.name}' must be {self._within}, not {value!r}")
 
 
 class Parameters:

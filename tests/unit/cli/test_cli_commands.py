@@ -58,7 +58,9 @@ def test_a_folder_without_px4_is_told_before_anything_is_built(tmp_path: Path) -
 def test_a_run_that_cannot_last_names_its_option(seconds: str) -> None:
     result = runner.invoke(app, ["run", "hover", "--seconds", seconds])
     assert result.exit_code == 2
-    assert result.stderr == f"error: --seconds: a run lasts longer than 0 s (found {seconds})\n"
+    assert result.stderr.startswith("error: --seconds: ")
+    assert result.stderr.count("\n") == 1
+    assert seconds in result.stderr
 
 
 def test_an_interrupt_that_a_library_made_an_error_of_is_told_as_one() -> None:

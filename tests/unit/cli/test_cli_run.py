@@ -79,7 +79,7 @@ def test_ros1_log(invoke: Invoke, tmp_path: Path) -> None:
         (("run", "hovr"), "no scenario 'hovr'.*did you mean 'hover'"),
         (("run", "nowhere.toml"), "nowhere.toml: no such file"),
         (("run", "hover", "--seconds", "-1"), "--seconds: a run lasts"),
-        (("run", "hover", "--seconds", "nan"), "--seconds: a run lasts"),
+        (("run", "hover", "--seconds", "nan"), "--seconds: 0, or a number"),
         (("run", "hover", "--uavs", "0"), "--uavs.*at least 1"),
         (("run", "hover", "--seed", "-3"), "seed"),
         (("run", "hover", "--speed", "fast"), "--speed.*positive number or max"),
