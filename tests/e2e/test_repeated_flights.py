@@ -359,7 +359,7 @@ def test_a_recording_begun_late_holds_what_came_before(tmp_path):
         session.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
         session.publish("/uav1/cmd_vel", Twist(Vector3(1.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)))
         simulation.run(0.5)
-        request = message_type("volery_interfaces/srv/StartRecording_Request")("late.mcap")
+        request = message_type("volery_interfaces/srv/StartRecording_Request")("late.mcap", [], [])
         answers = []
         session.call("/volery/start_recording", request, Reply(answers.append, answers.append))
         simulation.run(0.5)

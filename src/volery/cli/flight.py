@@ -14,6 +14,7 @@ from volery.cli.guard import INTERRUPTED, USER_ERROR, complain
 from volery.cli.interrupt import Interrupts
 from volery.cli.keys import Keys
 from volery.cli.progress import FlightProgress
+from volery.cli.record_size import warn_of_size
 from volery.cli.steering import steer
 from volery.core.counting import counted
 from volery.core.errors import RecordingError, VoleryError
@@ -40,6 +41,10 @@ class RunOptions:
     speed: float | None = None
     threads: int | None = None
     record: Path | None = None
+    topics: tuple[str, ...] = ()
+    """Patterns of what is recorded; none: all topics, and no picture twice."""
+    exclude: tuple[str, ...] = ()
+    """Patterns of what is not."""
     report: Path | None = None
     digest: bool = False
     overwrite: bool = False
@@ -99,9 +104,12 @@ class Flight:
             self._collector = FlightCollector(simulation)
         if options.record is not None:
             from volery.bridges.logs.bag import open_log
+            from volery.bridges.logs.recorded_topics import recorded_topics
 
+            matches = recorded_topics(simulation.graph, options.topics, options.exclude)
+            warn_of_size(simulation.picture_rates, matches)
             self._log = open_log(options.record, overwrite=options.overwrite)
-            self._recorded = simulation.graph.subscribe_all(self._log.write)
+            self._recorded = simulation.graph.subscribe_all(self._log.write, matches)
 
     def fly(self) -> int:
         """Run to the end, to Ctrl-C or to an error; then write what is left to write."""

@@ -47,6 +47,18 @@ Record = Annotated[
     Path | None,
     typer.Option(help="Write a log: .mcap (ROS 2) or .bag (ROS 1).", rich_help_panel=FILES),
 ]
+Topics = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Record these topics alone, such as '/uav*/laser/**'; repeatable. Without it: all, "
+        "and no picture twice.",
+        rich_help_panel=FILES,
+    ),
+]
+Exclude = Annotated[
+    list[str] | None,
+    typer.Option(help="Do not record these topics; repeatable.", rich_help_panel=FILES),
+]
 Report = Annotated[
     Path | None,
     typer.Option(help="Write an illustrated report into this folder.", rich_help_panel=FILES),

@@ -9,6 +9,7 @@ from volery.graph import camera_messages as messages
 from volery.graph.camera_messages import Camera
 from volery.graph.graph import Graph, Publisher
 from volery.graph.messages import CameraInfo, CompressedImage, Image, PointCloud2
+from volery.graph.picture_sizes import bytes_per_picture
 from volery.scenario.camera import CameraSensor
 from volery.sensors.cameras.camera import Part
 from volery.sensors.samples import CameraFrames, SensorId
@@ -76,6 +77,7 @@ class CameraPublisher:
         self._graph = graph
         self._cameras: dict[str, Camera] = {}
         self._outlets: dict[str, list[_Outlet]] = {}
+        self._pixels: dict[str, int] = {}
 
     def announce(self, camera: Camera) -> None:
         """Advertise what a camera publishes."""
@@ -90,6 +92,18 @@ class CameraPublisher:
             for channel in _CHANNELS
             if (parts := channel.parts(camera.settings))
         ]
+
+    def set_size(self, cameras: Sequence[SensorId], pixels: int) -> None:
+        """Learn how many pixels the pictures of these cameras have."""
+        self._pixels.update((sensor.path, pixels) for sensor in cameras)
+
+    def log_rates(self) -> dict[str, float]:
+        """Returns about how many bytes a second of simulated time each topic takes in a log."""
+        return {
+            f"/{path}{end}": size * camera.settings.rate_hz
+            for path, camera in self._cameras.items()
+            for end, size in bytes_per_picture(camera.settings, self._pixels.get(path, 0)).items()
+        }
 
     def retire(self, uav_name: str) -> None:
         """Publish no more for the cameras of a UAV."""

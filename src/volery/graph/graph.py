@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, MutableSequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -95,7 +95,9 @@ class Publisher:
     @property
     def wanted(self) -> bool:
         """Whether anybody would receive a message; what is not wanted need not be built."""
-        return bool(self.latched or self._topic.callbacks or self._graph.listens_to_all)
+        return bool(
+            self.latched or self._topic.callbacks or self._graph.is_recorded(self._topic.name)
+        )
 
     def publish(self, message: Any) -> None:
         """Queue a message for delivery; nothing after `cancel`."""
@@ -153,7 +155,7 @@ class Subscription:
 
     def __init__(
         self,
-        callbacks: list[Callback],
+        callbacks: MutableSequence[Any],
         callback: Callback,
         left: Callable[[], None] = lambda: None,
     ) -> None:
@@ -166,6 +168,21 @@ class Subscription:
         if self._callback in self._callbacks:
             self._callbacks.remove(self._callback)
             self._left()
+
+
+class _Listener:
+    """A callback for all topics that match."""
+
+    def __init__(self, callback: Callback, matches: Callable[[str], bool]) -> None:
+        self.matches = matches
+        self._callback = callback
+
+    def __call__(self, published: Published) -> None:
+        self._callback(published)
+
+
+def _match_all(_topic: str) -> bool:
+    return True
 
 
 class _Letter(NamedTuple):
@@ -207,7 +224,7 @@ class Graph:
         """Goals that take their time."""
         self.parameters = Parameters()
         """What the nodes have declared."""
-        self._to_all: list[Callback] = []
+        self._to_all: list[_Listener] = []
         self._queue: deque[_Letter] = deque()
         self._members = threading.RLock()
         """Held by whoever changes topics, publishers, subscribers or services."""
@@ -228,10 +245,9 @@ class Graph:
 
     # ---------------------------------------------------------------------------------- topics
 
-    @property
-    def listens_to_all(self) -> bool:
-        """Whether a recorder or digest wants every message."""
-        return bool(self._to_all)
+    def is_recorded(self, topic: str) -> bool:
+        """Whether a recorder or digest wants the messages of a topic."""
+        return any(listener.matches(topic) for listener in self._to_all)
 
     def advertise(
         self, topic: str, msgtype: str | type[Any], *, latched: bool = False
@@ -294,14 +310,21 @@ class Graph:
 
         return Subscription(found.callbacks, put, leave)
 
-    def subscribe_all(self, callback: Callback) -> Subscription:
-        """Call `callback` with every message of every topic, before the topic's subscribers.
+    def subscribe_all(
+        self, callback: Callback, matches: Callable[[str], bool] | None = None
+    ) -> Subscription:
+        """Call `callback` with every message, before the topics' subscribers.
 
         What latched publishers sent before comes first, as for `subscribe`.
+
+        matches: whether a topic is meant, by its name; without it all are. Messages of other topics
+        are not made for it.
         """
-        self._to_all.append(callback)
-        self._send_kept(list(self._topics.values()), callback)
-        return Subscription(self._to_all, callback)
+        listener = _Listener(callback, matches or _match_all)
+        self._to_all.append(listener)
+        meant = [topic for topic in self._topics.values() if listener.matches(topic.name)]
+        self._send_kept(meant, listener)
+        return Subscription(self._to_all, listener)
 
     def topics(self) -> list[TopicInfo]:
         """All topics, by name."""
@@ -357,7 +380,8 @@ class Graph:
             with self._members:  # who attaches meanwhile gets it once
                 if sender.keeps:
                     topic.kept[sender] = published
-                callbacks = (*self._to_all, *topic.callbacks)
+                callbacks: list[Callback] = [c for c in self._to_all if c.matches(topic.name)]
+                callbacks += topic.callbacks
             for callback in callbacks:
                 callback(published)
 

@@ -142,6 +142,7 @@ class Crew:
             if bank.name == "camera":
                 cameras: Any = bank
                 cameras.bank.wants = partial(self.publisher.cameras.wanted_parts, bank.sensors)
+                self.publisher.cameras.set_size(bank.sensors, cameras.bank.pixels)
         for row, start in enumerate(self.starts):
             if start.name in fresh:
                 self.beginnings[start.name] = Beginning(begun, row)

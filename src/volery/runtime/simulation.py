@@ -575,6 +575,11 @@ class Simulation:
     # -------------------------------------------------------------------------------- what is known
 
     @property
+    def picture_rates(self) -> dict[str, float]:
+        """About how many bytes a second each topic of a camera takes in a log."""
+        return self._crew.publisher.cameras.log_rates()
+
+    @property
     def starts(self) -> tuple[Start, ...]:
         """Where the UAVs began, in fleet order."""
         return self._crew.starts

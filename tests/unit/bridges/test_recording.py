@@ -60,7 +60,61 @@ def test_what_matches_while_it_runs(bench, tmp_path, suffix):
     assert not recorder.info.running
     counts = {t.topic: t.messages for t in summarize(log.path).topics}
     assert counts == {"/uav1/laser/horizontal/scan": 2, "/late": 1}
-    assert not bench.graph.listens_to_all
+    assert not bench.graph.is_recorded("/a")
+
+
+def camera(bench, base, *ends):
+    """Publishes one message on each topic of a camera; those that are wanted are returned."""
+    publishers = {f"{base}{end}": bench.graph.advertise(f"{base}{end}", String) for end in ends}
+    wanted = {topic for topic, publisher in publishers.items() if publisher.wanted}
+    for publisher in publishers.values():
+        publisher.publish(String("x"))
+    bench.graph.deliver()
+    return wanted
+
+
+def recorded(bench, path, **options):
+    """Topics that are recorded of two cameras, the second without compressed pictures."""
+    recorder = Recorder(bench.graph, open_log(path), **options)
+    recorder.start()
+    ends = ("/camera_info", "/image_raw", "/depth", "/points", "/labels/instance")
+    both = ("/image_raw/compressed", "/depth/compressedDepth")
+    wanted = camera(bench, "/uav1/front", *ends, *both) | camera(bench, "/uav1/bare", *ends)
+    bench.say("/uav1/points")  # a LIDAR's
+    wanted |= {"/uav1/points"} & set(bench.publishers)
+    recorder.stop()
+    found = {topic.topic for topic in summarize(path).topics}
+    assert wanted >= found
+    return found, wanted
+
+
+def test_no_picture_is_recorded_twice(bench, tmp_path):
+    found, wanted = recorded(bench, tmp_path / "a.mcap")
+    assert found == {
+        *("/uav1/front/camera_info", "/uav1/front/image_raw/compressed", "/uav1/front/depth"),
+        *("/uav1/front/labels/instance", "/uav1/bare/camera_info", "/uav1/bare/image_raw"),
+        *("/uav1/bare/depth", "/uav1/bare/labels/instance", "/uav1/points"),
+    }
+    assert wanted == found  # the others are not even made
+
+
+def test_patterns_choose_forms_of_pictures(bench, tmp_path):
+    found, wanted = recorded(bench, tmp_path / "a.mcap", topics=["/**/image_raw"])
+    assert found == {"/uav1/front/image_raw", "/uav1/bare/image_raw"}
+    assert wanted - {"/uav1/points"} == found
+
+
+def test_everything_can_be_recorded(bench, tmp_path):
+    found, _ = recorded(bench, tmp_path / "a.mcap", topics=["/**"])
+    assert len(found) == 13
+
+
+def test_topics_are_left_out(bench, tmp_path):
+    found, wanted = recorded(bench, tmp_path / "a.mcap", exclude=["/**/labels/**", "/**/depth"])
+    assert not {topic for topic in found | wanted if "labels" in topic or "depth" in topic}
+    assert "/uav1/front/image_raw/compressed" in found
+    with pytest.raises(GraphError, match="is no pattern"):
+        Recorder(bench.graph, open_log(tmp_path / "b.mcap"), exclude=["labels"])
 
 
 def test_what_was_latched_comes_first(bench, tmp_path):

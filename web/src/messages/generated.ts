@@ -2407,6 +2407,8 @@ export interface volery_interfaces_SetWeather_Response {
 
 export interface volery_interfaces_StartRecording_Request {
   path: string;
+  topics: string[];
+  exclude: string[];
 }
 
 export interface volery_interfaces_StartRecording_Response {

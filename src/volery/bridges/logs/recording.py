@@ -15,12 +15,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from volery.bridges.logs.bag import Log
-from volery.bridges.topic_patterns import topic_filter
+from volery.bridges.logs.recorded_topics import recorded_topics
 from volery.core.errors import RecordingError
 from volery.graph.graph import Graph, Subscription
 from volery.graph.messages import Published
-
-EVERYTHING = ("/**",)
 
 
 @dataclass(frozen=True)
@@ -45,8 +43,7 @@ class Recorder:
     log
         Where to; `stop` closes it.
     topics, exclude
-        Patterns of topics that are recorded, and of those of them that are not; see
-        `topic_patterns`. `GraphError` for what is no pattern.
+        See `recorded_topics`. `GraphError` for what is no pattern.
 
     """
 
@@ -54,12 +51,12 @@ class Recorder:
         self,
         graph: Graph,
         log: Log,
-        topics: Iterable[str] = EVERYTHING,
+        topics: Iterable[str] = (),
         exclude: Iterable[str] = (),
     ) -> None:
         self._graph = graph
         self._log = log
-        self._wants = topic_filter(topics, exclude)
+        self._matches = recorded_topics(graph, topics, exclude)
         self._subscription: Subscription | None = None
         self._ended = False
         self._messages = 0
@@ -76,7 +73,7 @@ class Recorder:
         """Begin. `RecordingError` for a recorder that was started before."""
         if self._ended or self._subscription is not None:
             raise RecordingError(f"{self._log.path}: this recording was started before")
-        self._subscription = self._graph.subscribe_all(self._take)
+        self._subscription = self._graph.subscribe_all(self._take, self._matches)
 
     def stop(self) -> None:
         """Write the rest and close the log; a second time nothing happens.
@@ -91,7 +88,7 @@ class Recorder:
             raise self._failure
 
     def _take(self, published: Published) -> None:
-        if not self._ended and self._failure is None and self._wants(published.topic):
+        if not self._ended and self._failure is None:
             try:
                 self._log.write(published)
             except RecordingError as error:

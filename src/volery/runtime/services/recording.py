@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from volery.bridges.logs.bag import Log, open_log
+from volery.bridges.logs.recorded_topics import recorded_topics
 from volery.core.errors import RecordingError
 from volery.graph.graph import Graph, Subscription
 from volery.graph.messages import Published
@@ -53,10 +54,12 @@ class Recording:
             raise RecordingError(f"{self._log.path.name} is being recorded; stop that first")
         path = self._checked(request.path)
         self._failure = None
+        matches = recorded_topics(self._graph, request.topics, request.exclude)
         self._log = open_log(path)
         for earlier in self._commands.earlier():
-            self._log.write(earlier)
-        self._subscription = self._graph.subscribe_all(self._write)
+            if matches(earlier.topic):
+                self._log.write(earlier)
+        self._subscription = self._graph.subscribe_all(self._write, matches)
         return {"path": str(path)}
 
     def _stop(self, _request: Any) -> Fields:

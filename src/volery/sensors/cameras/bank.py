@@ -61,6 +61,11 @@ class CameraBank(NoisyBank):
         self._light_in = light_in
         self._mounts = stack_mounts(mounts)
 
+    @property
+    def pixels(self) -> int:
+        """How many a picture has."""
+        return self._model.width * self._model.height
+
     def is_wanted(self) -> bool:
         """Whether anybody would receive a picture."""
         return bool(self.wants())

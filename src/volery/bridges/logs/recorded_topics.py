@@ -1,0 +1,66 @@
+"""Which topics a log gets: those of patterns; without patterns all, and no picture twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from volery.bridges.topic_patterns import topic_filter
+from volery.graph.graph import Graph
+
+EVERYTHING = ("/**",)
+_SECOND_FORMS = (
+    ("/image_raw", "{base}/image_raw/compressed"),
+    ("/depth/compressedDepth", "{base}/depth"),
+    ("/points", "{base}/depth"),
+)
+"""Ends of a camera's topics that are left out where another one has the same picture.
+
+Of colours the compressed form stays, of depth the lossless one; points are made of the depth.
+"""
+
+
+def recorded_topics(
+    graph: Graph, topics: Iterable[str] = (), exclude: Iterable[str] = ()
+) -> Callable[[str], bool]:
+    """Returns whether a topic is recorded, by its name.
+
+    Parameters
+    ----------
+    graph
+        Of which topics exist: a raw picture is left out only where a compressed one is published.
+    topics
+        Patterns of `topic_patterns`. Without any: all topics, each picture in one form.
+    exclude
+        Patterns of topics that are left out in either case.
+
+    Raises
+    ------
+    GraphError
+        For what is no pattern.
+
+    """
+    chosen = tuple(topics)
+    matches = topic_filter(chosen or EVERYTHING, exclude)
+    if chosen:
+        return matches
+    answers: dict[str, bool] = {}
+
+    def is_recorded(topic: str) -> bool:
+        answer = answers.get(topic)
+        if answer is None:
+            answer = matches(topic) and not _has_another_form(graph, topic)
+            answers[topic] = answer
+        return answer
+
+    return is_recorded
+
+
+def _has_another_form(graph: Graph, topic: str) -> bool:
+    for end, other in _SECOND_FORMS:
+        if topic.endswith(end):
+            base = topic.removesuffix(end)
+            return (
+                graph.publishers(f"{base}/camera_info") > 0
+                and graph.publishers(other.format(base=base)) > 0
+            )
+    return False

@@ -1,0 +1,27 @@
+"""Says before a recording how much room its pictures take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from volery.cli.guard import warn
+
+_NOTABLE_MB_PER_MIN = 100.0
+_MOST_NAMED = 3
+
+
+def warn_of_size(rates: Mapping[str, float], matches: Callable[[str], bool]) -> None:
+    """Warn of pictures that fill a disk.
+
+    rates: bytes a second of simulated time, by topic. matches: whether a topic is recorded.
+    """
+    recorded = {topic: rate * 60e-6 for topic, rate in rates.items() if matches(topic)}
+    total = sum(recorded.values())
+    if total < _NOTABLE_MB_PER_MIN:
+        return
+    largest = sorted(recorded, key=lambda topic: -recorded[topic])[:_MOST_NAMED]
+    named = ", ".join(f"{topic} {recorded[topic]:.0f}" for topic in largest)
+    warn(
+        f"the log grows by about {total:.0f} MB per minute of the flight, by pictures alone "
+        f"({named}); --exclude '{largest[0]}' leaves one out, --topics chooses"
+    )
