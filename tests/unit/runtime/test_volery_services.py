@@ -77,6 +77,19 @@ def test_recording(simulate, flat_data, tmp_path):
     assert summarize(tmp_path / "day" / "flight.mcap").messages == stopped.messages
 
 
+def test_recording_of_some_topics(simulate, flat_data, tmp_path):
+    simulation = simulate(flat_data, recordings=tmp_path)
+    start = "/volery/start_recording"
+    refused(ask(simulation, start, path="a.mcap", topics=["odom"]), "is no pattern")
+    chosen = {"topics": ["/uav1/**", "/clock"], "exclude": ["/**/ground_truth/**"]}
+    assert ask(simulation, start, path="a.mcap", **chosen).success
+    simulation.run(0.2)
+    assert ask(simulation, "/volery/stop_recording").success
+    topics = {topic.topic for topic in summarize(tmp_path / "a.mcap").topics}
+    assert {"/clock", "/uav1/odom"} <= topics
+    assert not {name for name in topics if "ground_truth" in name or name.startswith("/volery")}
+
+
 @pytest.mark.parametrize(
     ("path", "word"),
     [
