@@ -44,5 +44,7 @@ class Connection:
     station: Known | None = None
     parser: FrameParser = field(default_factory=FrameParser)
     control: list[bytes] = field(default_factory=list)
+    is_held: bool = False
+    """Whether what it has sent waits elsewhere."""
     closing: bool = False
     """To be ended when what is said has been sent."""

@@ -147,6 +147,17 @@ class Router:
             size += len(frame.data)
         return b"".join(frames)
 
+    def hold(self, connection: int, *, is_held: bool) -> None:
+        """Notes that what a connection has sent waits before it comes to the router."""
+        known = self._connections.get(connection)
+        if known is not None:
+            known.is_held = is_held
+
+    def has_greeted(self, connection: int) -> bool:
+        """Returns whether the station of a connection is known."""
+        known = self._connections.get(connection)
+        return known is not None and known.station is not None
+
     def closing(self, connection: int) -> bool:
         """Whether a connection is to be ended when what `take` gave has been sent."""
         known = self._connections.get(connection)
@@ -233,7 +244,9 @@ class Router:
         greeted = connection.station is not None
         since = connection.heard_ns if greeted else connection.opened_ns
         allowed_s = self._settings.silence_s if greeted else self._settings.hello_s
-        if now_ns - since > allowed_s * NS_PER_S and not connection.closing:
+        if connection.is_held or connection.closing:
+            return
+        if now_ns - since > allowed_s * NS_PER_S:
             self._tally.counts["silent"] += 1
             connection.closing = True
             self._woken.add(number)

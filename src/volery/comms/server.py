@@ -20,12 +20,17 @@ from volery.comms.router import Router
 from volery.comms.settings import RouterSettings
 from volery.comms.statistics import Statistics
 from volery.core.errors import CommsError
+from volery.core.listener import Listener, open_listener
 from volery.core.listening import check_address, check_token, tend, write_while_open
+from volery.core.preamble import Preamble
+from volery.core.token_guesses import TokenGuesses
 
 PORT = 10200
 _TICK_S = 0.05
 _UNSENT_BYTES = 128 << 10
 """In the operating system's hands and ours before a station's mailbox has to wait."""
+_EARLY_BYTES = 4096
+"""A HELLO fits; more need not come before the token has been checked."""
 _FAREWELL_S = 1.0
 """For how long a connection that is being ended may take to read why."""
 
@@ -58,6 +63,9 @@ class CommsServer:
         self._anywhere = anywhere
         self._server: asyncio.Server | None = None
         self._ticks: asyncio.TimerHandle | None = None
+        self._listener: Listener | None = None
+        self._guesses: TokenGuesses | None = None
+        self._checks: set[asyncio.Task[None]] = set()
         self._links: dict[int, _StationLink] = {}
         self._sends = False
 
@@ -87,14 +95,16 @@ class CommsServer:
         self.router = Router(self._settings, time.monotonic_ns(), secrets.randbits(32))
         self._loop = asyncio.get_running_loop()
         try:
+            self._listener = open_listener(self.host, self.port, "communication server")
             self._server = await self._loop.create_server(
-                lambda: _StationLink(self), self.host, self.port, reuse_address=True
+                lambda: _StationLink(self), sock=self._listener
             )
         except (OSError, OverflowError) as error:
             taken = isinstance(error, OSError) and error.errno == errno.EADDRINUSE
             why = "the port is taken" if taken else str(error)
             raise CommsError(f"cannot listen on {self.host}:{self.port}: {why}") from None
         self.port = self._server.sockets[0].getsockname()[1]
+        self._guesses = None if self._settings.token is None else TokenGuesses()
         self._tick()
 
     async def stop(self) -> None:
@@ -103,6 +113,8 @@ class CommsServer:
             self._ticks.cancel()
         if self._server is not None:
             self._server.close()
+        for check in tuple(self._checks):
+            check.cancel()
         for link in list(self._links.values()):
             link.transport.abort()
         await asyncio.sleep(0)  # their callbacks
@@ -123,10 +135,45 @@ class CommsServer:
         self._links[number] = link
 
     def _came(self, link: _StationLink, data: bytes) -> None:
+        if self._guesses is None or link.proven:
+            self._receive(link, data)
+            return
+        link.early += data
+        if len(link.early) > _EARLY_BYTES:
+            link.transport.pause_reading()
+        if not link.waits:
+            link.waits = True
+            self.router.hold(link.number, is_held=True)
+            check = self._loop.create_task(self._check(link, self._guesses))
+            self._checks.add(check)
+            check.add_done_callback(self._checks.discard)
+
+    async def _check(self, link: _StationLink, guesses: TokenGuesses) -> None:
+        """Brings what a station has sent before its token was checked to the router, in turn."""
+        async with guesses.turn(link.address):
+            self.router.hold(link.number, is_held=False)
+            data, link.early, link.waits = link.early, b"", False
+            if link.transport.is_closing():
+                return
+            self._receive(link, data)
+            link.transport.resume_reading()
+            if self.router.closing(link.number):
+                await guesses.penalize()
+
+    def _receive(self, link: _StationLink, data: bytes) -> None:
         self.router.receive(link.number, data, time.monotonic_ns())
+        if not link.proven and self._listener is not None:
+            link.proven = self.router.has_greeted(link.number)
+            if link.proven:
+                self._listener.prove(link.transport)
         if not self._sends:  # once for all that has come in this turn of the loop
             self._sends = True
             self._loop.call_soon(self._send_woken)
+
+    def _end_stranger(self, link: _StationLink, protocol: str) -> None:
+        if self._listener is not None:
+            self._listener.note_stranger(protocol)
+        link.transport.abort()
 
     def _closed(self, link: _StationLink) -> None:
         self._links.pop(link.number, None)
@@ -158,6 +205,13 @@ class _StationLink(asyncio.Protocol):
         self._server = server
         self.number = 0
         self.paused = False
+        self.proven = False
+        """Whether the station is known to the router."""
+        self.waits = False
+        """Whether what it sends waits for its token to be checked."""
+        self.early = b""
+        self.address = "?"
+        self._preamble = Preamble()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """As of asyncio."""
@@ -165,11 +219,16 @@ class _StationLink(asyncio.Protocol):
         self.transport = transport
         transport.set_write_buffer_limits(_UNSENT_BYTES)
         tend(transport.get_extra_info("socket"))
+        self.address = str((transport.get_extra_info("peername") or ("?",))[0])
         self._server._opened(self)
 
     def data_received(self, data: bytes) -> None:
         """As of asyncio."""
-        self._server._came(self, data)
+        data = self._preamble.feed(data)
+        if self._preamble.refused is not None:
+            self._server._end_stranger(self, self._preamble.refused)
+        elif data:
+            self._server._came(self, data)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
         """As of asyncio."""

@@ -115,6 +115,10 @@ class HilSeat:
         """As of `Pilot`: a PX4 cannot go back in time."""
         self._end("the simulation was reset, and its PX4 must begin anew")
 
+    def give_way(self) -> None:
+        """Ends the connection of a client that has sent no MAVLink frame, for another one."""
+        self._end("what was connected has sent no MAVLink; another connection takes its place")
+
     def drop(self) -> None:
         """As of `Pilot`."""
         self._end("the connection to its PX4 was closed")

@@ -7,14 +7,28 @@ import errno
 from volery.mavlink.codec import Parser
 from volery.mavlink.fleet import Fleet
 from volery.mavlink.framing import Framer
+from volery.mavlink.intake import IntakeAccount
 from volery.mavlink.signing import Signing
 
 
 class Party:
-    """One connection that carries all vehicles: TCP clients and serial lines."""
+    """One connection that carries all vehicles: TCP clients and serial lines.
 
-    def __init__(self, fleet: Fleet, number: int, profile: int, key: bytes | None = None) -> None:
+    account: limits what is read of it; None: nothing does.
+    """
+
+    def __init__(
+        self,
+        fleet: Fleet,
+        number: int,
+        profile: int,
+        key: bytes | None = None,
+        account: IntakeAccount | None = None,
+    ) -> None:
         self.number = number
+        self.has_spoken = False
+        """Whether a valid frame has come."""
+        self._account = account
         self._signing = Signing(key, number)
         self._fleet, self._profile = fleet, profile
         self._framer, self._parser = Framer(), Parser()
@@ -25,13 +39,26 @@ class Party:
         self._systems.add(system)
         self._fleet.send(system, self.number, self._profile, b"")
 
-    def take(self, data: bytes) -> None:
-        """Bring what came to the vehicles that it is for."""
-        for frame in filter(self._signing.accepts, self._framer.feed(data)):
+    def take(self, data: bytes) -> float:
+        """Brings what came to the vehicles that it is for.
+
+        Returns for how many seconds nothing more must be read.
+        """
+        frames = self._framer.feed(data)
+        for frame in filter(self._signing.accepts, frames):
+            self.has_spoken = True
             target = getattr(self._parser.decode(frame.data), "target_system", 0)
             chosen = self._systems if target == 0 else self._systems & {target}
             for system in sorted(chosen):
                 self._fleet.send(system, self.number, self._profile, frame.data)
+        if self._account is None:
+            return 0.0
+        noise_bytes = len(data) - sum(len(frame.data) for frame in frames)
+        return self._account.charge(len(frames), noise_bytes)
+
+    def may_read(self) -> float:
+        """Returns for how many seconds more nothing must be read."""
+        return 0.0 if self._account is None else self._account.charge()
 
     def sign(self, data: bytes) -> bytes:
         """Frames as they go over this connection."""
@@ -39,6 +66,8 @@ class Party:
 
     def leave(self) -> None:
         """Tell the vehicles that it is there no more."""
+        if self._account is not None:
+            self._account.close()
         for system in self._systems:
             self._fleet.close_link(system, self.number)
 

@@ -19,7 +19,9 @@ import socket
 from collections.abc import Callable
 
 from volery.core.errors import BridgeError
+from volery.core.listener import Listener, open_listener
 from volery.core.listening import check_address, tend
+from volery.core.preamble import Preamble
 from volery.graph.session import Gateway
 from volery.mavlink.absence import NOTICE_S, Absence
 from volery.mavlink.codec import dialect
@@ -31,6 +33,8 @@ from volery.mavlink.px4_processes import MOST_INSTANCES
 PORT = 4560
 _MOST_UNSENT_BYTES = 1 << 16
 """What may wait for a PX4 that does not read, beside what the kernel holds."""
+_MOST_CONNECTIONS = 4
+"""To one UAV's port; all but one end as soon as the server sees them."""
 _log = logging.getLogger(__name__)
 
 
@@ -111,7 +115,10 @@ class Px4Door:
     async def _listen(self, seat: HilSeat, port: int) -> None:
         loop = asyncio.get_running_loop()
         try:
-            server = await loop.create_server(lambda: _Connection(seat), self._host, port)
+            listener = open_listener(
+                self._host, port, f"{seat.uav}: PX4", max_connections=_MOST_CONNECTIONS
+            )
+            server = await loop.create_server(lambda: _Connection(seat, listener), sock=listener)
         except (OSError, OverflowError) as error:
             raise BridgeError(
                 f"{seat.uav}: cannot listen on {self._host}:{port}: {why_not(error)}"
@@ -120,7 +127,7 @@ class Px4Door:
 
 
 class _Connection(asyncio.Protocol):
-    """One PX4's connection; a second one at the same port is sent away.
+    """One PX4's connection; a second one at the same port ends, or the first without a frame.
 
     The loop reads. The simulation's thread writes, by a socket of its own on the same connection:
     it would only wait for the loop to wake up.
@@ -130,8 +137,10 @@ class _Connection(asyncio.Protocol):
     _transport: asyncio.Transport
     _out: socket.socket | None = None
 
-    def __init__(self, seat: HilSeat) -> None:
+    def __init__(self, seat: HilSeat, listener: Listener) -> None:
         self._seat = seat
+        self._listener = listener
+        self._preamble = Preamble()
         self._loop = asyncio.get_running_loop()
         self._unsent = bytearray()
         self._hear: Callable[[bytes], None] = _ignore
@@ -160,6 +169,8 @@ class _Connection(asyncio.Protocol):
         """As of asyncio."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
+        if self._seat.taken and not self._seat.has_heard:
+            self._seat.give_way()
         if self._seat.taken:
             uav = self._seat.uav
             _log.warning("%s: its PX4 is connected already; another connection is ended", uav)
@@ -171,7 +182,14 @@ class _Connection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """As of asyncio."""
+        data = self._preamble.feed(data)
+        if self._preamble.refused is not None:
+            self._listener.note_stranger(self._preamble.refused)
+            self._transport.abort()
+            return
         self._hear(data)
+        if self._seat.has_heard:
+            self._listener.prove(self._transport)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
         """As of asyncio."""

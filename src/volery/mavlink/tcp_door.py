@@ -5,18 +5,23 @@ from __future__ import annotations
 import asyncio
 
 from volery.core.errors import BridgeError
+from volery.core.listener import Listener, open_listener
 from volery.core.listening import check_address, tend, write_while_open
+from volery.core.preamble import Preamble
 from volery.graph.session import Gateway
 from volery.mavlink import ports
 from volery.mavlink.codec import dialect
 from volery.mavlink.fleet import Fleet, Sink
+from volery.mavlink.intake import IntakeLimits
 from volery.mavlink.party import Party, why_not
 from volery.mavlink.streams import GROUND
 
 _UNSENT_BYTES = 1 << 18
 """What may wait for a TCP client who does not read; what comes then is lost for him."""
 _MOST_CLIENTS = 32
-"""Of the TCP server (modelling choice)."""
+"""Of the TCP server (modelling choice). Above, the oldest that has sent no valid frame ends."""
+_BITE_BYTES = 2048
+"""Read at once, so that no client delays others or the simulation for long."""
 
 
 class MavlinkTcp:
@@ -38,6 +43,8 @@ class MavlinkTcp:
         self.port = port
         self._anywhere = anywhere
         self._server: asyncio.Server | None = None
+        self._listener: Listener | None = None
+        self._intake = IntakeLimits()
         self._fleet: Fleet | None = None
         self._looks: asyncio.Task[None] | None = None
         self._clients: dict[int, _TcpClient] = {}
@@ -54,9 +61,14 @@ class MavlinkTcp:
         check_address(self.host, anywhere=self._anywhere, flag="--allow-remote")
         loop = asyncio.get_running_loop()
         try:
-            self._server = await loop.create_server(
-                lambda: _TcpClient(self), self.host, self.port, reuse_address=True
+            self._listener = open_listener(
+                self.host,
+                self.port,
+                "MAVLink TCP",
+                max_connections=_MOST_CLIENTS,
+                max_unproven=None,  # a program may listen in silence
             )
+            self._server = await loop.create_server(lambda: _TcpClient(self), sock=self._listener)
         except (OSError, OverflowError) as error:
             raise BridgeError(
                 f"cannot listen on {self.host}:{self.port}: {why_not(error)}"
@@ -90,15 +102,24 @@ class MavlinkTcp:
                 client.send(data)
 
     def _opened(self, client: _TcpClient) -> None:
-        if self._fleet is None or len(self._clients) >= _MOST_CLIENTS:
+        if self._fleet is None:
             client.transport.abort()
             return
         self._numbers += 1
         number = (self.port + self._numbers) % 65535
-        client.party = Party(self._fleet, number, GROUND, self._key)
+        client.party = Party(self._fleet, number, GROUND, self._key, self._intake.account())
         self._clients[number] = client
         for system in self._fleet.systems:
             client.party.greet(system)
+
+    def _prove(self, client: _TcpClient) -> None:
+        if self._listener is not None:
+            self._listener.prove(client.transport)
+
+    def _end_stranger(self, client: _TcpClient) -> None:
+        if self._listener is not None:
+            self._listener.note_stranger(client.preamble.refused or "")
+        client.transport.abort()
 
     def _closed(self, client: _TcpClient) -> None:
         for number, one in tuple(self._clients.items()):
@@ -107,7 +128,7 @@ class MavlinkTcp:
                 client.party.leave()
 
 
-class _TcpClient(asyncio.Protocol):
+class _TcpClient(asyncio.BufferedProtocol):
     """One connection."""
 
     transport: asyncio.Transport
@@ -116,6 +137,10 @@ class _TcpClient(asyncio.Protocol):
     def __init__(self, door: MavlinkTcp) -> None:
         self._door = door
         self._full = False
+        self._bite = bytearray(_BITE_BYTES)
+        self.preamble = Preamble()
+        self._proven = False
+        self._pause: asyncio.TimerHandle | None = None
 
     def send(self, data: bytes) -> None:
         """Send frames, whole or not at all."""
@@ -130,9 +155,33 @@ class _TcpClient(asyncio.Protocol):
         tend(transport.get_extra_info("socket"))
         self._door._opened(self)
 
-    def data_received(self, data: bytes) -> None:
+    def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002
         """As of asyncio."""
-        self.party.take(data)
+        return self._bite
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """As of asyncio."""
+        data = self.preamble.feed(bytes(self._bite[:nbytes]))
+        if self.preamble.refused is not None:
+            self._door._end_stranger(self)
+            return
+        pause_s = self.party.take(data)
+        if not self._proven and self.party.has_spoken:
+            self._proven = True
+            self._door._prove(self)
+        if pause_s > 0.0 and not self.transport.is_closing():
+            self.transport.pause_reading()
+            self._read_after(pause_s)
+
+    def _read_after(self, pause_s: float) -> None:
+        self._pause = asyncio.get_running_loop().call_later(pause_s, self._read_again)
+
+    def _read_again(self) -> None:
+        pause_s = self.party.may_read()
+        if pause_s > 0.0:
+            self._read_after(pause_s)
+        elif not self.transport.is_closing():
+            self.transport.resume_reading()
 
     def pause_writing(self) -> None:
         """As of asyncio."""
@@ -144,4 +193,6 @@ class _TcpClient(asyncio.Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
         """As of asyncio."""
+        if self._pause is not None:
+            self._pause.cancel()
         self._door._closed(self)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+import time
+from collections.abc import AsyncIterator
 from pathlib import Path
 
 from starlette.requests import ClientDisconnect, Request
@@ -9,11 +12,17 @@ from starlette.requests import ClientDisconnect, Request
 from volery.server.replies import RefusedError
 from volery.server.rights import Role
 
+LONGEST_PAUSE_S = 30.0
+"""Between two pieces of a body (modelling choice)."""
+LEAST_BYTES_S = 1000.0
+"""Of a body on average, after the first such time (modelling choice)."""
+
 
 async def save_body(request: Request, path: Path, most_bytes: int) -> int:
     """Write the body of a request to `path`; the number of bytes.
 
-    Raises `RefusedError` where there are none, or more than `most_bytes`; what was written stays.
+    Raises `RefusedError` where there are none, more than `most_bytes`, or where they come too
+    slowly; what was written stays.
     """
     too_large = RefusedError(413, f"more than {_size(most_bytes)}; that is the most taken here")
     announced = request.headers.get("content-length", "")
@@ -22,7 +31,7 @@ async def save_body(request: Request, path: Path, most_bytes: int) -> int:
     size = 0
     with path.open("xb") as file:
         try:
-            async for chunk in request.stream():
+            async for chunk in _pieces_in_time(request):
                 size += len(chunk)
                 if size > most_bytes:
                     raise too_large
@@ -32,6 +41,24 @@ async def save_body(request: Request, path: Path, most_bytes: int) -> int:
     if not size:
         raise RefusedError(400, "the file is empty")
     return size
+
+
+async def _pieces_in_time(request: Request) -> AsyncIterator[bytes]:
+    """Yields the pieces of a body; `RefusedError` for a client that sends them too slowly."""
+    pieces, size, began_s = aiter(request.stream()), 0, time.monotonic()
+    while True:
+        try:
+            async with asyncio.timeout(LONGEST_PAUSE_S):
+                piece = await anext(pieces, None)
+        except TimeoutError:
+            raise RefusedError(408, f"nothing has come for {LONGEST_PAUSE_S:g} s") from None
+        if piece is None:
+            return
+        yield piece
+        size += len(piece)
+        elapsed_s = time.monotonic() - began_s
+        if elapsed_s > LONGEST_PAUSE_S and size < LEAST_BYTES_S * elapsed_s:
+            raise RefusedError(408, f"the file comes with less than {LEAST_BYTES_S:g} bytes/s")
 
 
 def check_pilot(request: Request) -> None:

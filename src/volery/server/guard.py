@@ -19,6 +19,7 @@ from starlette.websockets import WebSocket
 
 from volery.bridges.origins import Origins, name_of
 from volery.core.listening import LOOPBACK
+from volery.core.token_guesses import TokenGuesses
 from volery.server.replies import RefusedError, refused
 from volery.server.rights import Role, Sessions, Tokens
 
@@ -39,7 +40,7 @@ _HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 _WRONG_TOKEN_S = 0.5
-"""What a wrong token costs its guesser."""
+"""What a wrong token costs its guesser, beside his turn (`TokenGuesses`)."""
 _GONE_S = 0.2
 """How long a refused WebSocket has to go."""
 _HARMLESS = {"GET", "HEAD", "OPTIONS"}
@@ -78,6 +79,7 @@ class Guard:
         self._cookie = cookie
         self._only_loopback = only_loopback
         self._sessions = Sessions()
+        self._guesses = TokenGuesses()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request pass, or refuse it."""
@@ -87,7 +89,7 @@ class Guard:
         headers = Headers(scope=scope)
         try:
             self._check_place(scope, headers)
-            visitor = await self._recognize(scope, headers)
+            visitor = await self._recognize(scope, headers, receive)
         except RefusedError as error:
             await _refuse(error, scope, receive, self._polite(send, None))
             return
@@ -109,20 +111,23 @@ class Guard:
                 f"this server is not called '{host[:80]}'; use localhost, or start it with "
                 "--origin for a name of a reverse proxy",
             )
+        foreign = headers.get("sec-fetch-site") in ("cross-site", "same-site")
         if scope["type"] == "http" and scope["method"] in _HARMLESS:
+            if foreign and headers.get("sec-fetch-mode") != "navigate" and _in_query(scope):
+                raise RefusedError(403, "pages of other sites may not show tokens")
             return
         if not self._origins.let_in(origin, host):
             raise RefusedError(403, f"pages of {origin} are not let in; allow them with --origin")
-        if origin is None and headers.get("sec-fetch-site") in ("cross-site", "same-site"):
+        if origin is None and foreign:
             raise RefusedError(403, "pages of other sites are not let in")
 
-    async def _recognize(self, scope: Scope, headers: Headers) -> _Visitor:
+    async def _recognize(self, scope: Scope, headers: Headers, receive: Receive) -> _Visitor:
         """Whose token or session this is; `RefusedError` where one is needed and missing."""
         if not self._tokens.needed:
             return _Visitor(Role.PILOT, None)
         given = _token_of(scope, headers)
         if given is not None:
-            role = self._tokens.role_of(given)
+            role = await self._role_of(given, scope, receive)
             if role is None:
                 await asyncio.sleep(_WRONG_TOKEN_S)
                 if scope["path"].startswith(_GUARDED):
@@ -134,6 +139,17 @@ class Guard:
         if role is None and path.startswith(_GUARDED) and path != _FOR_ALL:
             raise RefusedError(401, "show a token: ?token=, or the header Authorization: Bearer")
         return _Visitor(role, None)
+
+    async def _role_of(self, given: str, scope: Scope, receive: Receive) -> Role | None:
+        """The role of a token, in turn with others of the same address."""
+        client: tuple[str, int] | None = scope.get("client")
+        async with self._guesses.turn(client[0] if client else "?"):
+            role = self._tokens.role_of(given)
+            if role is None:
+                # of a WebSocket nothing may be read before it is accepted
+                gone = _wait_for_end(receive) if scope["type"] == "http" else None
+                await self._guesses.penalize(gone)
+        return role
 
     def _polite(self, send: Send, ticket: str | None) -> Send:
         """`send` that adds the headers, and the session."""
@@ -153,11 +169,23 @@ class Guard:
         return polite
 
 
-def _token_of(scope: Scope, headers: Headers) -> str | None:
+async def _wait_for_end(receive: Receive) -> None:
+    """Returns when the client has left; what it has sent is passed over."""
+    while (await receive())["type"] != "http.disconnect":
+        pass
+
+
+def _in_query(scope: Scope) -> str | None:
+    """Returns the token in the address that was asked for."""
     query: str = scope["query_string"].decode("latin-1")
     given = parse_qs(query).get("token")
-    if given:
-        return given[0]
+    return given[0] if given else None
+
+
+def _token_of(scope: Scope, headers: Headers) -> str | None:
+    given = _in_query(scope)
+    if given is not None:
+        return given
     scheme, _, bearer = headers.get("authorization", "").partition(" ")
     return bearer.strip() if scheme.lower() == "bearer" else None
 

@@ -9,7 +9,7 @@ with PageServer(PageSettings(port=8080)) as server:
 from __future__ import annotations
 
 import asyncio
-import socket
+import logging
 from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -20,10 +20,13 @@ from volery.bridges.loop_thread import LoopThread
 from volery.bridges.origins import Origins
 from volery.bridges.rosbridge.wire import MOST_MESSAGE_BYTES
 from volery.core.errors import BridgeError
+from volery.core.listener import Listener, open_listener
 from volery.core.listening import LOOPBACK
+from volery.core.rare_log import RepeatFilter
 from volery.scenario.schema import Scenario
 from volery.scenario.shelf import Shelf
 from volery.server.app import make_app
+from volery.server.http_protocol import http_protocol
 from volery.server.rights import check_rights
 from volery.server.settings import PageSettings
 from volery.server.site import Site, Situation, State, World
@@ -32,6 +35,9 @@ _KEEPALIVE_S = 20.0
 """Between two pings, and how long an answer may take."""
 _LONGEST_CALL_S = 30.0
 """Of the server's own work on a busy machine; nothing in it waits for a client longer."""
+
+_REPEATS = RepeatFilter()
+"""Clients can cause uvicorn's warnings without end."""
 
 
 class PageServer:
@@ -45,7 +51,7 @@ class PageServer:
         self._site = Site(settings.recordings, shelf or Shelf(settings.uploads))
         self._thread = LoopThread("volery-page")
         self._server: uvicorn.Server | None = None
-        self._socket: socket.socket | None = None
+        self._socket: Listener | None = None
         self._serving: asyncio.Task[None] | None = None
 
     @property
@@ -80,9 +86,11 @@ class PageServer:
             cookie=f"volery_{self.port}",
             only_loopback=settings.host in LOOPBACK,
         )
+        logging.getLogger("uvicorn.error").addFilter(_REPEATS)
         self._server = uvicorn.Server(
             uvicorn.Config(
                 app,
+                http=http_protocol(self._socket),
                 ws="websockets-sansio",
                 ws_max_size=MOST_MESSAGE_BYTES,
                 ws_ping_interval=_KEEPALIVE_S,
@@ -148,7 +156,7 @@ class PageServer:
 
     # ------------------------------------------------------------------------------- its own thread
 
-    async def _begin(self, server: uvicorn.Server, listening: socket.socket) -> None:
+    async def _begin(self, server: uvicorn.Server, listening: Listener) -> None:
         self._serving = asyncio.create_task(server.serve([listening]))
         while not server.started:
             if self._serving.done():
@@ -167,24 +175,13 @@ class PageServer:
         self._thread.call(work, _LONGEST_CALL_S)
 
 
-def _listen(host: str, port: int) -> socket.socket:
+def _listen(host: str, port: int) -> Listener:
     """A listening socket. `BridgeError` where there cannot be one."""
     try:
-        (family, kind, protocol, _, address), *_ = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )
-        listening = socket.socket(family, kind, protocol)
-        try:
-            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            listening.bind(address)
-            listening.listen(100)
-            listening.setblocking(False)
-        except BaseException:
-            listening.close()
-            raise
-    except OSError as error:
+        return open_listener(host, port, "page")
+    except (OSError, OverflowError) as error:
         raise BridgeError(
-            f"the page's server cannot listen on {host}:{port}: {error.strerror or error}; "
+            f"the page's server cannot listen on {host}:{port}: "
+            f"{getattr(error, 'strerror', None) or error}; "
             "end the program that has the port, or choose another"
         ) from None
-    return listening

@@ -194,6 +194,8 @@ class Bench:
     over_limit = ""
     """Word of the limit in the error that oversized frames bring."""
     remote_service = "/theirs"
+    speaks_http = False
+    """Whether its protocol begins with a request of HTTP."""
 
     def __init__(self):
         self.clients = []

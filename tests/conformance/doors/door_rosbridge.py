@@ -175,6 +175,7 @@ class ServerBench(Bench):
     """Our server; compression: how clients want messages."""
 
     over_limit = f"{LIMIT_BYTES}"
+    speaks_http = True
 
     def __init__(self, compression):
         super().__init__()

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import gc
 import itertools
@@ -16,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from door_bench import IMAGE, STRING, Refused, taken_port, vanish
+from door_bench import IMAGE, PATIENCE_S, STRING, Refused, taken_port, vanish
 from ros_tcp_client import until
 
 from volery.core.errors import VoleryError
@@ -264,3 +265,28 @@ def test_strangers_who_speak_another_protocol_harm_nobody(bench, others):
     for stranger in strangers:
         stranger.close()
     others.check()
+
+
+@pytest.mark.needs("listening")
+@pytest.mark.parametrize("words", [b"POST / HTTP/1.1\r\nHost: x\r\n\r\n", b"\x16\x03\x01\x02\0"])
+def test_web_pages_and_tls_are_sent_away(bench, others, words):
+    stranger = socket.create_connection(("127.0.0.1", bench.door.port), PATIENCE_S)
+    with stranger, contextlib.suppress(ConnectionError):
+        for byte in words:
+            stranger.sendall(bytes((byte,)))
+        if bench.speaks_http:  # which waits for the end of a line, up to a deadline
+            stranger.shutdown(socket.SHUT_WR)
+        while stranger.recv(4096):
+            pass
+    others.check()
+
+
+@pytest.mark.needs("listening", "others")
+def test_half_open_connections_keep_nobody_out(bench, others):
+    """More than may be unproven at once; those that are there already notice nothing."""
+    idle = [socket.create_connection(("127.0.0.1", bench.door.port)) for _ in range(100)]
+    again = Served(bench, bench.connect())
+    again.check()
+    others.check()
+    for sock in idle:
+        sock.close()

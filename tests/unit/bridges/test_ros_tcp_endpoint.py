@@ -517,7 +517,7 @@ def test_a_port_in_use_is_named(serve):
 
 
 def test_beyond_loopback_only_with_consent():
-    with pytest.raises(BridgeError, match="--anywhere"):
+    with pytest.raises(BridgeError, match="--allow-remote"):
         RosTcpEndpoint("0.0.0.0")
     assert "0.0.0.0" in RosTcpEndpoint("0.0.0.0", anywhere=True).name
 

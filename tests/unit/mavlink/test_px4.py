@@ -77,19 +77,31 @@ def test_a_vehicle_flies_in_lock_step(opened):
     assert simulation.uavs["uav1"].position_map[2] > 0.3
 
 
-def test_who_speaks_no_mavlink_and_who_comes_second_are_told_of(opened, caplog):
+def is_ended(connection):
+    connection.settimeout(20.0)
+    with contextlib.suppress(ConnectionResetError):
+        while connection.recv(4096):
+            pass
+    return True
+
+
+def test_who_speaks_no_mavlink_gives_way_and_who_comes_after_a_px4_is_ended(opened, caplog):
     simulation, door = opened()
-    with socket.create_connection(("127.0.0.1", door._port)) as stranger:
+    address = ("127.0.0.1", door._port)
+    with socket.create_connection(address) as stranger:
         meet(simulation, door, 1)
-        for _ in range(5):
-            stranger.sendall(b"GET / HTTP/1.1\r\nHost: somewhere\r\n\r\n")
-        with socket.create_connection(("127.0.0.1", door._port)) as second:
-            second.settimeout(20.0)
-            with contextlib.suppress(ConnectionResetError):
-                assert second.recv(1) == b""
+        stranger.sendall(b"hello, is this the way to the aviary?" * 5)
         end = time.monotonic() + 20.0
         while "does not speak" not in caplog.text and time.monotonic() < end:
             time.sleep(0.01)
+        with socket.create_connection(address) as px4:
+            assert is_ended(stranger)
+            px4.sendall(HilLink(1).heartbeat())
+            while not door._seats[0].has_heard and time.monotonic() < end:
+                time.sleep(0.01)
+            with socket.create_connection(address) as second:
+                assert is_ended(second)
+            assert door.connected == ("uav1",)
     told = [text for text in caplog.messages if "does not speak MAVLink" in text]
     assert told == ["uav1: what is connected does not speak MAVLink: no PX4?"]
     assert "uav1: its PX4 is connected already; another connection is ended" in caplog.messages
@@ -349,7 +361,7 @@ def test_a_px4_that_does_not_read_for_long_hears_whole_frames_again():
     frame = bytes(range(64))
 
     async def made():
-        return _Connection(None)
+        return _Connection(None, None)
 
     connection = asyncio.run(made())
     connection._out = ours

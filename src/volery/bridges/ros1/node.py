@@ -214,7 +214,7 @@ def _check_master(master: Ros1Master) -> None:
 def _set_address(host: str | None, *, anywhere: bool) -> None:
     """Tell rospy, which knows nothing but the environment, how others reach this machine."""
     given = host or os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or "127.0.0.1"
-    check_address(given, anywhere=anywhere, flag="anywhere=True (--anywhere)")
+    check_address(given, anywhere=anywhere, flag="anywhere=True or --allow-remote")
     if host is not None or not (os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP")):
         os.environ.pop("ROS_HOSTNAME", None)
         os.environ["ROS_IP"] = given

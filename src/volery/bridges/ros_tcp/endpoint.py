@@ -18,11 +18,13 @@ from functools import partial
 from volery.bridges.doors import wake_of
 from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.payloads import payloads_of
-from volery.bridges.ros_tcp.pipe import Pipe
+from volery.bridges.ros_tcp.pipe import Pipe, ServerEnd
 from volery.bridges.ros_tcp.session import EndpointSession
 from volery.bridges.ros_tcp.wire import MOST_PAYLOAD_BYTES, FrameParser, Generation
 from volery.core.errors import BridgeError
+from volery.core.listener import Listener, open_listener
 from volery.core.listening import check_address
+from volery.core.preamble import Preamble
 from volery.graph.mailbox import Wake
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.session import Gateway
@@ -30,8 +32,7 @@ from volery.graph.session import Gateway
 SILENCE_S = 15.0
 """Fifteen keepalives of Unity's Connector."""
 _CHECKS_A_SILENCE = 4
-_OUT_OF_FILES_S = 0.1
-_BACKLOG = 64
+_RETRY_S = 0.1
 
 
 class RosTcpEndpoint:
@@ -68,7 +69,7 @@ class RosTcpEndpoint:
         silence_s: float = SILENCE_S,
         most_clients: int = 256,
     ) -> None:
-        check_address(host, anywhere=anywhere, flag="anywhere=True or --anywhere")
+        check_address(host, anywhere=anywhere, flag="anywhere=True or --allow-remote")
         payloads_of(generation)
         self.port = port
         self._host = host
@@ -77,7 +78,7 @@ class RosTcpEndpoint:
         self._depth = depth
         self._silence_s = silence_s
         self._most_clients = most_clients
-        self._listener: socket.socket | None = None
+        self._listener: Listener | None = None
         self._tasks: list[asyncio.Task[None]] = []
         self._clients: set[_Client] = set()
 
@@ -89,7 +90,7 @@ class RosTcpEndpoint:
     async def start(self, gateway: Gateway) -> None:
         """Listen. `BridgeError` where the port is in use or the host is not ours."""
         loop = asyncio.get_running_loop()
-        self._listener = await _listen(self._host, self.port)
+        self._listener = _listen(self._host, self.port)
         self.port = self._listener.getsockname()[1]
         self._tasks = [
             loop.create_task(self._accept(gateway, self._listener)),
@@ -108,13 +109,13 @@ class RosTcpEndpoint:
         for client in tuple(self._clients):
             client.pipe.close("the door was closed")
 
-    async def _accept(self, gateway: Gateway, listener: socket.socket) -> None:
+    async def _accept(self, gateway: Gateway, listener: Listener) -> None:
         loop = asyncio.get_running_loop()
         while True:
             try:
                 sock, address = await loop.sock_accept(listener)
-            except OSError:  # out of files, or the client is gone already
-                await asyncio.sleep(_OUT_OF_FILES_S)
+            except OSError:  # the client is gone already
+                await asyncio.sleep(_RETRY_S)
                 continue
             if len(self._clients) >= self._most_clients:
                 with contextlib.suppress(OSError), sock:
@@ -124,7 +125,7 @@ class RosTcpEndpoint:
             open_session = partial(EndpointSession, gateway, name, self._generation, self._depth)
             with contextlib.suppress(OSError):  # gone already
                 parser = FrameParser(self._most_payload_bytes)
-                _Client(sock, parser, open_session, self._clients)
+                _Client(sock, parser, open_session, self._clients, listener)
 
     async def _watch(self) -> None:
         """Let those go who fell silent."""
@@ -146,12 +147,19 @@ class _Client:
         parser: FrameParser,
         open_session: Callable[[Wake], EndpointSession],
         everyone: set[_Client],
+        listener: Listener,
     ) -> None:
         self._everyone = everyone
         self._session = session = open_session(wake_of(asyncio.get_running_loop(), self._flush))
         try:
             self.pipe = Pipe(
-                sock, parser, session.outbox, session.take, session.complain, self._closed
+                sock,
+                parser,
+                session.outbox,
+                session.take,
+                session.complain,
+                self._closed,
+                ServerEnd(Preamble(), partial(listener.prove, sock), listener.note_stranger),
             )
         except OSError:
             session.close()
@@ -167,23 +175,13 @@ class _Client:
         self._session.close()
 
 
-async def _listen(host: str, port: int) -> socket.socket:
-    loop = asyncio.get_running_loop()
-    listener: socket.socket | None = None
+def _listen(host: str, port: int) -> Listener:
     try:
-        (family, *_, address), *_ = await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-        listener = socket.socket(family, socket.SOCK_STREAM)
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(address)
-        listener.listen(_BACKLOG)
-        listener.setblocking(False)
+        return open_listener(host, port, "ROS-TCP")
     except (OSError, OverflowError) as error:
-        if listener is not None:
-            listener.close()
         if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
             raise BridgeError(
                 f"ROS-TCP: port {port} on {host} is in use: end the program that listens there "
                 f"(`ss -ltnp 'sport = :{port}'` names it) or choose another port"
             ) from None
         raise BridgeError(f"ROS-TCP: cannot listen on {host}:{port}: {error}") from None
-    return listener

@@ -10,11 +10,12 @@ import asyncio
 import contextlib
 import socket
 from collections.abc import Callable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from volery.bridges.ros_tcp.wire import Bytes, Frame, FrameParser
 from volery.core.errors import BridgeError
 from volery.core.listening import tend
+from volery.core.preamble import Preamble
 
 _BATCHES_A_TURN = 16
 """After so many others have their turn."""
@@ -22,6 +23,7 @@ _FRAMES_A_TURN = 32
 """Who sends more at once is read from in small bites, so that a flood delays nobody else."""
 _BITE_BYTES = 2048
 _LARGEST_BITE_BYTES = 16 << 20
+_PREAMBLE_BYTES = 16
 _FAREWELL_S = 1.0
 
 
@@ -36,11 +38,22 @@ class Outgoing(Protocol):
         """Parts of whole frames to send next, a bounded number; none if nothing waits."""
 
 
+class ServerEnd(NamedTuple):
+    """What a server wants to know of the first bytes of a client."""
+
+    preamble: Preamble
+    prove: Callable[[], None]
+    """Called when a valid frame has come."""
+    note_stranger: Callable[[str], None]
+    """Called with the protocol of a client that speaks another one."""
+
+
 class Pipe:
     """Reads frames, hands them to `take`, and sends what the outbox gathers.
 
     broken: told why nothing that follows can be read; what it puts into the outbox is still sent.
     closed: told once why the connection has ended.
+    server_end: what a server checks of a new client; None: we are the client.
     """
 
     def __init__(
@@ -51,6 +64,7 @@ class Pipe:
         take: Callable[[Frame], None],
         broken: Callable[[str], None],
         closed: Callable[[str], None],
+        server_end: ServerEnd | None = None,
     ) -> None:
         self._loop = asyncio.get_running_loop()
         self._sock = sock
@@ -59,6 +73,7 @@ class Pipe:
         self._take = take
         self._broken = broken
         self._closed = closed
+        self._unproven = server_end
         self._unsent: list[Bytes] = []
         self._blocked = False
         self._bite = _BITE_BYTES
@@ -95,8 +110,9 @@ class Pipe:
         self._closed(reason)
 
     def _readable(self) -> None:
+        space = self.parser.space()
         try:
-            count = self._sock.recv_into(self.parser.space()[: self._bite])
+            count = self._sock.recv_into(space[: self._bite])
         except (BlockingIOError, InterruptedError):
             return
         except OSError as error:
@@ -108,8 +124,11 @@ class Pipe:
         self.last_received_s = self._loop.time()
         if self._ending:  # what is not read would make the kernel withdraw our last words
             return
+        if self._is_stranger(space[:count]):
+            return
         try:
             frames = self.parser.written(count)
+            self._prove(bool(frames))
             flood = len(frames) > _FRAMES_A_TURN
             self._bite = _BITE_BYTES if flood else min(2 * self._bite, _LARGEST_BITE_BYTES)
             for frame in frames:
@@ -120,6 +139,26 @@ class Pipe:
         if self._outbox.crowded and self._open and not self._ending:
             self._reading = False  # who does not read our answers is not asked for more
             self._loop.remove_reader(self._sock)
+
+    def _is_stranger(self, data: memoryview) -> bool:
+        """Ends a connection that speaks another protocol; whether it did.
+
+        Nothing need be held back: no frame is whole before its first bytes tell.
+        """
+        if self._unproven is None:
+            return False
+        preamble = self._unproven.preamble
+        preamble.feed(bytes(data[:_PREAMBLE_BYTES]))
+        if preamble.refused is None:
+            return False
+        self._unproven.note_stranger(preamble.refused)
+        self.close(f"it speaks {preamble.refused}")
+        return True
+
+    def _prove(self, has_frames: bool) -> None:
+        if self._unproven is not None and (has_frames or self.parser.keepalives):
+            self._unproven.prove()
+            self._unproven = None
 
     def _write(self) -> None:
         try:

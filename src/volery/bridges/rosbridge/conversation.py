@@ -13,6 +13,7 @@ from contextlib import suppress
 from typing import Any, Protocol
 
 from volery.bridges.doors import wake_of
+from volery.bridges.rosbridge.checkpoint import Checkpoint
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.wire import Frame
 
@@ -69,15 +70,17 @@ def post_to(loop: asyncio.AbstractEventLoop) -> Callable[[Callable[[], Any]], No
     return post
 
 
-async def converse(channel: Channel, bell: Bell, peer: RosbridgePeer) -> Exception | None:
+async def converse(
+    channel: Channel, bell: Bell, peer: RosbridgePeer, checkpoint: Checkpoint | None = None
+) -> Exception | None:
     """Serve a client until it leaves or must go, then close its peer.
 
-    bell: what the peer's `wake` rings. Returns what ended the service unless that was its own end:
-    mostly that the connection was closed.
+    bell: what the peer's `wake` rings. checkpoint: of a client that must show a token. Returns what
+    ended the service unless that was its own end: mostly that the connection was closed.
     """
     read = asyncio.Event()
     tasks = [
-        asyncio.create_task(_read(channel, peer, read)),
+        asyncio.create_task(_read(channel, peer, read, checkpoint)),
         asyncio.create_task(_write(channel, peer, bell, read)),
     ]
     try:
@@ -90,7 +93,9 @@ async def converse(channel: Channel, bell: Bell, peer: RosbridgePeer) -> Excepti
     return next((outcome for outcome in outcomes if isinstance(outcome, Exception)), None)
 
 
-async def _read(channel: Channel, peer: RosbridgePeer, read: asyncio.Event) -> None:
+async def _read(
+    channel: Channel, peer: RosbridgePeer, read: asyncio.Event, checkpoint: Checkpoint | None
+) -> None:
     """Hand the client's frames to its peer until it leaves or must go."""
     while peer.refused is None:
         silence_s = None if peer.authorized else _LONGEST_SILENCE_S
@@ -100,7 +105,10 @@ async def _read(channel: Channel, peer: RosbridgePeer, read: asyncio.Event) -> N
         except TimeoutError:
             await channel.close(POLICY_VIOLATION, "no token was shown")
             return
-        peer.receive(frame, time.monotonic())
+        if peer.authorized or checkpoint is None:
+            peer.receive(frame, time.monotonic())
+        else:
+            await checkpoint.receive(peer, frame)
         while peer.congested:  # it asks for more than it reads
             read.clear()
             await read.wait()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Sequence
+from functools import partial
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -15,6 +16,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from volery.bridges.origins import Origins
+from volery.bridges.rosbridge.checkpoint import Checkpoint
 from volery.bridges.rosbridge.conversation import Bell, converse, post_to
 from volery.bridges.rosbridge.forms import Forms, Generation
 from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
@@ -22,13 +24,21 @@ from volery.bridges.rosbridge.rosapi import RosApi
 from volery.bridges.rosbridge.rosapi_parameters import Parameters
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES
 from volery.core.errors import BridgeError
+from volery.core.listener import Listener, open_listener
 from volery.core.listening import check_address, check_token, shows_token, tend
+from volery.core.rare_log import RepeatFilter
+from volery.core.token_guesses import TokenGuesses
 from volery.graph.session import Gateway
 
 _log = logging.getLogger(__name__)
+_handshakes = logging.getLogger(f"{__name__}.handshakes")
+_handshakes.addFilter(RepeatFilter(bare=("opening handshake failed",)))
+"""Of `websockets`, to which clients give cause for warnings without end."""
 
 DEFAULT_PORT = 9090
 MOST_CLIENTS = 1000
+HANDSHAKE_TIMEOUT_S = 10.0
+"""For the request of a WebSocket, its wait for the check of a token included."""
 _ONCE = ("Host", "Origin", "Authorization")
 """Headers that say where a request comes from: two of them say nothing."""
 
@@ -94,6 +104,8 @@ class RosbridgeServer:
         self._keepalive_s = keepalive_s
         self._parameters = parameters
         self._server: Server | None = None
+        self._listener: Listener | None = None
+        self._guesses = TokenGuesses()
         self._rosapi: RosApi | None = None
         self._clients: set[ServerConnection] = set()
         self._shown: WeakSet[ServerConnection] = WeakSet()
@@ -127,10 +139,12 @@ class RosbridgeServer:
         self._gateway = gateway
         self._shared = Shared(Forms(self._generation), graph.now_ns, self._token, self._most_bytes)
         try:
+            self._listener = open_listener(self.host, self.port, "rosbridge")
             self._server = await serve(
                 self._serve,
-                self.host,
-                self.port,
+                sock=self._listener,
+                open_timeout=HANDSHAKE_TIMEOUT_S,
+                logger=_handshakes,
                 process_request=self._check_request,
                 select_subprotocol=_select_subprotocol,
                 compression=None,  # deflating would cost more time than loopback and LANs do
@@ -160,7 +174,9 @@ class RosbridgeServer:
 
     # ------------------------------------------------------------------------------- who may come
 
-    def _check_request(self, connection: ServerConnection, request: Request) -> Response | None:
+    async def _check_request(
+        self, connection: ServerConnection, request: Request
+    ) -> Response | None:
         """Refuse strangers before they are connected."""
         url = urlsplit(request.path)
         if self._path is not None and url.path.rstrip("/") != self._path.rstrip("/"):
@@ -179,13 +195,25 @@ class RosbridgeServer:
         scheme, _, bearer = request.headers.get("Authorization", "").partition(" ")
         if given is None and scheme.lower() == "bearer":
             given = bearer.strip()
-        if given is not None and not shows_token(given, self._token):
+        if given is not None and not await self._is_token(given, connection):
             return connection.respond(HTTPStatus.UNAUTHORIZED, "wrong token\n")
         if len(self._clients) >= MOST_CLIENTS:
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "too many clients\n")
         if given is not None:
             self._shown.add(connection)
         return None
+
+    async def _is_token(self, given: str, connection: ServerConnection) -> bool:
+        """Whether this is the token, told in turn with others of the same address."""
+        async with self._guesses.turn(_address_of(connection)):
+            is_right = shows_token(given, self._token)
+            if not is_right:
+                await self._guesses.penalize(connection.wait_closed())
+        return is_right
+
+    def _prove(self, connection: ServerConnection) -> None:
+        if self._listener is not None:
+            self._listener.prove(connection.transport)
 
     # -------------------------------------------------------------------------------- one client
 
@@ -204,12 +232,22 @@ class RosbridgeServer:
             authorized=connection in self._shown,
         )
         self._clients.add(connection)
+        prove = partial(self._prove, connection)
+        checkpoint = Checkpoint(
+            self._guesses, _address_of(connection), connection.wait_closed, prove
+        )
+        if peer.authorized:
+            prove()
         try:
-            trouble = await converse(connection, bell, peer)
+            trouble = await converse(connection, bell, peer, checkpoint)
         finally:
             self._clients.discard(connection)
         if trouble is not None and not isinstance(trouble, ConnectionClosed):
             _log.error("serving %s failed", session.name, exc_info=trouble)
+
+
+def _address_of(connection: ServerConnection) -> str:
+    return str((connection.remote_address or ("?",))[0])
 
 
 def _select_subprotocol(_connection: ServerConnection, offered: Sequence[Any]) -> Any:

@@ -18,7 +18,9 @@ from volery.bridges.sensor_link.payloads import encode_notice
 from volery.bridges.sensor_link.streams import IMAGES, SENSORS, Stream, Streams, period_from_hz
 from volery.bridges.sensor_link.wire import VERSION, Frame, FrameParser, Kind, encode_frame
 from volery.core.errors import BridgeError
+from volery.core.listener import Listener, open_listener
 from volery.core.listening import check_address, tend
+from volery.core.preamble import Preamble
 from volery.graph.session import Gateway
 
 PORT = 10100
@@ -125,14 +127,18 @@ class _Port:
         self._depth = depth
         self._period_ns = period_ns
         self._server: asyncio.Server | None = None
+        self._listener: Listener | None = None
         self._clients: set[_Client] = set()
         self._streams: Streams
 
     async def open(self, gateway: Gateway) -> None:
         loop = asyncio.get_running_loop()
         try:
+            self._listener = open_listener(  # whose clients may listen in silence
+                self._host, self.port, self._name, max_unproven=None
+            )
             self._server = await loop.create_server(
-                lambda: _Client(self, gateway, self._name), self._host, self.port
+                lambda: _Client(self, gateway, self._name), sock=self._listener
             )
         except (OSError, OverflowError) as error:
             raise _cannot_listen(self._host, self.port, error) from None
@@ -161,11 +167,25 @@ class _Port:
 
     def admit(self, client: _Client) -> bool:
         """Whether there is room for one more, who is then a client."""
-        if self._server is None or len(self._clients) >= MOST_CLIENTS:
+        if self._listener is None or self._server is None:
+            return False
+        if len(self._clients) >= MOST_CLIENTS and not self._listener.make_room_for(
+            client.transport
+        ):
             return False
         self._clients.add(client)
         self._streams.open()
         return True
+
+    def prove(self, client: _Client) -> None:
+        """Notes that a client has sent a valid frame."""
+        if self._listener is not None:
+            self._listener.prove(client.transport)
+
+    def note_stranger(self, protocol: str) -> None:
+        """Counts a client that speaks another protocol."""
+        if self._listener is not None:
+            self._listener.note_stranger(protocol)
 
     def forget(self, client: _Client) -> None:
         self._clients.discard(client)
@@ -189,14 +209,15 @@ class _Client(asyncio.Protocol):
         self._name = name
         self._outbox = Outbox(port.depth)
         self._parser = FrameParser(_COMMAND_LIMIT_BYTES)
+        self._preamble = Preamble()
         self._paused = False
         self._notices = 0
         self._told_version = self._told_length = False
-        self._transport: asyncio.Transport
+        self.transport: asyncio.Transport
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
+        self.transport = transport
         address = transport.get_extra_info("peername") or ("?", 0)
         self._name = f"{self._name} {address[0]}:{address[1]}"
         tend(transport.get_extra_info("socket"))
@@ -215,9 +236,16 @@ class _Client(asyncio.Protocol):
             session.close()
 
     def data_received(self, data: bytes) -> None:
-        if self._port.takes_commands and not self._transport.is_closing():
+        data = self._preamble.feed(data)
+        if self._preamble.refused is not None:
+            self._port.note_stranger(self._preamble.refused)
+            self.transport.abort()
+            return
+        if self._port.takes_commands and not self.transport.is_closing():
             for frame in self._parser.feed(data):
                 self._take(frame)
+            if self._parser.frames:
+                self._port.prove(self)
             if self._parser.other_version is not None and not self._told_version:
                 self._told_version = True
                 self._notify(f"version {VERSION} is spoken here, not {self._parser.other_version}")
@@ -239,7 +267,7 @@ class _Client(asyncio.Protocol):
 
     def end(self) -> None:
         """Let the client go, with whatever it has not taken."""
-        self._transport.abort()
+        self.transport.abort()
 
     @property
     def info(self) -> ClientInfo:
@@ -259,11 +287,11 @@ class _Client(asyncio.Protocol):
         self._flush()
 
     def _flush(self) -> None:
-        while not self._paused and not self._transport.is_closing():
+        while not self._paused and not self.transport.is_closing():
             frame = self._outbox.take()
             if frame is None:
                 return
-            self._transport.write(frame)
+            self.transport.write(frame)
 
 
 def _cannot_listen(host: str, port: int, error: Exception) -> BridgeError:

@@ -1,0 +1,32 @@
+"""Checks the token of a client that has not shown it with its request for a connection."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+from volery.bridges.rosbridge.protocol import RosbridgePeer
+from volery.bridges.rosbridge.wire import Frame
+from volery.core.token_guesses import TokenGuesses
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """What the frames of one client pass until it is authorized."""
+
+    guesses: TokenGuesses
+    address: str
+    wait_closed: Callable[[], Awaitable[None]]
+    """Waits for the end of the connection."""
+    prove: Callable[[], None]
+    """Called once the client is authorized."""
+
+    async def receive(self, peer: RosbridgePeer, frame: Frame) -> None:
+        """Hands a frame to the peer, in turn with other clients of the same address."""
+        async with self.guesses.turn(self.address):
+            peer.receive(frame, time.monotonic())
+            if peer.refused is not None:
+                await self.guesses.penalize(self.wait_closed())
+        if peer.authorized:
+            self.prove()

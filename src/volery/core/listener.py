@@ -1,0 +1,243 @@
+"""A listening TCP socket that keeps to limits, for every server over TCP.
+
+    listener = open_listener("127.0.0.1", 5760, "MAVLink TCP")
+    server = await loop.create_server(make_protocol, sock=listener)
+    ...
+    listener.prove(transport)          # the client has sent a valid first frame
+
+The limits hold where connections are accepted, so asyncio, uvicorn and websockets need no change. A
+connection is unproven until its first valid frame. Where there is no room, the oldest unproven
+connection ends; where there is none, the new one is refused. Both are counted and logged now and
+then. Out of file descriptors, asyncio's own loop would log a traceback for each attempt; here a
+reserved descriptor serves to refuse the client.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import logging
+import os
+import socket
+import time
+from typing import Any
+
+from volery.core.connection_limits import SHARED, ConnectionLimits
+from volery.core.rare_log import RareLog
+
+MAX_UNPROVEN = 64
+"""Connections to one listener that have sent no valid frame (modelling choice)."""
+_BACKLOG = 128
+_REFUSALS_A_TURN = 64
+_EVICTIONS_A_TURN = 16
+"""After so many the server gets its turn, to close what was ended."""
+_NO_DESCRIPTORS = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
+_PAUSE_S = 0.001
+"""Of a server that has no descriptor at all: it would spin otherwise."""
+_log = logging.getLogger(__name__)
+
+
+class Listener(socket.socket):
+    """Accepts connections within limits. All methods belong to the thread of its server.
+
+    name: of the server, for logs. limits: what it shares with others. max_connections: of this
+    listener, above which the oldest unproven one gives way; None: those of `limits`. max_unproven:
+    as MAX_UNPROVEN; None: no limit of their own, where clients may listen in silence.
+    """
+
+    def __init__(
+        self,
+        family: int,
+        name: str,
+        limits: ConnectionLimits = SHARED,
+        max_connections: int | None = None,
+        max_unproven: int | None = MAX_UNPROVEN,
+    ) -> None:
+        super().__init__(family, socket.SOCK_STREAM)
+        self._name = name
+        self._key = f"{name} {id(self)}"
+        self._limits = limits
+        self._max_connections = max_connections
+        self._max_unproven = max_unproven
+        self._open: dict[int, _Accepted] = {}
+        self._unproven: dict[int, _Accepted] = {}
+        """By file descriptor, the oldest first."""
+        self._evicted = 0
+        """Connections that have been ended and not yet closed."""
+        self._reserve: int | None = os.open(os.devnull, os.O_RDONLY)
+        self.refusals = RareLog(_log)
+        """What was refused and ended, by reason."""
+
+    def add_port(self) -> None:
+        """Adds the port to the name in logs."""
+        self._name = f"{self._name}, port {self.getsockname()[1]}"
+
+    def accept(self) -> tuple[socket.socket, Any]:
+        """As of `socket.socket`, for a connection that there is room for.
+
+        Raises
+        ------
+        BlockingIOError
+            None waits, or the server shall close some first.
+
+        """
+        for _ in range(_REFUSALS_A_TURN):
+            if self._evicted >= _EVICTIONS_A_TURN:
+                break
+            accepted = self._accept_one()
+            if accepted is not None:
+                return accepted
+        raise BlockingIOError(errno.EAGAIN, "others have their turn")
+
+    def prove(self, connection: Any) -> None:
+        """Notes a valid frame of the client of `connection`, a socket or a transport."""
+        self._unproven.pop(_descriptor_of(connection), None)
+
+    def make_room_for(self, connection: Any) -> bool:
+        """Ends the oldest unproven connection but this one; returns whether there was one.
+
+        For servers with a limit of their own, that tell a client why it is refused.
+        """
+        return self._evict("as many connections as may be", _descriptor_of(connection))
+
+    def note_stranger(self, protocol: str) -> None:
+        """Counts a connection that is ended because it speaks `protocol`, see `Preamble`."""
+        self._note(f"ends connections that speak {protocol}: a web page, or a wrong port")
+
+    def note_slow_client(self) -> None:
+        """Counts a connection that is ended because its request does not come."""
+        self._note("ends connections whose requests do not come in time")
+
+    def close(self) -> None:
+        """Stops listening; connections stay open."""
+        if self._reserve is not None:
+            os.close(self._reserve)
+            self._reserve = None
+        super().close()
+
+    # ---------------------------------------------------------------------------------- internal
+
+    def _accept_one(self) -> tuple[socket.socket, Any] | None:
+        """Accepts the next connection; None: it was refused."""
+        try:
+            descriptor, address = self._accept()  # type: ignore[attr-defined]
+        except OSError as error:
+            if error.errno not in _NO_DESCRIPTORS:
+                raise
+            self._refuse_blindly()
+            return None
+        accepted = _Accepted(self.family, self.type, self.proto, fileno=descriptor)
+        reason = self._enter(accepted, str(address[0]))
+        if reason is not None:
+            self._note(f"refuses connections: there are {reason}")
+            accepted.close()
+            return None
+        return accepted, address
+
+    def _enter(self, accepted: _Accepted, address: str) -> str | None:
+        """Makes room for a connection and counts it; or returns why there is none."""
+        most, unproven = self._max_connections, self._max_unproven
+        if unproven is not None:
+            unproven = min(unproven, max(1, self._limits.max_connections // 4))
+            if len(self._unproven) >= unproven:
+                self._evict(f"{unproven} without a valid request")
+        if most is not None and len(self._open) - self._evicted >= most:
+            full = f"{most} connections"
+            if not self._evict(full):
+                return full
+        reason = self._limits.enter(self._key, address)
+        if reason is not None:
+            self._evict(reason)  # room for the next one; this one's would come too late
+            return reason
+        accepted.attach(self, address)
+        self._open[accepted.fileno()] = self._unproven[accepted.fileno()] = accepted
+        return None
+
+    def _evict(self, reason: str, spared: int = -1) -> bool:
+        """Ends the oldest unproven connection; returns whether there was one."""
+        descriptor = next((number for number in self._unproven if number != spared), None)
+        if descriptor is None:
+            return False
+        oldest = self._unproven.pop(descriptor)
+        oldest.is_evicted = True
+        self._evicted += 1
+        self._note(f"ends idle connections: there are {reason}")
+        with contextlib.suppress(OSError):  # its client has left
+            oldest.shutdown(socket.SHUT_RDWR)  # its server sees the end of the stream
+        return True
+
+    def _refuse_blindly(self) -> None:
+        """Out of descriptors: gives the reserved one up for a moment to send a client away."""
+        self._note("refuses connections: out of file descriptors")
+        if self._reserve is None:
+            time.sleep(_PAUSE_S)
+        else:
+            os.close(self._reserve)
+            self._reserve = None
+            with contextlib.suppress(OSError):
+                os.close(self._accept()[0])  # type: ignore[attr-defined]
+        with contextlib.suppress(OSError):
+            self._reserve = os.open(os.devnull, os.O_RDONLY)
+
+    def _note(self, text: str) -> None:
+        self.refusals.note(f"{self._name}: {text}")
+
+    def forget(self, accepted: _Accepted, descriptor: int, address: str) -> None:
+        """Counts a connection as closed."""
+        self._open.pop(descriptor, None)
+        self._unproven.pop(descriptor, None)
+        self._evicted -= accepted.is_evicted
+        self._limits.leave(self._key, address)
+
+
+class _Accepted(socket.socket):
+    """A connection that tells its listener when it is closed."""
+
+    is_evicted = False
+    _listener: Listener | None = None
+    _address = ""
+
+    def attach(self, listener: Listener, address: str) -> None:
+        self._listener, self._address = listener, address
+
+    def close(self) -> None:
+        descriptor, listener, self._listener = self.fileno(), self._listener, None
+        super().close()
+        if listener is not None:
+            listener.forget(self, descriptor, self._address)
+
+
+def open_listener(
+    host: str,
+    port: int,
+    name: str,
+    *,
+    limits: ConnectionLimits = SHARED,
+    max_connections: int | None = None,
+    max_unproven: int | None = MAX_UNPROVEN,
+) -> Listener:
+    """Returns a socket that listens on the first address of `host`; port 0 takes a free one.
+
+    Names such as `localhost` mean IPv4 where they have such an address. The other arguments are
+    those of `Listener`. Raises `OSError` or `OverflowError` where it cannot listen.
+    """
+    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    family, _, _, _, address = min(found, key=lambda entry: entry[0] != socket.AF_INET)
+    listener = Listener(family, name, limits, max_connections, max_unproven)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(_BACKLOG)
+        listener.setblocking(False)
+        listener.add_port()
+    except BaseException:
+        listener.close()
+        raise
+    return listener
+
+
+def _descriptor_of(connection: Any) -> int:
+    """Returns the file descriptor of a socket or of an asyncio transport; -1: it is closed."""
+    if hasattr(connection, "get_extra_info"):
+        connection = connection.get_extra_info("socket")
+    return -1 if connection is None else int(connection.fileno())

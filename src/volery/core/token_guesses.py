@@ -1,0 +1,85 @@
+"""Limits how many wrong tokens a server is shown in a time, without locking anyone out.
+
+Clients of one address are checked one after the other, in the order in which they came. A right
+token takes no time; a wrong one keeps the next waiting for PENALTY_S, unless its client leaves. At
+most MAX_PENALTIES addresses do so at once. So an address gets at most 1 / PENALTY_S wrong guesses a
+second and all addresses together MAX_PENALTIES times that, however many connections they open. A
+client with the right token waits at most for those of its own address that came before it.
+
+    async with guesses.turn(address):
+        if not shows_token(given, token):
+            await guesses.penalize(gone)
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ipaddress
+from collections.abc import AsyncIterator, Awaitable
+
+PENALTY_S = 0.05
+MAX_PENALTIES = 5
+_IPV6_PREFIX = 64
+"""Bits that one customer of a network has in common."""
+
+
+class TokenGuesses:
+    """The limits of one server; belongs to one event loop."""
+
+    def __init__(self, penalty_s: float = PENALTY_S, max_penalties: int = MAX_PENALTIES) -> None:
+        self._penalty_s = penalty_s
+        self._penalties = asyncio.Semaphore(max_penalties)
+        self._queues: dict[str, _Queue] = {}
+        self.num_wrong = 0
+        """Wrong tokens that were shown."""
+
+    @property
+    def num_waiting(self) -> int:
+        """Clients that wait for their turn or have it."""
+        return sum(queue.num_clients for queue in self._queues.values())
+
+    @contextlib.asynccontextmanager
+    async def turn(self, address: str) -> AsyncIterator[None]:
+        """Waits until those of the same address that came before have been checked."""
+        key = _network_of(address)
+        queue = self._queues.setdefault(key, _Queue())
+        queue.num_clients += 1
+        try:
+            async with queue.lock:
+                yield
+        finally:
+            queue.num_clients -= 1
+            if not queue.num_clients:
+                self._queues.pop(key, None)
+
+    async def penalize(self, gone: Awaitable[object] | None = None) -> None:
+        """Keeps the turn after a wrong token, until `gone` says that the client has left."""
+        self.num_wrong += 1
+        async with self._penalties:
+            if gone is None:
+                await asyncio.sleep(self._penalty_s)
+                return
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(gone, self._penalty_s)
+
+
+class _Queue:
+    """Those of one address."""
+
+    def __init__(self) -> None:
+        self.lock = asyncio.Lock()
+        self.num_clients = 0
+
+
+def _network_of(address: str) -> str:
+    """Returns what one guesser has: an IPv4 address, or a network of IPv6 addresses."""
+    try:
+        found = ipaddress.ip_address(address.partition("%")[0])
+    except ValueError:
+        return address
+    if isinstance(found, ipaddress.IPv4Address):
+        return str(found)
+    if found.ipv4_mapped is not None:
+        return str(found.ipv4_mapped)
+    return str(ipaddress.IPv6Network((found, _IPV6_PREFIX), strict=False))

@@ -1,0 +1,72 @@
+"""Limits what clients of a MAVLink port may send in a time.
+
+Each frame takes time of the port's thread and of the simulation. A client has an account of frames
+that fills at a rate; while it is overdrawn nothing is read of the client, so TCP slows it down and
+UDP loses what does not fit. Clients that overdraw at the same time share one rate; the others
+notice nothing.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+FRAMES_PER_S = 1000.0
+"""Of all clients of a port that send more than they may (modelling choice: 50 UAVs get 20 setpoints
+a second each)."""
+_BURST_FRAMES = 500.0
+"""At once: a mission of many waypoints, all parameters."""
+_BYTES_PER_NOISE = 24
+"""Bytes of no frame that cost as much as a frame: each is a possible start of one."""
+
+
+class IntakeLimits:
+    """What the clients of one port share."""
+
+    def __init__(
+        self, frames_per_s: float = FRAMES_PER_S, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.clock = clock
+        self._frames_per_s = frames_per_s
+        self._overdrawn: set[IntakeAccount] = set()
+
+    @property
+    def rate(self) -> float:
+        """Frames a second of one client at present."""
+        return self._frames_per_s / max(1, len(self._overdrawn))
+
+    def account(self) -> IntakeAccount:
+        """Returns the account of a new client."""
+        return IntakeAccount(self)
+
+    def note(self, account: IntakeAccount, *, is_overdrawn: bool) -> None:
+        """Counts a client among those that send too much, or no more."""
+        if is_overdrawn:
+            self._overdrawn.add(account)
+        else:
+            self._overdrawn.discard(account)
+
+
+class IntakeAccount:
+    """One client's account."""
+
+    def __init__(self, limits: IntakeLimits) -> None:
+        self._limits = limits
+        self._frames = _BURST_FRAMES
+        self._at_s = limits.clock()
+
+    def charge(self, num_frames: int = 0, noise_bytes: int = 0) -> float:
+        """Returns for how many seconds nothing must be read of the client that has sent this.
+
+        noise_bytes: those of no frame. Call it again, without arguments, when the time is over.
+        """
+        now_s = self._limits.clock()
+        filled = self._frames + (now_s - self._at_s) * self._limits.rate
+        cost = num_frames + max(0, noise_bytes) / _BYTES_PER_NOISE
+        self._at_s, self._frames = now_s, min(_BURST_FRAMES, filled) - cost
+        self._limits.note(self, is_overdrawn=self._frames < 0.0)
+        return max(0.0, -self._frames / self._limits.rate)
+
+    def close(self) -> None:
+        """The client has left."""
+        self._limits.note(self, is_overdrawn=False)
