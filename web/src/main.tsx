@@ -16,9 +16,11 @@ import { tellFailure } from "./state/notices.ts";
 import { followLeaving, usePilot } from "./state/pilots.ts";
 import { followSilence } from "./state/silence.ts";
 import { followSimulation } from "./state/simulation.ts";
+import { hideToken } from "./state/token.ts";
 import { followTopics } from "./state/topics.ts";
 import { followVehicles } from "./state/vehicles.ts";
 
+hideToken(location, history);
 followAddress();
 connectAsAddressed(location, usePilot.getState().wished);
 followLeaving();

@@ -17,6 +17,13 @@ _EVERY = ("px4", "ardupilot")
 
 _ROS2 = ("ros2", "ros2-zenoh")
 
+_BY_SIGNING = ("mavlink", "mavlink-tcp")
+_WITHOUT_TOKEN = (
+    *("ros-tcp", "ros-tcp-2", "ros1", "ros2", "ros2-zenoh", "sensor-link", "px4", "ardupilot"),
+    *_BY_SIGNING,
+)
+"""Bridges that programs connect to, whose protocols carry no token."""
+
 
 def check_doors(options: RunOptions) -> None:
     """`BridgeError` for doors that would fight over UAVs, and options that nothing would heed."""
@@ -41,6 +48,30 @@ def check_doors(options: RunOptions) -> None:
         raise BridgeError(
             "--ros2-interface is for ROS 2 over DDS, and no such door is open: --ros2"
         )
+
+
+def token_gaps(options: RunOptions) -> list[str]:
+    """Returns what a user who sets a token must know of bridges that cannot ask for it."""
+    if options.token is None:
+        return []
+    return [
+        f"--door {text}: this bridge cannot ask for the --token, its protocol carries none. Every "
+        f"program that reaches its port commands the UAVs: {_remedy(text.partition('=')[0])}"
+        for text in options.doors
+        if text.partition("=")[0] in _WITHOUT_TOKEN
+        and not (text.partition("=")[0] in _BY_SIGNING and options.mavlink_key is not None)
+    ]
+
+
+def _remedy(name: str) -> str:
+    if name in _BY_SIGNING:
+        return "sign its frames with --mavlink-key"
+    if name in _ROS2:
+        return "use --door rosbridge, or let ROS 2's own security (SROS 2) guard the domain"
+    return (
+        "use --door rosbridge, which asks for it, or keep the port on this machine and let remote "
+        "programs in by an SSH tunnel"
+    )
 
 
 def check_autopilots(scenario: Scenario, options: RunOptions) -> None:

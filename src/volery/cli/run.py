@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from volery.cli.door_checks import check_doors
+from volery.cli.door_checks import check_doors, token_gaps
 from volery.cli.doors import fit_out, open_doors
 from volery.cli.flight import Flight, RunOptions
-from volery.cli.guard import INTERRUPTED
+from volery.cli.guard import INTERRUPTED, warn
 from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, page_of
 from volery.cli.progress import FlightProgress
@@ -50,6 +50,8 @@ def parse_speed(text: str) -> float | None:
 def fly(options: RunOptions) -> int:
     """Fly a scenario as the options say, then those that clients load; return the exit code."""
     check_doors(options)
+    for gap in token_gaps(options):
+        warn(gap)
     with page_of(options) as page, Interrupts() as interrupts:
         try:
             code, change = _build_and_fly(options, interrupts, page)

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from volery.cli.door_checks import check_doors
+from volery.cli.door_checks import check_doors, token_gaps
 from volery.cli.doors import fit_out, open_doors
 from volery.cli.flight import RunOptions
-from volery.cli.guard import complain
+from volery.cli.guard import complain, warn
 from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, serving
 from volery.core.errors import VoleryError
@@ -57,6 +57,8 @@ def serve(options: ServeOptions) -> None:
     from volery.scenario.shelf import Shelf
 
     check_doors(options.first)
+    for gap in token_gaps(options.first):
+        warn(gap)
     first = _first_scenario(options.first)
     shelf = Shelf(options.page.uploads, options.page.recordings, given=first)
     with Interrupts() as interrupts, serving(options.page, shelf) as page:

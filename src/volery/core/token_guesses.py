@@ -16,7 +16,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ipaddress
-from collections.abc import AsyncIterator, Awaitable
+from collections.abc import AsyncIterator, Awaitable, Callable
 
 PENALTY_S = 0.05
 MAX_PENALTIES = 5
@@ -25,10 +25,10 @@ _IPV6_PREFIX = 64
 
 
 class TokenGuesses:
-    """The limits of one server; belongs to one event loop."""
+    """The limits of one server; belongs to one event loop. penalty_s: PENALTY_S unless given."""
 
-    def __init__(self, penalty_s: float = PENALTY_S, max_penalties: int = MAX_PENALTIES) -> None:
-        self._penalty_s = penalty_s
+    def __init__(self, penalty_s: float | None = None, max_penalties: int = MAX_PENALTIES) -> None:
+        self._penalty_s = PENALTY_S if penalty_s is None else penalty_s
         self._penalties = asyncio.Semaphore(max_penalties)
         self._queues: dict[str, _Queue] = {}
         self.num_wrong = 0
@@ -53,15 +53,18 @@ class TokenGuesses:
             if not queue.num_clients:
                 self._queues.pop(key, None)
 
-    async def penalize(self, gone: Awaitable[object] | None = None) -> None:
-        """Keeps the turn after a wrong token, until `gone` says that the client has left."""
+    async def penalize(self, gone: Callable[[], Awaitable[object]] | None = None) -> None:
+        """Keeps the turn after a wrong token, but not for a client that leaves.
+
+        gone: waits until the client has left.
+        """
         self.num_wrong += 1
         async with self._penalties:
             if gone is None:
                 await asyncio.sleep(self._penalty_s)
                 return
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(gone, self._penalty_s)
+                await asyncio.wait_for(gone(), self._penalty_s)
 
 
 class _Queue:

@@ -16,10 +16,13 @@ from volery.mavlink import ports
 from volery.mavlink.codec import dialect
 from volery.mavlink.fleet import Fleet, Sink
 from volery.mavlink.framing import Framer, lengths_of
+from volery.mavlink.intake import IntakeAccount, IntakeLimits
 from volery.mavlink.party import why_not
 from volery.mavlink.signing import Signing
 from volery.mavlink.streams import GROUND, ONBOARD
 
+_DATAGRAMS_A_TURN = 32
+"""After so many others have their turn."""
 _MOST_DATAGRAM = 1400
 """Bytes: below the MTU of Ethernet."""
 
@@ -47,6 +50,7 @@ class MavlinkUdp:
         self._shift = port - ports.ONBOARD_TO
         self._ground = ports.GROUND_TO + self._shift if ground_port is None else ground_port
         self._anywhere = anywhere
+        self._intake = IntakeLimits()
         self._links: dict[int, list[_UdpLink]] = {}
         self._fleet: Fleet | None = None
         self._looks: asyncio.Task[None] | None = None
@@ -85,8 +89,11 @@ class MavlinkUdp:
         opened: list[_UdpLink] = []
         try:
             for own, to, profile in links:
+                account = self._intake.account()
                 opened.append(
-                    _UdpLink(self._fleet, system, profile, own, (self._host, to), self._key)
+                    _UdpLink(
+                        self._fleet, system, profile, own, (self._host, to), self._key, account
+                    )
                 )
         except BridgeError as error:
             for link in opened:
@@ -117,8 +124,11 @@ class _UdpLink:
         own: int,
         to: tuple[str, int],
         key: bytes | None,
+        account: IntakeAccount,
     ) -> None:
         self.number = own
+        self._account = account
+        self._pause: asyncio.TimerHandle | None = None
         self._fleet, self._system, self._profile = fleet, system, profile
         self._peers = [to]
         self._framer = Framer()
@@ -145,26 +155,50 @@ class _UdpLink:
 
     def close(self) -> None:
         """Give the port back."""
+        self._account.close()
+        if self._pause is not None:
+            self._pause.cancel()
         self._loop.remove_reader(self._socket)
         self._socket.close()
         self._fleet.close_link(self._system, self.number)
 
     def _read(self) -> None:
-        while True:
+        for _ in range(_DATAGRAMS_A_TURN):
             try:
                 data, peer = self._socket.recvfrom(65535)
             except (BlockingIOError, InterruptedError):
                 return
             except OSError:  # what was sent found nobody
                 continue
-            heard = self._framer.datagram(data)
-            frames = b"".join(frame.data for frame in heard if self._signing.accepts(frame))
-            if self._signing.has_key and not frames:  # a stranger
-                continue
-            if peer not in self._peers:  # the place agreed upon, and who spoke last
-                self._peers = [self._peers[0], peer[:2]]
-            if frames:
-                self._fleet.send(self._system, self.number, self._profile, frames)
+            pause_s = self._take(data, peer)
+            if pause_s > 0.0:
+                self._loop.remove_reader(self._socket)
+                self._read_after(pause_s)
+                return
+
+    def _take(self, data: bytes, peer: tuple[str, int]) -> float:
+        """Brings a datagram to its vehicle; for how many seconds none must be read after it."""
+        heard = self._framer.datagram(data)
+        frames = b"".join(frame.data for frame in heard if self._signing.accepts(frame))
+        noise_bytes = len(data) - sum(len(frame.data) for frame in heard)
+        pause_s = self._account.charge(max(1, len(heard)), noise_bytes)
+        if self._signing.has_key and not frames:  # a stranger
+            return pause_s
+        if peer not in self._peers:  # the place agreed upon, and who spoke last
+            self._peers = [self._peers[0], peer[:2]]
+        if frames:
+            self._fleet.send(self._system, self.number, self._profile, frames)
+        return pause_s
+
+    def _read_after(self, pause_s: float) -> None:
+        self._pause = self._loop.call_later(pause_s, self._read_again)
+
+    def _read_again(self) -> None:
+        pause_s = self._account.charge()
+        if pause_s > 0.0:
+            self._read_after(pause_s)
+        else:
+            self._loop.add_reader(self._socket, self._read)
 
 
 def _pieces(data: bytes) -> list[bytes]:

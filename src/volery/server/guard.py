@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import suppress
+from functools import partial
 from http.cookies import CookieError, Morsel, SimpleCookie
 from typing import NamedTuple
 from urllib.parse import parse_qs
@@ -147,7 +148,7 @@ class Guard:
             role = self._tokens.role_of(given)
             if role is None:
                 # of a WebSocket nothing may be read before it is accepted
-                gone = _wait_for_end(receive) if scope["type"] == "http" else None
+                gone = partial(_wait_for_end, receive) if scope["type"] == "http" else None
                 await self._guesses.penalize(gone)
         return role
 

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.cli.app import app
-from volery.cli.door_checks import check_autopilots, check_doors
+from volery.cli.door_checks import check_autopilots, check_doors, token_gaps
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
 from volery.mavlink.outfit import with_autopilots
@@ -46,6 +46,32 @@ def test_what_does_not_go_together(doors, more, text):
 )
 def test_what_goes_together(doors, more):
     check_doors(RunOptions("hover", doors=doors, **more))
+
+
+@pytest.mark.parametrize(
+    ("door", "remedy"),
+    [
+        ("ros-tcp", "--door rosbridge, which asks for it"),
+        ("ros-tcp-2=10001", "SSH tunnel"),
+        ("sensor-link", "--door rosbridge"),
+        ("ros1", "SSH tunnel"),
+        ("ros2", "SROS 2"),
+        ("mavlink", "--mavlink-key"),
+        ("mavlink-tcp", "--mavlink-key"),
+        ("px4", "SSH tunnel"),
+    ],
+)
+def test_bridges_that_cannot_ask_for_the_token_are_named(door, remedy):
+    (gap,) = token_gaps(RunOptions("hover", doors=("rosbridge", door), token="secret"))
+    assert gap.startswith(f"--door {door}: this bridge cannot ask for the --token")
+    assert remedy in gap
+    assert token_gaps(RunOptions("hover", doors=(door,))) == []
+
+
+def test_signed_mavlink_needs_no_token():
+    options = RunOptions("hover", doors=("mavlink",), token="secret", mavlink_key=Path("key"))
+    assert token_gaps(options) == []
+    assert token_gaps(RunOptions("hover", doors=("rosbridge", "comms"), token="secret")) == []
 
 
 def test_a_scenario_with_autopilots_is_not_flown_by_others_too():

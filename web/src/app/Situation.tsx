@@ -10,8 +10,10 @@ import {
   Title,
 } from "@mantine/core";
 import { TriangleAlert } from "lucide-react";
+import { useState } from "react";
 import { useConnection } from "../state/connection.ts";
 import { useSimulation } from "../state/simulation.ts";
+import { hadToken, showToken } from "../state/token.ts";
 import { openWindow } from "../state/windows.ts";
 import { Banner } from "./Banner.tsx";
 import { Ended } from "./Ended.tsx";
@@ -74,18 +76,22 @@ function Lobby() {
   );
 }
 
+const WRONG_TOKEN = "This is not a token of this server";
+
 function TokenNeeded() {
   const reason = useConnection((connection) => connection.reason);
-  const given = new URLSearchParams(location.search).has("token");
+  const [refused, setRefused] = useState("");
+  const wrong = hadToken ? "The token in the address is not one of this server's" : "";
   return (
     <Paper className="situation" shadow="lg" withBorder p="lg">
       <form
         onSubmit={(event) => {
           event.preventDefault();
-          const token = new FormData(event.currentTarget).get("token");
-          const query = new URLSearchParams(location.search);
-          query.set("token", String(token));
-          location.search = query.toString();
+          const token = String(new FormData(event.currentTarget).get("token"));
+          showToken(token).then(
+            (isRight) => (isRight ? location.reload() : setRefused(WRONG_TOKEN)),
+            () => setRefused("The server does not answer"),
+          );
         }}
       >
         <Stack gap="sm">
@@ -100,7 +106,7 @@ function TokenNeeded() {
             name="token"
             required
             autoComplete="current-password"
-            error={given && "The token in the address is not one of this server's"}
+            error={refused || wrong}
           />
           <Button type="submit">Enter</Button>
         </Stack>

@@ -28,8 +28,6 @@ export function connectAsAddressed(address: Location, pilot: string): void {
   const own = new URL("./rosbridge", address.href);
   own.protocol = own.protocol === "https:" ? "wss:" : "ws:";
   own.search = own.hash = "";
-  const token = query.get("token");
-  if (token !== null) own.searchParams.set("token", token);
   if (pilot !== "") own.searchParams.set("pilot", pilot);
   useConnection.setState({ volery: robot === null });
   link.watch(() => {

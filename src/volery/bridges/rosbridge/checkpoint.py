@@ -27,6 +27,6 @@ class Checkpoint:
         async with self.guesses.turn(self.address):
             peer.receive(frame, time.monotonic())
             if peer.refused is not None:
-                await self.guesses.penalize(self.wait_closed())
+                await self.guesses.penalize(self.wait_closed)
         if peer.authorized:
             self.prove()

@@ -208,7 +208,7 @@ class RosbridgeServer:
         async with self._guesses.turn(_address_of(connection)):
             is_right = shows_token(given, self._token)
             if not is_right:
-                await self._guesses.penalize(connection.wait_closed())
+                await self._guesses.penalize(connection.wait_closed)
         return is_right
 
     def _prove(self, connection: ServerConnection) -> None:

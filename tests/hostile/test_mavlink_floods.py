@@ -1,0 +1,150 @@
+"""MAVLink clients that send without end, or never read: bounded in time and memory."""
+
+import contextlib
+import socket
+import threading
+
+import pytest
+from live_graph import LiveGraph
+
+from volery.bridges.doors import Doors
+from volery.mavlink.codec import dialect
+from volery.mavlink.intake import FRAMES_PER_S, IntakeLimits
+from volery.mavlink.tcp_door import MavlinkTcp
+
+PATIENCE_S = 30.0
+
+
+class Clock:
+    now_s = 0.0
+
+    def __call__(self):
+        return self.now_s
+
+
+def flood(accounts, clock, seconds, frames_per_s, step_s=0.01):
+    """Frames that clients get through who send so many as long as they are read."""
+    through, resume_s = dict.fromkeys(accounts, 0), dict.fromkeys(accounts, 0.0)
+    end_s = clock.now_s + seconds
+    while clock.now_s < end_s:
+        for account in accounts:
+            if clock.now_s >= resume_s[account]:
+                frames = round(frames_per_s * step_s)
+                through[account] += frames
+                resume_s[account] = clock.now_s + account.charge(frames)
+        clock.now_s += step_s
+    return [through[account] for account in accounts]
+
+
+def test_a_flood_is_held_to_the_rate():
+    clock = Clock()
+    limits = IntakeLimits(clock=clock)
+    (through,) = flood([limits.account()], clock, 20.0, 10_000)
+    assert through == pytest.approx(20.0 * FRAMES_PER_S, rel=0.1)
+
+
+def test_floods_share_one_rate_and_others_notice_nothing():
+    clock = Clock()
+    limits = IntakeLimits(clock=clock)
+    modest = limits.account()
+    flooding = [limits.account() for _ in range(10)]
+    begun = flood(flooding, clock, 10.0, 10_000)
+    assert sum(begun) < 10.0 * FRAMES_PER_S + 10 * 1000
+    for _ in range(100):
+        assert modest.charge(1) == 0.0
+        clock.now_s += 0.02
+    for account in flooding:
+        account.close()
+    assert limits.rate == FRAMES_PER_S
+
+
+def test_noise_costs_as_frames_do():
+    clock = Clock()
+    account = IntakeLimits(clock=clock).account()
+    paused_s = sum(account.charge(0, 2048) for _ in range(100))
+    assert paused_s > 1.0
+
+
+def test_who_floods_no_more_is_read_again():
+    clock = Clock()
+    limits = IntakeLimits(clock=clock)
+    account = limits.account()
+    pause_s = account.charge(5000)
+    clock.now_s += pause_s + 0.001
+    assert account.charge() == 0.0
+    assert limits.rate == FRAMES_PER_S
+
+
+# ---------------------------------------------------------------------------------------- the port
+
+
+@pytest.fixture
+def door():
+    live = LiveGraph()
+    with Doors(live.gateway) as doors:
+        made = MavlinkTcp(port=0)
+        doors.open(made)
+        made.in_loop = lambda action: doors.call(called(action))
+        yield made
+    live.close()
+
+
+async def called(action):
+    return action()
+
+
+def heartbeat():
+    codec = dialect().MAVLink(None, 245, 190)
+    return codec.heartbeat_encode(6, 8, 0, 0, 0).pack(codec)
+
+
+def connect(door):
+    return socket.create_connection(("127.0.0.1", door.port), PATIENCE_S)
+
+
+def until(true):
+    waited = threading.Event()
+    for _ in range(int(PATIENCE_S / 0.01)):
+        if true():
+            return
+        waited.wait(0.01)
+    raise AssertionError("it does not come true")
+
+
+def test_what_is_sent_too_fast_stays_with_the_sender(door, monkeypatch):
+    monkeypatch.setattr(door._intake, "_frames_per_s", 1e-3)
+    sent, words = 0, heartbeat() * 1000
+    with connect(door) as client:
+        client.settimeout(0.3)
+        with contextlib.suppress(TimeoutError):
+            while sent < 256 << 20:
+                sent += client.send(words)
+        assert sent < 64 << 20  # what the two kernels' buffers hold
+        with connect(door) as other:  # who is read as before
+            until(lambda: len(door._clients) == 2)
+            other.sendall(heartbeat())
+            until(lambda: sum(one.party.has_spoken for one in door._clients.values()) == 2)
+
+
+def test_a_client_that_does_not_read_costs_no_memory(door):
+    frames = heartbeat() * 50
+    with connect(door):
+        until(lambda: door._clients)
+        (client,) = door._clients.values()
+        for _ in range(100):
+            door.in_loop(lambda: [door._send(-1, frames) for _ in range(1000)])
+            size = door.in_loop(client.transport.get_write_buffer_size)
+            assert size < 1 << 20
+
+
+def test_idle_clients_give_way_and_those_that_speak_stay(door):
+    with contextlib.ExitStack() as stack:
+        speaking = stack.enter_context(connect(door))
+        speaking.sendall(heartbeat())
+        until(lambda: any(one.party.has_spoken for one in door._clients.values()))
+        for _ in range(100):
+            stack.enter_context(connect(door))
+        late = stack.enter_context(connect(door))
+        late.sendall(heartbeat())
+        until(lambda: sum(one.party.has_spoken for one in door._clients.values()) == 2)
+        assert len(door._clients) <= 40

@@ -1,0 +1,28 @@
+import { expect, test, vi } from "vitest";
+import { hideToken, showToken } from "./token.ts";
+
+const address = (search: string) =>
+  ({ pathname: "/user/anna/", search, hash: "#view=map" }) as Location;
+
+test("a token leaves the address, all else stays", () => {
+  const replaceState = vi.fn();
+  const history = { state: { a: 1 }, replaceState } as unknown as History;
+  hideToken(address("?pilot=Anna&token=se%20cret&token=again"), history);
+  expect(replaceState).toHaveBeenCalledWith({ a: 1 }, "", "/user/anna/?pilot=Anna#view=map");
+  hideToken(address("?token=x"), history);
+  expect(replaceState).toHaveBeenLastCalledWith({ a: 1 }, "", "/user/anna/#view=map");
+});
+
+test("an address without a token stays as it is", () => {
+  const replaceState = vi.fn();
+  hideToken(address("?pilot=Anna"), { replaceState } as unknown as History);
+  expect(replaceState).not.toHaveBeenCalled();
+});
+
+test("a token is shown to the server, whatever its characters", async () => {
+  const asked = vi.fn((...urls: string[]) => Promise.resolve({ ok: urls[0] !== "" }));
+  vi.stubGlobal("fetch", asked);
+  expect(await showToken("ä & b")).toBe(true);
+  expect(asked.mock.lastCall![0]).toBe("./api/status?token=%C3%A4+%26+b");
+  vi.unstubAllGlobals();
+});
