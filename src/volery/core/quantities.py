@@ -22,6 +22,8 @@ class Quantity(NamedTuple):
     """Smallest number above 0 of a key that takes none below it: it may be divided by."""
     others: Mapping[str, float] = {}
     """Units that are taken for this one by mistake, as factors of it."""
+    low: float | None = None
+    """Smallest number of what is never below it; None: `-most`."""
 
 
 _LARGEST_INT = 2**63
@@ -32,6 +34,7 @@ _QUANTITIES: dict[str, Quantity] = {
     # space
     "m": Quantity("m", 1e6, 1e-9, _MM),
     "cm": Quantity("cm", 1e5, 1e-3, {"mm": 0.1}),
+    **dict.fromkeys(("radius_m", "reach_m", "arrival_m"), Quantity("m", 1e6, 1e-9, _MM, 0.0)),
     "m2": Quantity("m2", 1e10, 1e-9, {"mm2": 1e-6}),
     "drag_area_m2": Quantity("m2", 100.0, 1e-9, {"mm2": 1e-6, "cm2": 1e-4}),
     "per_m": Quantity("1/m", 100.0),
@@ -39,13 +42,14 @@ _QUANTITIES: dict[str, Quantity] = {
     "deg": Quantity("deg", 36_000.0, 1e-6),
     "rad": Quantity("rad", 100.0, 1e-9, {"deg": math.pi / 180.0}),
     # time
-    "s": Quantity("s", 1e7, 1e-9, {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}),
+    "s": Quantity("s", 1e7, 1e-9, {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}, 0.0),
     "hz": Quantity("Hz", 1e6, 1e-4),
     "mhz": Quantity("MHz", 1e6, 1e-6, {"Hz": 1e-6}),
     "mbit_s": Quantity("Mbit/s", 1e6, 1e-6, {"bit/s": 1e-6}),
     "rpm": Quantity("rpm", 1e6),
     # motion
     "m_s": Quantity("m/s", 1000.0, 1e-6, {"mm/s": 1e-3}),
+    "deceleration_m_s2": Quantity("m/s^2", 1000.0, 1e-6, {"mm/s^2": 1e-3}, 0.0),
     "m_s2": Quantity("m/s^2", 1000.0, 1e-6, {"mm/s^2": 1e-3}),
     "rad_s": Quantity("rad/s", 1e5, 1e-6, {"deg/s": math.pi / 180.0}),
     "deg_s": Quantity("deg/s", 1e5, 1e-3),
@@ -61,6 +65,8 @@ _QUANTITIES: dict[str, Quantity] = {
     "v": Quantity("V", 1e4, 1e-3, {"mV": 1e-3}),
     "ohm": Quantity("ohm", 1000.0, 0.0, {"mohm": 1e-3}),
     "w": Quantity("W", 1e5, 0.0, {"mW": 1e-3}),
+    "seed": Quantity("", float(_LARGEST_INT), low=0.0),
+    "share": Quantity("", 1.0, low=0.0),
     "damping": Quantity("", 100.0, 1e-3),
     # what sensors measure, and their noise
     "pa": Quantity("Pa", 1e4, 0.0, {"mPa": 1e-3}),
@@ -116,8 +122,9 @@ def fault_in(
         elif not math.isfinite(number):
             return f"{place}{number} is not finite"
         tiny = (positive or low == 0.0) and 0 < number < quantity.least
-        if tiny or abs(number) > quantity.most:
-            least = quantity.least if positive or tiny else low
+        below = quantity.low is not None and number < quantity.low
+        if tiny or below or abs(number) > quantity.most:
+            least = quantity.least if positive or tiny else quantity.low if low is None else low
             return place + _beyond(number, quantity, least)
     return None
 

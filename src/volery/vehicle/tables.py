@@ -24,7 +24,7 @@ class Table(Bounded):
     """A table of a vehicle's data file."""
 
     quantities: ClassVar[Mapping[str, Quantity]] = {
-        "m": Quantity("m", 100.0, 1e-6, {"mm": 1e-3}),
+        **dict.fromkeys(("m", "radius_m"), Quantity("m", 100.0, 1e-6, {"mm": 1e-3})),
         "rise_time_s": Quantity("s", 10.0, 1e-6, {"ms": 1e-3}),
         "fall_time_s": Quantity("s", 10.0, 1e-6, {"ms": 1e-3}),
         "torque_m": Quantity("m", 10.0, 1e-7, {"mm": 1e-3}),
