@@ -39,8 +39,8 @@ def flood(accounts, clock, seconds, frames_per_s, step_s=0.01):
 def test_a_flood_is_held_to_the_rate():
     clock = Clock()
     limits = IntakeLimits(clock=clock)
-    (through,) = flood([limits.account()], clock, 20.0, 10_000)
-    assert through == pytest.approx(20.0 * FRAMES_PER_S, rel=0.1)
+    (through,) = flood([limits.account()], clock, 60.0, 10_000)
+    assert through == pytest.approx(60.0 * FRAMES_PER_S, rel=0.1)
 
 
 def test_floods_share_one_rate_and_others_notice_nothing():
@@ -63,6 +63,14 @@ def test_noise_costs_as_frames_do():
     account = IntakeLimits(clock=clock).account()
     paused_s = sum(account.charge(0, 2048) for _ in range(100))
     assert paused_s > 1.0
+
+
+def test_the_rate_grows_with_the_vehicles():
+    limits = IntakeLimits(clock=Clock())
+    limits.fit(3)
+    assert limits.rate == FRAMES_PER_S
+    limits.fit(50)
+    assert limits.rate == 50 * 20.0
 
 
 def test_who_floods_no_more_is_read_again():

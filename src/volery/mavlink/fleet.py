@@ -21,6 +21,9 @@ from volery.graph.session import Gateway, Session
 PACKETS = "volery_interfaces/msg/MavlinkPackets"
 _IN, _OUT = "/mavlink/in", "/mavlink/out"
 _DEPTH = 1000
+_MOST_WAITING = 2000
+"""Frames that the simulation has not taken yet, above which clients wait."""
+_PAUSE_S = 0.02
 _LOOK_S = 0.2
 """Between two looks who has come and gone."""
 _BEAT_S = 1.0
@@ -68,6 +71,11 @@ class Fleet:
     def systems(self) -> tuple[int, ...]:
         """Ids of those that are there."""
         return tuple(self._craft)
+
+    @property
+    def pause_s(self) -> float:
+        """For how long nothing must be read of a client: the simulation has not kept up."""
+        return _PAUSE_S if self._session.waiting > _MOST_WAITING else 0.0
 
     def look(self) -> None:
         """See who has come and gone, and what has been silent."""

@@ -11,9 +11,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-FRAMES_PER_S = 1000.0
-"""Of all clients of a port that send more than they may (modelling choice: 50 UAVs get 20 setpoints
-a second each)."""
+FRAMES_PER_S = 400.0
+"""Of all clients of a port that send more than they may; a frame for three vehicles counts as three
+(modelling choice)."""
+_FRAMES_PER_S_AND_VEHICLE = 20.0
+"""At least: setpoints for all vehicles of a large swarm over one connection."""
 _BURST_FRAMES = 500.0
 """At once: a mission of many waypoints, all parameters."""
 _BYTES_PER_NOISE = 24
@@ -29,6 +31,10 @@ class IntakeLimits:
         self.clock = clock
         self._frames_per_s = frames_per_s
         self._overdrawn: set[IntakeAccount] = set()
+
+    def fit(self, num_vehicles: int) -> None:
+        """Sets the rate for so many vehicles."""
+        self._frames_per_s = max(FRAMES_PER_S, _FRAMES_PER_S_AND_VEHICLE * num_vehicles)
 
     @property
     def rate(self) -> float:

@@ -44,21 +44,23 @@ class Party:
 
         Returns for how many seconds nothing more must be read.
         """
-        frames = self._framer.feed(data)
+        frames, cost = self._framer.feed(data), 0
         for frame in filter(self._signing.accepts, frames):
             self.has_spoken = True
             target = getattr(self._parser.decode(frame.data), "target_system", 0)
             chosen = self._systems if target == 0 else self._systems & {target}
+            cost += max(0, len(chosen) - 1)
             for system in sorted(chosen):
                 self._fleet.send(system, self.number, self._profile, frame.data)
         if self._account is None:
             return 0.0
         noise_bytes = len(data) - sum(len(frame.data) for frame in frames)
-        return self._account.charge(len(frames), noise_bytes)
+        pause_s = self._account.charge(len(frames) + cost, noise_bytes)
+        return max(pause_s, self._fleet.pause_s)
 
     def may_read(self) -> float:
         """Returns for how many seconds more nothing must be read."""
-        return 0.0 if self._account is None else self._account.charge()
+        return 0.0 if self._account is None else max(self._account.charge(), self._fleet.pause_s)
 
     def sign(self, data: bytes) -> bytes:
         """Frames as they go over this connection."""

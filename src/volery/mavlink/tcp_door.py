@@ -92,6 +92,8 @@ class MavlinkTcp:
             self._fleet.close()
 
     def _join(self, _name: str, system: int) -> Sink:
+        if self._fleet is not None:
+            self._intake.fit(len(self._fleet.systems))
         for client in self._clients.values():
             client.party.greet(system)
         return self._send

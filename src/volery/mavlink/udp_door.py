@@ -81,6 +81,7 @@ class MavlinkUdp:
 
     def _join(self, name: str, system: int) -> Sink:
         assert self._fleet is not None
+        self._intake.fit(len(self._fleet.systems))
         k = ports.number_of(system) + self._shift
         links = [
             (ports.ONBOARD_FROM + k, ports.ONBOARD_TO + k, ONBOARD),
@@ -181,7 +182,8 @@ class _UdpLink:
         heard = self._framer.datagram(data)
         frames = b"".join(frame.data for frame in heard if self._signing.accepts(frame))
         noise_bytes = len(data) - sum(len(frame.data) for frame in heard)
-        pause_s = self._account.charge(max(1, len(heard)), noise_bytes)
+        cost_s = self._account.charge(max(1, len(heard)), noise_bytes)
+        pause_s = max(cost_s, self._fleet.pause_s)
         if self._signing.has_key and not frames:  # a stranger
             return pause_s
         if peer not in self._peers:  # the place agreed upon, and who spoke last
@@ -194,7 +196,7 @@ class _UdpLink:
         self._pause = self._loop.call_later(pause_s, self._read_again)
 
     def _read_again(self) -> None:
-        pause_s = self._account.charge()
+        pause_s = max(self._account.charge(), self._fleet.pause_s)
         if pause_s > 0.0:
             self._read_after(pause_s)
         else:
