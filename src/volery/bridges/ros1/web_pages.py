@@ -25,7 +25,7 @@ def is_of_a_page(headers: Mapping[str, str]) -> bool:
 def refuse_web_pages() -> None:
     """Has servers that rospy opens from now on refuse what web pages send."""
     module: Any = importlib.import_module("rosgraph.xmlrpc")
-    handler = module.SilenceableXMLRPCRequestHandler
+    handler: Any = module.SilenceableXMLRPCRequestHandler
     if getattr(handler, "refuses_web_pages", False):
         return
 
