@@ -5,6 +5,7 @@ import { create } from "zustand";
 import { link } from "../link/link.ts";
 import { eulerOf } from "../lib/pose.ts";
 import { useConnection } from "./connection.ts";
+import { useEpoch } from "./epoch.ts";
 import { attempt, succeeds } from "./notices.ts";
 import { pickPlace } from "./tool.ts";
 import { baseFrame } from "./vehicles.ts";
@@ -13,7 +14,12 @@ import { heightAt } from "./worldPlan.ts";
 /** Places that UAVs were last sent to from this page. */
 export const useGoals = create<Record<string, Place>>(() => ({}));
 
-/** Nobody is sent nearer to the ground than this. */
+/** Forget the goals of a flight that is over. */
+export function followGoals(): void {
+  useEpoch.subscribe(() => useGoals.setState({}, true));
+}
+
+/** No UAV is sent nearer to the ground than this. */
 const LEAST_HEIGHT_M = 1.5;
 
 /** Fly there, as the UAV looks now; a robot without the service gets a goal of its navigation. */

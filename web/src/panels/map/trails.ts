@@ -1,4 +1,5 @@
 import { useEffect, useRef } from "react";
+import { useEpoch } from "../../state/epoch.ts";
 import { useVehicles } from "../../state/vehicles.ts";
 
 const MOST_POINTS = 600;
@@ -23,6 +24,7 @@ export class Trail {
 /** Trails of all UAVs while the map is shown. */
 export function useTrails(): ReadonlyMap<string, Trail> {
   const trails = useRef(new Map<string, Trail>());
+  useEffect(() => useEpoch.subscribe(() => trails.current.clear()), []);
   useEffect(
     () =>
       useVehicles.subscribe(({ list }) => {

@@ -1,5 +1,6 @@
 import { Group } from "three";
 import { POSE } from "../../link/protocol.ts";
+import { useEpoch } from "../../state/epoch.ts";
 import { useView } from "../../state/view.ts";
 import { SegmentLines } from "../lines/SegmentLines.ts";
 import type { Moment, Part } from "../stage/part.ts";
@@ -20,6 +21,7 @@ export class Trails implements Part {
   readonly object = new Group();
   private readonly lines = new SegmentLines(SEGMENTS, { fadeS: FADE_S });
   private version = -1;
+  private epoch = -1;
   private each = LONGEST;
   /** Of each UAV: end of its trail, and how many segments it has had. */
   private ends = new Float64Array(0);
@@ -32,7 +34,8 @@ export class Trails implements Part {
 
   update(moment: Moment): void {
     this.object.visible = useView.getState().show.trails;
-    if (fleet.version !== this.version || this.begunMs === 0) this.restart(moment.nowMs);
+    const { epoch } = useEpoch.getState();
+    if (fleet.version !== this.version || epoch !== this.epoch) this.restart(moment.nowMs, epoch);
     const nowS = (moment.nowMs - this.begunMs) / 1000;
     const { uavs } = fleet;
     for (let i = 0; i < uavs.length; i++) this.grow(i, nowS);
@@ -43,7 +46,8 @@ export class Trails implements Part {
     this.lines.dispose();
   }
 
-  private restart(nowMs: number): void {
+  private restart(nowMs: number, epoch: number): void {
+    this.epoch = epoch;
     const count = fleet.uavs.length;
     this.version = fleet.version;
     this.begunMs = nowMs;
