@@ -197,11 +197,11 @@ def test_a_recording_is_played_with_a_slider_and_left_again(page, served, shared
     keep_picture(page, "player")
     player.get_by_role("button", name="Play the recording").click()
     until(lambda: float(slider.get_attribute("aria-valuenow")) > start + 0.2)
-    answer = served.call(
-        "/load_world",
-        "simulation_interfaces/srv/LoadWorld",
-        {"world_resource": {"uri": "hover"}},
-    )
-    assert answer["result"]["result"] == 1
+    page.get_by_label("Link: playback").wait_for()
+    panel = open_panel(page, "Recordings")
+    assert panel.get_by_role("button", name="Record", exact=True).is_disabled()
+    assert panel.get_by_role("button", name="Play to_be_played.mcap").is_enabled()
+    player.get_by_role("button", name="Close the recording").click()
     player.wait_for(state="detached")
+    until(lambda: served.status()["state"] == "flying")
     page.get_by_label("Simulated time").wait_for()

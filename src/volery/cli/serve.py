@@ -168,7 +168,9 @@ class _Host:
         """Open a log and stay with it."""
         from volery.runtime.player import Player
 
-        with Player(log, on_load=self._wish.ask, shelf=self._wish.shelf) as player:
+        with Player(
+            log, on_load=self._wish.ask, on_close=self._return, shelf=self._wish.shelf
+        ) as player:
             if player.scenario is not None:
                 self._page.building(player.scenario, self._trouble)
             _ = player.geometry  # made here: the server only reads it
@@ -182,6 +184,11 @@ class _Host:
                     player.wait(_GLANCE_S)
                 player.wait(_FAREWELL_S)
             self._quits = player.quitting and not self._wish.asked
+
+    def _return(self) -> None:
+        """Fly again what was flown before a log."""
+        self._wish.want(self._present)
+        self._wish.quit()
 
     def _stay(self, simulation: Any) -> None:
         """Fly; at the end hold still there, until a reset or something else is asked for."""

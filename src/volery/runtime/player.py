@@ -52,10 +52,10 @@ class Player:
 
     `speed` is a factor of real time, None plays as fast as possible; with `loop` it begins again at
     the end, else it pauses there. `on_load` is called with the name of a scenario that a client
-    wants to see flown instead, or with None where it wants no world; `shelf` has what there is to
-    choose from. Methods belong to one thread,
-    which calls `wait` or `run`; others use `Gateway.post`. Raises `RecordingError` where there is
-    no log, or nothing in it.
+    wants to see flown instead, or with None where it wants no world; `on_close` where a client
+    wants to return to what was flown before. `shelf` has what there is to choose from. Methods
+    belong to one thread, which calls `wait` or `run`; others use `Gateway.post`. Raises
+    `RecordingError` where there is no log, or nothing in it.
     """
 
     def __init__(
@@ -66,6 +66,7 @@ class Player:
         loop: bool = False,
         paused: bool = False,
         on_load: OnLoad | None = None,
+        on_close: Callable[[], None] | None = None,
         shelf: Shelf | None = None,
     ) -> None:
         _check_speed(speed)
@@ -88,7 +89,7 @@ class Player:
         self._clock = self.graph.advertise("/clock", Clock)
         self._clock_due = self._state_due = 0.0
         self._playback.open(self.graph)
-        self._services = PlayerServices(self, on_load, shelf)
+        self._services = PlayerServices(self, on_load, shelf, on_close)
         self._rebase()
 
     # -------------------------------------------------------------------------------------- time

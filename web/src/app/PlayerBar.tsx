@@ -1,9 +1,9 @@
 import { ActionIcon, Group, Paper, Select, Slider, Text, Tooltip } from "@mantine/core";
-import { Pause, Play, Repeat } from "lucide-react";
+import { Pause, Play, Repeat, X } from "lucide-react";
 import { useMemo, useState } from "react";
 import { Latest } from "../lib/latest.ts";
 import { clockText } from "../lib/time.ts";
-import { PLAYING, seek, setLoop, setPlaying, setSpeed } from "../link/commands.ts";
+import { closeRecording, PLAYING, seek, setLoop, setPlaying, setSpeed } from "../link/commands.ts";
 import { succeeds } from "../state/notices.ts";
 import { usePlayer } from "../state/player.ts";
 import classes from "./PlayerBar.module.css";
@@ -71,6 +71,18 @@ export function PlayerBar() {
             <Repeat size={17} />
           </ActionIcon>
         </Tooltip>
+        {player.can_close && (
+          <Tooltip label="Close the recording and fly again">
+            <ActionIcon
+              size="lg"
+              variant="subtle"
+              aria-label="Close the recording"
+              onClick={() => void succeeds("The player refused", closeRecording())}
+            >
+              <X size={17} />
+            </ActionIcon>
+          </Tooltip>
+        )}
       </Group>
     </Paper>
   );

@@ -2031,6 +2031,7 @@ export interface volery_interfaces_PlayerState {
   state: number;
   speed: number;
   loop: boolean;
+  can_close: boolean;
 }
 
 export interface volery_interfaces_SearchState {

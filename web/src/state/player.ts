@@ -12,6 +12,8 @@ export interface Player {
   /** Seconds of the log a second; 0: as fast as possible. */
   speed: number;
   loop: boolean;
+  /** Whether the server can return to a simulation. */
+  can_close: boolean;
 }
 
 /** The recorded log that is shown; null: a simulation is. */

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,8 +37,15 @@ _MOST_STEPS = 1_000_000_000
 class PlayerServices:
     """The services of one player, and the topic that tells how it stands."""
 
-    def __init__(self, player: Player, on_load: OnLoad | None, shelf: Shelf | None) -> None:
+    def __init__(
+        self,
+        player: Player,
+        on_load: OnLoad | None,
+        shelf: Shelf | None,
+        on_close: Callable[[], None] | None = None,
+    ) -> None:
         self._player = player
+        self._on_close = on_close
         graph = player.graph
         self._state = graph.advertise("/volery/player/state", _STATE, latched=True)
         loads = on_load is not None
@@ -55,6 +63,7 @@ class PlayerServices:
             ("player/seek", f"{_OURS}/srv/Seek", self._seek),
             ("player/set_loop", "std_srvs/srv/SetBool", self._set_loop),
             ("player/info", f"{_OURS}/srv/PlayerInfo", self._info),
+            ("player/close", "std_srvs/srv/Trigger", self._close),
         )
         for name, srvtype, handler in ours:
             offer_command(graph, f"/volery/{name}", srvtype, handler)
@@ -72,6 +81,7 @@ class PlayerServices:
             "state": int(player.state),
             "speed": player.speed or 0.0,
             "loop": player.loop,
+            "can_close": self._on_close is not None,
         }
 
     def _get_state(self, _request: Any) -> Fields:
@@ -114,6 +124,12 @@ class PlayerServices:
     def _set_loop(self, request: Any) -> None:
         self._player.loop = bool(request.data)
         self.tell_state()
+
+    def _close(self, _request: Any) -> Fields:
+        if self._on_close is None:
+            raise CommandError("this process plays one log; Ctrl-C ends it")
+        self._on_close()
+        return {"message": f"{self._player.name} is closed"}
 
     def _info(self, _request: Any) -> Fields:
         told = {**self._present(), **self._player.describe()}

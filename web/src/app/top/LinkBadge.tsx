@@ -1,16 +1,20 @@
 import { Badge, Tooltip } from "@mantine/core";
 import { useConnection } from "../../state/connection.ts";
+import { usePlayer } from "../../state/player.ts";
 import { useSilence } from "../../state/silence.ts";
 
 /** How the link is. */
 export function LinkBadge() {
   const { state, reason, url } = useConnection();
+  const playback = usePlayer(({ player }) => player !== null);
   const silent = useSilence((silence) => silence.sinceMs > 0);
   const [text, color] =
     state === "open"
       ? silent
         ? ["silent", "yellow"]
-        : ["live", "teal"]
+        : playback
+          ? ["playback", "grape"]
+          : ["live", "teal"]
       : state === "connecting"
         ? ["connecting", "yellow"]
         : [state, "red"];

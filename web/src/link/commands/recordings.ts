@@ -57,6 +57,11 @@ export async function seek(time: number): Promise<void> {
   await order("/volery/player/seek", "volery_interfaces/srv/Seek", { time });
 }
 
+/** Return from a log to the simulation that was flown before. */
+export async function closeRecording(): Promise<void> {
+  await order("/volery/player/close", "std_srvs/srv/Trigger", {}, LONGEST_START_S);
+}
+
 export async function setLoop(data: boolean): Promise<void> {
   await order("/volery/player/set_loop", "std_srvs/srv/SetBool", { data });
 }

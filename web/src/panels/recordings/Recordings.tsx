@@ -24,7 +24,7 @@ import {
   type Recording,
 } from "../../link/commands.ts";
 import { attempt, tellSuccess } from "../../state/notices.ts";
-import { useWhyNot } from "../../state/rights.ts";
+import { useWhyNot, useWhyNotOpen } from "../../state/rights.ts";
 import { useSimulation } from "../../state/simulation.ts";
 import { Reason } from "../shared/Reason.tsx";
 import { useAsked } from "../shared/useAsked.ts";
@@ -36,6 +36,7 @@ const ASK_MS = 2000;
 export default function Recordings() {
   const { value: list, reason, again } = useAsked(recordings, NONE, ASK_MS);
   const whyNot = useWhyNot();
+  const whyNotOpen = useWhyNotOpen();
 
   const open = async (name: string) => {
     await attempt("The recording cannot be played", playRecording(name));
@@ -58,7 +59,7 @@ export default function Recordings() {
               size="compact-sm"
               variant="default"
               leftSection={<Upload size={14} />}
-              disabled={whyNot !== null}
+              disabled={whyNotOpen !== null}
             >
               Bring a log
             </Button>
@@ -95,7 +96,7 @@ export default function Recordings() {
                       variant="light"
                       leftSection={<Play size={13} />}
                       aria-label={`Play ${recording.name}`}
-                      disabled={whyNot !== null}
+                      disabled={whyNotOpen !== null}
                       onClick={() => void open(recording.name)}
                     >
                       Play

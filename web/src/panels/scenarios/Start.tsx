@@ -18,7 +18,7 @@ import {
   type ScenarioChanges,
 } from "../../link/commands.ts";
 import { succeeds } from "../../state/notices.ts";
-import { useWhyNot } from "../../state/rights.ts";
+import { useWhyNotOpen } from "../../state/rights.ts";
 import { closeWindow } from "../../state/windows.ts";
 import { sensorSetsOf } from "./sensorSets.ts";
 
@@ -27,7 +27,7 @@ const MOST_UAVS = 10_000;
 /** How a scenario is to be flown. What is left as it is is not told to the server. */
 export function Start({ card, back }: { card: ScenarioCard; back: () => void }) {
   const offered = useChoices();
-  const whyNot = useWhyNot();
+  const whyNot = useWhyNotOpen();
   const [changes, setChanges] = useState<ScenarioChanges>({});
   const [busy, setBusy] = useState(false);
   const change = (next: ScenarioChanges) => setChanges({ ...changes, ...next });

@@ -3,7 +3,7 @@ import { useEffect, useState } from "react";
 import { ENDINGS, kindOf } from "../../lib/fileKinds.ts";
 import { upload, type UploadKind } from "../../link/commands.ts";
 import { reasonOf } from "../../state/notices.ts";
-import { useWhyNot } from "../../state/rights.ts";
+import { useWhyNotOpen } from "../../state/rights.ts";
 import { closeWindow, offerFile, offerScenario, useWindows } from "../../state/windows.ts";
 
 const KINDS: { kind: UploadKind; label: string; description: string }[] = [
@@ -24,7 +24,7 @@ export default function Upload() {
   const [kind, setKind] = useState<UploadKind | null>(null);
   const [trouble, setTrouble] = useState("");
   const [busy, setBusy] = useState(false);
-  const whyNot = useWhyNot();
+  const whyNot = useWhyNotOpen();
   useEffect(() => {
     setTrouble("");
     if (file === null) return;
