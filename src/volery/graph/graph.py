@@ -339,6 +339,11 @@ class Graph:
         found = self._topics.get(topic)
         return 0 if found is None else found.publishers
 
+    def subscribers(self, topic: str) -> int:
+        """How many subscribe to a topic."""
+        found = self._topics.get(topic)
+        return 0 if found is None else len(found.callbacks)
+
     def topic_type(self, topic: str) -> str | None:
         """Type of a topic; None where there is no such topic."""
         found = self._topics.get(topic)

@@ -16,6 +16,7 @@ from volery.bridges.rosbridge.conversation import SERVICE_RESTART, Channel
 from volery.bridges.rosbridge.forms import Forms
 from volery.bridges.rosbridge.protocol import Shared
 from volery.bridges.rosbridge.rosapi import RosApi
+from volery.bridges.rosbridge.tf_republisher import TfRepublisher
 from volery.graph.graph import Graph
 from volery.graph.session import Gateway
 from volery.runtime.end_of_run import EndOfRun
@@ -78,6 +79,8 @@ class JoinedWorld:
         self._world = world
         self._rosapi = RosApi(world.gateway, "ros2", graph.now_ns)
         self._rosapi.start()
+        self._transforms = TfRepublisher(world.gateway)
+        self._transforms.start()
 
     @property
     def geometry(self) -> Geometry | None:
@@ -94,6 +97,7 @@ class JoinedWorld:
     def leave(self) -> None:
         """Take back what is offered to clients."""
         self._rosapi.stop()
+        self._transforms.stop()
 
 
 @dataclass(eq=False)

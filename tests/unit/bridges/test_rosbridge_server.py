@@ -556,3 +556,62 @@ def test_roslib(simulation, server):
     assert found["feedback"]["completed_steps"] == 1
     assert found["result"]["result"]["error_message"] == "ok"
     assert found["parameter"] == {"a": 1}
+
+
+def transform(parent, child, x, yaw=0.0):
+    turn = m.Quaternion(0.0, 0.0, float(np.sin(yaw / 2)), float(np.cos(yaw / 2)))
+    moved = m.Transform(m.Vector3(x, 0.0, 0.0), turn)
+    return m.TransformStamped(m.header(5, parent), child, moved)
+
+
+def test_the_tf_client_of_roslibpy(simulation, server):
+    import roslibpy.tf
+
+    fixed = [transform("uav1/base_link", "uav1/laser", 0.5)]
+    simulation.publish("/tf_static", m.TFMessage(fixed), latched=True)
+    moving = simulation.graph.advertise("/tf", "tf2_msgs/msg/TFMessage")
+    ros = roslibpy.Ros("127.0.0.1", server.port)
+    ros.run(timeout=10)
+    seen, done = [], threading.Event()
+
+    def fly():
+        x = 0.0
+        while not done.wait(0.02):
+            x += 1.0
+            frames = [transform("map", "uav1/base_link", x, yaw=np.pi)]
+            simulation.do(lambda f=frames: moving.publish(m.TFMessage(f)))
+
+    flying = threading.Thread(target=fly)
+    flying.start()
+    try:
+        client = roslibpy.tf.TFClient(ros, fixed_frame="/map", angular_threshold=0.1, rate=30.0)
+        client.subscribe("/uav1/laser", seen.append)
+        until(lambda: len(seen) >= 3)
+    finally:
+        done.set()
+        flying.join()
+        ros.close()
+    places = [transform["translation"]["x"] for transform in seen]
+    assert places == sorted(places)
+    assert all(abs(x % 1.0 - 0.5) < 1e-9 for x in places)  # half a metre behind, turned about
+    assert abs(seen[0]["rotation"]["z"]) == pytest.approx(1.0)
+
+
+def test_tf_clients_cannot_ask_for_too_much(simulation, server):
+    with Plain(server) as client:
+        frames = [f"f{k}" for k in range(501)]
+        args = {"source_frames": frames, "target_frame": "map", "rate": 10.0}
+        client.send("call_service", service="/republish_tfs", args=args)
+        answer = client.read()
+        assert not answer["result"]
+        assert "500 at most" in str(answer["values"])
+
+
+def test_a_topic_of_frames_ends_without_subscribers(simulation, server):
+    with Plain(server) as client:
+        args = {"source_frames": ["a"], "target_frame": "map", "rate": 10.0}
+        args["timeout"] = {"sec": 0, "nanosec": 100_000_000}
+        client.send("call_service", service="/republish_tfs", args=args)
+        topic = client.read()["values"]["topic_name"]
+        assert simulation.graph.publishers(topic) == 1
+        until(lambda: simulation.graph.publishers(topic) == 0)

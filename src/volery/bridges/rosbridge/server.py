@@ -22,6 +22,7 @@ from volery.bridges.rosbridge.forms import Forms, Generation
 from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
 from volery.bridges.rosbridge.rosapi import RosApi
 from volery.bridges.rosbridge.rosapi_parameters import Parameters
+from volery.bridges.rosbridge.tf_republisher import TfRepublisher
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, open_listener
@@ -107,6 +108,7 @@ class RosbridgeServer:
         self._listener: Listener | None = None
         self._guesses = TokenGuesses()
         self._rosapi: RosApi | None = None
+        self._transforms: TfRepublisher | None = None
         self._clients: set[ServerConnection] = set()
         self._shown: WeakSet[ServerConnection] = WeakSet()
         """Clients whose request for a connection carried the token."""
@@ -161,12 +163,17 @@ class RosbridgeServer:
         self.port = next(iter(self._server.sockets)).getsockname()[1]
         self._rosapi = RosApi(gateway, self._generation, graph.now_ns, self._parameters)
         self._rosapi.start()
+        self._transforms = TfRepublisher(gateway)
+        self._transforms.start()
 
     async def stop(self) -> None:
         """Let everybody go."""
         if self._rosapi is not None:
             self._rosapi.stop()
             self._rosapi = None
+        if self._transforms is not None:
+            self._transforms.stop()
+            self._transforms = None
         if self._server is not None:
             self._server.close()
             await self._server.wait_closed()
