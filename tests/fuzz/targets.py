@@ -6,6 +6,7 @@ were. What it must not let out: any exception but those that its parser document
 
 import city_targets
 import comms_targets
+import damaged_log_targets
 import data_file_targets
 import grid_map_targets
 import log_targets
@@ -44,6 +45,8 @@ TARGETS = {
     "ros2_attachments": ros2_targets.attachments,
     "mcap": log_targets.mcap,
     "bag": log_targets.bag,
+    "damaged_mcap": damaged_log_targets.damaged_mcap,
+    "damaged_bag": damaged_log_targets.damaged_bag,
     "grid_map_matrix": grid_map_targets.matrix,
     "grid_map_moving_ai": grid_map_targets.moving_ai,
     "grid_map_picture": grid_map_targets.picture,

@@ -14,7 +14,12 @@ from mutation import Mutator
 from targets import BUILT, LOADED, TARGETS
 
 every_parser = pytest.mark.parametrize("name", TARGETS)
-_CHECKS = {"mcap": 100, "bag": 100, **dict.fromkeys(BUILT, 8), **dict.fromkeys(LOADED, 60)}
+_LOGS = ("mcap", "bag", "damaged_mcap", "damaged_bag")
+_CHECKS = {
+    **dict.fromkeys(_LOGS, 100),
+    **dict.fromkeys(BUILT, 8),
+    **dict.fromkeys(LOADED, 60),
+}
 _PARSERS = [name for name in TARGETS if name not in BUILT]
 
 

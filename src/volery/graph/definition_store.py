@@ -16,6 +16,8 @@ from rosbags.typesys import TypesysError
 from rosbags.typesys.store import Typestore
 
 from volery.core.errors import GraphError
+from volery.graph import definition_budget
+from volery.graph.definition_budget import MAX_DEPTH, check_definitions, check_foreign
 from volery.graph.definition_files import (
     Definition,
     DefinitionFile,
@@ -23,8 +25,10 @@ from volery.graph.definition_files import (
     read_definition_file,
 )
 
-EMPTY_MEMBER = "structure_needs_at_least_one_member"
+EMPTY_MEMBER = definition_budget.EMPTY_MEMBER
 """The byte that a message without fields has in ROS 2, and only there."""
+MAX_FOREIGN = 5000
+"""Types that one process learns from logs."""
 
 
 class _LazyDict(dict[str, Any]):
@@ -59,6 +63,7 @@ class DefinitionStore(Typestore):
         self._lock = threading.RLock()
         self._module = module
         self._definitions: dict[str, Definition] = {}
+        self._num_foreign = 0
         self.types = _LazyDict(dict(base.types), self._load)
         self.fielddefs = _LazyDict(dict(base.fielddefs), self._load)
 
@@ -83,16 +88,17 @@ class DefinitionStore(Typestore):
                 if not dict.__contains__(self.fielddefs, name):
                     self._files.setdefault(name, file)
 
-    def add_folder(self, folder: Path) -> list[str]:
+    def add_folder(self, folder: Path, *, foreign: bool = False) -> list[str]:
         """Read a folder and register its types, all or none. Returns their names.
 
-        A type that is known already with the same fields is passed over.
+        A type that is known already with the same fields is passed over. Types of a stranger's log
+        (`foreign`) are held to more: a process learns at most `MAX_FOREIGN` of them.
 
         Raises
         ------
         GraphError
             A file is broken, names an unknown type, repeats a type of another file, or defines a
-            known type with other fields; a type contains itself.
+            known type with other fields; a type contains itself, or is too large to be used.
 
         """
         found: dict[str, Definition] = {}
@@ -108,8 +114,21 @@ class DefinitionStore(Typestore):
             for definition in found.values():
                 self._check(definition, found)
             _check_cycles(found)
-            self._register(d for n, d in found.items() if n not in self.fielddefs)
+            new = {n: d for n, d in found.items() if n not in self.fielddefs}
+            check_definitions(new, self.fielddefs.__getitem__)
+            if foreign:
+                self._admit(new)
+            self._register(new.values())
         return sorted(found)
+
+    def _admit(self, new: dict[str, Definition]) -> None:
+        check_foreign(new, self.fielddefs.__getitem__)
+        if self._num_foreign + len(new) > MAX_FOREIGN:
+            raise GraphError(
+                f"{MAX_FOREIGN} message types were learned from logs, and this process takes no "
+                "more; start it again"
+            )
+        self._num_foreign += len(new)
 
     def _check(self, definition: Definition, found: dict[str, Definition]) -> None:
         name = definition.name
@@ -172,6 +191,8 @@ def _check_cycles(found: dict[str, Definition]) -> None:
             raise GraphError(f"{found[name].source}: {name} contains itself: {loop}")
         if name in done or name not in found:
             return
+        if len(above) > MAX_DEPTH:
+            raise GraphError(f"{found[name].source}: types are nested more than {MAX_DEPTH} deep")
         for nested, _ in found[name].nested:
             visit(nested, (*above, name))
         done.add(name)

@@ -80,19 +80,21 @@ def typestore() -> DefinitionStore:
     return store
 
 
-def add_definitions(folder: str | Path) -> list[str]:
+def add_definitions(folder: str | Path, *, foreign: bool = False) -> list[str]:
     """Register the `.msg`, `.srv` and `.action` files of a folder of packages.
 
     Returns the names of the types, `package/srv/Name_Request` and `_Response` for a service.
+    foreign: they come from a log, which may be a stranger's.
 
     Raises
     ------
     GraphError
-        A definition is broken, names an unknown type or contradicts a type that is known; the
-        message names file and line, and none of the folder's types is registered.
+        A definition is broken, too large to be used, names an unknown type or contradicts a type
+        that is known; the message names file and line, and none of the folder's types is
+        registered.
 
     """
-    return typestore().add_folder(Path(folder))
+    return typestore().add_folder(Path(folder), foreign=foreign)
 
 
 def __getattr__(name: str) -> Any:

@@ -12,6 +12,7 @@ such a file (its index) is missing; `volery.bridges.logs.recover` writes it.
 
 from __future__ import annotations
 
+import errno
 import io
 import time
 from abc import ABC, abstractmethod
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 from volery.bridges.logs.bag_writer import CHUNK_BYTES, bag_writer
 from volery.bridges.logs.disk_file import DiskFile
+from volery.bridges.logs.file_lock import locked_for_replacing
 from volery.core.errors import GraphError, RecordingError
 
 if TYPE_CHECKING:
@@ -42,28 +44,42 @@ def open_log(path: str | Path, *, overwrite: bool = False, compression: Compress
     path
         `.mcap` for ROS 2 CDR in MCAP, `.bag` for ROS 1. Missing folders are made.
     overwrite
-        Replace a file of that name; otherwise one is refused.
+        Replace a file of that name; otherwise one is refused. One that another process is writing
+        is never replaced.
     compression
         `zstd` is smaller and slower than `lz4`; a .bag knows `lz4` and `none`.
 
     Raises
     ------
     RecordingError
-        The suffix is unknown, the file exists, or it cannot be created.
+        The suffix is unknown, the file exists or is being written, or it cannot be created; then
+        nothing is left of it.
 
     """
     path = Path(path)
     kind = check_target(path, overwrite=overwrite)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.unlink(missing_ok=True)
-        return kind(path, compression)
+        with locked_for_replacing(path):
+            path.unlink(missing_ok=True)
+            return _begin(kind, path, compression)
     except OSError as error:
         raise RecordingError(f"{path}: cannot create the log: {error.strerror}") from None
 
 
+def _begin(kind: type[McapLog] | type[BagLog], path: Path, compression: Compression) -> Log:
+    """A new log; where its first bytes cannot be written the file is removed again."""
+    try:
+        return kind(path, compression)
+    except FileExistsError:
+        raise  # of another process, made meanwhile
+    except (OSError, RecordingError):
+        path.unlink(missing_ok=True)
+        raise
+
+
 def check_target(path: Path, *, overwrite: bool = False) -> type[McapLog] | type[BagLog]:
-    """The kind of log that `open_log` would begin; RecordingError where it would refuse."""
+    """Returns the kind of log that `open_log` begins; `RecordingError` where it refuses to."""
     kinds: dict[str, type[McapLog] | type[BagLog]] = {".mcap": McapLog, ".bag": BagLog}
     kind = kinds.get(path.suffix.lower())
     if kind is None:
@@ -72,7 +88,8 @@ def check_target(path: Path, *, overwrite: bool = False) -> type[McapLog] | type
         raise RecordingError(f"{path}: cannot create the log: it is a folder")
     if path.exists() and not overwrite:
         raise RecordingError(f"{path}: exists already; choose another name or overwrite it")
-    return kind
+    with locked_for_replacing(path):
+        return kind
 
 
 class Log(ABC):
@@ -198,13 +215,18 @@ class BagLog(Log):
     """ROS 1 bag, format 2.0."""
 
     def __init__(self, path: Path, compression: Compression = "lz4") -> None:
+        from rosbags.rosbag1.writer import WriterError
+
         from volery.graph.ros1 import ros1_codec
 
         super().__init__(path)
         if compression == "zstd":
             raise RecordingError(f"{path}: a .bag is compressed with lz4 or not at all")
         writer = bag_writer(path, compressed=compression == "lz4")
-        writer.open()
+        try:
+            writer.open()
+        except WriterError:
+            raise FileExistsError(errno.EEXIST, "it exists already", str(path)) from None
         if writer.bio is not None:
             writer.bio.close()
         self._file = DiskFile(path, append=True)

@@ -7,22 +7,23 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.rosbag1.reader import decompressors
 
-from volery.bridges.logs.chunks import Chunk, ChunkedLog, Content, Head, Span, Unindexed
-from volery.bridges.logs.records import (
-    BAG_MAGIC,
-    CUT_OFF,
-    PART_CHUNK,
-    BagIndex,
-    LogTopic,
-    bag_fields,
+from volery.bridges.logs import bag_format
+from volery.bridges.logs.bag_format import BagIndex, bag_fields
+from volery.bridges.logs.budgets import (
+    MAX_CHUNK_MESSAGES,
+    MAX_DEFINITION_BYTES,
+    MAX_HEAD_BYTES,
+    MAX_TIME_NS,
 )
+from volery.bridges.logs.chunks import Chunk, ChunkedLog, Span, Unindexed
+from volery.bridges.logs.content import Content
+from volery.bridges.logs.records import BAG_MAGIC, CUT_OFF, LogTopic, cut_at
 from volery.core.clock import NS_PER_S
 
-_MESSAGE, _INDEX, _CHUNK, _CONNECTION = b"\x02", b"\x04", b"\x05", b"\x07"
 _LENGTH = struct.Struct("<I")
-_TIME = struct.Struct("<II")
+_STAMP_BYTES = 12
+"""Seconds, nanoseconds, offset."""
 
 
 class BagChunks(ChunkedLog):
@@ -31,91 +32,98 @@ class BagChunks(ChunkedLog):
     format = "bag"
 
     def _scan(self) -> None:
-        found = self._found
+        self._chunk: Span | None = None
+        self._counts: dict[int, int] = {}
+        self._stamps: list[NDArray[Any]] = []
         position = len(BAG_MAGIC)
-        span: Span | None = None
-        counts: dict[int, int] = {}
-        stamps: list[NDArray[Any]] = []
         index = BagIndex()
-
-        def end_chunk() -> None:
-            nonlocal span
-            if span is not None:
-                found.append(_indexed(span, dict(counts), stamps) if counts else Unindexed(span))
-            span = None
-            counts.clear()
-            stamps.clear()
-
         while position < self.size:
             record = self._record(position)
             if record is None:
-                self.trouble = PART_CHUNK
+                self._cut = cut_at(position)
                 break
             fields, body, after = record
+            self._count_record()
             index.pass_record(fields)
-            kind = fields.get(b"op")
-            if kind == _CHUNK:
-                end_chunk()
-                span = Span(position, after - position)
-            elif kind == _INDEX and span is not None:
-                (channel,) = _LENGTH.unpack(fields[b"conn"])
-                data = self._read(body, after - body)
-                if data:
-                    stamps.append(np.frombuffer(data, "<u4").reshape(-1, 3))
-                    counts[channel] = counts.get(channel, 0) + len(stamps[-1])
-            elif kind == _CONNECTION:
-                self._learn(fields, self._read(body, after - body))
+            try:
+                self._take(fields, Span(position, after - position), body)
+            except ValueError as error:
+                self._damage.add(position, error)
             position = after
-        end_chunk()
-        if not index.is_whole and not self.trouble:
-            self.trouble = CUT_OFF
+        self._end_chunk()
+        if not index.is_whole and not self._cut:
+            self._cut = CUT_OFF
+
+    def _take(self, fields: dict[bytes, bytes], span: Span, body: int) -> None:
+        """Take one record outside of chunks, its data from `body` on; `ValueError`: damaged."""
+        kind = fields.get(b"op")
+        length = span.position + span.length - body
+        if kind == bag_format.CHUNK:
+            self._end_chunk()
+            self._chunk = span
+        elif kind == bag_format.INDEX and self._chunk is not None:
+            self._index(fields, body, length)
+        elif kind == bag_format.CONNECTION:
+            if length > MAX_DEFINITION_BYTES:
+                raise ValueError(f"a message definition of {length} bytes")
+            self._learn(bag_format.number(fields, b"conn"), fields, self._read(body, length))
+
+    def _index(self, fields: dict[bytes, bytes], body: int, length: int) -> None:
+        """The times of one channel in the present chunk; a damaged one has the chunk be read."""
+        known = sum(len(stamps) for stamps in self._stamps)
+        stamps = None
+        if not length % _STAMP_BYTES and length // _STAMP_BYTES <= MAX_CHUNK_MESSAGES - known:
+            stamps = np.frombuffer(self._read(body, length), "<u4").reshape(-1, 3).astype(np.int64)
+            times = stamps[:, 0] * NS_PER_S + stamps[:, 1]
+        if stamps is None or (len(stamps) and times.max() > MAX_TIME_NS):
+            if self._chunk is not None:
+                self._found.append(Unindexed(self._chunk))
+            self._forget_chunk()
+            raise ValueError("the index of a chunk is damaged or too long")
+        if len(stamps):
+            channel = bag_format.number(fields, b"conn")
+            self._stamps.append(stamps)
+            self._counts[channel] = self._counts.get(channel, 0) + len(stamps)
+
+    def _end_chunk(self) -> None:
+        if self._chunk is not None:
+            chunk, counts = self._chunk, dict(self._counts)
+            self._found.append(
+                _indexed(chunk, counts, self._stamps) if counts else Unindexed(chunk)
+            )
+        self._forget_chunk()
+
+    def _forget_chunk(self) -> None:
+        self._chunk = None
+        self._counts.clear()
+        self._stamps.clear()
 
     def _record(self, position: int) -> tuple[dict[bytes, bytes], int, int] | None:
         """Header fields, begin and end of the data of a record; None where it is not whole."""
         start = self._read(position, 4)
         if len(start) < 4:
             return None
-        body = position + 4 + _LENGTH.unpack(start)[0]
+        length = _LENGTH.unpack(start)[0]
+        body = position + 4 + length
         if body + 4 > self.size:
             return None
-        head = self._read(position + 4, body - position)
-        after = body + 4 + _LENGTH.unpack(head[-4:])[0]
-        return None if after > self.size else (bag_fields(head[:-4]), body + 4, after)
+        head = self._read(position + 4, length) if length <= MAX_HEAD_BYTES else b""
+        after = body + 4 + _LENGTH.unpack(self._read(body, 4))[0]
+        return None if after > self.size else (bag_fields(head), body + 4, after)
 
     def _parse(self, data: bytes) -> Content:
-        fields, begin, _ = _inner(data, 0)
-        chunk = bytes(decompressors[fields[b"compression"].decode()](data[begin:]))
-        heads = []
-        position = 0
-        while position < len(chunk):
-            fields, begin, end = _inner(chunk, position)
-            kind = fields[b"op"]
-            if kind == _CONNECTION:
-                self._learn(fields, chunk[begin:end])
-            elif kind == _MESSAGE:
-                (channel,) = _LENGTH.unpack(fields[b"conn"])
-                sec, nsec = _TIME.unpack(fields[b"time"])
-                heads.append(Head(channel, sec * NS_PER_S + nsec, begin, end, 0))
-            position = end
-        return Content(tuple(heads), chunk)
+        fields, begin, _ = bag_format.inner_record(data, 0)
+        chunk = bag_format.unpack_chunk(fields, memoryview(data)[begin:])
+        return bag_format.chunk_content(chunk, self._learn)
 
-    def _learn(self, fields: dict[bytes, bytes], data: bytes) -> None:
-        (channel,) = _LENGTH.unpack(fields[b"conn"])
-        self.topics[channel] = LogTopic.of_bag(fields, bag_fields(data))
+    def _learn(self, channel: int, fields: dict[bytes, bytes], data: bytes) -> None:
+        if channel not in self.topics:
+            self._described.spend(len(data))
+        self.topics[channel] = LogTopic.of_bag(fields, data)
 
 
-def _indexed(span: Span, counts: dict[int, int], stamps: list[NDArray[Any]]) -> Chunk:
+def _indexed(span: Span, counts: dict[int, int], stamps: list[NDArray[np.int64]]) -> Chunk:
     """A chunk by its index records: rows of seconds, nanoseconds, offset."""
-    found = np.concatenate(stamps).astype(np.int64)
+    found = np.concatenate(stamps)
     found = found[np.argsort(found[:, 2])]
     return Chunk.of_times(span, counts, found[:, 0] * NS_PER_S + found[:, 1])
-
-
-def _inner(data: bytes, position: int) -> tuple[dict[bytes, bytes], int, int]:
-    """Header fields of a record in memory, begin and end of its data."""
-    (length,) = _LENGTH.unpack_from(data, position)
-    body = position + 4 + length
-    (size,) = _LENGTH.unpack_from(data, body)
-    if body + 4 + size > len(data):
-        raise ValueError("the record is not whole")
-    return bag_fields(data[position + 4 : body]), body + 4, body + 4 + size

@@ -7,7 +7,6 @@ as good as a whole one; what is compressed is read only where nothing else tells
 from __future__ import annotations
 
 import os
-import struct
 from abc import ABC, abstractmethod
 from collections import Counter, OrderedDict
 from collections.abc import Mapping
@@ -18,10 +17,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.bridges.logs.budgets import (
+    KEPT_BYTES,
+    MAX_CHUNK_BYTES,
+    MAX_CHUNKS,
+    MAX_RECORDS,
+    TopicBudget,
+    UnpackingBudget,
+)
+from volery.bridges.logs.content import Content, DamageCount, Head
 from volery.bridges.logs.records import LogRecord, LogTopic
+from volery.core.errors import RecordingError
 
 _CHUNKS_KEPT = 8
-"""Decompressed ones, in memory."""
+"""Decompressed ones, in memory; fewer where they are large."""
 
 
 class Span(NamedTuple):
@@ -50,24 +59,6 @@ class Chunk:
         return cls(span, first, last, counts, int(falls.max()))
 
 
-class Head(NamedTuple):
-    """A message in a chunk's bytes."""
-
-    channel: int
-    time_ns: int
-    begin: int
-    end: int
-    sequence: int
-
-
-@dataclass(frozen=True)
-class Content:
-    """What a chunk holds, in the order of the log."""
-
-    heads: tuple[Head, ...] = ()
-    data: bytes = b""
-
-
 class Unindexed(NamedTuple):
     """A chunk of which the file's index does not tell what is in it."""
 
@@ -75,26 +66,45 @@ class Unindexed(NamedTuple):
 
 
 class ChunkedLog(ABC):
-    """The chunks of one file; a damaged one is empty, and `trouble` tells of it."""
+    """The chunks of one file; a damaged one is empty, and `trouble` tells of it.
+
+    Raises `RecordingError` where the file describes or unpacks to more than any log does.
+    """
 
     format = ""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.trouble = ""
         self.topics: dict[int, LogTopic] = {}
         """By channel."""
-        self.damaged = 0
+        self._cut = ""
+        """What is missing at the file's end."""
+        self._damage = DamageCount()
         self._file = path.open("rb", buffering=0)
         self.size = os.fstat(self._file.fileno()).st_size
         self._kept: OrderedDict[Span, Content] = OrderedDict()
         self._found: list[Chunk | Unindexed] = []
+        self._unpacking: UnpackingBudget | None = UnpackingBudget(path, self.size)
+        self._described = TopicBudget(path)
+        self._records = 0
         try:
             self._scan()
-        except (KeyError, ValueError, struct.error) as error:  # what stands there is no record
-            self.trouble = f"damaged: {error}"
-        self.chunks = [chunk for found in self._found if (chunk := self._told(found)).counts]
-        self._learn_channels()
+            self.chunks = [chunk for found in self._found if (chunk := self._told(found)).counts]
+            self._learn_channels()
+        except BaseException:
+            self.close()
+            raise
+        self._unpacking = None  # from here on what is played decides, a chunk at a time
+
+    @property
+    def trouble(self) -> str:
+        """What is wrong with the file, as far as it was read; empty for a whole one."""
+        return "; ".join(part for part in (self._cut, self._damage.describe()) if part)
+
+    @property
+    def damaged(self) -> int:
+        """Chunks and records that were left out so far."""
+        return self._damage.count
 
     def counts(self) -> Counter[int]:
         """Messages of each channel."""
@@ -125,25 +135,46 @@ class ChunkedLog(ABC):
 
     @abstractmethod
     def _parse(self, data: bytes) -> Content:
-        """The messages of a span, whatever is raised for damaged bytes; learns its channels."""
+        """The messages of a span, `ValueError` for damaged bytes; learns its channels."""
 
     def _read(self, position: int, length: int) -> bytes:
         return os.pread(self._file.fileno(), length, position)
+
+    def _count_record(self) -> None:
+        """Count a record outside of chunks. `RecordingError` where there are too many."""
+        self._records += 1
+        if self._records > MAX_RECORDS or len(self._found) > MAX_CHUNKS:
+            raise RecordingError(
+                f"{self.path}: has more than {MAX_CHUNKS} chunks or {MAX_RECORDS} records; it is "
+                "not read any further"
+            )
 
     def _content(self, span: Span) -> Content:
         kept = self._kept.get(span)
         if kept is None:
             try:
-                kept = self._parse(self._read(*span))
-            except Exception:  # whatever a decoder makes of damaged bytes
+                kept = self._parsed(span)
+            except ValueError as error:
                 kept = Content()
-                self.damaged += 1
+                self._damage.add(span.position, error)
             self._kept[span] = kept
-            if len(self._kept) > _CHUNKS_KEPT:
+            while len(self._kept) > 1 and self._keeps_too_much():
                 self._kept.popitem(last=False)
         else:
             self._kept.move_to_end(span)
         return kept
+
+    def _parsed(self, span: Span) -> Content:
+        if span.length > MAX_CHUNK_BYTES:
+            raise ValueError(f"a chunk of {span.length} bytes; at most {MAX_CHUNK_BYTES} are read")
+        content = self._parse(self._read(*span))
+        if self._unpacking is not None:
+            self._unpacking.spend(len(content.data))
+        return content
+
+    def _keeps_too_much(self) -> bool:
+        kept = sum(content.memory_bytes for content in self._kept.values())
+        return len(self._kept) > _CHUNKS_KEPT or kept > KEPT_BYTES
 
     def _told(self, found: Chunk | Unindexed) -> Chunk:
         """The chunk with its times and counts, read where the index does not tell them."""
@@ -153,6 +184,7 @@ class ChunkedLog(ABC):
         if not heads:
             return Chunk(found.span, 0, 0, {}, 0)
         counts = Counter(head.channel for head in heads)
+        self._records += len(counts)
         times = np.array([head.time_ns for head in heads], np.int64)
         return Chunk.of_times(found.span, counts, times)
 

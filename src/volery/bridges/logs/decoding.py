@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from volery.bridges.logs.budgets import MAX_DEFINITION_BYTES, MAX_NESTED_TYPES
 from volery.bridges.logs.records import LogRecord, LogTopic
 from volery.core.errors import GraphError
 from volery.graph.cdr import decode_cdr
@@ -15,7 +16,7 @@ from volery.graph.ros1 import ros1_codec, ros2_name
 
 _SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
 _NESTED = re.compile(r"\s*MSG:\s*(\S+)[^\n]*\n?")
-_TYPE = re.compile(r"([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)
+_TYPE = re.compile(r"([A-Za-z]\w{0,99})/(?:msg/)?([A-Za-z]\w{0,99})", re.ASCII)
 _DEFINITION_FORMS = {"ros1msg", "ros2msg"}
 
 
@@ -79,7 +80,13 @@ def _learn(name: str, topic: LogTopic) -> None:
     """Register a type, and what it nests, from the log's text."""
     if topic.schema_encoding not in _DEFINITION_FORMS or not topic.definition.strip():
         raise GraphError(f"type {name} is not known, and the log does not define it")
+    if len(topic.definition) > MAX_DEFINITION_BYTES:
+        raise GraphError(
+            f"the definition of {name} has more than {MAX_DEFINITION_BYTES} characters"
+        )
     first, *others = _SEPARATOR.split(topic.definition)
+    if len(others) > MAX_NESTED_TYPES:
+        raise GraphError(f"the definition of {name} nests more than {MAX_NESTED_TYPES} types")
     texts = {name: first}
     for other in others:
         head = _NESTED.match(other)
@@ -89,9 +96,9 @@ def _learn(name: str, topic: LogTopic) -> None:
         for long_name, text in texts.items():
             parts = _TYPE.fullmatch(long_name)
             if parts is None:
-                raise GraphError(f"the log has a type with the name '{long_name}'")
+                raise GraphError(f"the log has a type with the name '{long_name[:100]}'")
             if f"{parts[1]}/msg/{parts[2]}" not in typestore().types:
                 path = Path(folder, parts[1], "msg", f"{parts[2]}.msg")
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(text, encoding="utf-8")
-        add_definitions(folder)
+        add_definitions(folder, foreign=True)

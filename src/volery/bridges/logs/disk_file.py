@@ -10,16 +10,25 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from volery.bridges.logs.file_lock import lock_for_writing
 from volery.core.errors import RecordingError
 
 
 class DiskFile:
-    """Binary output file with `commit`; offers the few stream methods that log writers call."""
+    """Binary output file with `commit`; offers the few stream methods that log writers call.
+
+    It is locked until it is closed: `RecordingError` where another process has the lock.
+    """
 
     def __init__(self, path: Path, *, append: bool = False) -> None:
         self.path = path
         flags = os.O_WRONLY | os.O_CLOEXEC | (0 if append else os.O_CREAT | os.O_EXCL)
         self._descriptor = os.open(path, flags, 0o644)
+        try:
+            lock_for_writing(self._descriptor, path)
+        except RecordingError:
+            os.close(self._descriptor)
+            raise
         self._buffer = bytearray()
         self._committed = os.lseek(self._descriptor, 0, os.SEEK_END)
         self._rewrites_start = False

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from volery.bridges.logs.budgets import UnpackingBudget
 from volery.bridges.logs.chunks import ChunkedLog, open_chunks
 from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.logs.records import LogRecord
@@ -143,13 +144,18 @@ def _command(message: Any, content: Any) -> Command:
 
 
 def _records_of(log: ChunkedLog, topic: str, *, following: bool = False) -> Iterator[LogRecord]:
-    """Messages of a topic, and with `following` also the one after each."""
+    """Messages of a topic, and with `following` also the one after each.
+
+    `RecordingError` where the chunks that are said to hold them unpack to more than any log does.
+    """
+    budget = UnpackingBudget(log.path, log.size)
     channels = {channel for channel, found in log.topics.items() if found.topic == topic}
     wanted = False
     for chunk in log.chunks:
         if not wanted and channels.isdisjoint(chunk.counts):
             continue
         content = log.content(chunk)
+        budget.spend(len(content.data))
         for head in content.heads:
             if wanted or head.channel in channels:
                 yield log.record(content, head)

@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import struct
-import zlib
 from collections.abc import Mapping
 from typing import Any
 
-import lz4.frame
 import numpy as np
-import zstandard
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema
+from mcap.records import Schema
 from numpy.typing import NDArray
 
-from volery.bridges.logs.chunks import Chunk, ChunkedLog, Content, Head, Span, Unindexed
-from volery.bridges.logs.records import CUT_OFF, MCAP_MAGIC, PART_CHUNK, LogTopic, mcap_records
+from volery.bridges.logs import mcap_format
+from volery.bridges.logs.budgets import MAX_CHUNK_MESSAGES, MAX_DEFINITION_BYTES, MAX_TIME_NS
+from volery.bridges.logs.chunks import Chunk, ChunkedLog, Span, Unindexed
+from volery.bridges.logs.content import Content
+from volery.bridges.logs.records import CUT_OFF, MCAP_MAGIC, LogTopic, cut_at
 
-_HEAD = struct.Struct("<BQ")
-_CHUNK = struct.Struct("<QQQIL")
-"""Start, end, size uncompressed, CRC-32, length of the compression's name."""
-_MESSAGE = struct.Struct("<HIQ")
-"""Channel, sequence, log time; the publish time follows."""
-_MESSAGE_BYTES = 22
+_HEAD = mcap_format.HEAD
 _INDEX = struct.Struct("<HL")
 _ENTRIES = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _LOOSE_BYTES = 1 << 20
@@ -36,76 +31,99 @@ class McapChunks(ChunkedLog):
 
     def _scan(self) -> None:
         self._schemas: dict[int, Schema] = {}
-        found = self._found
+        self._chunk: Span | None = None
+        self._entries: dict[int, NDArray[Any]] = {}
+        self._loose: Span | None = None
         position = len(MCAP_MAGIC)
-        chunk: Span | None = None
-        entries: dict[int, NDArray[Any]] = {}
-        loose: Span | None = None
-
-        def end_chunk() -> None:
-            nonlocal chunk, loose
-            if chunk is not None:
-                found.append(_indexed(chunk, entries) if entries else Unindexed(chunk))
-            if loose is not None:
-                found.append(Unindexed(loose))
-            chunk = loose = None
-            entries.clear()
-
         while True:
             head = self._read(position, _HEAD.size)
             if len(head) < _HEAD.size:
-                self.trouble = CUT_OFF
+                self._cut = CUT_OFF
                 break
             opcode, length = _HEAD.unpack(head)
-            body, after = position + _HEAD.size, position + _HEAD.size + length
-            if after > self.size:
-                self.trouble = PART_CHUNK
+            span = Span(position, _HEAD.size + length)
+            position += span.length
+            if position > self.size:
+                self._cut = cut_at(span.position)
                 break
             if opcode == Opcode.FOOTER:
-                if self._read(after, len(MCAP_MAGIC)) != MCAP_MAGIC:
-                    self.trouble = CUT_OFF
+                if self._read(position, len(MCAP_MAGIC)) != MCAP_MAGIC:
+                    self._cut = CUT_OFF
                 break
-            if opcode == Opcode.MESSAGE_INDEX and chunk is not None:
-                data = self._read(body, length)
-                channel, size = _INDEX.unpack_from(data)
-                if size:
-                    entries[channel] = np.frombuffer(data[_INDEX.size :], _ENTRIES)
-            elif opcode == Opcode.MESSAGE:
-                if loose is None or loose.length > _LOOSE_BYTES:
-                    end_chunk()
-                    loose = Span(position, 0)
-                loose = Span(loose.position, after - loose.position)
-            elif opcode == Opcode.CHUNK:
-                end_chunk()
-                chunk = Span(position, after - position)
-            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._learn(opcode, self._read(body, length))
-            position = after
-        end_chunk()
+            self._count_record()
+            try:
+                self._take(opcode, span)
+            except ValueError as error:
+                self._damage.add(span.position, error)
+        self._end_chunk()
+
+    def _take(self, opcode: int, span: Span) -> None:
+        """Take one record outside of chunks. `ValueError` where it is damaged."""
+        if opcode == Opcode.MESSAGE_INDEX and self._chunk is not None:
+            self._index(span)
+        elif opcode == Opcode.MESSAGE:
+            loose = self._loose
+            if loose is None or loose.length > _LOOSE_BYTES:
+                self._end_chunk()
+                loose = Span(span.position, 0)
+            self._loose = Span(loose.position, span.position + span.length - loose.position)
+        elif opcode == Opcode.CHUNK:
+            self._end_chunk()
+            self._chunk = span
+        elif opcode in mcap_format.DEFINITIONS:
+            begin = span.position + _HEAD.size
+            most = min(span.length - _HEAD.size, MAX_DEFINITION_BYTES + 1)
+            self._learn(opcode, self._read(begin, most))
+
+    def _index(self, span: Span) -> None:
+        """The times of one channel in the present chunk; a damaged one has the chunk be read."""
+        count = (span.length - _HEAD.size - _INDEX.size) // _ENTRIES.itemsize
+        known = sum(len(entries) for entries in self._entries.values())
+        data = b""
+        if 0 <= count <= MAX_CHUNK_MESSAGES - known:
+            data = self._read(span.position + _HEAD.size, span.length - _HEAD.size)
+        if len(data) != _INDEX.size + count * _ENTRIES.itemsize:
+            self._forget_index()
+            raise ValueError("the index of a chunk is damaged or too long")
+        channel, _ = _INDEX.unpack_from(data)
+        entries = np.frombuffer(data[_INDEX.size :], _ENTRIES)
+        if len(entries) and entries["time"].max() > MAX_TIME_NS:
+            self._forget_index()
+            raise ValueError("the index of a chunk has a time later than ROS can tell")
+        if len(entries):
+            self._entries[channel] = entries
+
+    def _forget_index(self) -> None:
+        if self._chunk is not None:
+            self._found.append(Unindexed(self._chunk))
+        self._chunk = None
+        self._entries.clear()
+
+    def _end_chunk(self) -> None:
+        if self._chunk is not None:
+            known = _indexed(self._chunk, self._entries) if self._entries else None
+            self._found.append(known or Unindexed(self._chunk))
+        if self._loose is not None:
+            self._found.append(Unindexed(self._loose))
+        self._chunk = self._loose = None
+        self._entries.clear()
 
     def _parse(self, data: bytes) -> Content:
         if data[0] == Opcode.CHUNK:
-            data = _unpacked(memoryview(data)[_HEAD.size :])
-        heads = []
-        position, size = 0, len(data)
-        while position < size:
-            opcode, length = _HEAD.unpack_from(data, position)
-            body = position + _HEAD.size
-            position = body + length
-            if opcode == Opcode.MESSAGE:
-                channel, sequence, time_ns = _MESSAGE.unpack_from(data, body)
-                heads.append(Head(channel, time_ns, body + _MESSAGE_BYTES, position, sequence))
-            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._learn(opcode, data[body:position])
-        return Content(tuple(heads), data)
+            data = mcap_format.unpack_chunk(memoryview(data)[_HEAD.size :])
+        return mcap_format.chunk_content(data, self._learn)
 
     def _learn(self, opcode: int, data: bytes) -> None:
-        for record in mcap_records(opcode, data):
-            if isinstance(record, Schema):
-                self._schemas[record.id] = record
-            elif isinstance(record, Channel):
-                schema = self._schemas.get(record.schema_id)
-                self.topics[record.id] = LogTopic.of_mcap(record, schema)
+        record = mcap_format.definition(opcode, data)
+        if isinstance(record, Schema):
+            if record.id not in self._schemas:
+                self._described.spend(len(record.data))
+            self._schemas[record.id] = record
+        else:
+            if record.id not in self.topics:
+                self._described.spend(0)
+            schema = self._schemas.get(record.schema_id)
+            self.topics[record.id] = LogTopic.of_mcap(record, schema)
 
 
 def _indexed(span: Span, entries: Mapping[int, NDArray[Any]]) -> Chunk:
@@ -114,20 +132,3 @@ def _indexed(span: Span, entries: Mapping[int, NDArray[Any]]) -> Chunk:
     found = np.concatenate(list(entries.values()))
     times = found["time"][np.argsort(found["offset"])].astype(np.int64)
     return Chunk.of_times(span, counts, times)
-
-
-def _unpacked(chunk: memoryview) -> bytes:
-    """The records in a chunk. `ValueError` where they are damaged."""
-    _, _, size, crc, name_length = _CHUNK.unpack_from(chunk)
-    begin = _CHUNK.size + name_length
-    compression = bytes(chunk[_CHUNK.size : begin]).decode()
-    packed = chunk[begin + 8 :]
-    if compression == "lz4":
-        data = lz4.frame.decompress(packed)
-    elif compression == "zstd":
-        data = zstandard.ZstdDecompressor().decompress(packed, size)
-    else:
-        data = bytes(packed)
-    if crc and zlib.crc32(data) != crc:
-        raise ValueError("the chunk is damaged")
-    return bytes(data)

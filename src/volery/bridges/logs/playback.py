@@ -90,18 +90,14 @@ class Playback:
     @property
     def trouble(self) -> str:
         """What is wrong with the file; empty for a whole one."""
-        parts = [self.log.trouble] if self.log.trouble else []
-        if self.log.damaged:
-            noun = "chunk" if self.log.damaged == 1 else "chunks"
-            parts.append(f"{self.log.damaged} damaged {noun} left out")
-        return "; ".join(parts)
+        return self.log.trouble
 
     def advance(self, until_ns: int) -> bool:
         """Publish what was told up to `until_ns`, or some of it; whether that is all."""
         until_ns = min(until_ns, self.end_ns)
         shown, self._place, over = self._line.take(self._place, until_ns, self._wanted())
         self._publish(shown)
-        reached_ns = until_ns if over else shown[-1].time_ns
+        reached_ns = until_ns if over else shown[-1].time_ns if shown else self.position_ns
         self.position_ns = max(self.position_ns, reached_ns)
         self._set_clock()
         return over

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from volery.bridges.logs.records import MCAP_MAGIC, LogWalk, log_format
+from volery.bridges.logs.file_index import bag_index, mcap_index
+from volery.bridges.logs.records import LogWalk, log_format
 from volery.core.clock import NS_PER_S
 
 
@@ -45,13 +46,13 @@ def summarize(path: str | Path) -> LogSummary:
     Raises
     ------
     RecordingError
-        The file cannot be read or is no log.
+        The file cannot be read, is no log, or describes or unpacks to more than any log does.
 
     """
     path = Path(path)
     kind = log_format(path)
     counts: dict[tuple[str, str], int] = {}
-    indexed = (_mcap_index if kind == "mcap" else _bag_index)(path, counts)
+    indexed = (mcap_index if kind == "mcap" else bag_index)(path, counts)
     trouble = ""
     if indexed is None:
         counts.clear()
@@ -72,45 +73,3 @@ def summarize(path: str | Path) -> LogSummary:
     )
     size = path.stat().st_size
     return LogSummary(path, kind, size, start, end, sum(counts.values()), topics, trouble)
-
-
-def _mcap_index(path: Path, counts: dict[tuple[str, str], int]) -> tuple[int, int] | None:
-    """First and last time, and counts by topic, from an MCAP's summary; None without one."""
-    from mcap.reader import make_reader
-
-    with path.open("rb") as file:
-        file.seek(0, 2)
-        if file.tell() < 2 * len(MCAP_MAGIC):
-            return None
-        file.seek(-len(MCAP_MAGIC), 2)
-        if file.read() != MCAP_MAGIC:
-            return None
-        file.seek(0)
-        try:
-            summary = make_reader(file).get_summary()
-        except Exception:  # whatever the reader makes of damaged bytes
-            return None
-    if summary is None or summary.statistics is None:
-        return None
-    numbers = summary.statistics
-    for channel in summary.channels.values():
-        schema = summary.schemas.get(channel.schema_id)
-        key = (channel.topic, schema.name if schema else "")
-        counts[key] = counts.get(key, 0) + numbers.channel_message_counts.get(channel.id, 0)
-    return numbers.message_start_time, numbers.message_end_time
-
-
-def _bag_index(path: Path, counts: dict[tuple[str, str], int]) -> tuple[int, int] | None:
-    """The same from a bag's index."""
-    from rosbags.rosbag1 import Reader
-
-    try:
-        with Reader(path) as reader:
-            for connection in reader.connections:
-                key = (connection.topic, connection.msgtype)
-                counts[key] = counts.get(key, 0) + connection.msgcount
-            if not reader.chunk_infos:
-                return 0, 0
-            return reader.start_time, reader.end_time - 1  # rosbags' end is exclusive
-    except Exception:  # whatever the reader makes of damaged bytes
-        return None

@@ -6,26 +6,35 @@ length, so they can be read until the file ends in the middle of one.
 
 from __future__ import annotations
 
-import io
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Message, Schema
-from mcap.stream_reader import breakup_chunk
-from rosbags.rosbag1.reader import decompressors
+from mcap.records import Channel, Schema
 
+from volery.bridges.logs import bag_format, mcap_format
+from volery.bridges.logs.bag_format import BagIndex, bag_fields
+from volery.bridges.logs.budgets import (
+    MAX_CHUNK_BYTES,
+    MAX_HEAD_BYTES,
+    TopicBudget,
+    UnpackingBudget,
+)
+from volery.bridges.logs.content import Content, DamageCount
 from volery.core.errors import RecordingError
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 BAG_MAGIC = b"#ROSBAG V2.0\n"
 
 CUT_OFF = "cut off: the index at its end is missing"
-PART_CHUNK = "cut off in the middle of a chunk"
+
+
+def cut_at(position: int) -> str:
+    """What is wrong with a file that ends within the record at a byte."""
+    return f"cut off in the middle of a chunk, which begins at byte {position}"
 
 
 @dataclass(frozen=True)
@@ -54,16 +63,23 @@ class LogTopic:
         )
 
     @classmethod
-    def of_bag(cls, head: dict[bytes, bytes], details: dict[bytes, bytes]) -> LogTopic:
-        """Topic of a bag's connection: fields of its record's header and data."""
-        return cls(
-            head[b"topic"].decode(),
-            _ros2_name(details[b"type"].decode()),
-            details[b"message_definition"].decode(errors="replace"),
-            "ros1",
-            "ros1msg",
-            details[b"md5sum"].decode(),
-        )
+    def of_bag(cls, head: dict[bytes, bytes], data: bytes) -> LogTopic:
+        """Topic of a bag's connection: fields and data of its record.
+
+        Raises `ValueError` where it is no such record.
+        """
+        details = bag_fields(data)
+        try:
+            return cls(
+                head[b"topic"].decode(),
+                _ros2_name(details[b"type"].decode()),
+                details[b"message_definition"].decode(errors="replace"),
+                "ros1",
+                "ros1msg",
+                details[b"md5sum"].decode(),
+            )
+        except KeyError as error:
+            raise ValueError(f"a connection lacks its field {error}") from None
 
 
 class LogRecord(NamedTuple):
@@ -77,116 +93,110 @@ class LogRecord(NamedTuple):
 
 @dataclass
 class LogWalk:
-    """Iterate over it for the messages; afterwards `trouble` says what was wrong, if anything."""
+    """Iterate over it for the messages; afterwards `trouble` says what was wrong, if anything.
+
+    Iterating raises `RecordingError` where the file describes or unpacks to more than any log does.
+    """
 
     path: Path
     trouble: str = ""
-    damaged_chunks: int = 0
+    damage: DamageCount = field(default_factory=DamageCount)
     _topics: dict[int, LogTopic] = field(default_factory=dict)
+    _schemas: dict[int, Schema] = field(default_factory=dict)
+
+    @property
+    def damaged_chunks(self) -> int:
+        """Chunks and records that were left out so far."""
+        return self.damage.count
 
     def __iter__(self) -> Iterator[LogRecord]:
-        with self.path.open("rb") as file:
-            yield from _WALKS[log_format(self.path)](self, file)
-        if self.damaged_chunks:
-            noun = "chunk" if self.damaged_chunks == 1 else "chunks"
-            damage = f"{self.damaged_chunks} damaged {noun} left out"
-            self.trouble = f"{self.trouble}; {damage}" if self.trouble else damage
-
-    def _mcap(self, file: BinaryIO) -> Iterator[LogRecord]:
         size = self.path.stat().st_size
+        self._unpacking, self._described = UnpackingBudget(self.path, size), TopicBudget(self.path)
+        with self.path.open("rb") as file:
+            yield from _WALKS[log_format(self.path)](self, file, size)
+        parts = (self.trouble, self.damage.describe())
+        self.trouble = "; ".join(part for part in parts if part)
+
+    def _mcap(self, file: BinaryIO, size: int) -> Iterator[LogRecord]:
         position = len(MCAP_MAGIC)
-        schemas: dict[int, Schema] = {}
         while True:
             file.seek(position)
-            head = file.read(9)
-            if len(head) < 9:
+            head = file.read(mcap_format.HEAD.size)
+            if len(head) < mcap_format.HEAD.size:
                 self.trouble = CUT_OFF
                 return
-            opcode, length = struct.unpack("<BQ", head)
-            position += 9 + length
+            opcode, length = mcap_format.HEAD.unpack(head)
+            begin, position = position, position + mcap_format.HEAD.size + length
             if position > size:
-                self.trouble = PART_CHUNK
+                self.trouble = cut_at(begin)
                 return
             if opcode in (Opcode.DATA_END, Opcode.FOOTER):
                 file.seek(size - len(MCAP_MAGIC))
                 if file.read() != MCAP_MAGIC:
                     self.trouble = CUT_OFF
                 return
-            if opcode in (Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
+            if opcode in mcap_format.READ:
                 try:
-                    records = mcap_records(opcode, file.read(length))
-                except Exception:  # whatever a decoder makes of damaged bytes
-                    self.damaged_chunks += 1
+                    content = self._mcap_content(opcode, _body(file, length))
+                except ValueError as error:
+                    self.damage.add(begin, error)
                     continue
-                yield from self._mcap_messages(records, schemas)
+                yield from self._records(content)
 
-    def _mcap_messages(self, records: list[Any], schemas: dict[int, Schema]) -> Iterator[LogRecord]:
-        for record in records:
-            if isinstance(record, Schema):
-                schemas[record.id] = record
-            elif isinstance(record, Channel):
-                schema = schemas.get(record.schema_id)
-                self._topics[record.id] = LogTopic.of_mcap(record, schema)
-            elif isinstance(record, Message) and record.channel_id in self._topics:
-                topic = self._topics[record.channel_id]
-                yield LogRecord(topic, record.log_time, record.data, record.sequence)
+    def _mcap_content(self, opcode: int, data: bytes) -> Content:
+        if opcode in mcap_format.DEFINITIONS:
+            self._learn(opcode, data)
+            return Content()
+        if opcode == Opcode.MESSAGE:
+            return Content((mcap_format.message_head(data, 0, len(data)),), data)
+        unpacked = mcap_format.unpack_chunk(memoryview(data))
+        self._unpacking.spend(len(unpacked))
+        return mcap_format.chunk_content(unpacked, self._learn)
 
-    def _bag(self, file: BinaryIO) -> Iterator[LogRecord]:
-        size = self.path.stat().st_size
+    def _learn(self, opcode: int, data: bytes) -> None:
+        record = mcap_format.definition(opcode, data)
+        if isinstance(record, Schema):
+            self._described.spend(len(record.data))
+            self._schemas[record.id] = record
+        else:
+            self._described.spend(0)
+            schema = self._schemas.get(record.schema_id)
+            self._topics[record.id] = LogTopic.of_mcap(record, schema)
+
+    def _bag(self, file: BinaryIO, size: int) -> Iterator[LogRecord]:
         file.seek(len(BAG_MAGIC))
         index = BagIndex()
-        while file.tell() < size:
+        while (begin := file.tell()) < size:
             record = _bag_record(file, size)
             if record is None:
-                self.trouble = PART_CHUNK
+                self.trouble = cut_at(begin)
                 return
             head, data = record
             index.pass_record(head)
-            if head.get(b"op") == b"\x05":
+            if head.get(b"op") == bag_format.CHUNK:
                 try:
-                    chunk = decompressors[head[b"compression"].decode()](data)
-                    messages = list(self._bag_messages(chunk))
-                except Exception:  # whatever a decoder makes of damaged bytes
-                    self.damaged_chunks += 1
+                    content = self._bag_content(head, data)
+                except ValueError as error:
+                    self.damage.add(begin, error)
                     continue
-                yield from messages
+                yield from self._records(content)
         if not index.is_whole:
             self.trouble = CUT_OFF
 
-    def _bag_messages(self, chunk: bytes) -> Iterator[LogRecord]:
-        inner = io.BytesIO(chunk)
-        while (record := _bag_record(inner, len(chunk))) is not None:
-            head, data = record
-            if head[b"op"] == b"\x07":
-                (number,) = struct.unpack("<I", head[b"conn"])
-                self._topics[number] = LogTopic.of_bag(head, bag_fields(data))
-            elif head[b"op"] == b"\x02":
-                (number,) = struct.unpack("<I", head[b"conn"])
-                seconds, nanoseconds = struct.unpack("<II", head[b"time"])
-                time_ns = seconds * 1_000_000_000 + nanoseconds
-                yield LogRecord(self._topics[number], time_ns, data, 0)
+    def _bag_content(self, head: dict[bytes, bytes], data: bytes) -> Content:
+        unpacked = bag_format.unpack_chunk(head, data)
+        self._unpacking.spend(len(unpacked))
+        return bag_format.chunk_content(unpacked, self._connect)
 
+    def _connect(self, number: int, head: dict[bytes, bytes], data: bytes) -> None:
+        self._described.spend(len(data))
+        self._topics[number] = LogTopic.of_bag(head, data)
 
-class BagIndex:
-    """Finds out whether a bag's index is there and has a record of every chunk."""
-
-    def __init__(self) -> None:
-        self._is_begun = False
-        self._missing = 0
-
-    def pass_record(self, fields: dict[bytes, bytes]) -> None:
-        """Takes the header fields of the next record of the file."""
-        kind = fields.get(b"op")
-        if kind == b"\x03":
-            self._is_begun = any(fields.get(b"index_pos", b""))
-            self._missing = int.from_bytes(fields.get(b"chunk_count", b""), "little")
-        elif kind == b"\x06":
-            self._missing -= 1
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether all of it has been passed."""
-        return self._is_begun and self._missing <= 0
+    def _records(self, content: Content) -> Iterator[LogRecord]:
+        for channel, time_ns, begin, end, sequence in content.heads:
+            if channel in self._topics:
+                data = content.data[begin:end]
+                yield LogRecord(self._topics[channel], time_ns, data, sequence)
 
 
 _WALKS = {"mcap": LogWalk._mcap, "bag": LogWalk._bag}
@@ -217,45 +227,31 @@ def log_format(path: Path) -> str:
     raise RecordingError(f"{path}: neither an MCAP log nor a ROS 1 bag (version 2.0)")
 
 
-def mcap_records(opcode: int, data: bytes) -> list[Any]:
-    """The record of an opcode, those in it where it is a chunk."""
-    stream = ReadDataStream(io.BytesIO(data))
-    if opcode == Opcode.CHUNK:
-        return breakup_chunk(Chunk.read(stream), validate_crc=True)
-    if opcode == Opcode.SCHEMA:
-        return [Schema.read(stream)]
-    if opcode == Opcode.CHANNEL:
-        return [Channel.read(stream)]
-    return [Message.read(stream, len(data))]
+def _body(file: BinaryIO, length: int) -> bytes:
+    """The next bytes of a file. `ValueError` where they are more than any record has."""
+    if length > MAX_CHUNK_BYTES:
+        raise ValueError(f"a record of {length} bytes; at most {MAX_CHUNK_BYTES} are read")
+    return file.read(length)
 
 
 def _bag_record(file: BinaryIO, size: int) -> tuple[dict[bytes, bytes], bytes] | None:
     """Header fields and data of the next record; None at the end or where it is not whole.
 
     size: bytes of the whole file. A read of more would claim memory for all that a length says.
+    What is too large is passed over, and comes empty.
     """
     parts = []
-    for _ in range(2):
+    for most in (MAX_HEAD_BYTES, MAX_CHUNK_BYTES):
         head = file.read(4)
         if len(head) < 4:
             return None
         (length,) = struct.unpack("<I", head)
         if length > size - file.tell():
             return None
-        parts.append(file.read(length))
+        parts.append(file.read(length) if length <= most else b"")
+        if length > most:
+            file.seek(length, 1)
     return bag_fields(parts[0]), parts[1]
-
-
-def bag_fields(data: bytes) -> dict[bytes, bytes]:
-    """The fields of a record's header."""
-    fields: dict[bytes, bytes] = {}
-    position = 0
-    while position + 4 <= len(data):
-        (length,) = struct.unpack_from("<I", data, position)
-        name, _, value = data[position + 4 : position + 4 + length].partition(b"=")
-        fields[name] = value
-        position += 4 + length
-    return fields
 
 
 def _ros2_name(name: str) -> str:

@@ -12,6 +12,7 @@ from typing import Any, cast
 from volery.bridges.logs.bag import LIBRARY
 from volery.bridges.logs.bag_writer import CHUNK_BYTES, bag_writer
 from volery.bridges.logs.disk_file import DiskFile
+from volery.bridges.logs.file_lock import locked_for_reading, locked_for_replacing
 from volery.bridges.logs.records import LogRecord, LogTopic, LogWalk, log_format
 from volery.core.errors import RecordingError
 
@@ -38,8 +39,8 @@ def recover(path: str | Path, out: str | Path | None = None) -> Recovery:
     Raises
     ------
     RecordingError
-        The file is no log or holds no readable message, or the new one exists already or cannot
-        be written.
+        The file is no log, holds no readable message or is being written, or the new one exists
+        already or cannot be written; then nothing is left of it.
 
     """
     path = Path(path)
@@ -47,18 +48,33 @@ def recover(path: str | Path, out: str | Path | None = None) -> Recovery:
     out = recovered_name(path) if out is None else Path(out)
     if out.exists():
         raise RecordingError(f"{out}: exists already; choose another name")
-    walk = LogWalk(path)
-    records = iter(walk)
-    first = next(records, None)
-    if first is None:
-        trouble = f" ({walk.trouble})" if walk.trouble else ""
-        raise RecordingError(f"{path}: holds no readable message{trouble}; nothing is written")
-    write = _to_mcap if kind == "mcap" else _to_bag
-    try:
-        count, end_ns = write(itertools.chain([first], records), out)
-    except OSError as error:
-        raise RecordingError(f"{out}: cannot write the log: {error.strerror}") from None
+    with locked_for_reading(path):
+        walk = LogWalk(path)
+        records = iter(walk)
+        first = next(records, None)
+        if first is None:
+            trouble = f" ({walk.trouble})" if walk.trouble else ""
+            raise RecordingError(f"{path}: holds no readable message{trouble}; nothing is written")
+        count, end_ns = _write(kind, itertools.chain([first], records), out)
     return Recovery(out, count, end_ns, walk.trouble)
+
+
+def _write(kind: str, records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
+    """Write a whole log under another name first, so that `out` is whole or not there."""
+    made = out.with_name(f".{out.stem}.part{out.suffix}")
+    try:
+        with locked_for_replacing(made):
+            made.unlink(missing_ok=True)
+        try:
+            found = (_to_mcap if kind == "mcap" else _to_bag)(records, made)
+            made.rename(out)
+        finally:
+            made.unlink(missing_ok=True)
+    except OSError as error:
+        raise RecordingError(
+            f"{out}: cannot write the log: {error.strerror}; nothing of it is left"
+        ) from None
+    return found
 
 
 def _to_mcap(records: Iterable[LogRecord], out: Path) -> tuple[int, int]:

@@ -12,13 +12,16 @@ from collections.abc import Callable, Iterator, Set
 from functools import partial
 from typing import NamedTuple
 
-from volery.bridges.logs.chunks import Chunk, ChunkedLog, Content, Head
+from volery.bridges.logs.chunks import Chunk, ChunkedLog
+from volery.bridges.logs.content import Content, Head
 from volery.bridges.logs.records import LogRecord
 from volery.core.clock import NS_PER_S
 
 _JUMP_NS = NS_PER_S // 10
 """Messages may be out of order by less (modelling choice): publishers have their own clocks."""
 _FOREVER_NS = 1 << 62
+_MAX_FRUITLESS = 64
+"""Chunks that are read for messages that their index promises and that are not in them."""
 
 
 class _Piece(NamedTuple):
@@ -80,10 +83,19 @@ class Timeline:
     def after(self, time_ns: int) -> Place:
         """Place of the first message that is later than `time_ns`."""
         number = bisect_left(self._ends, time_ns + 1)
-        return self.take(Place(number, 0), time_ns, frozenset()).place
+        place = Place(number, 0)
+        for _ in range(_MAX_FRUITLESS):
+            passage = self.take(place, time_ns, frozenset())
+            place = passage.place
+            if passage.over:
+                break
+        return place
 
     def take(self, place: Place, until_ns: int, channels: Set[int]) -> Passage:
-        """Messages of `channels` from a place on, up to `until_ns`, at most those of one chunk."""
+        """Messages of `channels` from a place on, up to `until_ns`, at most those of one chunk.
+
+        No more than one chunk is read, also where an index promises messages that are not in it.
+        """
         shown: list[Shown] = []
         number, message = place
         while number < len(self._pieces):
@@ -99,22 +111,25 @@ class Timeline:
                     if head.channel in channels:
                         record = self.log.record(content, head)
                         shown.append(Shown(head.time_ns + shift_ns, head.channel, record))
-            number, message = number + 1, 0
-            if shown:
+                number, message = number + 1, 0
                 break
+            number, message = number + 1, 0
         return Passage(shown, Place(number, 0), over=number == len(self._pieces))
 
     def last_before(self, place: Place, channels: Set[int]) -> list[Shown]:
         """The last message of each channel before a place, in the order of the log."""
         missing = set(channels)
         found: list[Shown] = []
+        fruitless = 0
         for piece, content, heads in self._backwards(place):
-            if not missing:
+            if not missing or fruitless > _MAX_FRUITLESS:
                 break
             if missing.isdisjoint(piece.chunk.counts):
                 continue
+            fruitless += 1
             for head in reversed(heads()):
                 if head.channel in missing:
+                    fruitless = 0
                     missing.discard(head.channel)
                     record = self.log.record(content(), head)
                     found.append(Shown(head.time_ns + piece.shift_ns, head.channel, record))
@@ -123,14 +138,17 @@ class Timeline:
     def since(self, place: Place, time_ns: int, channels: Set[int]) -> list[Shown]:
         """All messages of `channels` before a place and after `time_ns`, in their order."""
         found: list[Shown] = []
+        fruitless = 0
         for piece, content, heads in self._backwards(place):
-            if piece.end_ns <= time_ns:
+            if piece.end_ns <= time_ns or fruitless > _MAX_FRUITLESS:
                 break
             if channels.isdisjoint(piece.chunk.counts):
                 continue
+            fruitless += 1
             for head in reversed(heads()):
                 at_ns = head.time_ns + piece.shift_ns
                 if head.channel in channels and at_ns > time_ns:
+                    fruitless = 0
                     found.append(Shown(at_ns, head.channel, self.log.record(content(), head)))
         return found[::-1]
 
