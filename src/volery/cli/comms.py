@@ -18,15 +18,24 @@ _TOLD_S = 10.0
 def serve_stations(host: str, port: int, settings: RouterSettings, *, anywhere: bool) -> None:
     """Serve stations and say every ten seconds, if something changed, how it goes.
 
-    SIGINT and SIGTERM end it, also where a shell that put it into the background ignores SIGINT.
+    SIGINT, SIGTERM and SIGHUP end it, also where a shell that put it into the background ignores
+    SIGINT; the second of its kind at once.
     """
     asyncio.run(_serve(CommsServer(settings, host, port, anywhere=anywhere)))
 
 
 async def _serve(server: CommsServer) -> None:
     ended = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+    loop = asyncio.get_running_loop()
+
+    def end(number: signal.Signals) -> None:
+        ended.set()
+        loop.remove_signal_handler(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if number is signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN:
+            continue  # `nohup`
+        loop.add_signal_handler(number, end, number)
     await server.start()
     typer.echo(f"open    {server.name}")
     said = ""

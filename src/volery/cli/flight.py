@@ -1,4 +1,4 @@
-"""One flight of the command line: run it, then write what was asked for, also after Ctrl-C."""
+"""One flight of the command line: run it, then write what was asked for, also when stopped."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from volery.cli.guard import INTERRUPTED, USER_ERROR, complain
-from volery.cli.interrupt import Interrupts
+from volery.cli.guard import USER_ERROR, complain
+from volery.cli.interrupt import Interrupts, stopped_code, stopped_how
 from volery.cli.keys import Keys
 from volery.cli.progress import FlightProgress
 from volery.cli.record_size import warn_of_size
@@ -74,7 +74,7 @@ class RunOptions:
 
 
 class _StoppedError(Exception):
-    """Ctrl-C was pressed; raised between two steps."""
+    """A signal has come; raised between two steps."""
 
 
 class Flight:
@@ -112,7 +112,7 @@ class Flight:
             self._recorded = simulation.graph.subscribe_all(self._log.write, matches)
 
     def fly(self) -> int:
-        """Run to the end, to Ctrl-C or to an error; then write what is left to write."""
+        """Run to the end, to a signal or to an error; then write what is left to write."""
         code = 0
         trouble = ""
         start = time.perf_counter()
@@ -120,7 +120,7 @@ class Flight:
             with self._keys:
                 self._simulation.run(speed=self._options.speed, on_progress=self._on_progress)
         except _StoppedError:
-            code, trouble = INTERRUPTED, "Stopped with Ctrl-C"
+            code, trouble = stopped_code(), f"Stopped {stopped_how()}"
         except RecordingError as error:
             code, trouble = USER_ERROR, "The log could not be written"
             complain(str(error))

@@ -5,20 +5,20 @@ from __future__ import annotations
 import functools
 import logging
 import os
+import signal
 import sys
 from collections.abc import Callable, Mapping
 from typing import ParamSpec
 
 import typer
 
+from volery.cli.interrupt import StopSignals, stop_at_once, stopped_code
 from volery.core.errors import VoleryError
 
 P = ParamSpec("P")
 
 USER_ERROR = 2
 _SMALLEST, _LARGEST = 1e-9, 1e9
-INTERRUPTED = 130
-"""128 + SIGINT, as shells have it."""
 
 
 class _Words(logging.Formatter):
@@ -63,17 +63,19 @@ def _check_numbers(options: Mapping[str, object]) -> None:
 
 
 def guarded(command: Callable[P, None]) -> Callable[P, None]:
-    """Turn a user's mistakes and Ctrl-C into a line and an exit code."""
+    """Turn a user's mistakes, Ctrl-C, SIGTERM and SIGHUP into a line and an exit code."""
 
     @functools.wraps(command)
     def run(*arguments: P.args, **options: P.kwargs) -> None:
+        StopSignals.first = None
         try:
             _check_numbers(options)
-            command(*arguments, **options)
+            with StopSignals(stop_at_once, (signal.SIGTERM, signal.SIGHUP)):
+                command(*arguments, **options)
         except (VoleryError, KeyboardInterrupt) as error:
             if _was_interrupted(error):
                 typer.echo("stopped", err=True)
-                raise typer.Exit(INTERRUPTED) from None
+                raise typer.Exit(stopped_code()) from None
             complain(str(error))
             raise typer.Exit(USER_ERROR) from None
         except BrokenPipeError:

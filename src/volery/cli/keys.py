@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import sys
@@ -35,7 +36,8 @@ class Keys:
     def __exit__(self, *_exception: object) -> None:
         """Set the terminal as it was."""
         if self._terminal >= 0 and self._in_foreground():
-            termios.tcsetattr(self._terminal, termios.TCSADRAIN, self._before)
+            with contextlib.suppress(termios.error):  # it was hung up
+                termios.tcsetattr(self._terminal, termios.TCSADRAIN, self._before)
 
     def pressed(self) -> str:
         """The keys since the last call, one character each; cursor keys and the like left out."""

@@ -10,7 +10,7 @@ import typer
 
 from volery.cli.doors import open_doors
 from volery.cli.flight import RunOptions
-from volery.cli.interrupt import Interrupts
+from volery.cli.interrupt import Interrupts, stopped_how
 from volery.cli.keys import Keys
 from volery.cli.steering import steer
 from volery.core.counting import counted
@@ -52,7 +52,7 @@ def play(log: Path, options: RunOptions, *, loop: bool, paused: bool) -> None:
             try:
                 player.run(on_progress=look)
             except _StoppedError:
-                typer.echo(f"Stopped with Ctrl-C at {player.time_s:.3f} s", err=True)
+                typer.echo(f"Stopped {stopped_how()} at {player.time_s:.3f} s", err=True)
 
 
 def _introduce(player: Any) -> None:
@@ -62,4 +62,5 @@ def _introduce(player: Any) -> None:
     messages = counted(sum(told["counts"]), "message")
     typer.echo(f"playing {player.path} ({span}, {messages}{what})", err=True)
     if told["trouble"]:
-        typer.echo(f"        {told['trouble']}", err=True)
+        mend = f"`volery recover {player.path}` writes what is readable"
+        typer.echo(f"        {told['trouble']}; {mend}", err=True)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import signal
 import threading
 from pathlib import Path
 from types import FrameType
 
 import typer
 
+from volery.cli.interrupt import StopSignals
 from volery.core.errors import BridgeError
 from volery.mavlink.px4_processes import Px4Instances, find_px4
 
@@ -24,18 +24,19 @@ def run_px4(
     folder: Path | None,
     speed: float | None,
 ) -> None:
-    """Run instances until SIGINT or SIGTERM; `BridgeError` where one cannot start or ends."""
+    """Run instances until a signal ends them; `BridgeError` where one cannot start or ends."""
     ended = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:
+        if ended.is_set():
+            raise KeyboardInterrupt
         ended.set()
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, end)
     build = find_px4(px4_dir)
-    with Px4Instances(
-        build, count, first=first, host=host, folder=folder, speed=speed
-    ) as instances:
+    with (
+        StopSignals(end),
+        Px4Instances(build, count, first=first, host=host, folder=folder, speed=speed) as instances,
+    ):
         last = first + count - 1
         typer.echo(f"started {build.binary}, instances {first} to {last}; Ctrl-C ends them")
         while not ended.is_set() and not instances.wait(_LOOK_S):

@@ -12,8 +12,8 @@ import typer
 from volery.cli.door_checks import check_doors, token_gaps
 from volery.cli.doors import fit_out, open_doors
 from volery.cli.flight import Flight, RunOptions
-from volery.cli.guard import INTERRUPTED, warn
-from volery.cli.interrupt import Interrupts
+from volery.cli.guard import warn
+from volery.cli.interrupt import Interrupts, stopped_code, stopped_how
 from volery.cli.pages import Page, page_of
 from volery.cli.progress import FlightProgress
 from volery.cli.repeating import recorded_flight, recorded_scenario
@@ -64,8 +64,8 @@ def fly(options: RunOptions) -> int:
         except KeyboardInterrupt:
             if interrupts.gentle:
                 raise
-            typer.echo("Stopped with Ctrl-C before the flight began", err=True)
-            return INTERRUPTED
+            typer.echo(f"Stopped {stopped_how()} before the flight began", err=True)
+            return stopped_code()
         return code
 
 
@@ -109,7 +109,7 @@ def _wait_for_world(options: RunOptions, interrupts: Interrupts, page: Page) -> 
         while not (change.asked or lobby.quitting or interrupts.pressed):
             lobby.wait(_GLANCE_S)
         lobby.wait(_FAREWELL_S)
-    return INTERRUPTED if interrupts.pressed else 0, change
+    return stopped_code() if interrupts.pressed else 0, change
 
 
 def _scenario_of(options: RunOptions) -> Scenario:

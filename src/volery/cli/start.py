@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 _INTERRUPTED = 130
-"""As `volery.cli.guard` has it, which takes a while to load."""
+"""128 + SIGINT; as `volery.cli.interrupt` has it, which is not loaded yet."""
 
 
 def main() -> None:

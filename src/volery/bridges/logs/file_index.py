@@ -82,13 +82,16 @@ def _mcap_statistics(file: BinaryIO, path: Path, counts: Counts) -> tuple[int, i
                 channels[record.id] = record
         elif opcode == Opcode.STATISTICS:
             numbers = Statistics.read(ReadDataStream(io.BytesIO(data)))
-    if numbers is None or numbers.message_end_time > MAX_TIME_NS:
+    if numbers is None:
+        return None
+    first_ns, last_ns = numbers.message_start_time, numbers.message_end_time
+    if not 0 <= first_ns <= last_ns <= MAX_TIME_NS:
         return None
     for number, channel in channels.items():
         topic = LogTopic.of_mcap(channel, schemas.get(channel.schema_id))
         key = (topic.topic, topic.msgtype)
         counts[key] = counts.get(key, 0) + numbers.channel_message_counts.get(number, 0)
-    return numbers.message_start_time, numbers.message_end_time
+    return first_ns, last_ns
 
 
 def _mcap_records(data: bytes) -> Iterator[tuple[int, bytes]]:

@@ -14,7 +14,6 @@ from pathlib import Path
 
 from volery.core.errors import RecordingError
 
-
 _BEING_WRITTEN = "is being written by another process; end that first"
 
 
