@@ -16,8 +16,6 @@ from volery.graph.definition_files import NUMBERS, Definition
 
 EMPTY_MEMBER = "structure_needs_at_least_one_member"
 """The byte that a message without fields has in ROS 2, and only there."""
-MAX_FIELDS = 4096
-"""Of one type."""
 MAX_UNROLLED = 1 << 16
 """Elements in the fixed arrays of messages and strings of one type."""
 MAX_ELEMENTS = 1 << 24
@@ -102,11 +100,10 @@ def _check_code(definition: Definition) -> None:
         if kind == Nodetype.ARRAY
         and not (detail[0][0] == Nodetype.BASE and detail[0][1][0] in NUMBERS)
     )
-    if len(definition.fields) > MAX_FIELDS or unrolled > MAX_UNROLLED:
+    if unrolled > MAX_UNROLLED:
         raise GraphError(
-            f"{definition.source}: {definition.name} has {len(definition.fields)} fields and "
-            f"{unrolled} strings and messages in fixed arrays; at most {MAX_FIELDS} and "
-            f"{MAX_UNROLLED} are possible"
+            f"{definition.source}: {definition.name} has {unrolled} strings and messages in fixed "
+            f"arrays; at most {MAX_UNROLLED} are possible"
         )
 
 

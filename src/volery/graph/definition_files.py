@@ -52,6 +52,8 @@ _LINE = re.compile(
 # Fixed arrays are made whole for every message, so a slip of the pen must not cost gigabytes.
 _MOST_NUMBERS = 1 << 24
 _MOST_PARTS = 4096
+MAX_FIELDS = 4096
+"""Fields and constants of one type."""
 
 _KINDS = {".msg": "msg", ".srv": "srv", ".action": "action"}
 _PARTS = {
@@ -237,6 +239,8 @@ def _read_line(definition: Definition, line: str, package: str, number: int) -> 
     if match is None:
         raise ValueError(f"cannot read '{line}'; expected 'type name' or 'type NAME=value'")
     name = match["name"]
+    if len(definition.fields) + len(definition.constants) >= MAX_FIELDS:
+        raise ValueError(f"a type has at most {MAX_FIELDS} fields and constants")
     taken = {n for n, _ in definition.fields} | {n for n, _, _ in definition.constants}
     if name in taken:
         raise ValueError(f"'{name}' is defined twice")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from starlette.requests import ClientDisconnect, Request
 
+from volery.core.errors import reason_of
 from volery.server.replies import RefusedError
 from volery.server.rights import Role
 
@@ -36,6 +37,8 @@ async def save_body(request: Request, path: Path, most_bytes: int) -> int:
                 if size > most_bytes:
                     raise too_large
                 file.write(chunk)
+        except OSError as error:
+            raise RefusedError(507, f"the file cannot be kept: {reason_of(error)}") from None
         except ClientDisconnect:
             raise RefusedError(400, "the file did not come whole") from None
     if not size:

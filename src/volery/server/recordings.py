@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import re
+import threading
 import time
-from functools import lru_cache
+from collections import OrderedDict
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 
-from volery.bridges.logs.reader import summarize
-from volery.core.errors import VoleryError
+from volery.bridges.logs.recordings_room import room_left
+from volery.core.errors import RecordingError
 from volery.server.bodies import check_pilot, save_body
+from volery.server.log_check import look_into
 from volery.server.replies import RefusedError
 from volery.server.site import Site
 
@@ -25,6 +27,7 @@ _NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_. -]{0,99}\.(mcap|bag)$")
 _WAITING = ".incoming_"
 _STILL_S = 3.0
 """A log that was written to since then may be growing."""
+_MOST_KNOWN = 10_000
 
 
 async def recordings(request: Request) -> Response:
@@ -56,15 +59,20 @@ async def bring_recording(request: Request) -> Response:
     if suffix not in _SUFFIXES:
         raise RefusedError(415, f"logs are read from {', '.join(_SUFFIXES)}, not '{suffix[:20]}'")
     folder.mkdir(parents=True, exist_ok=True)
+    try:
+        most = min(MOST_BYTES, await asyncio.to_thread(room_left, folder))
+    except RecordingError as error:
+        raise RefusedError(507, str(error)) from None
     waiting = folder / f"{_WAITING}{id(request):x}{suffix}"
     try:
-        await save_body(request, waiting, MOST_BYTES)
-        try:
-            found = await asyncio.to_thread(summarize, waiting)
-        except VoleryError as error:
-            raise RefusedError(422, str(error).replace(str(waiting), called)) from None
-        if not found.messages:
-            raise RefusedError(422, f"there is no message in it. {found.trouble}".strip())
+        await save_body(request, waiting, most)
+        lock: asyncio.Lock = request.app.state.upload_lock
+        async with lock:  # one after the other
+            (found,) = await asyncio.to_thread(look_into, [waiting], play=True)
+        if "error" in found:
+            raise RefusedError(422, found["error"].replace(str(waiting), called))
+        if not found["messages"]:
+            raise RefusedError(422, f"there is no message in it. {found['trouble']}".strip())
         name = _free_name(folder, called, suffix)
         waiting.rename(folder / name)
     finally:
@@ -77,24 +85,53 @@ def _listed(folder: Path) -> list[dict[str, Any]]:
         return []
     files = [path for path in folder.iterdir() if _NAME.match(path.name) and path.is_file()]
     files.sort(key=lambda path: path.stat().st_mtime_ns, reverse=True)
-    return [_told(path) for path in files if not path.is_symlink()]
+    files = [path for path in files if not path.is_symlink()]
+    _durations.learn(files)
+    return [_told(path) for path in files]
 
 
 def _told(path: Path) -> dict[str, Any]:
+    size, seconds = path.stat().st_size, _durations.of(path)
+    return {"name": path.name, "bytes": size, "seconds": seconds, "kind": path.suffix[1:]}
+
+
+class _Durations:
+    """Remembers how long logs are, as long as they stay as they are."""
+
+    def __init__(self) -> None:
+        self._known: OrderedDict[tuple[Path, int, int], float | None] = OrderedDict()
+        self._looking = threading.Lock()
+
+    def of(self, path: Path) -> float | None:
+        """Seconds; None where the log cannot be read, grows, or is being looked into."""
+        return self._known.get(_version(path))
+
+    def learn(self, paths: list[Path]) -> None:
+        """Look into those that are not known; not while another request does."""
+        if not self._looking.acquire(blocking=False):
+            return
+        try:
+            fresh = [(path, _version(path)) for path in paths if not _may_be_growing(path)]
+            fresh = [(path, version) for path, version in fresh if version not in self._known]
+            found = look_into([path for path, _ in fresh])
+            for (_, version), told in zip(fresh, found, strict=True):
+                self._known[version] = told.get("seconds")
+            while len(self._known) > _MOST_KNOWN:
+                self._known.popitem(last=False)
+        finally:
+            self._looking.release()
+
+
+def _version(path: Path) -> tuple[Path, int, int]:
     known = path.stat()
-    written = time.time() - known.st_mtime < _STILL_S  # its end would have to be looked for
-    seconds = None if written else _seconds(path, known.st_mtime_ns, known.st_size)
-    kind = path.suffix[1:]
-    return {"name": path.name, "bytes": known.st_size, "seconds": seconds, "kind": kind}
+    return path, known.st_mtime_ns, known.st_size
 
 
-@lru_cache(maxsize=10_000)
-def _seconds(path: Path, _changed_ns: int, _size: int) -> float | None:
-    """How long a log is, as long as it stays as it is; None where it cannot be read."""
-    try:
-        return round(summarize(path).duration_s, 3)
-    except (VoleryError, OSError):
-        return None
+def _may_be_growing(path: Path) -> bool:
+    return time.time() - path.stat().st_mtime < _STILL_S  # its end would have to be looked for
+
+
+_durations = _Durations()
 
 
 def _free_name(folder: Path, called: str, suffix: str) -> str:

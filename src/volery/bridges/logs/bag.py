@@ -108,6 +108,11 @@ class Log(ABC):
         self.messages = 0
         self._taken = 0
 
+    @property
+    def size_bytes(self) -> int:
+        """Of the file, what is gathered for it included."""
+        return self._file.tell()
+
     def write(self, published: Published) -> None:
         """Add a message, at its simulated time of publication."""
         if self._failure is not None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from volery.bridges.logs.bag import Log, open_log
 from volery.bridges.logs.recorded_topics import recorded_topics
+from volery.bridges.logs.recordings_room import room_left
 from volery.core.errors import RecordingError
 from volery.graph.graph import Graph, Subscription
 from volery.graph.messages import Published
@@ -26,6 +27,8 @@ class Recording:
         self._log: Log | None = None
         self._subscription: Subscription | None = None
         self._failure: RecordingError | None = None
+        self._room = 0
+        """Bytes that the present log may have."""
 
     def offer(self) -> None:
         """Offer the services."""
@@ -55,6 +58,7 @@ class Recording:
         path = self._checked(request.path)
         self._failure = None
         matches = recorded_topics(self._graph, request.topics, request.exclude)
+        self._room = room_left(path.parent if self._folder is None else self._folder)
         self._log = open_log(path)
         for earlier in self._commands.earlier():
             if matches(earlier.topic):
@@ -88,6 +92,11 @@ class Recording:
         try:
             if self._log is not None and self._failure is None:
                 self._log.write(published)
+                if self._log.size_bytes > self._room:
+                    raise RecordingError(
+                        f"{self._log.path.name}: ended, as the folder for recordings is full; "
+                        "remove some"
+                    )
         except RecordingError as error:
             self._failure = error
             self._leave()

@@ -9,20 +9,14 @@ that could suffer. Prints one JSON object: `{}` or `{"error": "one clear message
 from __future__ import annotations
 
 import json
-import os
-import resource
 import sys
 from pathlib import Path
 
 from volery.core.errors import VoleryError
 from volery.scenario.shelf import Shelf
+from volery.server.bounded_process import bound_this_process
+from volery.server.uploads.kinds import BOUNDS
 from volery.server.uploads.making import toml_of
-
-_NICENESS = 5
-"""A run beside it, at full speed on all cores, keeps three quarters of them."""
-_MOST_CPU_S = 90
-_MOST_MEMORY = 8 * 1024**3
-"""Of addresses; Embree and the compiler reserve about a gigabyte that they do not use."""
 
 
 def check(kind: str, path: Path, name: str, called: str) -> None:
@@ -49,16 +43,14 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
 
 def main(kind: str, file: str, name: str, called: str) -> None:
     """Check, and print what came of it."""
-    os.nice(_NICENESS)
-    resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY, _MOST_MEMORY))
-    resource.setrlimit(resource.RLIMIT_CPU, (_MOST_CPU_S, 2 * _MOST_CPU_S))
+    bound_this_process(BOUNDS)
     told: dict[str, str] = {}
     try:
         check(kind, Path(file), name, called)
     except VoleryError as error:
         told["error"] = str(error)
     except MemoryError:
-        told["error"] = f"{file} needs more than {_MOST_MEMORY // 1024**3} GB of memory"
+        told["error"] = f"{file} needs more than {BOUNDS.memory_bytes >> 30} GB of memory"
     sys.stdout.write(json.dumps(told))
 
 

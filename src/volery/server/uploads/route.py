@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import re
 import shutil
-import signal
-import subprocess
-import sys
 import tempfile
 from pathlib import Path, PurePosixPath
 
@@ -18,15 +14,13 @@ from starlette.responses import JSONResponse, Response
 from volery.scenario import library
 from volery.scenario.shelf import Shelf
 from volery.server.bodies import check_pilot, save_body
+from volery.server.bounded_process import BoundedError, run_bounded
 from volery.server.replies import RefusedError
 from volery.server.site import Site
-from volery.server.uploads.kinds import MOST_UPLOADS, kind_of_upload, suffix_of
+from volery.server.uploads.kinds import BOUNDS, MOST_UPLOADS, kind_of_upload, suffix_of
 
-LONGEST_CHECK_S = 300.0
-"""Of wall time, on a machine that has much else to do; see `check` for that of the processor."""
 _MOST_CHARACTERS = 30
 """Of a scenario's name, before its number."""
-_BROKEN = "the file cannot be read: its reader broke off"
 _MOST_WORDS = 600
 """Of a message, in characters."""
 
@@ -68,18 +62,10 @@ def name_for(called: str, shelf: Shelf) -> str:
 
 def _check(kind: str, path: Path, name: str, called: str) -> None:
     """Build the world in a process of its own. `RefusedError` tells what is wrong with the file."""
-    words = [sys.executable, "-m", f"{__package__}.check", kind, str(path), name, called]
     try:
-        ran = subprocess.run(
-            words, capture_output=True, text=True, timeout=LONGEST_CHECK_S, check=False
-        )
-    except subprocess.TimeoutExpired:
-        raise RefusedError(422, "it takes too long to build") from None
-    try:
-        told = json.loads(ran.stdout)
-    except ValueError:
-        why = "it takes too long to build" if ran.returncode == -signal.SIGXCPU else _BROKEN
-        raise RefusedError(422, why) from None
+        told = run_bounded(f"{__package__}.check", (kind, str(path), name, called), BOUNDS)
+    except BoundedError as error:
+        raise RefusedError(422, str(error)) from None
     if "error" in told:
         plain = str(told["error"]).replace(str(path), called).replace(str(path.parent), "")
         raise RefusedError(422, plain[:_MOST_WORDS])
