@@ -12,7 +12,6 @@ such a file (its index) is missing; `volery.bridges.logs.recover` writes it.
 
 from __future__ import annotations
 
-import errno
 import io
 import time
 from abc import ABC, abstractmethod
@@ -158,6 +157,14 @@ class Log(ABC):
         self.messages = self._taken  # a chunk is handed over as soon as it is whole
         self._chunk_since = time.monotonic()
 
+    def _commit_start(self) -> None:
+        """Hand the first bytes to the disk; where it does not take them the file is closed."""
+        try:
+            self._file.commit()
+        except RecordingError:
+            self._file.discard()
+            raise
+
     @abstractmethod
     def _add(self, published: Published) -> None: ...
 
@@ -184,7 +191,7 @@ class McapLog(Log):
         stream = cast("io.BufferedWriter", self._file)
         self._writer: Any = Writer(stream, chunk_size=CHUNK_BYTES, compression=kind)
         self._writer.start(profile="ros2", library=LIBRARY)
-        self._file.commit()
+        self._commit_start()
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._sequences: dict[int, int] = {}
@@ -216,26 +223,31 @@ class McapLog(Log):
         self._writer.finish()
 
 
+class _Opened:
+    """In the place of a path, for a writer that opens its file by itself."""
+
+    def __init__(self, file: DiskFile) -> None:
+        self._file = file
+
+    def open(self, _mode: str) -> DiskFile:
+        """Returns the file, which is open already."""
+        return self._file
+
+
 class BagLog(Log):
     """ROS 1 bag, format 2.0."""
 
     def __init__(self, path: Path, compression: Compression = "lz4") -> None:
-        from rosbags.rosbag1.writer import WriterError
-
         from volery.graph.ros1 import ros1_codec
 
         super().__init__(path)
         if compression == "zstd":
             raise RecordingError(f"{path}: a .bag is compressed with lz4 or not at all")
         writer = bag_writer(path, compressed=compression == "lz4")
-        try:
-            writer.open()
-        except WriterError:
-            raise FileExistsError(errno.EEXIST, "it exists already", str(path)) from None
-        if writer.bio is not None:
-            writer.bio.close()
-        self._file = DiskFile(path, append=True)
-        writer.bio = cast("io.BufferedWriter", self._file)
+        self._file = DiskFile(path)
+        writer.path = cast("Path", _Opened(self._file))
+        writer.open()
+        self._commit_start()
         self._writer = writer
         self._codec = ros1_codec()
         self._connections: dict[str, Any] = {}

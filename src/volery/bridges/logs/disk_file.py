@@ -20,9 +20,9 @@ class DiskFile:
     It is locked until it is closed: `RecordingError` where another process has the lock.
     """
 
-    def __init__(self, path: Path, *, append: bool = False) -> None:
+    def __init__(self, path: Path) -> None:
         self.path = path
-        flags = os.O_WRONLY | os.O_CLOEXEC | (0 if append else os.O_CREAT | os.O_EXCL)
+        flags = os.O_WRONLY | os.O_CLOEXEC | os.O_CREAT | os.O_EXCL
         self._descriptor = os.open(path, flags, 0o644)
         try:
             lock_for_writing(self._descriptor, path)
@@ -30,7 +30,7 @@ class DiskFile:
             os.close(self._descriptor)
             raise
         self._buffer = bytearray()
-        self._committed = os.lseek(self._descriptor, 0, os.SEEK_END)
+        self._committed = 0
         self._rewrites_start = False
 
     @property
