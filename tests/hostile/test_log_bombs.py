@@ -5,9 +5,11 @@ from __future__ import annotations
 import bz2
 import gc
 import os
+import sqlite3
 import struct
 import tracemalloc
 import zlib
+from contextlib import closing
 from functools import cache
 
 import lz4.frame
@@ -28,6 +30,7 @@ from volery.graph.graph import Graph
 from volery.graph.messages import Published, String
 from volery.runtime.command_log import CommandLog
 from volery.runtime.services.recording import Recording
+from volery.runtime.slam_run.sources import open_source
 from volery.server import log_check
 from volery.server.bounded_process import BoundedError, Bounds, run_bounded
 
@@ -242,6 +245,28 @@ def test_types_learned_from_logs_are_limited(monkeypatch):
     topic = LogTopic("/new", "bombs/msg/Harmless", "bool b\n", "cdr", "ros2msg")
     with pytest.raises(GraphError, match="takes no more"):
         LogDecoder().type_of(topic)
+
+
+def test_a_ros2_bag_of_views_is_refused(tmp_path):
+    """Rows without end, of nothing."""
+    path = tmp_path / "bomb.db3"
+    with closing(sqlite3.connect(path)) as base:
+        base.execute(
+            "CREATE VIEW messages AS "
+            "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) "
+            "SELECT i AS id, 1 AS topic_id, i AS timestamp, zeroblob(1000000) AS data FROM n"
+        )
+        base.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT)")
+        base.commit()
+    with pytest.raises(RecordingError, match="'messages' is no plain table"):
+        open_source(path)
+
+
+@pytest.mark.parametrize("line", ["compression_mode: FILE", "storage_identifier: mcap"])
+def test_a_ros2_bag_that_others_would_unpack_is_refused(tmp_path, line):
+    (tmp_path / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  {line}\n")
+    with pytest.raises(RecordingError, match="is compressed, or of files that are not named"):
+        open_source(tmp_path)
 
 
 # ------------------------------------------------------------------------------------- the server

@@ -9,13 +9,12 @@ from typing import Any, NamedTuple
 
 from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.logs.reader import summarize
-from volery.bridges.logs.records import LogRecord, LogTopic, LogWalk, log_format
+from volery.bridges.logs.records import LogWalk, log_format
 from volery.bridges.logs.text_layout import TextLayout
 from volery.bridges.logs.text_scans import TextScans
 from volery.core.counting import counted
 from volery.core.errors import GraphError, RecordingError
-
-_ROS2_FORMS = {"msg": "ros2msg", "idl": "ros2idl"}
+from volery.runtime.slam_run.ros2_bags import BagWalk, bag_topics
 
 
 class Heard(NamedTuple):
@@ -106,7 +105,7 @@ def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | Tex
     if layout is not None:
         return TextSource(path, layout)
     if path.is_dir() or path.suffix == ".db3":
-        return LogSource(path, _ros2_topics(path), _walk=_Ros2Walk)
+        return LogSource(path, bag_topics(path), _walk=BagWalk)
     try:
         log_format(path)
     except RecordingError as error:
@@ -116,41 +115,3 @@ def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | Tex
     summary = summarize(path)
     topics = {t.topic: t.msgtype for t in summary.topics}
     return LogSource(path, topics, damage=summary.trouble, _walk=LogWalk)
-
-
-def _ros2_topics(path: Path) -> dict[str, str]:
-    from rosbags.rosbag2 import Reader
-
-    try:
-        with Reader(path) as reader:
-            return {one.topic: one.msgtype for one in reader.connections}
-    except Exception as error:  # whatever the reader makes of a folder that is no bag
-        raise RecordingError(f"{path}: cannot be read as a ROS 2 bag: {error}") from None
-
-
-class _Ros2Walk:
-    """The records of a ROS 2 bag, a folder or its SQLite file."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self.trouble = ""
-
-    def __iter__(self) -> Iterator[LogRecord]:
-        from rosbags.rosbag2 import Reader
-
-        topics: dict[int, LogTopic] = {}
-        try:
-            with Reader(self._path) as reader:
-                for connection, time_ns, data in reader.messages():
-                    if connection.id not in topics:
-                        form = _ROS2_FORMS.get(connection.msgdef.format.name.lower(), "")
-                        topics[connection.id] = LogTopic(
-                            connection.topic,
-                            connection.msgtype,
-                            connection.msgdef.data,
-                            "cdr",
-                            form,
-                        )
-                    yield LogRecord(topics[connection.id], time_ns, bytes(data), 0)
-        except Exception as error:  # whatever the reader makes of damaged bytes
-            self.trouble = f"cut off or damaged: {error}"

@@ -1,0 +1,123 @@
+"""ROS 2 bags, a folder or its SQLite file, within the bounds of logs.
+
+MCAP files in a bag's folder are read as any MCAP; SQLite files by `rosbags`, after a look at what
+they are made of.
+"""
+
+from __future__ import annotations
+
+import re
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from volery.bridges.logs.budgets import MAX_CHUNK_BYTES, UnpackingBudget
+from volery.bridges.logs.reader import summarize
+from volery.bridges.logs.records import LogRecord, LogTopic, LogWalk
+from volery.core.errors import RecordingError
+
+_PACKED = re.compile(r"compression_mode\W+(file|message)", re.IGNORECASE)
+_MCAP = re.compile(r"storage_identifier\W+mcap", re.IGNORECASE)
+_FORMS = {"msg": "ros2msg", "idl": "ros2idl"}
+_TABLES = ("messages", "topics", "message_definitions", "metadata", "schema")
+
+
+def bag_topics(path: Path) -> dict[str, str]:
+    """Types by topic. `RecordingError` where there is no such bag, or it is beyond the bounds."""
+    if parts := _mcap_parts(path):
+        return {t.topic: t.msgtype for part in parts for t in summarize(part).topics}
+    from rosbags.rosbag2 import Reader
+
+    _check_metadata(path)
+    _check_files(path)
+    try:
+        with Reader(path) as reader:
+            return {one.topic: one.msgtype for one in reader.connections}
+    except RecordingError:
+        raise
+    except Exception as error:  # whatever the reader makes of a folder that is no bag
+        raise RecordingError(f"{path}: cannot be read as a ROS 2 bag: {error}") from None
+
+
+class BagWalk:
+    """The records of a ROS 2 bag; afterwards `trouble` says what was wrong, if anything."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.trouble = ""
+
+    def __iter__(self) -> Iterator[LogRecord]:
+        parts = _mcap_parts(self._path)
+        for part in parts:
+            walk = LogWalk(part)
+            yield from walk
+            self.trouble = self.trouble or walk.trouble
+        if not parts:
+            yield from self._sqlite()
+
+    def _sqlite(self) -> Iterator[LogRecord]:
+        from rosbags.rosbag2 import Reader
+
+        topics: dict[int, LogTopic] = {}
+        budget = UnpackingBudget(self._path, _size(self._path))
+        try:
+            with Reader(self._path) as reader:
+                for connection, time_ns, data in reader.messages():
+                    budget.spend(len(data))
+                    if connection.id not in topics:
+                        topics[connection.id] = _topic(connection)
+                    yield LogRecord(topics[connection.id], time_ns, bytes(data), 0)
+        except RecordingError:
+            raise
+        except Exception as error:  # whatever the reader makes of damaged bytes
+            self.trouble = f"cut off or damaged: {error}"
+
+
+def _topic(connection: Any) -> LogTopic:
+    form = _FORMS.get(connection.msgdef.format.name.lower(), "")
+    definition = connection.msgdef.data
+    return LogTopic(connection.topic, connection.msgtype, definition, "cdr", form)
+
+
+def _mcap_parts(path: Path) -> list[Path]:
+    """The MCAP files of a bag's folder, in their order: `x_0.mcap` to `x_10.mcap`."""
+    found = path.glob("*.mcap") if path.is_dir() else ()
+    return sorted(found, key=lambda part: (len(part.name), part.name))
+
+
+def _size(path: Path) -> int:
+    files = path.iterdir() if path.is_dir() else (path,)
+    return sum(file.stat().st_size for file in files if file.is_file())
+
+
+def _check_metadata(path: Path) -> None:
+    """Refuse what `rosbags` would unpack without a bound: packed files, MCAP of other names."""
+    try:
+        text = (path / "metadata.yaml").read_text(encoding="utf-8") if path.is_dir() else ""
+    except (OSError, UnicodeDecodeError):
+        return  # the reader says why
+    if _PACKED.search(text) or _MCAP.search(text):
+        raise RecordingError(
+            f"{path}: is compressed, or of files that are not named .mcap; `ros2 bag convert` "
+            "writes it so that it can be read here"
+        )
+
+
+def _check_files(path: Path) -> None:
+    """Refuse SQLite files whose tables are none: a view makes rows without end of nothing."""
+    for file in path.glob("*.db3") if path.is_dir() else (path,):
+        try:
+            with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro", uri=True)) as base:
+                base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_CHUNK_BYTES)
+                marks = ",".join("?" * len(_TABLES))
+                odd = base.execute(
+                    f"SELECT name FROM sqlite_master WHERE name COLLATE NOCASE IN ({marks})"
+                    " AND (type != 'table' OR sql LIKE '%VIRTUAL%' OR sql LIKE '%GENERATED%')",
+                    _TABLES,
+                ).fetchone()
+        except sqlite3.Error:
+            continue  # the reader says why
+        if odd:
+            raise RecordingError(f"{file}: '{odd[0]}' is no plain table; this is no bag of ROS 2")
