@@ -322,7 +322,7 @@ def test_a_recording_ends_where_the_folder_is_full(tmp_path, monkeypatch):
     monkeypatch.setattr(recordings_room, "MAX_TOTAL_BYTES", 100_000)
     graph = Graph(lambda: 0)
     recording = Recording(graph, tmp_path, CommandLog(graph, lambda: (0, 0)))
-    recording._start(type("Request", (), {"path": "flight.mcap"}))
+    recording._start(type("Request", (), {"path": "flight.mcap", "topics": (), "exclude": ()}))
     publisher = graph.advertise("/text", "std_msgs/msg/String")
     for _ in range(30):
         publisher.publish(String(os.urandom(50_000).hex()))
