@@ -20,9 +20,14 @@ test("an address without a token stays as it is", () => {
 });
 
 test("a token is shown to the server, whatever its characters", async () => {
-  const asked = vi.fn((...urls: string[]) => Promise.resolve({ ok: urls[0] !== "" }));
+  const status = { token_needed: false };
+  const asked = vi.fn((...urls: string[]) =>
+    Promise.resolve({ ok: urls[0] !== "", json: () => Promise.resolve(status) }),
+  );
   vi.stubGlobal("fetch", asked);
   expect(await showToken("ä & b")).toBe(true);
-  expect(asked.mock.lastCall![0]).toBe("./api/status?token=%C3%A4+%26+b");
+  expect(asked.mock.calls[0]![0]).toBe("./?token=%C3%A4+%26+b");
+  status.token_needed = true;
+  expect(await showToken("wrong")).toBe(false);
   vi.unstubAllGlobals();
 });

@@ -18,9 +18,13 @@ export function hideToken(address: Location, history: History): void {
   );
 }
 
-/** Shows a token to the server; returns whether it is one of its own, and sets the cookie. */
+/**
+ * Shows a token to the server; returns whether it is one of its own, and sets the cookie. The page
+ * itself is asked for, because the cookie holds for the folder of what was asked for.
+ */
 export async function showToken(token: string): Promise<boolean> {
   const query = new URLSearchParams({ token });
-  const answer = await fetch(`./api/status?${query}`, { cache: "no-store" });
-  return answer.ok;
+  await fetch(`./?${query}`, { cache: "no-store" });
+  const answer = await fetch("./api/status", { cache: "no-store" });
+  return answer.ok && !((await answer.json()) as { token_needed: boolean }).token_needed;
 }
