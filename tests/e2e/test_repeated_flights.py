@@ -28,7 +28,6 @@ from volery.graph.reply import Reply
 from volery.graph.zero import zero_message
 from volery.runtime import Simulation
 from volery.runtime.command_kinds import Weight, weight_of
-from volery.runtime.origin import scenario_of
 from volery.scenario.load import parse_scenario
 
 SENSORS = [
@@ -250,7 +249,7 @@ def recorded(path, speed, seed):
 def repeated(path, again=None, **options):
     """Digest of the flight of a log flown again, and recorded into `again`."""
     flight = read_flight(path)
-    with Simulation(scenario_of(flight.origin), threads=1) as simulation:
+    with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
         simulation.enable_digest()
         simulation.repeat(flight)
         log = None if again is None else open_log(again)
@@ -300,7 +299,7 @@ def test_without_its_commands_the_flight_is_another_one(tmp_path):
     path = tmp_path / "flight.mcap"
     digest = recorded(path, 3.0, 3)
     flight = read_flight(path)
-    with Simulation(scenario_of(flight.origin), threads=1) as simulation:
+    with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
         simulation.enable_digest()
         less = [c for c in flight.commands if c.taken.name != "/reset_simulation"]
         simulation.repeat(replace(flight, commands=tuple(less)))
@@ -370,7 +369,7 @@ def test_a_recording_begun_late_holds_what_came_before(tmp_path):
         place = simulation.uavs["uav1"].position_map
     flight = read_flight(tmp_path / "late.mcap")
     assert [c.taken.kind for c in flight.commands] == ["advertise", "publish", "call"]
-    with Simulation(scenario_of(flight.origin), threads=1) as simulation:
+    with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
         simulation.repeat(flight)
         simulation.run()
         assert simulation.time_s == pytest.approx(1.0, abs=0.02)  # the log knows no more
@@ -387,7 +386,7 @@ def test_nobody_changes_a_flight_that_is_repeated(tmp_path):
         simulation.commands.end()
     log.close()
     flight = read_flight(path)
-    with Simulation(scenario_of(flight.origin), threads=1) as simulation:
+    with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
         simulation.repeat(flight)
         session = simulation.gateway.open("visitor")
         answers = []

@@ -39,9 +39,7 @@ def search(uavs: int, odometry: str = "slam/odom", folder: str = "") -> Any:
             parameters["odometry"] = odometry
         if node["node"].endswith(":Mapping"):
             parameters["folder"] = folder
-    changed = parse_scenario(data)
-    changed._folder = scenario.folder
-    return changed
+    return parse_scenario(data, access=scenario.access)
 
 
 class Relay:

@@ -41,7 +41,7 @@ def measure(
 @contextlib.contextmanager
 def served(port: int = 0) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """A communication server in a process of its own, and its port; killed at the end."""
-    command = [sys.executable, "-m", "volery.cli.app", "comms", "--port", str(port)]
+    command = [sys.executable, "-P", "-m", "volery.cli.app", "comms", "--port", str(port)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     try:

@@ -136,6 +136,6 @@ def _first_plan() -> float:
     """Seconds of the first plan of a new process that finds everything compiled on disk."""
     plan(CASES[1])
     told = subprocess.run(
-        [sys.executable, "-c", _FIRST_PLAN], capture_output=True, text=True, check=True
+        [sys.executable, "-P", "-c", _FIRST_PLAN], capture_output=True, text=True, check=True
     )
     return float(told.stdout)

@@ -160,9 +160,7 @@ def sparse_scenario(seed: int, seconds: float) -> Scenario:
     for node in data["types"]["searcher"]["nodes"]:
         if "area_m" in node.get("parameters", {}):
             node["parameters"]["area_m"] = [180.0, 160.0, 260.0, 240.0]
-    changed = parse_scenario(data)
-    changed._folder = scenario.folder
-    return changed
+    return parse_scenario(data, access=scenario.access)
 
 
 def area_of(scenario: Scenario) -> tuple[float, float, float, float]:

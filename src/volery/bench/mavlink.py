@@ -80,7 +80,14 @@ def _ask(simulation: Any) -> list[float]:
     simulation.be_prompt()
     thread = threading.Thread(target=lambda: simulation.run(600.0, speed=1.0))
     thread.start()
-    command = [sys.executable, "-m", "volery.bench.mavlink_client", str(_PORT), str(_COMMANDS)]
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "volery.bench.mavlink_client",
+        str(_PORT),
+        str(_COMMANDS),
+    ]
     try:
         done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False, timeout=120)
     finally:

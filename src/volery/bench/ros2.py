@@ -57,7 +57,15 @@ class _Peer:
     """A subscriber in a process of its own; it tells what came when it is asked."""
 
     def __init__(self, kind: str, topics: list[str]) -> None:
-        command = [sys.executable, "-m", "volery.bench.ros2_peer", str(_DOMAIN), kind, *topics]
+        command = [
+            sys.executable,
+            "-P",
+            "-m",
+            "volery.bench.ros2_peer",
+            str(_DOMAIN),
+            kind,
+            *topics,
+        ]
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
 

@@ -164,7 +164,7 @@ def exchange(via: str, port: int) -> list[list[int]]:
 def _peer(via: str, port: int, what: str) -> Iterator[subprocess.Popen[str]]:
     words = [via, str(port), what, str(_WARM_UP + _CALLS)]
     process = subprocess.Popen(
-        [sys.executable, "-m", "volery.bench.search_peer", *words],
+        [sys.executable, "-P", "-m", "volery.bench.search_peer", *words],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

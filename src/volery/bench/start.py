@@ -42,13 +42,13 @@ def measure() -> dict[str, float]:
 
 def _first_frame_s(cache: Path) -> float:
     before = time.perf_counter()
-    subprocess.run([sys.executable, "-c", _FIRST_FRAME], check=True, env=_environment(cache))
+    subprocess.run([sys.executable, "-P", "-c", _FIRST_FRAME], check=True, env=_environment(cache))
     return time.perf_counter() - before
 
 
 def _main_job(folder: Path, cache: Path) -> tuple[float, float]:
     """Wall seconds and peak resident memory (MB, 1e6 bytes) of the main job in its own process."""
-    command = [sys.executable, "-m", "volery.cli", "run", "forest_survey"]
+    command = [sys.executable, "-P", "-m", "volery.cli", "run", "forest_survey"]
     command += ["--record", str(folder / "flight.mcap"), "--report", str(folder / "report")]
     before = time.perf_counter()
     process = subprocess.Popen(command, env=_environment(cache), stdout=subprocess.DEVNULL)

@@ -59,7 +59,7 @@ def _progress_told() -> Iterator[None]:
 
 def _in_own_process(name: str) -> Result:
     """A bench unspoilt by what the others left in memory."""
-    command = [sys.executable, "-m", "volery.cli.app", "bench", name, "--json"]
+    command = [sys.executable, "-P", "-m", "volery.cli.app", "bench", name, "--json"]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
     if done.returncode:
         raise VoleryError(f"bench '{name}' failed with exit code {done.returncode}")

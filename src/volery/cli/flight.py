@@ -38,6 +38,8 @@ class RunOptions:
     seed: int | None = None
     nodes: bool = True
     """Whether the scenario's nodes run inside; else they run elsewhere, or not at all."""
+    trust: bool = False
+    """Whether nodes that lie beside the scenario's file run."""
     speed: float | None = None
     threads: int | None = None
     record: Path | None = None

@@ -22,6 +22,7 @@ from volery.cli.options import (
     Ros2Option,
     SilenceOption,
     ThreadsOption,
+    TrustOption,
 )
 from volery.core.errors import BridgeError
 
@@ -33,6 +34,7 @@ def run(
     seconds: run_words.Seconds = None,
     seed: run_words.Seed = None,
     no_nodes: run_words.NoNodes = False,
+    trust: TrustOption = False,
     speed: run_words.Speed = None,
     threads: ThreadsOption = None,
     replay_commands: run_words.ReplayCommands = None,
@@ -79,6 +81,7 @@ def run(
         seconds=seconds,
         seed=seed,
         nodes=not no_nodes,
+        trust=trust,
         speed=parse_speed(speed or ("1" if doors or page is not None else "max")),
         doors=doors,
         domain_id=domain_id,
@@ -143,6 +146,7 @@ def serve(
     seed: Annotated[int | None, typer.Option(help="Seed of the first scenario.")] = None,
     speed: Annotated[str, typer.Option(help="Factor of real time, or max.")] = "1",
     threads: ThreadsOption = None,
+    trust: TrustOption = False,
     door: DoorsOption = None,
 ) -> None:
     """Serve the page until Ctrl-C: one world after the other, as its visitors choose.
@@ -161,6 +165,7 @@ def serve(
                 uavs=uavs,
                 seconds=3600.0 if scenario is None and seconds is None else seconds,
                 seed=seed,
+                trust=trust,
                 speed=parse_speed(speed),
                 doors=tuple(door or ()),
                 recordings=recordings,
@@ -184,6 +189,10 @@ def serve(
 @guarded
 def play(
     log: Annotated[Path, typer.Argument(help="A .mcap or .bag log.")],
+    scenario: Annotated[
+        Path | None,
+        typer.Option(help="Your own file of its scenario, for files that its world needs."),
+    ] = None,
     speed: Annotated[str, typer.Option(help="Factor of real time, or max.")] = "1",
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
     paused: Annotated[bool, typer.Option("--paused", help="Wait at the beginning.")] = False,
@@ -206,7 +215,7 @@ def play(
         allow_remote=allow_remote,
         token=token,
     )
-    play_log(log, options, loop=loop, paused=paused)
+    play_log(log, options, scenario=scenario, loop=loop, paused=paused)
 
 
 @guarded
@@ -248,6 +257,7 @@ def launch(
     via: Annotated[
         str | None, typer.Option(help="Way into the graph, as of `volery node`.")
     ] = None,
+    trust: TrustOption = False,
     namespace: Annotated[str | None, typer.Option(help="Of the nodes, such as /uav1.")] = None,
     lock_step: Annotated[
         float | None, typer.Option(help="The simulation waits for them each so many seconds.")
@@ -256,4 +266,4 @@ def launch(
     """Run the nodes of a launch profile in a process of their own."""
     from volery.cli.launching import launch_profile
 
-    launch_profile(profile, via=via, namespace=namespace, lock_step_s=lock_step)
+    launch_profile(profile, via=via, namespace=namespace, lock_step_s=lock_step, trust=trust)

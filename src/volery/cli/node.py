@@ -46,6 +46,7 @@ def run_node(options: NodeOptions) -> None:
     from volery.graph.messages import add_definitions
     from volery.runtime.node_loading import start_node
     from volery.runtime.warm_up.sharing import compile_all
+    from volery.scenario.access import ScenarioAccess
     from volery.scenario.schema import NodeEntry
 
     profile = Profile() if options.profile is None else load_profile(options.profile)
@@ -66,10 +67,11 @@ def run_node(options: NodeOptions) -> None:
     if options.lock_step_s is not None and not 0.0 < options.lock_step_s < math.inf:
         raise BridgeError(f"--lock-step: a period in s above 0, not {options.lock_step_s:g}")
     folder = options.profile.parent if options.profile else None
+    access = ScenarioAccess(folder)  # the command line names the node itself
     with closing(LateLink(name, lambda: await_link(via, name))) as late:
         host = NodeHost(late, clock=profile.clock)
         context = host.context(absolute_names(profile.remap, namespace))
-        node = start_node(entry, context, namespace, "volery node", folder)
+        node = start_node(entry, context, namespace, "volery node", access)
         try:
             compile_all(node.warm_ups())  # before the graph, or a clock in lock step, waits for it
             link = join_late(late, host)

@@ -59,6 +59,10 @@ InterfaceOption = Annotated[
         rich_help_panel=ROS2,
     ),
 ]
+TrustOption = Annotated[
+    bool,
+    typer.Option("--trust", help="Run nodes that lie beside the file.", rich_help_panel=FLIGHT),
+]
 ThreadsOption = Annotated[
     int | None,
     typer.Option(

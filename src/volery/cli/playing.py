@@ -25,16 +25,22 @@ class _StoppedError(Exception):
     """Ctrl-C was pressed."""
 
 
-def play(log: Path, options: RunOptions, *, loop: bool, paused: bool) -> None:
+def play(
+    log: Path, options: RunOptions, *, scenario: Path | None, loop: bool, paused: bool
+) -> None:
     """Play a log until Ctrl-C, or until a client wants it to quit.
+
+    scenario: the user's own file of what was flown; without it files lie beside the log.
 
     Raises `RecordingError` where there is no log, or nothing in it.
     """
     from volery.runtime.player import Player
+    from volery.scenario.load import load_scenario
 
+    own = None if scenario is None else load_scenario(scenario)
     with (
         Interrupts() as interrupts,
-        Player(log, speed=options.speed, loop=loop, paused=paused) as player,
+        Player(log, speed=options.speed, loop=loop, paused=paused, own=own) as player,
     ):
         interrupts.be_gentle()
         _introduce(player)

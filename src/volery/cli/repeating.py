@@ -34,13 +34,19 @@ def recorded_flight(options: RunOptions) -> RecordedFlight | None:
 def recorded_scenario(flight: RecordedFlight, options: RunOptions) -> Scenario:
     """The scenario of the flight; says where it may not come out the same.
 
+    Its files and nodes are those of the file that the command line names. By a mere name it reads
+    only beside the log and starts shipped nodes only.
+
     Raises `ScenarioError` where the log is of another one than was named.
     """
-    from volery import __version__
+    from volery import __version__, load_scenario
     from volery.runtime.origin import scenario_of
 
     origin = flight.origin
     if origin.version != __version__:
         text = f"the flight was recorded with Volery {origin.version}, this is {__version__}"
         typer.echo(f"{text}: it may come out differently", err=True)
-    return scenario_of(origin, options.scenario)
+    own = None
+    if options.scenario != origin.name:
+        own = load_scenario(options.scenario, trust=options.trust)
+    return scenario_of(origin, own, folder=flight.path.parent)

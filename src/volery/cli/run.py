@@ -18,6 +18,7 @@ from volery.cli.pages import Page, page_of
 from volery.cli.progress import FlightProgress
 from volery.cli.repeating import recorded_flight, recorded_scenario
 from volery.cli.targets import check_record, check_report
+from volery.cli.trust import with_trust
 from volery.core.errors import CommandError, ScenarioError
 from volery.scenario.changes import LogRequest
 
@@ -52,6 +53,7 @@ def fly(options: RunOptions) -> int:
     check_doors(options)
     for gap in token_gaps(options):
         warn(gap)
+    options = with_trust(options)
     with page_of(options) as page, Interrupts() as interrupts:
         try:
             code, change = _build_and_fly(options, interrupts, page)
@@ -117,7 +119,7 @@ def _scenario_of(options: RunOptions) -> Scenario:
     from volery.scenario import changes, overrides
 
     scenario = overrides.apply(
-        load_scenario(options.scenario),
+        load_scenario(options.scenario, trust=options.trust),
         uavs=options.uavs,
         seconds=options.seconds,
         seed=options.seed,

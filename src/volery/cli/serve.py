@@ -17,6 +17,7 @@ from volery.cli.flight import RunOptions
 from volery.cli.guard import complain, warn
 from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, serving
+from volery.cli.trust import with_trust
 from volery.core.errors import VoleryError
 from volery.scenario import changes
 from volery.scenario.changes import LogRequest
@@ -59,7 +60,7 @@ def serve(options: ServeOptions) -> None:
     check_doors(options.first)
     for gap in token_gaps(options.first):
         warn(gap)
-    first = _first_scenario(options.first)
+    first = _first_scenario(with_trust(options.first))
     shelf = Shelf(options.page.uploads, options.page.recordings, given=first)
     with Interrupts() as interrupts, serving(options.page, shelf) as page:
         host = _Host(options, page, interrupts, _Wish(first, options.first.speed, shelf))
@@ -225,7 +226,7 @@ def _first_scenario(options: RunOptions) -> Scenario:
     from volery.scenario import overrides
 
     return overrides.apply(
-        load_scenario(options.scenario),
+        load_scenario(options.scenario, trust=options.trust),
         uavs=options.uavs,
         seconds=options.seconds,
         seed=options.seed,

@@ -29,6 +29,7 @@ from volery.graph.messages import Published, message_type
 from volery.graph.parameters import Parameter, Within
 from volery.graph.qos import DEFAULT_DEPTH, QoSProfile, profile_of
 from volery.graph.thinking import Deferring, DelayedPublisher, Thinker
+from volery.scenario.access import ScenarioAccess
 
 
 class Timers(Deferring, Protocol):
@@ -58,6 +59,8 @@ class Context:
     latency_ns: int = 0
     remap: Mapping[str, str] = field(default_factory=dict)
     """Other names for topics and services: absolute name of the node's to that of the graph."""
+    access: ScenarioAccess = field(default_factory=ScenarioAccess)
+    """What the scenario that names the node may reach."""
 
 
 class Clock:
@@ -226,6 +229,20 @@ class Node:
         self._context.graph.parameters.declare(self.full_name, parameter)
         self._parameters[name] = parameter
         return parameter
+
+    def declare_folder(self, name: str, default: str) -> str:
+        """Declare a read-only parameter that names a folder of the node's files; its value.
+
+        `NodeError` where the scenario comes from a log or an upload and the folder does not lie
+        below the working folder.
+        """
+        folder = str(self.declare_parameter(name, default).value)
+        if not self._context.access.allows_work_folder(folder):
+            raise NodeError(
+                f"node {self.full_name}: parameter {name}: a scenario of a log or of an upload may "
+                "name folders below the working folder only"
+            )
+        return folder
 
     def get_parameter(self, name: str) -> Parameter:
         """A declared parameter."""

@@ -82,7 +82,5 @@ def _with_sensors(
 
 
 def _parsed_like(scenario: Scenario, data: dict[str, Any]) -> Scenario:
-    """The scenario of `data`, with the folder of `scenario`."""
-    changed = parse_scenario(data, where=scenario.name)
-    changed._folder = scenario.folder
-    return changed
+    """The scenario of `data`, with the access of `scenario`."""
+    return parse_scenario(data, where=scenario.name, access=scenario.access)

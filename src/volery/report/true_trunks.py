@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -51,12 +52,12 @@ def no_trunks(why: str) -> TrueTrunks:
     return TrueTrunks(np.zeros((0, 2)), np.zeros(0), why)
 
 
-def true_trunks(origin: Origin | None) -> TrueTrunks:
-    """All trunks of the scenario that a log tells of."""
+def true_trunks(origin: Origin | None, folder: Path | None = None) -> TrueTrunks:
+    """All trunks of the scenario that a log in `folder` tells of."""
     if origin is None:
         return no_trunks("The log tells of no scenario, so where trees truly stood is not known.")
     try:
-        scenario = scenario_of(origin)
+        scenario = scenario_of(origin, folder=folder)
         terrain = build_terrain(scenario)
         forest = build_forest(scenario, terrain, build_city(scenario, terrain))
     except VoleryError as error:

@@ -77,7 +77,7 @@ def write_log_report(
     flight = read_flight(log)
     chosen = _chosen(flight.uavs, uav, log)
     drawn = flight.uavs if uav is None or compare is not None else [chosen]
-    trunks = true_trunks(flight.origin)
+    trunks = true_trunks(flight.origin, log.parent)
     parts = _trouble_notes(log, flight.trouble, warnings)
     parts += [section for each in drawn for section in _estimate_section(each, trunks)]
     if compare is not None:

@@ -38,7 +38,7 @@ def airframes_of(scenario: Scenario) -> dict[str, Airframe]:
     airframes: dict[str, Airframe] = {}
     for name, kind in scenario.types.items():
         try:
-            airframes[name] = load_airframe(kind.airframe, scenario.folder)
+            airframes[name] = load_airframe(scenario.access.find_model(kind.airframe))
         except DataFileError as error:
             key = f"{scenario.name}: types.{name}.airframe"
             raise DataFileError(f"{key}: {error}") from None

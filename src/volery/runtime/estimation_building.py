@@ -78,7 +78,7 @@ class _Knowledge:
     """What estimators know of their sensors: the numbers of the data files, each read once."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self._folder = scenario.folder
+        self._model = scenario.access.find_model
         self._field = tuple(magnetic_field_map(scenario.world).tolist())
         self._settings: dict[tuple[Any, ...], EstimatorSettings] = {}
         self._gnss: dict[str, GnssModel] = {}
@@ -104,7 +104,7 @@ class _Knowledge:
         from volery.control.estimator.settings import EstimatorSettings
 
         keys = set(EstimatorSettings.model_fields)
-        imu = load_imu_model(aids["imu"].spec.model, self._folder).model_dump()
+        imu = load_imu_model(self._model(aids["imu"].spec.model)).model_dump()
         values: dict[str, Any] = {key: value for key, value in imu.items() if key in keys}
         values["imu_rate_hz"] = aids["imu"].spec.rate_hz
         values["magnetic_field_map"] = self._field
@@ -112,7 +112,7 @@ class _Knowledge:
             values["gnss_offset_sigma_m"] = self._drift(aids)
             values["gnss_offset_correlation_s"] = self._receiver(aids).drift_correlation_s
         if "sonar" in aids:
-            cone = load_sonar_model(aids["sonar"].spec.model, self._folder).field_of_view_deg
+            cone = load_sonar_model(self._model(aids["sonar"].spec.model)).field_of_view_deg
             values["range_half_cone_rad"] = math.radians(cone / 2.0)
         return EstimatorSettings(**values)
 
@@ -125,7 +125,7 @@ class _Knowledge:
     def _receiver(self, aids: Mapping[str, Fitted]) -> GnssModel:
         name = aids["gnss"].spec.model
         if name not in self._gnss:
-            self._gnss[name] = load_gnss_model(name, self._folder)
+            self._gnss[name] = load_gnss_model(self._model(name))
         return self._gnss[name]
 
 

@@ -56,9 +56,11 @@ def start_nodes(
     for start in starts:
         for k, entry in enumerate(scenario.types[start.type_name].nodes):
             where = f"{scenario.name}: types.{start.type_name}.nodes[{k}]"
-            context = Context(graph, engine, now_ns, ns_from_s(entry.latency_s))
+            context = Context(
+                graph, engine, now_ns, ns_from_s(entry.latency_s), access=scenario.access
+            )
             own = _with_start(entry, start)
-            nodes.append(start_node(own, context, f"/{start.name}", where, scenario.folder))
+            nodes.append(start_node(own, context, f"/{start.name}", where, scenario.access))
     return nodes
 
 
@@ -77,9 +79,9 @@ def start_system_nodes(
     """The nodes of the whole system, in the order of the scenario."""
     nodes = []
     for k, entry in enumerate(scenario.nodes):
-        context = Context(graph, engine, now_ns, ns_from_s(entry.latency_s))
+        context = Context(graph, engine, now_ns, ns_from_s(entry.latency_s), access=scenario.access)
         where = f"{scenario.name}: nodes[{k}]"
-        nodes.append(start_node(entry, context, "", where, scenario.folder))
+        nodes.append(start_node(entry, context, "", where, scenario.access))
     return nodes
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from volery.core.errors import CommandError, DataFileError, ScenarioError
-from volery.scenario.files import SHIPPED_DATA, resolve
 from volery.scenario.grid_map import GridMapFile
 from volery.scenario.schema import Scenario
 from volery.world.grid_maps import GridMap, block_mesh, read_cells
@@ -23,7 +22,7 @@ def read_grid_map(scenario: Scenario, entry: GridMapFile) -> GridMap:
     assert world is not None
     key = f"{scenario.name}: world.grid_map.maps: '{entry.called}'"
     try:
-        path = resolve(entry.file, scenario.folder, SHIPPED_DATA)
+        path = scenario.access.find_file(entry.file)
         cells = read_cells(path, entry.threshold)
         return GridMap(entry.called, cells, world.cell_size_m, world.block_height_m, world.origin_m)
     except DataFileError as error:

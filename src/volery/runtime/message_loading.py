@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from volery.core.errors import GraphError, ScenarioError
+from volery.core.errors import DataFileError, GraphError, ScenarioError
 from volery.graph.messages import add_definitions
 from volery.scenario.schema import Scenario
 
@@ -18,13 +16,8 @@ def learn_messages(scenario: Scenario) -> list[str]:
     learned = []
     for k, name in enumerate(scenario.messages):
         where = f"{scenario.name}: messages[{k}]"
-        places = [(scenario.folder or Path()) / name, Path(name)]
-        folder = next((place for place in places if place.is_dir()), None)
-        if folder is None:
-            looked = ", ".join(dict.fromkeys(str(place.parent.resolve()) for place in places))
-            raise ScenarioError(f"{where}: there is no folder '{name}' (looked in {looked})")
         try:
-            learned += add_definitions(folder)
-        except GraphError as error:
+            learned += add_definitions(scenario.access.find_folder(name))
+        except (DataFileError, GraphError) as error:
             raise ScenarioError(f"{where}: {error}") from None
     return learned

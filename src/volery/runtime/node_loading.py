@@ -1,4 +1,14 @@
-"""Starts the nodes that a scenario names."""
+"""Starts the nodes that a scenario or a launch profile names.
+
+Importing a module runs its code. Which modules may be imported is said by `ScenarioAccess`:
+
+- one that a program makes, or a trusted one: all that there are, also in its folder and the working
+  folder;
+- a file of the user's own: shipped and installed ones;
+- a confined one, from a log or an upload: shipped ones, and those that the user's own file names.
+
+Installed is what Python finds without the scenario's folder and without the working folder.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +16,25 @@ import importlib
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.machinery import PathFinder
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from volery.core.errors import ScenarioError
 from volery.graph.node import Context, Node
-from volery.scenario.schema import NodeEntry
+from volery.scenario.access import ScenarioAccess
+from volery.scenario.schema import NodeEntry, Scenario
+
+_SHIPPED = ("volery.autonomy.", "volery.comms.", "volery.mavlink.")
+"""Packages with nodes; some other modules of Volery are programs, which an import would start."""
 
 
 def start_node(
-    entry: NodeEntry, context: Context, namespace: str, where: str, folder: Path | None
+    entry: NodeEntry, context: Context, namespace: str, where: str, access: ScenarioAccess
 ) -> Node:
-    """Import and construct a node. Raises `ScenarioError` naming the key in the scenario.
-
-    Modules are also looked for in the scenario's `folder` and in the working folder.
-    """
-    node_class = find_node(entry, where, folder)
+    """Import and construct a node. Raises `ScenarioError` naming the key in the scenario."""
+    node_class = find_node(entry, where, access)
     try:
         node: Node = node_class(
             context=context, namespace=namespace, parameter_overrides=entry.parameters
@@ -50,10 +63,63 @@ def _check_base(node: object, entry: NodeEntry, where: str) -> None:
         )
 
 
-def find_node(entry: NodeEntry, where: str, folder: Path | None) -> type[Any]:
-    """Import a node's class, as `start_node` does."""
-    with _also_from(folder or Path(), Path()):
+def find_node(entry: NodeEntry, where: str, access: ScenarioAccess) -> type[Any]:
+    """Import a node's class. `ScenarioError` where it may not be imported, or is none."""
+    module = entry.node.partition(":")[0]
+    _check_allowed(entry.node, where, access)
+    if access.is_trusted:
+        with _also_from(*_local_folders(access)):
+            return _find_class(entry.node, where)
+    with _installed_only(access):
+        if is_local(module, access):
+            raise ScenarioError(
+                f"{where}: node '{entry.node}' is a module beside the scenario, which runs only if "
+                "you trust it: give --trust, or load_scenario(..., trust=True) in Python"
+            )
         return _find_class(entry.node, where)
+
+
+def local_nodes(scenario: Scenario) -> tuple[str, ...]:
+    """Return the scenario's nodes that lie beside it or in the working folder. Imports nothing."""
+    access, names = scenario.access, [entry.node for entry in scenario.node_entries]
+    return tuple(n for n in dict.fromkeys(names) if is_local(n.partition(":")[0], access))
+
+
+def is_local(module: str, access: ScenarioAccess) -> bool:
+    """Whether a module is found only in the folder of a scenario or in the working folder.
+
+    Imports nothing.
+    """
+    top = module.partition(".")[0]
+    with _installed_only(access):
+        if top in sys.modules or _is_found(top):
+            return False
+    folders = [str(folder.resolve()) for folder in _local_folders(access)]
+    return PathFinder.find_spec(top, folders) is not None
+
+
+def _check_allowed(node: str, where: str, access: ScenarioAccess) -> None:
+    if node.startswith(_SHIPPED) or node in access.own_nodes:
+        return
+    if access.is_confined:
+        raise ScenarioError(
+            f"{where}: node '{node}' does not ship with Volery: a scenario of a log or of an "
+            "upload starts shipped nodes only; name your own file of the scenario to allow its "
+            "nodes"
+        )
+    if node.startswith("volery.") and not access.is_trusted:
+        raise ScenarioError(f"{where}: '{node}' is no node that ships with Volery")
+
+
+def _local_folders(access: ScenarioAccess) -> tuple[Path, ...]:
+    return (Path(),) if access.folder is None else (access.folder, Path())
+
+
+def _is_found(top: str) -> bool:
+    try:
+        return find_spec(top) is not None
+    except (ImportError, ValueError):
+        return False
 
 
 @contextmanager
@@ -66,6 +132,21 @@ def _also_from(*folders: Path) -> Iterator[None]:
     finally:
         for folder in added:
             sys.path.remove(folder)
+
+
+@contextmanager
+def _installed_only(access: ScenarioAccess) -> Iterator[None]:
+    """Let imports find no modules in a scenario's folder nor in the working folder.
+
+    The latter is on the path of `python -m` and `python -c`.
+    """
+    local = {folder.resolve() for folder in _local_folders(access)}
+    before = list(sys.path)
+    sys.path[:] = [entry for entry in before if Path(entry).resolve() not in local]
+    try:
+        yield
+    finally:
+        sys.path[:] = before
 
 
 def _find_class(path: str, where: str) -> type[Any]:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from importlib.metadata import version
+from pathlib import Path
+from typing import Any
 
 from volery.bridges.logs.flights import ORIGIN_TOPIC, Origin
 from volery.core.errors import ScenarioError
 from volery.graph.graph import Graph
 from volery.graph.messages import String
-from volery.scenario import library
-from volery.scenario.load import load_scenario, parse_scenario
+from volery.scenario.access import ScenarioAccess
+from volery.scenario.load import parse_scenario
 from volery.scenario.schema import Scenario
 
 
@@ -22,26 +26,50 @@ def tell_origin(graph: Graph, scenario: Scenario) -> None:
 def origin_of_scenario(scenario: Scenario) -> Origin:
     """What a log is told of a scenario."""
     content = scenario.model_dump(exclude_unset=True)
-    shipped = library.path_of(scenario.name)
-    folder = scenario.folder
-    if shipped is not None and folder == shipped.parent:
-        folder = None
-    return Origin(scenario.name, scenario.seed, version("volery"), content, folder)
+    return Origin(scenario.name, scenario.seed, version("volery"), content)
 
 
-def scenario_of(origin: Origin, name_or_path: str | None = None) -> Scenario:
-    """The scenario that a log tells of, its files beside the one that is called `name_or_path`.
+def scenario_of(
+    origin: Origin, own: Scenario | None = None, *, folder: Path | None = None
+) -> Scenario:
+    """Return the scenario that a log tells of.
 
-    Raises `ScenarioError` where that is another scenario, or the log's content is none.
+    A log may be another person's, so the scenario is confined: it reads only below `folder`, that
+    of the log, and among shipped data, and starts shipped nodes only. `own` is the user's own
+    scenario of that name: the log's one then reads below the folder of that one, and what `own`
+    names itself, files and nodes, it may read and start as `own` may.
+
+    Raises `ScenarioError` where `own` is another scenario, or the log's content is none.
     """
-    folder = origin.folder
-    if name_or_path is not None and name_or_path != origin.name:
-        given = load_scenario(name_or_path)
-        if given.name != origin.name:
-            raise ScenarioError(f"the log is of a flight of '{origin.name}', not of '{given.name}'")
-        folder = given.folder
-    elif folder is None and (shipped := library.path_of(origin.name)) is not None:
-        folder = shipped.parent
-    scenario = parse_scenario(origin.content, where=f"the log's scenario '{origin.name}'")
-    scenario._folder = folder
-    return scenario
+    if own is not None and own.name != origin.name:
+        raise ScenarioError(f"the log is of a flight of '{origin.name}', not of '{own.name}'")
+    access = ScenarioAccess(folder, is_confined=True, is_trusted=False)
+    if own is not None:
+        access = _lent(own)
+    where = f"the log's scenario '{origin.name[:80]}'"
+    return parse_scenario(origin.content, where=where, access=access)
+
+
+def _lent(own: Scenario) -> ScenarioAccess:
+    """The access of a log's scenario whose user has it as a scenario of his own."""
+    access = own.access
+    if access.is_confined:
+        return access
+    return replace(
+        access,
+        is_confined=True,
+        own_names=frozenset(_texts(own.model_dump(exclude_unset=True))),
+        own_nodes=frozenset(entry.node for entry in own.node_entries),
+    )
+
+
+def _texts(data: Any) -> Iterator[str]:
+    """All texts in plain data, file names among them."""
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, dict):
+        for value in data.values():
+            yield from _texts(value)
+    elif isinstance(data, list | tuple):
+        for value in data:
+            yield from _texts(value)

@@ -18,7 +18,7 @@ def plant_of_type(scenario: Scenario, type_name: str, airframe: Airframe) -> Pla
     if kind.plant == "kinematic":
         return Kinematic(kind.kinematic.time_constant_s, kind.kinematic.limited)
     try:
-        return load_identified(kind.identified_model or airframe.name, scenario.folder)
+        return load_identified(scenario.access.find_model(kind.identified_model or airframe.name))
     except DataFileError as error:
         key = f"{scenario.name}: types.{type_name}.identified_model"
         raise DataFileError(f"{key}: {error}") from None

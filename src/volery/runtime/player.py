@@ -32,6 +32,7 @@ from volery.runtime.progress import Progress
 from volery.runtime.services.player import PlayerServices, State
 from volery.runtime.services.worlds import OnLoad
 from volery.runtime.worlds import geometry_of
+from volery.scenario import library
 from volery.scenario.schema import Scenario
 from volery.scenario.shelf import Shelf
 
@@ -53,9 +54,11 @@ class Player:
     `speed` is a factor of real time, None plays as fast as possible; with `loop` it begins again at
     the end, else it pauses there. `on_load` is called with the name of a scenario that a client
     wants to see flown instead, or with None where it wants no world; `on_close` where a client
-    wants to return to what was flown before. `shelf` has what there is to choose from. Methods
-    belong to one thread, which calls `wait` or `run`; others use `Gateway.post`. Raises
-    `RecordingError` where there is no log, or nothing in it.
+    wants to return to what was flown before. `shelf` has what there is to choose from. `own`: the
+    user's own scenario of the log's flight, for files that its world needs; unless given, one of
+    that name of the shelf; else they lie beside the log. Methods belong to one thread, which calls
+    `wait` or `run`; others use `Gateway.post`. Raises `RecordingError` where there is no log, or
+    nothing in it.
     """
 
     def __init__(
@@ -68,6 +71,7 @@ class Player:
         on_load: OnLoad | None = None,
         on_close: Callable[[], None] | None = None,
         shelf: Shelf | None = None,
+        own: Scenario | None = None,
     ) -> None:
         _check_speed(speed)
         self.path = Path(path)
@@ -80,7 +84,7 @@ class Player:
         """Whether somebody called `quit`."""
         self.origin = self._known_origin()
         """What was flown, as the log tells; None where it does not."""
-        self.scenario: Scenario | None = self._known_scenario()
+        self.scenario: Scenario | None = self._known_scenario(own, shelf)
         """The scenario that was flown, for its world; None where that is not known."""
         self._paused = paused
         self._speed = speed
@@ -303,11 +307,13 @@ class Player:
             return origin_of(self._playback.log)
         return None
 
-    def _known_scenario(self) -> Scenario | None:
-        if self.origin is None:
-            return None
+    def _known_scenario(self, own: Scenario | None, shelf: Shelf | None) -> Scenario | None:
+        origin, folder = self.origin, self.path.parent
+        if own is not None and origin is not None:
+            return scenario_of(origin, own, folder=folder)  # another one is a mistake of the user's
         with suppress(VoleryError):
-            return scenario_of(self.origin)
+            if origin is not None:
+                return scenario_of(origin, _of_shelf(shelf, origin.name), folder=folder)
         return None
 
     def describe(self) -> dict[str, Any]:
@@ -326,6 +332,15 @@ class Player:
             "scenario": "" if self.origin is None else self.origin.name,
             "seed": 0 if self.origin is None else self.origin.seed,
         }
+
+
+def _of_shelf(shelf: Shelf | None, name: str) -> Scenario | None:
+    """A scenario with files of its own beside it; shipped ones have none."""
+    if shelf is None or name in library.names() or name not in shelf.names():
+        return None
+    with suppress(VoleryError):
+        return shelf.load(name)
+    return None
 
 
 def _check_speed(speed: float | None) -> None:

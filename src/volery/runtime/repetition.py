@@ -1,7 +1,7 @@
 """A recorded flight flown again: every command of its clients, at the moment at which it was taken.
 
     flight = read_flight(Path("flight.mcap"))
-    with Simulation(scenario_of(flight.origin)) as simulation:
+    with Simulation(scenario_of(flight.origin, load_scenario("mine.toml"))) as simulation:
         simulation.repeat(flight)
         simulation.run()
 

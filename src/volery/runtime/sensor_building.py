@@ -74,7 +74,7 @@ class _Builder:
         self._estimation = estimation
         self._scenario = scenario.name
         self._world = scenario.world
-        self._folder = scenario.folder
+        self._model = scenario.access.find_model
         self._fleet = fleet
         self._scene = scene
 
@@ -118,7 +118,7 @@ class _Builder:
         spec = group[0].spec
         own = {name: getattr(spec, name) for name in PICTURE if getattr(spec, name) is not None}
         return CameraBank(
-            load_camera(spec.model, self._folder).model_copy(update=own),
+            load_camera(self._model(spec.model)).model_copy(update=own),
             _schedule(group),
             _ids(group),
             tuple(s.mount for s in group),
@@ -129,17 +129,17 @@ class _Builder:
 
     def _imu(self, group: list[Fitted]) -> Bank:
         spec = group[0].spec
-        model = load_imu_model(spec.model, self._folder)
+        model = load_imu_model(self._model(spec.model))
         return ImuBank(model, _schedule(group), _ids(group), *_places(group), _keys(group))
 
     def _sonar(self, group: list[Fitted]) -> Bank:
-        model = load_sonar_model(group[0].spec.model, self._folder)
+        model = load_sonar_model(self._model(group[0].spec.model))
         return SonarBank(
             model, _schedule(group), _ids(group), *_places(group), _keys(group), self._scene
         )
 
     def _odometry(self, group: list[Fitted]) -> Bank:
-        model = load_odometry_model(group[0].spec.model, self._folder)
+        model = load_odometry_model(self._model(group[0].spec.model))
         return OdometryBank(model, _schedule(group), _ids(group), _keys(group), self._fleet)
 
     def _estimate(self, group: list[Fitted]) -> Bank:
@@ -155,7 +155,7 @@ class _Builder:
         return GroundTruthBank(_schedule(group), _ids(group))
 
     def _gnss(self, group: list[Fitted]) -> Bank:
-        model = load_gnss_model(group[0].spec.model, self._folder)
+        model = load_gnss_model(self._model(group[0].spec.model))
         places, _ = _places(group)
         return GnssBank(
             model,
@@ -168,13 +168,13 @@ class _Builder:
         )
 
     def _barometer(self, group: list[Fitted]) -> Bank:
-        model = load_barometer_model(group[0].spec.model, self._folder)
+        model = load_barometer_model(self._model(group[0].spec.model))
         places, _ = _places(group)
         altitude = self._world.origin.altitude_m
         return BarometerBank(model, _schedule(group), _ids(group), places, _keys(group), altitude)
 
     def _magnetometer(self, group: list[Fitted]) -> Bank:
-        model = load_magnetometer_model(group[0].spec.model, self._folder)
+        model = load_magnetometer_model(self._model(group[0].spec.model))
         _, turns = _places(group)
         field = magnetic_field_map(self._world)
         return MagnetometerBank(model, _schedule(group), _ids(group), turns, _keys(group), field)

@@ -162,7 +162,7 @@ class _LidarModels:
         """Model of a LIDAR; errors name the scenario and the sensor."""
         if spec.model not in self._loaded:
             try:
-                self._loaded[spec.model] = load_lidar(spec.model, self._scenario.folder)
+                self._loaded[spec.model] = load_lidar(self._scenario.access.find_model(spec.model))
             except DataFileError as error:
                 where = f"{self._scenario.name}: sensor '{spec.name}'"
                 raise DataFileError(f"{where}: {error}") from None

@@ -95,7 +95,7 @@ class Spawner:
         if kind not in scenario.types:
             types = {**scenario.types, kind: usual_type(load_airframe(kind))}
             self._crew.scenario = scenario = scenario.model_copy(update={"types": types})
-        return load_airframe(scenario.types[kind].airframe, scenario.folder)
+        return load_airframe(scenario.access.find_model(scenario.types[kind].airframe))
 
     def _start(
         self,

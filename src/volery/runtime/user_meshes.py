@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.core.errors import DataFileError
-from volery.scenario.files import SHIPPED_DATA, resolve
 from volery.scenario.schema import Scenario
 from volery.scenario.user_mesh import UserMesh
 from volery.world.materials import Material
@@ -26,7 +25,7 @@ def mesh_solids(scenario: Scenario) -> tuple[Solid, ...]:
     solids = []
     for number, entry in enumerate(scenario.world.meshes):
         try:
-            path = resolve(entry.file, scenario.folder, SHIPPED_DATA)
+            path = scenario.access.find_file(entry.file)
             if (path, entry.up) not in read:
                 read[path, entry.up] = read_mesh(path, up=entry.up)
             solids.append(_solid(entry, path, read[path, entry.up]))

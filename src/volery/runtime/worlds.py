@@ -14,7 +14,6 @@ from volery.runtime.grid_map_building import starting_blocks
 from volery.runtime.thing_building import build_things
 from volery.runtime.user_meshes import mesh_solids
 from volery.scenario import wind as schema
-from volery.scenario.files import SHIPPED_DATA, resolve
 from volery.scenario.schema import (
     GridTerrain,
     InventoryForest,
@@ -49,7 +48,7 @@ def build_terrain(scenario: Scenario) -> Terrain:
     terrain = scenario.world.terrain
     if isinstance(terrain, GridTerrain):
         try:
-            path = resolve(terrain.file, scenario.folder, SHIPPED_DATA)
+            path = scenario.access.find_file(terrain.file)
             return Terrain.from_csv(path, terrain.spacing_m, origin=terrain.origin_m)
         except DataFileError as error:
             raise DataFileError(f"{scenario.name}: world.terrain: {error}") from None
@@ -65,7 +64,7 @@ def build_city(scenario: Scenario, terrain: Terrain) -> City | None:
     streets = city.streets
     try:
         return city_of_outlines(
-            resolve(city.file, scenario.folder, SHIPPED_DATA),
+            scenario.access.find_file(city.file),
             LocalFrame.from_degrees(origin.latitude_deg, origin.longitude_deg, origin.altitude_m),
             terrain,
             seed=scenario.world_seed,
@@ -119,7 +118,7 @@ def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
     forest = scenario.world.forest
     if isinstance(forest, InventoryForest):
         return forest_from_inventory(
-            resolve(forest.file, scenario.folder, SHIPPED_DATA),
+            scenario.access.find_file(forest.file),
             region=forest.region_m,
             share=forest.share,
             species=forest.species,
@@ -235,7 +234,7 @@ def _read_field(scenario: Scenario) -> WindField | None:
     if name is None:
         return None
     try:
-        return WindField.from_file(resolve(name, scenario.folder, SHIPPED_DATA))
+        return WindField.from_file(scenario.access.find_file(name))
     except DataFileError as error:
         raise DataFileError(f"{scenario.name}: world.wind.field: {error}") from None
 

@@ -87,9 +87,7 @@ def apply(scenario: Scenario, changes: Changes) -> Scenario:
     forest = _forest(scenario, changes)
     if forest:
         data["world"]["forest"] = {**data["world"]["forest"], **forest}
-    changed = parse_scenario(data, where=scenario.name)
-    changed._folder = scenario.folder
-    return changed
+    return parse_scenario(data, where=scenario.name, access=scenario.access)
 
 
 def _groups(scenario: Scenario, groups: Any, uavs: int) -> list[Any]:

@@ -35,19 +35,19 @@ def load_data_file(path: Path, model: type[Model]) -> Model:
 
 
 def find_data_file(name: str, shipped: Path, what: str, folder: Path | None = None) -> Path:
-    """Path of a part: a `.toml` path (beside the scenario or as given) or a shipped name.
+    """Path of a part: a `.toml` path (in `folder` or as given) or a shipped name.
 
-    Raises `DataFileError` listing the shipped names.
+    Names that a scenario gives pass through its `ScenarioAccess.find_model` first. Raises
+    `DataFileError` listing the shipped names.
     """
     if name.endswith(".toml"):
         for place in ((folder or Path()) / name, Path(name)):
             if place.is_file():
                 return place
         raise DataFileError(f"no {what} file '{name}'")
-    path = shipped / f"{name}.toml"
-    if path.is_file():
-        return path
     known = sorted(p.stem for p in shipped.glob("*.toml"))
+    if name in known:
+        return shipped / f"{name}.toml"
     near = difflib.get_close_matches(name, known, n=1)
     hint = f" Did you mean '{near[0]}'?" if near else ""
     raise DataFileError(f"no {what} '{name}'.{hint} Known: {', '.join(known)}, or a .toml path")

@@ -11,11 +11,21 @@ from pydantic import BaseModel, ValidationError
 
 from volery.core.errors import ScenarioError, reason_of
 from volery.scenario import library
+from volery.scenario.access import ScenarioAccess
 from volery.scenario.schema import Scenario
 
+_MOST_SHOWN = 60
+"""Characters of a value in an error."""
 
-def load_scenario(name_or_path: str | Path) -> Scenario:
+
+def load_scenario(
+    name_or_path: str | Path, *, trust: bool = False, confined: bool = False
+) -> Scenario:
     """Load a scenario by its name in the library or by the path of a TOML file.
+
+    trust: whether nodes may be modules that lie beside the file or in the working folder; without
+    it nodes come from Volery and from installed packages. confined: the file is another person's:
+    it reads only below its own folder and among shipped data, and starts shipped nodes only.
 
     Raises `ScenarioError` naming file, key and what is allowed.
     """
@@ -28,17 +38,26 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{path}: not valid TOML: {error}") from None
-    scenario = parse_scenario(data, where=str(path))
-    scenario._folder = path.parent
-    return scenario
+    access = ScenarioAccess(path.parent, is_confined=confined, is_trusted=trust and not confined)
+    return parse_scenario(data, where=str(path), access=access)
 
 
-def parse_scenario(data: dict[str, Any], *, where: str = "scenario") -> Scenario:
-    """Check plain data against the schema; `where` names its source in errors."""
+def parse_scenario(
+    data: dict[str, Any],
+    *,
+    where: str = "scenario",
+    access: ScenarioAccess = ScenarioAccess(),  # noqa: B008 - frozen
+) -> Scenario:
+    """Check plain data against the schema.
+
+    where: names the source in errors. access: what the scenario may reach; unless given that of a
+    program which makes a scenario itself. `ScenarioError` names key and what is allowed.
+    """
     try:
-        return Scenario.model_validate(data)
+        scenario = Scenario.model_validate(data)
     except ValidationError as error:
         raise ScenarioError(describe_validation_error(error, where, Scenario, data)) from None
+    return scenario.with_access(access)
 
 
 def describe_validation_error(
@@ -81,8 +100,14 @@ def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
     if fault["type"] == "tuple_type":
         message = "a list is needed, in brackets"
     found = fault.get("input")
-    shown = f" (found {found!r})" if isinstance(found, str | int | float | bool) else ""
+    shown = f" (found {_short(found)})" if isinstance(found, str | int | float | bool) else ""
     return f"key '{key}': {message}{shown}"
+
+
+def _short(value: str | float) -> str:
+    """A value as an error shows it: a token, not the text of a file."""
+    text = repr(value)
+    return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}..."
 
 
 def _key(location: tuple[int | str, ...], data: Any, *, keep_last: bool) -> str:

@@ -48,6 +48,4 @@ def apply(
     if not nodes:
         data["nodes"] = []
         data["types"] = {name: {**kind, "nodes": []} for name, kind in data["types"].items()}
-    changed = parse_scenario(data, where=scenario.name)
-    changed._folder = scenario.folder
-    return changed
+    return parse_scenario(data, where=scenario.name, access=scenario.access)

@@ -6,11 +6,11 @@ docs/scenarios.md explains it and `Scenario.model_json_schema()` serves editors.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
+from volery.scenario.access import ScenarioAccess
 from volery.scenario.base import (
     Data,
     MountedSensor,
@@ -390,7 +390,7 @@ class Scenario(Data):
     messages: tuple[str, ...] = ()
     """Folders of ROS packages whose `.msg`, `.srv` and `.action` files the nodes use."""
 
-    _folder: Path | None = PrivateAttr(default=None)
+    _access: ScenarioAccess = PrivateAttr(default_factory=ScenarioAccess)
 
     @model_validator(mode="after")
     def _types_exist(self) -> Self:
@@ -412,9 +412,20 @@ class Scenario(Data):
         return self.seed if self.world.seed is None else self.world.seed
 
     @property
-    def folder(self) -> Path | None:
-        """Folder that relative file names start from; None for a scenario made in memory."""
-        return self._folder
+    def access(self) -> ScenarioAccess:
+        """Where its files may lie and which code it may start; see `load_scenario`."""
+        return self._access
+
+    def with_access(self, access: ScenarioAccess) -> Scenario:
+        """Return the same scenario with another access."""
+        changed = self.model_copy()
+        changed._access = access
+        return changed
+
+    @property
+    def node_entries(self) -> tuple[NodeEntry, ...]:
+        """All entries of nodes: those beside the UAVs, then those of the whole system."""
+        return (*(entry for kind in self.types.values() for entry in kind.nodes), *self.nodes)
 
     @property
     def uav_count(self) -> int:

@@ -62,7 +62,7 @@ class Shelf:
                 return given
         if self.folder is None or name not in self.added():
             raise ScenarioError(f"no scenario '{name}'; known: {', '.join(self.names())}")
-        return load_scenario(self.folder / name / self.FILE)
+        return load_scenario(self.folder / name / self.FILE, confined=True)
 
     def log(self, name: str) -> Path:
         """A log by the name of its file. `RecordingError` where there is none."""

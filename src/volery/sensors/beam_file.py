@@ -40,8 +40,7 @@ def read_beams(path: Path, longest_s: float, most: int) -> BeamList:
             columns = tuple(reader.fieldnames or ())
             if not set(_NEEDED) <= set(columns) <= {*_NEEDED, "ring"}:
                 raise DataFileError(
-                    f"{path}: columns must be {', '.join(_NEEDED)} and perhaps ring, "
-                    f"not {', '.join(columns) or 'none'}"
+                    f"{path}: row 1 must name the columns {', '.join(_NEEDED)} and perhaps ring"
                 )
             rows = [_row(row, path, reader.line_num) for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PrivateAttr, model_validator
 
 from volery.core.clock import NS_PER_S, ns_from_s
+from volery.scenario.access import ScenarioAccess
 from volery.sensors.beam_file import BeamList, read_beams
 from volery.sensors.beam_table import BeamTable, block_table, row_table
 from volery.sensors.pattern import MOST_BEAMS, Pattern, median_spacing
@@ -226,13 +227,15 @@ class TableScan(Pattern):
 
     kind: Literal["table"]
     file: str
-    """Beside the model file, or an absolute path."""
+    """In the folder of the model file, or below it."""
 
     _folder: Path = PrivateAttr(default=Path())
 
     @cached_property
     def _list(self) -> BeamList:
-        return read_beams(self._folder / self.file, 1.0 / self.rate_hz, MOST_BEAMS)
+        access = ScenarioAccess(self._folder, is_confined=True)
+        path = access.find_file(self.file, shipped=None)
+        return read_beams(path, 1.0 / self.rate_hz, MOST_BEAMS)
 
     @cached_property
     def spacing_rad(self) -> float:

@@ -94,9 +94,7 @@ def _with_photographer(scenario: Scenario, view: View) -> Scenario:
     first = scenario.uavs[0].position_m
     waiting = {"type": _TYPE, "position_m": (first[0], first[1], _STUDIO_M)}
     data["uavs"] = [*data["uavs"], waiting]
-    changed = parse_scenario(data, where=scenario.name)
-    changed._folder = scenario.folder
-    return changed
+    return parse_scenario(data, where=scenario.name, access=scenario.access)
 
 
 def _jpeg(message: Any) -> bytes:

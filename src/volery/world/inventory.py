@@ -95,7 +95,10 @@ def _columns(path: Path, heading: list[str]) -> dict[str, int]:
     allowed = ", ".join((*_REQUIRED, *_OPTIONAL))
     for name in heading:
         if name not in _REQUIRED + _OPTIONAL:
-            raise DataFileError(f"inventory {path}: unknown column {name!r}; allowed: {allowed}")
+            at = heading.index(name) + 1
+            raise DataFileError(
+                f"inventory {path}: row 1, column {at}: unknown name; allowed: {allowed}"
+            )
         if heading.count(name) > 1:
             raise DataFileError(f"inventory {path}: column {name!r} occurs twice")
     for name in _REQUIRED:
@@ -121,14 +124,14 @@ def _parse(
         try:
             value = float(text)
         except ValueError:
-            return f"{column} {text!r} is not a number", [], ""
+            return f"{column} is not a number", [], ""
         fault = _wrong(column, value)
         if fault:
-            return f"{column} {text} {fault}", [], ""
+            return f"{column} {fault}", [], ""
         values.append(value / 100.0 if column == "dbh_cm" else value)
     name = row[columns["species"]].strip() if "species" in columns else ""
     if name and name not in known:
-        return f"unknown species {name!r}; known: {', '.join(sorted(known))}", [], ""
+        return f"unknown species; known: {', '.join(sorted(known))}", [], ""
     return "", values, name
 
 

@@ -232,13 +232,11 @@ def _read_heights(path: Path) -> NDArray[np.float64]:
             row = [float(field) for field in fields]
         except ValueError:
             at = next(k for k, f in enumerate(fields, start=1) if not _is_number(f))
-            faults.append(f"row {number}, column {at}: {fields[at - 1].strip()!r} is not a number")
+            faults.append(f"row {number}, column {at}: not a number")
             continue
         wrong = next((k for k, value in enumerate(row, start=1) if not math.isfinite(value)), 0)
         if wrong:
-            faults.append(
-                f"row {number}, column {wrong}: {fields[wrong - 1].strip()} is not finite"
-            )
+            faults.append(f"row {number}, column {wrong}: not finite")
             continue
         rows.append(row)
     if faults:

@@ -7,6 +7,7 @@ import pytest
 from volery.core.errors import ScenarioError
 from volery.graph.messages import message_type
 from volery.runtime.message_loading import learn_messages
+from volery.scenario.access import ScenarioAccess
 from volery.scenario.load import load_scenario
 
 
@@ -15,10 +16,8 @@ def scenario(tmp_path):
     """A function that makes a scenario with folders of messages."""
 
     def make(*folders):
-        shipped = load_scenario("hover")
-        made = shipped.model_copy(update={"messages": folders})
-        made._folder = tmp_path
-        return made
+        made = load_scenario("hover").model_copy(update={"messages": folders})
+        return made.with_access(ScenarioAccess(tmp_path))
 
     return make
 
@@ -40,7 +39,7 @@ def test_types_of_a_folder_are_known(scenario, tmp_path):
 
 
 def test_a_folder_that_is_not_there_is_named(scenario):
-    with pytest.raises(ScenarioError, match=r"hover: messages\[0\]: there is no folder 'none'"):
+    with pytest.raises(ScenarioError, match=r"hover: messages\[0\]: no folder 'none'"):
         learn_messages(scenario("none"))
 
 

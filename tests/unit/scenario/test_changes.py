@@ -18,7 +18,7 @@ def test_nothing_changes_nothing():
     scenario = load_scenario("longleaf")
     assert parse_changes("") == parse_changes(" {} ") == Changes()
     assert apply(scenario, Changes()) == scenario
-    assert apply(scenario, Changes()).folder == scenario.folder
+    assert apply(scenario, Changes()).access == scenario.access
 
 
 def test_numbers():

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from volery.core.errors import CommandError, DataFileError
-from volery.scenario.files import SHIPPED_DATA
+from volery.scenario.access import SHIPPED_DATA
 from volery.world.grid_maps import GridMap, read_cells
 from volery.world.grid_maps.grid_map import MOST_CELLS
 from volery.world.grid_maps.reading import parse_cells

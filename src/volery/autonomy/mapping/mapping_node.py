@@ -97,7 +97,7 @@ class Mapping(Node):
         extent = float(self.declare_parameter("extent_m", 500.0, least=1.0).value)
         nodes = int(self.declare_parameter("max_nodes", 3_000_000, least=1).value)
         self._half = float(self.declare_parameter("half_height_m", 0.6, least=0.01).value)
-        self._folder = str(self.declare_parameter("folder", f"maps{self.get_namespace()}").value)
+        self._folder = self.declare_folder("folder", f"maps{self.get_namespace()}")
         self._limits = MapLimits(self._resolution, extent, nodes)
         beams = Beams(reach_m=self._reach, every=every)
         self._intakes = {

@@ -95,7 +95,7 @@ class World:
     def start(self, client: str, *words: object) -> Any:
         """Start a client; the function returned waits for its result."""
         module = f"volery.bench.bridge.{client}"
-        command = [sys.executable, "-m", module, str(self._ports[client]), *map(str, words)]
+        command = [sys.executable, "-P", "-m", module, str(self._ports[client]), *map(str, words)]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
         def finish() -> Any:

@@ -38,7 +38,7 @@ def clients_figures(server: PageProcess, topics: list[str]) -> dict[str, float]:
     """What nine clients lose that read everything of `topics`, and the pace meanwhile."""
     module = "volery.bench.page.clients"
     words = [server.rosbridge, str(_CLIENTS), str(_CLIENTS_S), *topics]
-    command = [sys.executable, "-m", module, *words]
+    command = [sys.executable, "-P", "-m", module, *words]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as clients:
         assert clients.stdout is not None
         clients.stdout.readline()  # all are there

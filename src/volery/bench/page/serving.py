@@ -37,7 +37,7 @@ class PageProcess:
 
     def __init__(self, scenario: str, *options: str, port: int = 0) -> None:
         self.port = port
-        self._command = [sys.executable, "-m", "volery.cli", "serve", scenario, *options]
+        self._command = [sys.executable, "-P", "-m", "volery.cli", "serve", scenario, *options]
         self._process: subprocess.Popen[str] | None = None
         self._reader = threading.Thread()
         self._said: deque[str] = deque(maxlen=50)

@@ -49,7 +49,7 @@ def _make(folder: Path, python: Path, requirements: Sequence[str], timeout_s: fl
     shutil.rmtree(folder, ignore_errors=True)
     pip = [str(python), "-I", "-m", "pip", "--disable-pip-version-check", "--no-input"]
     try:
-        _run([sys.executable, "-m", "venv", str(folder)], timeout_s)
+        _run([sys.executable, "-P", "-m", "venv", str(folder)], timeout_s)
         _run([*pip, "install", "--prefer-binary", *requirements], timeout_s)
     except PeerError:
         shutil.rmtree(folder, ignore_errors=True)

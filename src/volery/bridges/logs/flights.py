@@ -22,19 +22,20 @@ _ORIGIN_TYPE = "std_msgs/msg/String"
 
 @dataclass(frozen=True)
 class Origin:
-    """What was flown: a scenario's name and content, as plain data, its seed, Volery's version."""
+    """What was flown: a scenario's name and content, as plain data, its seed, Volery's version.
+
+    A log says nothing of where the scenario's files lie: older logs have a `folder`, which is not
+    believed, for a log may be another person's.
+    """
 
     name: str
     seed: int
     version: str
     content: dict[str, Any]
-    folder: Path | None = None
-    """Where the scenario's files lay; None: it shipped."""
 
     def to_json(self) -> str:
         """As it stands in a log."""
-        folder = None if self.folder is None else str(self.folder)
-        fields = {"name": self.name, "seed": self.seed, "version": self.version, "folder": folder}
+        fields = {"name": self.name, "seed": self.seed, "version": self.version, "folder": None}
         return json.dumps({**fields, "content": self.content}, default=str)  # of dates
 
     @classmethod
@@ -42,12 +43,11 @@ class Origin:
         """Read it. `RecordingError` for what is none."""
         try:
             plain = json.loads(text)
-            folder = None if plain["folder"] is None else Path(plain["folder"])
             name, version, content = str(plain["name"]), str(plain["version"]), plain["content"]
-            return cls(name, int(plain["seed"]), version, dict(content), folder)
-        except (ValueError, TypeError, KeyError, RecursionError) as error:
-            reason = f"what the log tells on {ORIGIN_TOPIC} is no scenario: {error}"
-            raise RecordingError(reason) from None
+            return cls(name, int(plain["seed"]), version, dict(content))
+        except (ValueError, TypeError, KeyError, RecursionError, OverflowError):
+            reason = f"what the log tells on {ORIGIN_TOPIC} is no scenario: JSON with name, seed, "
+            raise RecordingError(f"{reason}version and content is needed") from None
 
 
 class Command(NamedTuple):

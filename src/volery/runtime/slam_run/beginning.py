@@ -52,7 +52,7 @@ def _scenario_pose(source: Log, uav: str) -> Pose | None:
     """Where `{start_pose}` is in the scenario that was flown; its world is built for that."""
     for _, _, message in source.messages({ORIGIN_TOPIC}):
         try:
-            scenario = scenario_of(Origin.from_json(message.data))
+            scenario = scenario_of(Origin.from_json(message.data), folder=source.path.parent)
             terrain, _, _, scene = build_world(scenario, 1)
             with closing(scene):
                 starts = place(scenario, scene, terrain)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,8 +13,8 @@ from volery.autonomy.fixed_joints import FixedJoints, Mount
 from volery.bridges.logs.flights import ORIGIN_TOPIC, Origin
 from volery.core import rotations
 from volery.core.errors import RecordingError, ScenarioError
+from volery.runtime.origin import scenario_of
 from volery.runtime.slam_run.sources import Heard
-from volery.scenario.load import parse_scenario
 
 _BODIES = ("base_link", "base_footprint", "base")
 """Last parts of names that the body's frame goes by."""
@@ -22,6 +23,8 @@ _STRING = "std_msgs/msg/String"
 
 class Log(Protocol):
     """What is asked of a log here."""
+
+    path: Path
 
     @property
     def topics(self) -> dict[str, str]:
@@ -108,7 +111,7 @@ def _join_by_scenario(source: Log, joints: FixedJoints, frames: set[str]) -> Non
     """Add the mounts of the scenario that was flown."""
     for _, _, message in source.messages({ORIGIN_TOPIC}):
         try:
-            scenario = parse_scenario(Origin.from_json(message.data).content)
+            scenario = scenario_of(Origin.from_json(message.data))
         except (RecordingError, ScenarioError):  # of another version
             return
         kinds = [group.type for group in scenario.uavs for _ in range(group.count)]

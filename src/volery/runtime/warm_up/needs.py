@@ -32,7 +32,7 @@ def needs_of(scenario: Scenario, *, nodes: bool = True) -> list[Task]:
     for kind in kinds:
         found += _of_type(kind, scenario)
     if nodes:
-        for entry in (*(entry for kind in kinds for entry in kind.nodes), *scenario.nodes):
+        for entry in scenario.node_entries:
             found += _of_node(entry, scenario)
     return list(dict.fromkeys(found))
 
@@ -75,7 +75,7 @@ def _of_type(kind: UavType, scenario: Scenario) -> Iterator[Task]:
 
 def _has_rings(sensor: LidarSensor, scenario: Scenario) -> bool:
     try:
-        model = load_lidar(sensor.model, scenario.folder)
+        model = load_lidar(scenario.access.find_model(sensor.model))
     except DataFileError:
         return False  # who builds the sensor tells of it
     return not isinstance(model.scan, PlanarScan)
@@ -83,7 +83,7 @@ def _has_rings(sensor: LidarSensor, scenario: Scenario) -> bool:
 
 def _of_node(entry: NodeEntry, scenario: Scenario) -> Iterator[Task]:
     try:
-        node = find_node(entry, scenario.name, scenario.folder)
+        node = find_node(entry, scenario.name, scenario.access)
     except ScenarioError:
         return  # who starts the node tells of it
     try:

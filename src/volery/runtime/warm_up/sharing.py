@@ -64,7 +64,7 @@ def _helper(tasks: Sequence[Task]) -> Iterator[tuple[subprocess.Popen[bytes], in
         os.write(end, bytes(range(len(tasks))))
         os.close(end)
         helper = subprocess.Popen(
-            [sys.executable, "-c", _HELPER, *map(name_of, tasks)],
+            [sys.executable, "-P", "-c", _HELPER, *map(name_of, tasks)],
             env={**os.environ, _IS_HELPER: "1"},
             stdin=numbers,
             stdout=subprocess.DEVNULL,

@@ -30,7 +30,7 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
 
     target = path.parent / Shelf.FILE
     target.write_text(toml_of(kind, path, name, called), encoding="utf-8")
-    scenario = load_scenario(target)
+    scenario = load_scenario(target, confined=True)
     terrain = build_terrain(scenario)
     city = build_city(scenario, terrain)
     forest = build_forest(scenario, terrain, city)

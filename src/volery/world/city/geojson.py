@@ -49,7 +49,7 @@ def read_features(path: str | Path) -> tuple[Feature, ...]:
     kind = data.get("type") if isinstance(data, dict) else None
     if kind != "FeatureCollection":
         raise DataFileError(
-            f"{path}: outlines are a GeoJSON FeatureCollection; this one's type is {kind!r}"
+            f"{path}: outlines are a GeoJSON FeatureCollection; this file's 'type' is another one"
         )
     _check_crs(path, data.get("crs"))
     features = data.get("features")
@@ -94,7 +94,7 @@ def _check_crs(path: Path, crs: Any) -> None:
     properties = crs.get("properties") if isinstance(crs, dict) else None
     name = properties.get("name") if isinstance(properties, dict) else None
     if not (isinstance(name, str) and name.endswith(_WGS_84)):
-        raise DataFileError(f"{path}: coordinates must be WGS 84 in degrees; 'crs' names {name!r}")
+        raise DataFileError(f"{path}: coordinates must be WGS 84 in degrees; 'crs' names others")
 
 
 def _id_of(feature: Mapping[str, Any], number: int) -> str:
@@ -126,7 +126,7 @@ def _read(feature: Mapping[str, Any], own: str) -> Feature:
     elif shape == "MultiPolygon":
         polygons = _list(coordinates, "'coordinates'")
     else:
-        raise ValueError(f"{shape!r} is no type of geometry")
+        raise ValueError("its geometry has an unknown 'type'")
     read = tuple(
         tuple(_ring(ring) for ring in _list(rings, "'coordinates' of a polygon"))
         for rings in polygons

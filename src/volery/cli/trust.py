@@ -1,0 +1,99 @@
+"""Asks once whether code that lies beside a scenario or a launch profile may run.
+
+A node is a module, and importing it runs its code with all rights of the user. Shipped and
+installed nodes start without a question; those beside the file only with `--trust`, or with a yes
+at a terminal, which is remembered for this file and these modules.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from volery.cli.flight import RunOptions
+from volery.core.errors import ScenarioError
+from volery.scenario import library
+from volery.scenario.access import ScenarioAccess
+
+
+def with_trust(options: RunOptions) -> RunOptions:
+    """The options, `trust` set where the nodes beside the scenario may run.
+
+    Raises `ScenarioError` where there are such nodes and they may not.
+    """
+    if options.trust or not options.nodes or options.scenario in library.names():
+        return options
+    file = Path(options.scenario)
+    if not file.is_file():  # an unknown name, or that of a log's scenario
+        return options
+    from volery.scenario.load import load_scenario
+
+    scenario = load_scenario(file)
+    nodes = [entry.node for entry in scenario.node_entries]
+    return replace(options, trust=may_run_local_nodes(file, nodes, scenario.access))
+
+
+def may_run_local_nodes(file: Path, nodes: Iterable[str], access: ScenarioAccess) -> bool:
+    """Whether a file names nodes that lie beside it, and its user trusts them.
+
+    Asks at a terminal where that is not known. Raises `ScenarioError` where they may not run.
+    """
+    from volery.runtime.node_loading import is_local
+
+    named = dict.fromkeys(node.partition(":")[0] for node in nodes)
+    modules = [module for module in named if is_local(module, access)]
+    if not modules:
+        return False
+    if not set(modules) <= _trusted(file):
+        words = ", ".join(modules)
+        if not (sys.stdin.isatty() and sys.stderr.isatty()):
+            raise ScenarioError(
+                f"{file}: runs code that lies beside it ({words}); give --trust if it is yours"
+            )
+        typer.echo(f"{file} runs code that lies beside it: {words}.", err=True)
+        typer.echo("It can do whatever you can. Answer yes only if you know the code.", err=True)
+        if not typer.confirm("Trust it from now on?", default=False, err=True):
+            raise ScenarioError(f"{file}: the code beside it ({words}) is not trusted")
+        _remember(file, modules)
+    return True
+
+
+def trust_file() -> Path:
+    """Where answers are kept: below XDG_STATE_HOME, or ~/.local/state."""
+    base = os.environ.get("XDG_STATE_HOME")
+    root = Path(base) if base else Path.home() / ".local" / "state"
+    return root / "volery" / "trusted.json"
+
+
+def _trusted(file: Path) -> set[str]:
+    found = _read().get(str(file.resolve()), [])
+    return {str(module) for module in found} if isinstance(found, list) else set()
+
+
+def _read() -> dict[str, Any]:
+    try:
+        found = json.loads(trust_file().read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _remember(file: Path, modules: Iterable[str]) -> None:
+    """Keep an answer; where that cannot be, it is asked for again."""
+    known = _read()
+    known[str(file.resolve())] = sorted(_trusted(file) | set(modules))
+    target = trust_file()
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        waiting = target.with_suffix(f".{os.getpid()}")
+        waiting.write_text(json.dumps(known, indent=1), encoding="utf-8")
+        waiting.replace(target)
+    except OSError:
+        return
