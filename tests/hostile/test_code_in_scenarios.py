@@ -184,7 +184,7 @@ def test_programs_of_volery_are_no_nodes(trap: Trap, node: str) -> None:
 @pytest.mark.parametrize("node", ["json:JSONDecoder", "volery.autonomy.gaps:Gap", "os:system"])
 def test_only_nodes_are_started(trap: Trap, node: str) -> None:
     trap.file.write_text(TOML.format(node=node))
-    with pytest.raises(ScenarioError, match="is no subclass|has no class"):
+    with pytest.raises(ScenarioError, match=r"is no subclass|has no class"):
         Simulation(load_scenario(trap.file), threads=1)
 
 
@@ -234,9 +234,7 @@ def test_an_upload_starts_no_module(trap: Trap, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_shipped_nodes_of_a_log_start(trap: Trap) -> None:
-    trap.file.write_text(TOML.format(node="volery.autonomy.task_manager:TaskManager"))
-    text = trap.file.read_text() + "parameters = {area_m = [0.0, 0.0, 10.0, 10.0]}\n"
-    trap.file.write_text(text)
+    trap.file.write_text(TOML.format(node="volery.autonomy.mapping.merging_node:MapMerging"))
     with Simulation(scenario_from_log(trap), threads=1) as simulation:
         simulation.run(0.01)
 

@@ -13,7 +13,7 @@ import pytest
 
 from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.flights import Origin, read_flight
-from volery.core.errors import DataFileError, RecordingError, ScenarioError, VoleryError
+from volery.core.errors import DataFileError, GraphError, RecordingError, ScenarioError, VoleryError
 from volery.graph import messages as m
 from volery.runtime import Simulation
 from volery.runtime.origin import scenario_of
@@ -94,7 +94,6 @@ def test_a_log_reads_below_its_own_folder_only(secret: Path, own: Path) -> None:
     for name in names_outside(secret, own):
         log = foreign_log(own / "flight.mcap", content(grid(name)))
         with Player(log) as player, pytest.raises(DataFileError, match="may be read") as refused:
-            assert player.scenario is not None
             _ = player.geometry
         assert SECRET not in str(refused.value)
         assert str(secret) not in str(refused.value).replace(name[:80], "")
@@ -154,7 +153,7 @@ def test_every_key_that_names_a_file_is_confined(
     assert SECRET not in str(refused.value)
 
 
-@pytest.mark.parametrize("airframe", ["/DIR/mine", "../../../DIR/mine", "../vehicle/f450"])
+@pytest.mark.parametrize("airframe", ["/DIR/mine", "../../../DIR/mine", "../airframes/f450"])
 def test_the_name_of_a_shipped_model_is_no_path(airframe: str, own: Path, tmp_path: Path) -> None:
     """`NAME` becomes `NAME.toml` among the shipped models."""
     shipped = Path(__file__).parents[2] / "src" / "volery" / "vehicle" / "airframes" / "f450.toml"
@@ -180,7 +179,7 @@ def test_a_beam_table_lies_beside_its_model(own: Path, secret: Path) -> None:
         with pytest.raises(VoleryError) as refused:
             Simulation(scenario_of(Origin("stranger", 1, "0", told), folder=own), threads=1)
         assert SECRET not in str(refused.value)
-        assert "may be read" in str(refused.value)
+        assert "lies in the folder of its model" in str(refused.value)
 
 
 def test_an_upload_reads_below_its_own_folder_only(tmp_path: Path, secret: Path) -> None:
@@ -275,6 +274,16 @@ def test_nodes_of_a_log_write_below_the_working_folder_only(
     told = content({}, types={"f450": kind})
     with pytest.raises(ScenarioError, match="below the working folder only"):
         Simulation(scenario_of(Origin("stranger", 1, "0", told), folder=own), threads=1)
+
+
+def test_clients_set_no_parameter_that_names_files() -> None:
+    node = "volery.autonomy.mapping.mapping_node:Mapping"
+    told = content({}, types={"f450": {"sensors": [], "nodes": [{"node": node}]}})
+    with Simulation(parse_scenario(told), threads=1) as simulation:
+        parameters = simulation.graph.parameters
+        for name in ("folder", "map_file"):
+            with pytest.raises(GraphError, match="read-only"):
+                parameters.get("/uav1/mapping", name).set("/etc")
 
 
 # ------------------------------------------------------------------------------ the whole attack

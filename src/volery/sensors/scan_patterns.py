@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PrivateAttr, model_validator
 
 from volery.core.clock import NS_PER_S, ns_from_s
+from volery.core.errors import DataFileError
 from volery.scenario.access import ScenarioAccess
 from volery.sensors.beam_file import BeamList, read_beams
 from volery.sensors.beam_table import BeamTable, block_table, row_table
@@ -234,7 +235,13 @@ class TableScan(Pattern):
     @cached_property
     def _list(self) -> BeamList:
         access = ScenarioAccess(self._folder, is_confined=True)
-        path = access.find_file(self.file, shipped=None)
+        try:
+            path = access.find_file(self.file, shipped=None)
+        except DataFileError:
+            raise DataFileError(
+                f"{self._folder / self.file}: cannot be read: a beam table lies in the folder of "
+                "its model file or below it"
+            ) from None
         return read_beams(path, 1.0 / self.rate_hz, MOST_BEAMS)
 
     @cached_property

@@ -127,7 +127,7 @@ def _parse(
             return f"{column} is not a number", [], ""
         fault = _wrong(column, value)
         if fault:
-            return f"{column} {fault}", [], ""
+            return f"{column} {value:g} {fault}", [], ""
         values.append(value / 100.0 if column == "dbh_cm" else value)
     name = row[columns["species"]].strip() if "species" in columns else ""
     if name and name not in known:

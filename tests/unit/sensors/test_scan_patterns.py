@@ -221,7 +221,7 @@ def test_a_broken_table_is_refused(tmp_path, rows, message):
 
 
 def test_a_table_needs_its_file_and_columns(tmp_path):
-    with pytest.raises(DataFileError, match="columns must be azimuth_deg"):
+    with pytest.raises(DataFileError, match="must name the columns azimuth_deg"):
         table_model(tmp_path, ["0,0"], "azimuth,elevation")
     (tmp_path / "beams.csv").unlink()
     with pytest.raises(DataFileError, match=r"beams\.csv: cannot be read"):

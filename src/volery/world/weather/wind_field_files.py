@@ -158,7 +158,7 @@ def _parse(row: list[str], order: list[int]) -> tuple[str, list[float]]:
             return f"{name} is not a number", []
         limit = MAX_WIND_M_S if name.endswith("_m_s") else 1e6
         if not abs(value) <= limit:
-            return f"{name} is out of range; +-{limit:g} is allowed", []
+            return f"{name} {value:g} is out of range; +-{limit:g} is allowed", []
         values.append(value)
     return "", values
 

@@ -187,7 +187,10 @@ def _set(key, value):
         (spoilt(lambda d: d.update(features=[3])), "feature 1: it must be an object"),
         (spoilt(lambda d: d.update(features=[])), "no outline of a building"),
         (spoilt(lambda d: d.update(crs={"properties": {"name": "EPSG:3879"}})), "WGS 84"),
-        (spoilt(_set("type", "Blob")), r"feature 1 \(id way/7\): 'Blob' is no type"),
+        (
+            spoilt(_set("type", "Blob")),
+            r"feature 1 \(id way/7\): its geometry has an unknown 'type'",
+        ),
         (spoilt(_set("coordinates", "x")), r"\(id way/7\): 'coordinates' of a polygon must be a"),
         (spoilt(_set("coordinates", [[["a", 1.0]]])), r"\(id way/7\): longitude and latitude"),
         (spoilt(_set("coordinates", [[[200.0, 1.0]]])), r"\(id way/7\): longitude and latitude"),
