@@ -7,14 +7,18 @@ import os
 import pty
 import subprocess
 import sys
-from contextlib import closing
+from collections.abc import Callable
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner, Result
 
 from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.flights import Origin
+from volery.cli import trust
+from volery.cli.app import app
 from volery.cli.trust import may_run_local_nodes
 from volery.core.errors import ScenarioError, VoleryError
 from volery.graph import messages as m
@@ -84,23 +88,6 @@ def trap(tmp_path: Path, request: pytest.FixtureRequest) -> Any:
     name = f"evil_{abs(hash(request.node.nodeid)):x}"
     yield Trap(tmp_path, name)
     sys.modules.pop(name, None)
-
-
-def volery(
-    *words: object, cwd: Path, state: Path, **options: Any
-) -> subprocess.CompletedProcess[Any]:
-    environment = {**os.environ, "XDG_STATE_HOME": str(state)}
-    return subprocess.run(
-        [*VOLERY, *map(str, words)],
-        cwd=cwd,
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=250,
-        check=False,
-        **options,
-    )
 
 
 # ------------------------------------------------------------------------------- what is imported
@@ -242,48 +229,73 @@ def test_shipped_nodes_of_a_log_start(trap: Trap) -> None:
 # ----------------------------------------------------------------------------- the command line
 
 
-def test_without_a_terminal_a_scenario_with_code_is_refused(trap: Trap, tmp_path: Path) -> None:
-    for cwd in (trap.folder, Path("/")):
-        for words in (("run",), ("serve", "--port", "0")):
-            done = volery(*words, trap.file, cwd=cwd, state=tmp_path / "state")
-            assert done.returncode == 2
-            assert f"runs code that lies beside it ({trap.module}); give --trust" in done.stderr
-            assert len(done.stderr.splitlines()) == 1
+@pytest.fixture
+def invoke(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The command line in this process, with a folder of its own for what it remembers."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    runner = CliRunner()
+
+    def run(*words: object, typed: str = "") -> Result:
+        result = runner.invoke(app, [str(word) for word in words], input=typed)
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        return result
+
+    return run
+
+
+Invoke = Callable[..., Result]
+
+
+@pytest.mark.parametrize("words", [("run",), ("serve", "--port", "0"), ("launch",)])
+def test_without_a_terminal_code_beside_a_file_is_refused(
+    words: tuple[str, ...], trap: Trap, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(trap.folder)
+    if words == ("launch",):
+        trap.file.write_text(f'[[launch]]\nnode = "{trap.node}"\n')
+    done = invoke(*words, trap.file)
+    assert done.exit_code == 2
+    assert f"runs code that lies beside it ({trap.module}); give --trust" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
     assert not trap.has_run
 
 
-def test_trust_and_no_nodes_are_ways_out(trap: Trap, tmp_path: Path) -> None:
-    done = volery("run", trap.file, "--no-nodes", cwd=Path("/"), state=tmp_path / "state")
-    assert (done.returncode, trap.has_run) == (0, False), done.stderr
-    done = volery("run", trap.file, "--trust", cwd=Path("/"), state=tmp_path / "state")
-    assert (done.returncode, trap.has_run) == (0, True), done.stderr
+def test_trust_and_no_nodes_are_ways_out(trap: Trap, invoke: Invoke, tmp_path: Path) -> None:
+    done = invoke("run", trap.file, "--no-nodes")
+    assert (done.exit_code, trap.has_run) == (0, False), done.stderr
+    done = invoke("run", trap.file, "--trust")
+    assert (done.exit_code, trap.has_run) == (0, True), done.stderr
     assert not (tmp_path / "state").exists()  # remembered is only what was asked for
 
 
-def test_a_strangers_log_starts_no_code(trap: Trap, tmp_path: Path) -> None:
-    """By its name alone, and even with `--trust`: that is said of a file, not of a log."""
+@pytest.mark.parametrize("flags", [(), ("--trust",)])
+def test_a_strangers_log_starts_no_code(
+    flags: tuple[str, ...], trap: Trap, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By its name alone, even with `--trust`: that is said of a file, not of a log."""
+    monkeypatch.chdir(trap.folder)
     log = trap.log()
-    for flags in ((), ("--trust",)):
-        done = volery(
-            "run", "stranger", "--replay-commands", log, *flags, cwd=trap.folder,
-            state=tmp_path / "state",
-        )  # fmt: skip
-        assert done.returncode == 2
-        assert "shipped nodes only" in done.stderr
+    done = invoke("run", "stranger", "--replay-commands", log, *flags)
+    assert done.exit_code == 2
+    assert "shipped nodes only" in done.stderr
     assert not trap.has_run
-    done = volery(
-        "run", trap.file, "--replay-commands", log, cwd=trap.folder, state=tmp_path / "state"
-    )
+
+
+def test_a_strangers_log_beside_its_scenario_starts_no_code(trap: Trap, invoke: Invoke) -> None:
+    done = invoke("run", trap.file, "--replay-commands", trap.log())
+    assert done.exit_code == 2
     assert "give --trust" in done.stderr
     assert not trap.has_run
 
 
-def test_ones_own_log_is_flown_again_with_ones_own_nodes(trap: Trap, tmp_path: Path) -> None:
-    words = ("run", trap.file, "--trust", "--digest")
-    log = tmp_path / "own.mcap"
-    once = volery(*words, "--record", log, cwd=Path("/"), state=tmp_path / "state")
-    again = volery(*words, "--replay-commands", log, cwd=Path("/"), state=tmp_path / "state")
-    assert again.returncode == 0, again.stderr
+def test_ones_own_log_is_flown_again_with_ones_own_nodes(
+    trap: Trap, invoke: Invoke, tmp_path: Path
+) -> None:
+    words, log = ("run", trap.file, "--trust", "--digest"), tmp_path / "own.mcap"
+    once = invoke(*words, "--record", log)
+    again = invoke(*words, "--replay-commands", log)
+    assert again.exit_code == 0, again.stderr
     assert digest_of(once.stdout) == digest_of(again.stdout)
 
 
@@ -291,80 +303,27 @@ def digest_of(text: str) -> str:
     return next(line for line in text.splitlines() if line.startswith("digest"))
 
 
-def test_a_launch_profile_with_code_is_refused(trap: Trap, tmp_path: Path) -> None:
-    profile = trap.folder / "profile.toml"
-    profile.write_text(f'[[launch]]\nnode = "{trap.node}"\n')
-    done = volery("launch", profile, cwd=trap.folder, state=tmp_path / "state")
-    assert done.returncode == 2
-    assert f"runs code that lies beside it ({trap.module}); give --trust" in done.stderr
-    assert not trap.has_run
-
-
-@pytest.mark.parametrize("module", ["numba", "json", "pydantic"])
-def test_helper_processes_import_nothing_from_the_working_folder(
-    module: str, trap: Trap, tmp_path: Path
-) -> None:
-    """As `python -m` and `python -c` would, before everything else."""
-    (trap.folder / f"{module}.py").write_text(EVIL.format(mark=str(trap.mark)))
-    environment = {**os.environ, "VOLERY_CACHE_DIR": str(tmp_path / "cache")}
-    script = (
-        "from volery.autonomy.warm_up import scan_returns\n"
-        "from volery.runtime.warm_up.sharing import compile_all\n"
-        "compile_all([scan_returns])\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", script],
-        cwd=trap.folder, env=environment, timeout=250, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0
-    assert not trap.has_run
-
-
 # ------------------------------------------------------------------------------- asked only once
 
 
-class Terminal:
-    """stdin and stderr are terminals; `answer` is typed."""
-
-    def __init__(self, trap: Trap, state: Path, answer: str, *words: str) -> None:
-        main, side = pty.openpty()
-        os.write(main, answer.encode())
-        command = [*VOLERY, "run", str(trap.file), *words]
-        environment = {**os.environ, "XDG_STATE_HOME": str(state)}
-        with subprocess.Popen(
-            command, stdin=side, stderr=side, stdout=subprocess.DEVNULL, env=environment, cwd="/"
-        ) as process:
-            os.close(side)
-            said = b""
-            while True:
-                try:
-                    piece = os.read(main, 4096)
-                except OSError:
-                    break
-                said += piece
-                if not piece:
-                    break
-            self.code = process.wait(250)
-        os.close(main)
-        self.said = said.decode(errors="replace")
-
-
-def test_an_answer_at_a_terminal_is_remembered(trap: Trap, tmp_path: Path) -> None:
-    state = tmp_path / "state"
-    refused = Terminal(trap, state, "n\n")
-    assert refused.code == 2
-    assert f"runs code that lies beside it: {trap.module}" in refused.said
-    assert "Trust it from now on?" in refused.said
+def test_an_answer_at_a_terminal_is_remembered(
+    trap: Trap, invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(trust, "at_terminal", lambda: True)
+    for typed in ("n\n", "\n"):  # the default is no
+        refused = invoke("run", trap.file, typed=typed)
+        assert refused.exit_code == 2
+        assert f"runs code that lies beside it: {trap.module}" in refused.stderr
     assert not trap.has_run
-    assert Terminal(trap, state, "\n").code == 2  # the default is no
-    asked = Terminal(trap, state, "y\n")
-    assert asked.code == 0, asked.said
+    asked = invoke("run", trap.file, typed="y\n")
+    assert asked.exit_code == 0, asked.stderr
     assert trap.has_run
-    known = json.loads((state / "volery" / "trusted.json").read_text())
+    known = json.loads((tmp_path / "state" / "volery" / "trusted.json").read_text())
     assert known == {str(trap.file): [trap.module]}
-    again = Terminal(trap, state, "")
-    assert again.code == 0
-    assert "Trust it" not in again.said
+    monkeypatch.setattr(trust, "at_terminal", lambda: False)
+    again = invoke("run", trap.file)
+    assert again.exit_code == 0
+    assert "lies beside it" not in again.stderr
 
 
 def test_what_is_remembered_is_of_one_file_and_its_modules(
@@ -390,3 +349,68 @@ def test_what_is_remembered_is_of_one_file_and_its_modules(
     assert not may_run_local_nodes(trap.file, ["not_there_at_all:X"], access)
     assert not is_local("volery.autonomy.gaps", access)
     assert not trap.has_run
+
+
+# --------------------------------------------------------------------- processes as users have them
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("module", ["numba", "json", "pydantic"])
+def test_helper_processes_import_nothing_from_the_working_folder(
+    module: str, trap: Trap, tmp_path: Path
+) -> None:
+    """As `python -m` and `python -c` would, before everything else."""
+    (trap.folder / f"{module}.py").write_text(EVIL.format(mark=str(trap.mark)))
+    environment = {**os.environ, "VOLERY_CACHE_DIR": str(tmp_path / "cache")}
+    script = (
+        "from volery.autonomy.warm_up import scan_returns\n"
+        "from volery.runtime.warm_up.sharing import compile_all\n"
+        "compile_all([scan_returns])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", script],
+        cwd=trap.folder, env=environment, timeout=250, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0
+    assert not trap.has_run
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cwd", ["beside", "elsewhere"])
+def test_a_process_starts_no_code(trap: Trap, tmp_path: Path, cwd: str) -> None:
+    """`python -m volery.cli` has the working folder on its path."""
+    words = ("run", "stranger", "--replay-commands", trap.log()), ("run", trap.file)
+    for each in words:
+        done = subprocess.run(
+            [*VOLERY, *map(str, each)],
+            cwd=trap.folder if cwd == "beside" else "/",
+            env={**os.environ, "XDG_STATE_HOME": str(tmp_path / "state")},
+            stdin=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=250,
+            check=False,
+        )
+        assert done.returncode == 2
+        assert len(done.stderr.splitlines()) == 1
+        assert not trap.has_run
+
+
+@pytest.mark.slow
+def test_a_terminal_is_asked(trap: Trap, tmp_path: Path) -> None:
+    main, side = pty.openpty()
+    os.write(main, b"y\n")
+    environment = {**os.environ, "XDG_STATE_HOME": str(tmp_path / "state")}
+    with subprocess.Popen(
+        [*VOLERY, "run", str(trap.file)],
+        stdin=side, stderr=side, stdout=subprocess.DEVNULL, env=environment, cwd="/",
+    ) as process:  # fmt: skip
+        os.close(side)
+        said = b""
+        with suppress(OSError):  # at its end
+            while piece := os.read(main, 4096):
+                said += piece
+        code = process.wait(250)
+    os.close(main)
+    assert b"Trust it from now on?" in said
+    assert (code, trap.has_run) == (0, True), said

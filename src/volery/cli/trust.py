@@ -53,7 +53,7 @@ def may_run_local_nodes(file: Path, nodes: Iterable[str], access: ScenarioAccess
         return False
     if not set(modules) <= _trusted(file):
         words = ", ".join(modules)
-        if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        if not at_terminal():
             raise ScenarioError(
                 f"{file}: runs code that lies beside it ({words}); give --trust if it is yours"
             )
@@ -63,6 +63,11 @@ def may_run_local_nodes(file: Path, nodes: Iterable[str], access: ScenarioAccess
             raise ScenarioError(f"{file}: the code beside it ({words}) is not trusted")
         _remember(file, modules)
     return True
+
+
+def at_terminal() -> bool:
+    """Whether a user can be asked."""
+    return sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def trust_file() -> Path:
