@@ -392,7 +392,7 @@ def test_a_process_starts_no_code(trap: Trap, tmp_path: Path, cwd: str) -> None:
             check=False,
         )
         assert done.returncode == 2
-        assert len(done.stderr.splitlines()) == 1
+        assert "Traceback" not in done.stderr
         assert not trap.has_run
 
 
