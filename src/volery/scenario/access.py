@@ -71,12 +71,17 @@ class ScenarioAccess:
     def _find(
         self, name: str, shipped: Path | None, exists: Callable[[Path], bool], what: str
     ) -> Path:
+        if "\0" in name:
+            raise DataFileError(f"a {what} that may be read has no NUL in its name")
         folders = [] if self.folder is None else [self.folder]
         folders += [Path()] if self._is_free(name) else []
         folders += [] if shipped is None else [shipped]
         for folder in folders:
             place = folder / name
-            if (self._is_free(name) or _lies_in(name, folder)) and _exists(place, exists):
+            is_open = self._is_free(name) or (
+                _is_inner(name) and (folder is shipped or _is_below(place, folder))
+            )
+            if is_open and _exists(place, exists):
                 return place
         if not self._is_free(name):
             raise DataFileError(
@@ -95,7 +100,7 @@ class ScenarioAccess:
 def _is_inner(name: str) -> bool:
     """Whether a name is relative and never goes up."""
     path = Path(name)
-    return not (path.is_absolute() or ".." in path.parts or "\0" in name)
+    return not (path.is_absolute() or ".." in path.parts)
 
 
 def _is_below(place: Path, folder: Path) -> bool:
@@ -104,10 +109,6 @@ def _is_below(place: Path, folder: Path) -> bool:
         return place.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError, ValueError):
         return False
-
-
-def _lies_in(name: str, folder: Path) -> bool:
-    return _is_inner(name) and _is_below(folder / name, folder)
 
 
 def _exists(place: Path, exists: Callable[[Path], bool]) -> bool:
