@@ -103,7 +103,7 @@ def test_an_inventory_becomes_a_forest(checked):
         ("city", ".json", outlines([500, 0], [1, 1], [2, 2], [500, 0]), "within 180 and 90"),
         ("mesh", ".obj", b"v 0 0 0\n", "no triangle"),
         ("mesh", ".glb", b"glTF" + b"\0" * 40, "mesh.glb"),
-        ("forest", ".csv", b"x,y\n1,2\n", "unknown column 'x'"),
+        ("forest", ".csv", b"x,y\n1,2\n", "row 1, column 1: unknown name"),
         ("forest", ".csv", b"x_m,y_m\n", "0 trees"),
         ("forest", ".csv", b"x_m,y_m\n385000,6672000\n", "at most 5000 m"),
         ("forest", ".csv", b"x_m,y_m\n1,nan\n", "row 2"),
