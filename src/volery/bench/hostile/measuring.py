@@ -94,7 +94,7 @@ def _attack(name: str, pid: int, rosbridge: int, ros_tcp: int, seconds: float) -
 
 
 def _start(module: str, *words: object) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", f"volery.bench.hostile.{module}", *map(str, words)]
+    command = [sys.executable, "-P", "-m", f"volery.bench.hostile.{module}", *map(str, words)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
 
@@ -114,7 +114,7 @@ def _result(process: subprocess.Popen[str], seconds: float) -> Any:
 def _victim() -> Iterator[tuple[int, int, int]]:
     """Process id, rosbridge port and ROS-TCP port of a run in real time."""
     rosbridge, ros_tcp = _free_port(), _free_port()
-    command = [sys.executable, "-m", "volery.cli.app", "run", "hover", "--speed", "1"]
+    command = [sys.executable, "-P", "-m", "volery.cli.app", "run", "hover", "--speed", "1"]
     command += ["--seconds", "100000"]
     command += ["--door", f"rosbridge={rosbridge}", "--door", f"ros-tcp={ros_tcp}"]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
