@@ -50,7 +50,7 @@ def run_bounded(module: str, words: Sequence[str], bounds: Bounds) -> Any:
 
     Raises `BoundedError` where it takes too long, or prints nothing: it ran out of memory.
     """
-    command = [sys.executable, "-m", module, *words]
+    command = [sys.executable, "-P", "-m", module, *words]
     few = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     try:
         ran = subprocess.run(
