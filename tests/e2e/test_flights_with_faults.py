@@ -163,6 +163,6 @@ def test_the_worst_of_overlapping_faults_decides(simulate, airborne):
 @pytest.mark.parametrize("offset", [[0.0, 0.0, -50.0], [1e6, 0.0, 0.0]])
 def test_nobody_is_displaced_out_of_the_world(simulate, airborne, offset):
     simulation = simulate(airborne)
-    simulation.inject({"kind": "displacement", "uav": "uav1", "offset_m": offset})
     with pytest.raises(CommandError, match="would be displaced"):
-        simulation.run(0.1)
+        simulation.inject({"kind": "displacement", "uav": "uav1", "offset_m": offset})
+    simulation.run(0.1)

@@ -12,7 +12,8 @@ from filling import filled
 from rosbags.typesys import Stores, get_typestore
 
 from volery.bridges.topic_patterns import renamer, topic_filter
-from volery.core.errors import GraphError
+from volery.core.errors import GraphError, PatternError
+from volery.core.patterns import posix_search
 from volery.graph.cdr import decode_cdr, encode_cdr
 from volery.graph.definition_files import parse_definition
 from volery.graph.definition_store import DefinitionStore
@@ -166,6 +167,17 @@ def patterns(mutator):
         assert found == (pattern == topic)
     with contextlib.suppress(GraphError):
         assert isinstance(renamer({pattern: topic})(topic), str)
+    return 1
+
+
+_FILTERS = (b"^uav[[:digit:]]+$", b"(a|b)*c{2,5}", b"(|||){14}x", b"[^[:alpha:]_]", b"(a+)+$")
+
+
+def filters(mutator):
+    """Filters of names, which are POSIX extended regular expressions."""
+    pattern = mutator.bytes(_FILTERS).decode(errors="surrogateescape")
+    with contextlib.suppress(PatternError):
+        assert posix_search(pattern)("uav12" + 300 * "a") in (True, False)
     return 1
 
 

@@ -40,6 +40,7 @@ TARGETS = {
     "plain_values": message_targets.plain_values,
     "definitions": message_targets.definitions,
     "topic_patterns": message_targets.patterns,
+    "name_filters": message_targets.filters,
     "type_names": message_targets.type_names,
     "ros2_tokens": ros2_targets.tokens,
     "ros2_attachments": ros2_targets.attachments,

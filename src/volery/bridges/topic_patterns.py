@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 
 from volery.core.errors import GraphError
+from volery.core.patterns import MAX_PATTERN_CHARACTERS
 
 _ALLOWED = re.compile(r"/(?:[\w*?]+(?:/[\w*?]+)*)?")
 _TOKENS = re.compile(r"/\*\*(?=/|$)|\*\*|\*|\?|[^*?/]+|/")
@@ -69,6 +70,8 @@ def _compiled(patterns: Iterable[str]) -> list[Pattern]:
         patterns = (patterns,)
     compiled = []
     for pattern in patterns:
+        if len(pattern) > MAX_PATTERN_CHARACTERS:
+            raise GraphError(f"a pattern has at most {MAX_PATTERN_CHARACTERS} characters")
         if _ALLOWED.fullmatch(pattern) is None:
             raise GraphError(
                 f"'{pattern}' is no pattern for topics: it begins with / and is made of letters, "

@@ -71,6 +71,10 @@ class DivergenceError(VoleryError):
         self.time_s = time_s
 
 
+class PatternError(VoleryError):
+    """A text is no regular expression, or one that is too large."""
+
+
 class SnapshotError(VoleryError):
     """A state cannot be kept or taken back: something in the run does not offer its state."""
 

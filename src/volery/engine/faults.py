@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Collection
 from typing import Any, Protocol
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
+from volery.control.setpoints import MAX_COORDINATE, checked
 from volery.core.clock import ns_from_s, s_from_ns
 from volery.core.errors import CommandError
 from volery.engine.engine import Engine, SensorBank
@@ -28,6 +30,8 @@ from volery.vehicle.plants import RigidBody
 from volery.world.weather import Gust
 
 Array = NDArray[np.float64]
+
+_log = logging.getLogger(__name__)
 
 
 class Radios(Protocol):
@@ -65,10 +69,13 @@ class FaultPlan:
             self._sound[name] = self._fleet.state.rotor_health[self._row(name)].copy()
             self.mend(name)
 
-    def add(self, fault: Fault) -> None:
+    def add(self, fault: Fault, *, client: str = "") -> None:
         """Let a fault happen when its time comes, or at the next tick if that has passed.
 
-        Raises `CommandError` for a UAV, rotor or sensor that there is not.
+        Raises `CommandError` for a UAV, rotor or sensor that there is not, and for what cannot be
+        in this world. `client`: the external client that wants it. A fault of a client that turns
+        out to be impossible when its time comes changes nothing and is logged; another one ends
+        the run.
         """
         begin: Callable[[], Any]
         end: Callable[[], Any] | None = None
@@ -86,9 +93,9 @@ class FaultPlan:
             begin = self._gnss(fault)
         uav = getattr(fault, "uav", None)
         until_s = getattr(fault, "until_s", None)
-        self._at(fault.at_s, begin, uav, f"fault: {fault.kind}")
+        self._at(fault.at_s, begin, uav, f"fault: {fault.kind}", client)
         if until_s is not None:
-            self._at(until_s, end or _nothing, uav, f"fault over: {fault.kind}")
+            self._at(until_s, end or _nothing, uav, f"fault over: {fault.kind}", client)
 
     def mend(self, uav: str) -> None:
         """Forget what weakens the rotors of a UAV that begins anew, and what silences its radio."""
@@ -108,13 +115,22 @@ class FaultPlan:
     def _fleet(self) -> Fleet:
         return self._engine.fleet
 
-    def _at(self, time_s: float, action: Callable[[], Any], uav: str | None, what: str) -> None:
+    def _at(
+        self, time_s: float, action: Callable[[], Any], uav: str | None, what: str, client: str
+    ) -> None:
         def act() -> None:
             if uav is not None and uav not in self._engine.names:
                 return
-            action()
+            told = what
+            try:
+                action()
+            except Exception as error:
+                if not client:
+                    raise
+                told = f"{what} is not possible: {error}"
+                _log.warning("%s (asked for by %s)", told, client)
             if uav is not None:
-                self._engine.note(self._row(uav), EventKind.FAULT, what)
+                self._engine.note(self._row(uav), EventKind.FAULT, told)
 
         self._engine.at(ns_from_s(time_s), act)
 
@@ -188,27 +204,51 @@ class FaultPlan:
         return [bank for bank in gnss if any(s.uav == row for s in bank.sensors)]
 
     def _gust(self, fault: GustFault) -> Callable[[], Any]:
-        def blow() -> None:
-            start = s_from_ns(self._engine.time_ns)
-            end = start + 2.0 * fault.rise_s + fault.hold_s
-            self._fleet.add_gust(Gust(fault.velocity_m_s, start, fault.rise_s, end))
+        def gust_at(start_s: float) -> Gust:
+            end_s = start_s + 2.0 * fault.rise_s + fault.hold_s
+            return Gust(fault.velocity_m_s, start_s, fault.rise_s, end_s)
 
-        return blow
+        try:
+            gust_at(fault.at_s)  # one that cannot be is refused now
+        except CommandError as error:
+            raise CommandError(f"fault: gust: velocity_m_s: {error}") from None
+        return lambda: self._fleet.add_gust(gust_at(s_from_ns(self._engine.time_ns)))
 
     def _displacement(self, fault: DisplacementFault) -> Callable[[], Any]:
         self._row(fault.uav)
+        if ns_from_s(fault.at_s) <= self._engine.time_ns:
+            self._check_displaced(fault)
+        else:
+            checked("offset_m", fault.offset_m, (3,), self._longest_way_m())
 
         def displace() -> None:
-            i = self._row(fault.uav)
-            there = self._fleet.state.position_map[i] + fault.offset_m
-            x0, y0, x1, y1 = self._engine.ground.bounds
-            if not (x0 <= there[0] <= x1 and y0 <= there[1] <= y1):
-                raise CommandError(f"fault: {fault.uav} would be displaced beyond the terrain")
-            if there[2] < float(self._engine.ground.height(there[0], there[1])):
-                raise CommandError(f"fault: {fault.uav} would be displaced under the ground")
-            self._fleet.displace(i, fault.offset_m)
+            self._check_displaced(fault)
+            self._fleet.displace(self._row(fault.uav), fault.offset_m)
 
         return displace
+
+    def _check_displaced(self, fault: DisplacementFault) -> None:
+        """`CommandError` where a UAV would be displaced out of the world, or into something."""
+        engine = self._engine
+        there = self._fleet.state.position_map[self._row(fault.uav)] + fault.offset_m
+        at = f"fault: {fault.uav} would be displaced to ({there[0]:g}, {there[1]:g}, {there[2]:g})"
+        x0, y0, x1, y1 = engine.ground.bounds
+        if not (x0 <= there[0] <= x1 and y0 <= there[1] <= y1):
+            reach = f"({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m"
+            raise CommandError(f"{at} m, beyond the terrain, which reaches from {reach}")
+        ground_m = float(engine.ground.height(there[0], there[1]))
+        if there[2] < ground_m:
+            raise CommandError(f"{at} m, under the ground, which lies at {ground_m:g} m there")
+        if there[2] > MAX_COORDINATE:
+            raise CommandError(f"{at} m, higher than {MAX_COORDINATE:g} m")
+        around = int(engine.scene.enclosing(there[None])[0])
+        if around >= 0:
+            raise CommandError(f"{at} m, inside {engine.scene.instance_name(around)}")
+
+    def _longest_way_m(self) -> float:
+        """Longest displacement along an axis that can stay inside the world."""
+        x0, y0, x1, y1 = self._engine.ground.bounds
+        return float(max(x1 - x0, y1 - y0, MAX_COORDINATE))
 
     def _row(self, uav: str) -> int:
         try:

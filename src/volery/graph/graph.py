@@ -13,14 +13,16 @@ be changed by any thread: `graph.session` does so for clients outside.
 
 from __future__ import annotations
 
+import logging
 import math
 import threading
 from collections import deque
-from collections.abc import Callable, MutableSequence
+from collections.abc import Callable, Iterable, Iterator, MutableSequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from volery.core.errors import GraphError
+from volery.core.errors import GraphError, VoleryError
 from volery.graph.actions import Actions
 from volery.graph.messages import Published, message_type, type_name
 from volery.graph.parameters import Parameters
@@ -31,6 +33,8 @@ from volery.graph.zero import zero_message
 Callback = Callable[[Published], None]
 AsyncHandler = Callable[[Any, Reply], None]
 """Takes a request and answers through the reply, at once or later."""
+
+_log = logging.getLogger(__name__)
 
 MOST_UNUSED = 1000
 """Topics that are remembered though nobody takes part in them any more."""
@@ -192,6 +196,8 @@ class _Letter(NamedTuple):
     published: Published
     sender: Publisher
     only: Callback | None = None
+    client: str = ""
+    """The external client whose command caused it."""
 
 
 @dataclass(frozen=True)
@@ -226,6 +232,9 @@ class Graph:
         """What the nodes have declared."""
         self._to_all: list[_Listener] = []
         self._queue: deque[_Letter] = deque()
+        self.acting_client = ""
+        """The external client whose command is being carried out; empty: none. A failure of what
+        receives a message that a client caused is logged, and does not end the run."""
         self._members = threading.RLock()
         """Held by whoever changes topics, publishers, subscribers or services."""
 
@@ -355,7 +364,7 @@ class Graph:
         topic.messages += 1
         if sender.wanted:
             published = Published(topic.name, topic.msgtype, self._now_ns(), message)
-            self._queue.append(_Letter(topic, published, sender))
+            self._queue.append(_Letter(topic, published, sender, client=self.acting_client))
 
     def show(self, sender: Publisher, topic: _Topic, message: Any) -> None:
         """Hand a message to clients outside alone; used by `Publisher`."""
@@ -377,7 +386,7 @@ class Graph:
     def deliver(self) -> None:
         """Hand out all queued messages, those published meanwhile included."""
         while self._queue:
-            topic, published, sender, only = self._queue.popleft()
+            topic, published, sender, only, client = self._queue.popleft()
             if only is not None:
                 if only in topic.callbacks or only in self._to_all:
                     only(published)
@@ -385,10 +394,41 @@ class Graph:
             with self._members:  # who attaches meanwhile gets it once
                 if sender.keeps:
                     topic.kept[sender] = published
-                callbacks: list[Callback] = [c for c in self._to_all if c.matches(topic.name)]
-                callbacks += topic.callbacks
+                watching = [c for c in self._to_all if c.matches(topic.name)]
+                callbacks = tuple(topic.callbacks)
+            for callback in watching:
+                callback(published)
+            if client:
+                self._hand_on_for(client, callbacks, published)
+                continue
             for callback in callbacks:
                 callback(published)
+
+    def _hand_on_for(
+        self, client: str, callbacks: Iterable[Callback], published: Published
+    ) -> None:
+        """Hand out a message that a client caused: what it breaks does not end the run."""
+        with self.on_behalf_of(client):
+            for callback in callbacks:
+                try:
+                    callback(published)
+                except Exception as error:
+                    _log.warning(
+                        "topic '%s': a message caused by %s is not taken: %s",
+                        published.topic,
+                        client,
+                        error,
+                        exc_info=not isinstance(error, VoleryError),
+                    )
+
+    @contextmanager
+    def on_behalf_of(self, client: str) -> Iterator[None]:
+        """Context in which all that is published is caused by an external client."""
+        before, self.acting_client = self.acting_client, client
+        try:
+            yield
+        finally:
+            self.acting_client = before
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps: undelivered and latched messages, how many each topic has seen."""

@@ -15,6 +15,7 @@ names that start with `~/` belong to the node.
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -30,6 +31,8 @@ from volery.graph.parameters import Parameter, Within
 from volery.graph.qos import DEFAULT_DEPTH, QoSProfile, profile_of
 from volery.graph.thinking import Deferring, DelayedPublisher, Thinker
 from volery.scenario.access import ScenarioAccess
+
+_log = logging.getLogger(__name__)
 
 
 class Timers(Deferring, Protocol):
@@ -280,15 +283,24 @@ class Node:
             finally:
                 self._busy_s += time.thread_time() - before
         else:
-            self._thinker.think(partial(self._guarded, callback, occasion), heavy=heavy)
+            client = self._context.graph.acting_client
+            self._thinker.think(partial(self._guarded, callback, occasion, client), heavy=heavy)
 
-    def _guarded(self, callback: Callable[[], None], occasion: str) -> None:
-        """Call back; a failure becomes a `NodeError` that tells whose it was."""
+    def _guarded(self, callback: Callable[[], None], occasion: str, client: str = "") -> None:
+        """Call back; a failure becomes a `NodeError` that tells whose it was.
+
+        client: the external client that caused it, where this runs later than its command; then
+        the failure is logged, and does not end the run.
+        """
         try:
             callback()
-        except VoleryError:
-            raise
         except Exception as error:
+            if client:
+                cause = f"node {self.full_name}: {occasion}, caused by {client}"
+                _log.warning("%s, failed", cause, exc_info=error)
+                return
+            if isinstance(error, VoleryError):
+                raise
             at = f"{self._now_ns() / 1e9:.3f} s"
             raise NodeError(
                 f"node {self.full_name} failed at {at} in its {occasion}: "

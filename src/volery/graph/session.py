@@ -15,13 +15,14 @@ newest. A client that does not read loses messages of its own and delays nobody.
 from __future__ import annotations
 
 import itertools
+import logging
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from volery.core.errors import GraphError
+from volery.core.errors import GraphError, VoleryError
 from volery.graph.graph import Graph, Publisher, Subscription
 from volery.graph.mailbox import Mailbox, MailboxInfo, Wake
 from volery.graph.messages import message_type
@@ -32,6 +33,11 @@ Post = Callable[[Callable[[], Any]], "Future[Any]"]
 """Has a function called by the simulation's thread; the future holds its result or error."""
 Handler = Callable[[Any, Reply], None]
 """Takes a request in the simulation's thread, at once, and answers through the reply later."""
+
+_log = logging.getLogger(__name__)
+
+_MAX_FAILURES_LOGGED = 20
+"""Of topics and services of one client; each is logged once."""
 
 _MOST_NAMES = 20_000
 """Of UAVs that are remembered as commanded; more than any fleet has."""
@@ -157,6 +163,7 @@ class Session:
         self._last_posted = 0
         self._taken = 0
         self._watch = watch or _look_away
+        self._inside = watch is None
         self._note = _look_away if watch is None else gateway.note_command
         self._gateway = gateway
         self._graph = gateway.graph
@@ -165,6 +172,7 @@ class Session:
         self._mailboxes: dict[Mailbox, Subscription] = {}
         self._offers: dict[str, set[Reply]] = {}
         self._closed = False
+        self._failed: set[str] = set()
 
     @property
     def graph(self) -> Graph:
@@ -180,7 +188,10 @@ class Session:
 
         def act() -> Any:
             self._taken += 1  # in the simulation's thread alone
-            return action()
+            if self._inside:
+                return action()
+            with self._graph.on_behalf_of(self.name):
+                return action()
 
         self._last_posted = next(self._posted)
         return self._post(act)
@@ -241,7 +252,8 @@ class Session:
                 publisher.publish_posted(message)
 
         if known:
-            self.post(publish)
+            topics = ", ".join(topic for topic, _ in messages)
+            self.post(publish).add_done_callback(lambda done: self._log_failure(done, topics))
 
     def _publisher(self, topic: str) -> Publisher:
         publisher = self._publishers.get(topic)
@@ -293,7 +305,9 @@ class Session:
             except GraphError as error:
                 reply.fail(error)
 
-        self.post(ask).add_done_callback(lambda asked: _tell_failure(asked, reply))
+        self.post(ask).add_done_callback(
+            lambda asked: _tell_failure(asked, reply, service, self.name)
+        )
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
         """Offer a service. `GraphError` if somebody does so already.
@@ -346,7 +360,7 @@ class Session:
             if threading.get_ident() == here:
                 take()
             else:
-                self.post(take)
+                self.post(take).add_done_callback(lambda done: self._log_failure(done, service))
 
         return Reply(
             lambda response: come(lambda: reply.answer(response), "answer", response),
@@ -388,6 +402,16 @@ class Session:
             publishes, offers = tuple(self._publishers), tuple(self._offers)
             return SessionInfo(self.name, publishes, self.mailboxes, offers)
 
+    def _log_failure(self, done: Future[Any], name: str) -> None:
+        """Log what became of a publication or an answer that nothing waits for."""
+        error = None if done.cancelled() else done.exception()
+        known = name in self._failed or len(self._failed) >= _MAX_FAILURES_LOGGED
+        if error is None or self._closed or known:
+            return
+        self._failed.add(name)
+        ours = None if isinstance(error, VoleryError) else error
+        _log.warning("'%s' from %s is not taken: %s", name, self.name, error, exc_info=ours)
+
     def _check_open(self) -> None:
         if self._closed:
             raise GraphError(f"{self.name} has left")
@@ -397,11 +421,14 @@ def _look_away(_what: object) -> None:
     """Watch nothing."""
 
 
-def _tell_failure(asked: Future[Any], reply: Reply) -> None:
+def _tell_failure(asked: Future[Any], reply: Reply, service: str, client: str) -> None:
     """Answer a caller whose question was never asked, or broke in the asking."""
     if asked.cancelled():
         reply.fail(GraphError("the simulation has ended"))
         return
     error = asked.exception()
-    if error is not None:
-        reply.fail(GraphError(f"the service failed: {type(error).__name__}: {error}"))
+    if isinstance(error, VoleryError):
+        reply.fail(GraphError(str(error)))
+    elif error is not None:
+        _log.error("service '%s', called by %s, failed", service, client, exc_info=error)
+        reply.fail(GraphError(f"service '{service}' failed; the simulation's log says why"))

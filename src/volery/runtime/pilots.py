@@ -68,7 +68,7 @@ class Pilots:
 
     def _check_held(self, uav: str, pilot: str) -> None:
         self._check_free(uav, pilot)
-        if self.holder_of(uav) != pilot:
+        if uav not in self._holders:
             raise CommandError(f"{pilot or 'who has no name'} does not hold {uav}; nobody does")
 
 

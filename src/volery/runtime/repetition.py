@@ -47,6 +47,7 @@ class Repetition:
         self._log = log
         self._next = 0
         self._end_step = -(-flight.end_ns // engine.dt_ns)
+        self._graph = gateway.graph
         self._clients = _Clients(gateway.graph)
         self._stopped = False
         self.over = False
@@ -98,7 +99,7 @@ class Repetition:
         self._log.note(taken, weight_of(taken))
         paused = self._pacer.paused
         # What broke in the hands of a service, or was refused, broke and was refused then too.
-        with suppress(Exception):
+        with suppress(Exception), self._graph.on_behalf_of(taken.client):
             self._clients.do(taken)
         if self._pacer.paused and not paused:
             self._pacer.resume()

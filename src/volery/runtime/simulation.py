@@ -382,7 +382,7 @@ class Simulation:
         one that cannot be.
         """
         self._check_open()
-        self._faults.add(parse_fault(fault))
+        self._faults.add(parse_fault(fault), client=self.graph.acting_client)
 
     def add_partner(
         self,

@@ -14,7 +14,6 @@ from volery.core.errors import (
     PlacementError,
     SpawnError,
     SpawnFault,
-    VoleryError,
 )
 from volery.runtime.crew import Crew
 from volery.runtime.keeping import Keeper
@@ -62,7 +61,7 @@ class Spawner:
         try:
             self._crew.regroup((*before, start))
             self._crew.start_nodes()
-        except VoleryError:
+        except Exception:
             if self._crew.starts != before:
                 self._crew.regroup(before)
             raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -160,6 +161,8 @@ class Uav:
 
     def set_landing_speed(self, speed_m_s: float) -> None:
         """Sink at this speed, m/s, but no faster than the airframe may, until it has landed."""
+        if math.isinf(speed_m_s):
+            raise CommandError(f"landing speed = {speed_m_s} m/s is not finite")
         self._fleet.set_landing_speed(self._row, min(speed_m_s, self.airframe.limits.descent_m_s))
 
     def return_home(self) -> None:

@@ -8,11 +8,14 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from volery.core.errors import CommandError
-from volery.scenario.base import Data, NonNegative, Vector3
+from volery.scenario.base import Data, Vector3
+
+SimulatedTime = Annotated[float, Field(ge=0.0, le=1e8)]
+"""s; the bound is three years, far inside what integer nanoseconds hold."""
 
 
 class _Fault(Data):
-    at_s: NonNegative = 0.0
+    at_s: SimulatedTime = 0.0
     """Simulated time at which it begins; one that has passed means at once."""
 
 
@@ -26,7 +29,7 @@ class _UavFault(_Fault):
 class _Passing(_UavFault):
     """A fault that may end by itself."""
 
-    until_s: NonNegative | None = None
+    until_s: SimulatedTime | None = None
     """Simulated time at which all is well again; None: it stays."""
 
     @model_validator(mode="after")

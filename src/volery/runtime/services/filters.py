@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from enum import IntEnum
 from typing import Any
@@ -10,22 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.errors import PatternError
+from volery.core.patterns import posix_search
 from volery.runtime.services.offering import Code, RefusedError
 
 Array = NDArray[np.float64]
-
-_LONGEST_PATTERN = 200
-_POSIX_CLASSES = {
-    "alnum": "a-zA-Z0-9",
-    "alpha": "a-zA-Z",
-    "blank": r" \t",
-    "digit": "0-9",
-    "lower": "a-z",
-    "punct": r"!-/:-@\[-`{-~",
-    "space": r"\s",
-    "upper": "A-Z",
-    "xdigit": "0-9A-Fa-f",
-}
 
 
 class Category(IntEnum):
@@ -52,16 +40,12 @@ def name_filter(pattern: str) -> Callable[[str], bool]:
 
     Raises `RefusedError` for one that is none.
     """
-    if len(pattern) > _LONGEST_PATTERN:
-        raise RefusedError(
-            Code.OPERATION_FAILED, f"a filter has at most {_LONGEST_PATTERN} characters"
-        )
+    if not pattern:
+        return lambda _name: True
     try:
-        expression = re.compile(_from_posix(pattern))
-    except (re.error, OverflowError, RecursionError) as error:
-        reason = f"filter '{pattern}' is no regular expression: {error}"
-        raise RefusedError(Code.OPERATION_FAILED, reason) from None
-    return lambda name: expression.search(name) is not None
+        return posix_search(pattern)
+    except PatternError as error:
+        raise RefusedError(Code.OPERATION_FAILED, f"filter: {error}") from None
 
 
 def tag_filter(tags: Any) -> Callable[[Sequence[str]], bool]:
@@ -105,10 +89,3 @@ def bounds_filter(bounds: Any) -> Callable[[Array, float], bool]:
 
 def _distance(a: Array, b: Array) -> float:
     return float(np.linalg.norm(a - b))
-
-
-def _from_posix(pattern: str) -> str:
-    """The classes that Python's expressions lack; all else is written alike in both."""
-    for name, members in _POSIX_CLASSES.items():
-        pattern = pattern.replace(f"[:{name}:]", members)
-    return pattern

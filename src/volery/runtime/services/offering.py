@@ -20,6 +20,9 @@ Close = Callable[[], None]
 Settle = Callable[["Fields | Exception"], None]
 """Gives the answer: its fields, or what went wrong."""
 
+_MAX_CHARACTERS = 1_000
+"""Of the reason of a refusal."""
+
 
 class Code(IntEnum):
     """`simulation_interfaces/msg/Result`, what every service of the standard answers with."""
@@ -55,7 +58,16 @@ def filled(name: str, fields: Fields | None = None) -> Any:
 def failed(error: Exception) -> Any:
     """The Result that tells of an error."""
     code = error.code if isinstance(error, RefusedError) else Code.OPERATION_FAILED
-    return result(code, str(error))
+    return result(code, reason_of(error))
+
+
+def reason_of(error: Exception) -> str:
+    """What an error says, shortened: a message may repeat what a client sent."""
+    text = str(error)
+    if len(text) <= _MAX_CHARACTERS:
+        return text
+    half = _MAX_CHARACTERS // 2
+    return f"{text[:half]} ... {text[-half:]}"
 
 
 def offer_result(graph: Graph, name: str, srvtype: str, handler: Handler) -> None:
@@ -99,7 +111,7 @@ def offer_command(graph: Graph, name: str, srvtype: str, handler: Handler) -> Cl
         try:
             fields = handler(request)
         except (RefusedError, VoleryError) as error:
-            return filled(f"{srvtype}_Response", {"success": False, "message": str(error)})
+            return filled(f"{srvtype}_Response", {"success": False, "message": reason_of(error)})
         return filled(f"{srvtype}_Response", {"success": True, **(fields or {})})
 
     graph.offer(name, srvtype, handle)
