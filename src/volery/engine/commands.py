@@ -6,7 +6,7 @@ import heapq
 import math
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
 from typing import Any, NamedTuple, Protocol
@@ -14,6 +14,8 @@ from typing import Any, NamedTuple, Protocol
 from volery.core.errors import CommandError
 from volery.engine.call_budget import CallBudget
 
+_MAX_ROUND_COMMANDS = 32
+"""Of one client at once, where the engine has no time to spare: what they cause is counted then."""
 _MAX_ROUND_S = 0.02
 """CPU time of clients' commands between two ticks, where the engine has no time to spare."""
 
@@ -94,6 +96,8 @@ class Inbox:
         self._closed: str | None = None
         self._charged: list[tuple[ClientQueue, float]] = []
         self._mark_s = 0.0
+        self.is_cut = False
+        """Whether `work_off` stopped early so that what it caused is handed out and counted."""
 
     def open_queue(self) -> ClientQueue:
         """A queue for the commands of one external client."""
@@ -160,16 +164,22 @@ class Inbox:
         heapq.heapify(heads)
         until_s = self._now_s() + idle_s
         worked, round_s = False, 0.0
+        called: Counter[ClientQueue] = Counter()
+        self.is_cut = False
         while heads:
             queue = heapq.heappop(heads)[-1]
             free = queue.client is None or until_s == math.inf or self._now_s() < until_s
             if not free and (round_s > _MAX_ROUND_S or not self._budget.may_spend(queue.client)):
                 queue.is_deferred = True
                 continue
+            if not free and called[queue] >= _MAX_ROUND_COMMANDS:
+                self.is_cut = True
+                continue
             command = self._pop(queue, limit)
             if command is None:
                 continue
             worked = True
+            called[queue] += not free
             round_s += self._call(command, None if free else queue)
             with self._lock:
                 if queue.commands and queue.commands[0].number < limit:

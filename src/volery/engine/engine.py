@@ -94,6 +94,10 @@ class Engine:
         self.terrain = terrain.grid
         self.sink = sink
         self.inbox = Inbox(on_post=on_post)
+        self.while_waiting: Callable[[], bool] = lambda: True
+        """Called now and then while a lock-step partner is waited for: whether the run goes on."""
+        self.is_broken_off = False
+        """Whether the last meeting with lock-step partners ended because the run does."""
         self.repeats: Repeats | None = None
         """Recorded commands to be taken again."""
         self.turn = 0
@@ -187,7 +191,7 @@ class Engine:
                 return
             before = self.fleet.step
             self._run_tick(Tick(step))
-            if in_pieces and self.fleet.step < before:
+            if in_pieces and (self.fleet.step < before or self.is_broken_off):
                 return
 
     def take_in(self, idle_s: float = 0.0) -> None:
@@ -195,9 +199,12 @@ class Engine:
 
         idle_s: wall time to spare, in which clients may do more than their budget; see `Inbox`.
         """
-        if self.inbox.work_off(idle_s):
+        while self.inbox.work_off(idle_s):
             self._hand_out()
             self.inbox.end_round()
+            if not self.inbox.is_cut:
+                break
+            idle_s = 0.0
         self.take_repeats()
 
     def take_repeats(self) -> None:
@@ -219,6 +226,10 @@ class Engine:
         """Wait for something to take in, or a `wake`, at most `timeout_s` of wall time."""
         comes = self.repeats is not None and self.repeats.next_step() == self.fleet.step
         self.inbox.wait(0.0 if comes else timeout_s)
+
+    def goes_on(self) -> bool:
+        """Whether the run goes on, asked where a lock-step partner is waited for."""
+        return self.while_waiting()
 
     def wake(self) -> None:
         """End a `wait`; from any thread."""

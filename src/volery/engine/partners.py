@@ -162,12 +162,18 @@ class Waiting(Protocol):
     def wait(self, timeout_s: float) -> None:
         """Wait for a post or a wake."""
 
+    def goes_on(self) -> bool:
+        """Whether the run goes on; asked now and then while a partner is waited for."""
+
     def wake(self) -> None:
         """End the wait; from any thread."""
 
 
-def meet(partners: Sequence[Partner], time_ns: int, engine: Waiting) -> None:
-    """Meet all `partners` at once; apply their replies in the order given."""
+def meet(partners: Sequence[Partner], time_ns: int, engine: Waiting) -> bool:
+    """Meet all `partners` at once; apply their replies in the order given.
+
+    Returns whether it came about: a run that is to end waits for no partner.
+    """
     start = time.monotonic()
     waited_for = [partner for partner in partners if not partner.has_left]
     for partner in waited_for:
@@ -179,9 +185,12 @@ def meet(partners: Sequence[Partner], time_ns: int, engine: Waiting) -> None:
                 break
             engine.wait(min(left_s, _LOOK_S))
             engine.take_in(_SPARE_S)
+            if not engine.goes_on():
+                return False
     for partner in waited_for:
         for action in partner.collect():
             action()
+    return True
 
 
 def _nothing() -> None:

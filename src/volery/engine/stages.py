@@ -87,7 +87,7 @@ def meet_partners(engine: Engine, _tick: Tick) -> None:
     due = engine.partner_agenda.pop_due(engine.fleet.step)
     if due:
         engine.turn += 1
-        meet([entry.what for entry in due], engine.time_ns, engine)
+        engine.is_broken_off = not meet([entry.what for entry in due], engine.time_ns, engine)
         engine.sink.deliver()
 
 

@@ -22,7 +22,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from volery.core.errors import GraphError, VoleryError
+from volery.core.errors import GraphError, NodeError, VoleryError
 from volery.graph.actions import Actions
 from volery.graph.messages import Published, message_type, type_name
 from volery.graph.parameters import Parameters
@@ -35,6 +35,13 @@ AsyncHandler = Callable[[Any, Reply], None]
 """Takes a request and answers through the reply, at once or later."""
 
 _log = logging.getLogger(__name__)
+
+MAX_ANSWERS_IN_A_ROW = 10_000
+"""Messages each published in answer to the one before, at one simulated instant; more are nodes
+that answer each other, or themselves, without end."""
+_MAX_ANSWERS_AT_ONCE = 1_000_000
+"""Of one topic at one simulated instant: where each message is answered by several."""
+_ANSWERS_NAMED = 50
 
 MOST_UNUSED = 1000
 """Topics that are remembered though nobody takes part in them any more."""
@@ -62,6 +69,8 @@ class _Topic:
         self.attached = 0  # how many did so far
         self.publishers = 0
         self.messages = 0
+        self.answer_ns = -1  # when the last message was published in answer to another one ...
+        self.answers = 0  # ... and how many such there were at that instant
         self.latched = False
         self.kept: dict[Publisher, Published] = {}  # the last delivered one of each latched one
 
@@ -78,6 +87,8 @@ class Publisher:
         self._graph = graph
         self._topic = topic
         self.latched = latched
+        self.owner = ""
+        """Full name of the node that it belongs to; empty: none."""
         self.lasting = False
         """Whether what it publishes is no part of kept states.
 
@@ -198,6 +209,8 @@ class _Letter(NamedTuple):
     only: Callback | None = None
     client: str = ""
     """The external client whose command caused it."""
+    answers: int = 0
+    """How many messages in a row have answered each other, this one included."""
 
 
 @dataclass(frozen=True)
@@ -232,6 +245,8 @@ class Graph:
         """What the nodes have declared."""
         self._to_all: list[_Listener] = []
         self._queue: deque[_Letter] = deque()
+        self._answers = 0  # in a row, that what is published now would be the last of
+        self._endless: set[tuple[str, str]] = set()
         self.acting_client = ""
         """The external client whose command is being carried out; empty: none. A failure of what
         receives a message that a client caused is logged, and does not end the run."""
@@ -364,7 +379,33 @@ class Graph:
         topic.messages += 1
         if sender.wanted:
             published = Published(topic.name, topic.msgtype, self._now_ns(), message)
-            self._queue.append(_Letter(topic, published, sender, client=self.acting_client))
+            client, answers = self.acting_client, self._answers
+            if answers and self._is_endless(sender, topic, published, answers):
+                return
+            self._queue.append(_Letter(topic, published, sender, None, client, answers))
+
+    def _is_endless(
+        self, sender: Publisher, topic: _Topic, published: Published, answers: int
+    ) -> bool:
+        """Whether nodes answer each other without end; `NodeError` unless a client began it."""
+        topic.answers = topic.answers + 1 if topic.answer_ns == published.time_ns else 1
+        topic.answer_ns = published.time_ns
+        if answers > MAX_ANSWERS_IN_A_ROW - _ANSWERS_NAMED:
+            self._endless.add((published.topic, sender.owner))
+        if answers <= MAX_ANSWERS_IN_A_ROW and topic.answers <= _MAX_ANSWERS_AT_ONCE:
+            return False
+        named = {*self._endless, (published.topic, sender.owner)}
+        self._endless.clear()
+        topics = ", ".join(sorted({f"'{name}'" for name, _ in named}))
+        nodes = ", ".join(sorted({owner for _, owner in named if owner})) or "callbacks"
+        reason = (
+            f"messages answer each other without end at {published.time_ns / 1e9:.3f} s: "
+            f"on {topics}, published by {nodes}; answer at a later time, by a timer, or not at all"
+        )
+        if not self.acting_client:
+            raise NodeError(reason)
+        _log.warning("%s (begun by %s): the rest is dropped", reason, self.acting_client)
+        return True
 
     def show(self, sender: Publisher, topic: _Topic, message: Any) -> None:
         """Hand a message to clients outside alone; used by `Publisher`."""
@@ -385,8 +426,16 @@ class Graph:
 
     def deliver(self) -> None:
         """Hand out all queued messages, those published meanwhile included."""
+        before = self._answers
+        try:
+            self._deliver()
+        finally:
+            self._answers = before
+
+    def _deliver(self) -> None:
         while self._queue:
-            topic, published, sender, only, client = self._queue.popleft()
+            topic, published, sender, only, client, answers = self._queue.popleft()
+            self._answers = answers + 1
             if only is not None:
                 if only in topic.callbacks or only in self._to_all:
                     only(published)

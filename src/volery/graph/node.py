@@ -150,6 +150,7 @@ class Node:
         """
         latched = profile_of(qos).latched or latched
         publisher = self._context.graph.advertise(self.resolve(topic), msg_type, latched=latched)
+        publisher.owner = self.full_name
         self._held.append(publisher.cancel)
         return publisher if self._thinker is None else DelayedPublisher(publisher, self._thinker)
 

@@ -7,12 +7,36 @@ the page's server are held to it (`volery.server.gate`).
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Callable, Collection
 
 from volery.core.errors import CommandError
 
 MOST_CHARACTERS = 40
 """Of a pilot's name."""
+
+
+def operator_name(text: str) -> str:
+    """An operator's name in its normal form.
+
+    Unicode NFKC, without control and format characters, without space at its ends, with single
+    spaces inside. Names that differ in case alone are one operator (`same_operator`).
+    """
+    plain = unicodedata.normalize("NFKC", text)
+    kept = (
+        " " if c.isspace() else c for c in plain if c.isspace() or unicodedata.category(c)[0] != "C"
+    )
+    return " ".join("".join(kept).split())
+
+
+def same_operator(one: str, other: str) -> bool:
+    """Whether two names are those of one operator."""
+    return operator_key(one) == operator_key(other)
+
+
+def operator_key(name: str) -> str:
+    """What is equal for all spellings of an operator's name."""
+    return unicodedata.normalize("NFKC", operator_name(name).casefold())
 
 
 class Pilots:
@@ -31,13 +55,13 @@ class Pilots:
 
     def held_by(self, pilot: str) -> tuple[str, ...]:
         """UAVs that a pilot holds."""
-        return tuple(uav for uav, holder in self._holders.items() if holder == pilot)
+        return tuple(uav for uav, by in self._holders.items() if same_operator(by, pilot))
 
     def take(self, uav: str, pilot: str) -> None:
         """Let a pilot hold a UAV that nobody else holds; `CommandError` otherwise."""
-        _check_name(pilot)
-        self._check_free(uav, pilot)
-        self._holders[uav] = pilot
+        name = _checked_name(pilot)
+        self._check_free(uav, name)
+        self._holders[uav] = name
 
     def release(self, uav: str, pilot: str) -> None:
         """Let go of a UAV, or, where none is named, of all; `CommandError` if it is another's."""
@@ -49,9 +73,9 @@ class Pilots:
 
     def hand_over(self, uav: str, pilot: str, to: str) -> None:
         """Give a UAV that a pilot holds to another pilot; `CommandError` if he does not."""
-        _check_name(to)
+        name = _checked_name(to)
         self._check_held(uav, pilot)
-        self._holders[uav] = to
+        self._holders[uav] = name
 
     def leave(self, pilot: str) -> None:
         """Let go of everything: the pilot has gone."""
@@ -63,7 +87,7 @@ class Pilots:
         if uav not in names:
             raise CommandError(f"there is no UAV '{uav}'; known: {', '.join(names)}")
         holder = self.holder_of(uav)
-        if holder not in ("", pilot):
+        if holder and not same_operator(holder, pilot):
             raise CommandError(f"{uav} is held by {holder}, who can hand it over")
 
     def _check_held(self, uav: str, pilot: str) -> None:
@@ -72,9 +96,11 @@ class Pilots:
             raise CommandError(f"{pilot or 'who has no name'} does not hold {uav}; nobody does")
 
 
-def _check_name(pilot: str) -> None:
-    if not pilot.strip() or len(pilot) > MOST_CHARACTERS or not pilot.isprintable():
+def _checked_name(pilot: str) -> str:
+    name = operator_name(pilot)
+    if not name or len(name) > MOST_CHARACTERS or len(pilot) > 4 * MOST_CHARACTERS:
         raise CommandError(
             f"a pilot needs a name of 1 to {MOST_CHARACTERS} printable characters, "
             f"not {pilot[:60]!r}"
         )
+    return name

@@ -67,6 +67,12 @@ class RunLoop:
         pacer.begin(speed, start_ns)
         teller = ProgressTeller(on_progress, left, pacer)
         over = engine.fleet.step >= find_end() or self.quitting
+
+        def while_waiting() -> bool:
+            teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns))
+            return not self.quitting
+
+        engine.while_waiting = while_waiting
         while not over:
             self._advance(find_end(), until)
             self.look()

@@ -13,6 +13,8 @@ from volery.scenario.schema import Scenario
 _LOG_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_. -]{0,99}\.(mcap|bag)")
 """No folder, no file that hides."""
 
+_MAX_LOADED = 1_000
+
 
 class Shelf:
     """The library and, where there is one, a folder with more: `FOLDER/NAME/scenario.toml`.
@@ -33,6 +35,7 @@ class Shelf:
         self.folder = folder
         self._logs = logs
         self._given = given
+        self._loaded: dict[Path, tuple[tuple[int, int, int], Scenario]] = {}
 
     def names(self) -> tuple[str, ...]:
         """All names that can be loaded."""
@@ -62,7 +65,21 @@ class Shelf:
                 return given
         if self.folder is None or name not in self.added():
             raise ScenarioError(f"no scenario '{name}'; known: {', '.join(self.names())}")
-        return load_scenario(self.folder / name / self.FILE, confined=True)
+        return self._load_added(self.folder / name / self.FILE)
+
+    def _load_added(self, path: Path) -> Scenario:
+        """A scenario of the folder, read again only where its file has changed."""
+        try:
+            status = path.stat()
+        except OSError:
+            return load_scenario(path, confined=True)
+        mark = status.st_mtime_ns, status.st_size, status.st_ino
+        known = self._loaded.get(path)
+        if known is None or known[0] != mark:
+            if len(self._loaded) >= _MAX_LOADED:
+                self._loaded.clear()
+            known = self._loaded[path] = mark, load_scenario(path, confined=True)
+        return known[1]
 
     def log(self, name: str) -> Path:
         """A log by the name of its file. `RecordingError` where there is none."""

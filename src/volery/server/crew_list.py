@@ -3,35 +3,38 @@
 from __future__ import annotations
 
 from volery.core.errors import BridgeError
-from volery.runtime.pilots import MOST_CHARACTERS
+from volery.runtime.pilots import MOST_CHARACTERS, operator_key, operator_name
 
 
 class CrewList:
-    """Names that are in use; its methods belong to the server's thread."""
+    """Names that are in use, however they are spelled; its methods belong to the server's thread.
+
+    See `operator_name`: `Anna`, `anna` and `Anna ` are one name.
+    """
 
     def __init__(self) -> None:
         self._names: set[str] = set()
 
     def __contains__(self, name: object) -> bool:
-        return name in self._names
+        return isinstance(name, str) and operator_key(name) in self._names
 
     def sign_in(self, wanted: str = "") -> str:
         """A name of one's own: the wanted one if it is free, else one with a number."""
-        base = "".join(c for c in wanted if c.isprintable()).strip()[: MOST_CHARACTERS - 5]
+        base = operator_name(wanted[: 4 * MOST_CHARACTERS])[: MOST_CHARACTERS - 5].strip()
         number, name = 1, base or "pilot 1"
-        while name in self._names:
+        while name in self:
             number += 1
             name = f"{base or 'pilot'} {number}"
-        self._names.add(name)
+        self._names.add(operator_key(name))
         return name
 
     def rename(self, old: str, new: str) -> None:
-        """Call oneself otherwise. `BridgeError` where somebody else is called like that."""
-        if new in self._names:
+        """Call oneself otherwise. `BridgeError` where another operator is called like that."""
+        if new in self and operator_key(new) != operator_key(old):
             raise BridgeError(f"another pilot is called {new}")
-        self._names.discard(old)
-        self._names.add(new)
+        self._names.discard(operator_key(old))
+        self._names.add(operator_key(new))
 
     def sign_out(self, name: str) -> None:
         """Give a name back."""
-        self._names.discard(name)
+        self._names.discard(operator_key(name))

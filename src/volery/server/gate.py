@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Callable
 from typing import Any
 
 from volery.bridges.rosbridge.fields import absolute
 from volery.bridges.rosbridge.wire import Operation
-from volery.core.errors import BridgeError
-from volery.runtime.pilots import MOST_CHARACTERS, Pilots
+from volery.core.errors import BridgeError, CommandError
+from volery.runtime.control_targets import names_in, parts_of
+from volery.runtime.pilots import MOST_CHARACTERS, Pilots, operator_name, same_operator
 from volery.runtime.services.piloting import HAND_OVER, RELEASE, TAKE
 from volery.server.crew_list import CrewList
 from volery.server.read_only import READ_ONLY_SERVICES
 
 _LOOKING = {"subscribe", "unsubscribe", "set_level", "status", "auth"}
 """Operations that change nothing for others."""
-_DEEPEST = 8
-"""Of arguments that are searched for the name of a UAV."""
 _TOLD_AGAIN_S = 1.0
 """How often the sender of a stream of commands learns that it is refused."""
 _MOST_TOLD = 1000
@@ -86,9 +83,13 @@ class PilotGate:
 
     def _check_free(self, name: str, operation: Operation) -> None:
         """Refuse what is below, or about, a UAV that another pilot holds."""
-        for uav in (name.split("/")[1], *_texts_in(operation.get("args"))):
+        try:
+            about = {*parts_of(name), *names_in(operation.get("args"))}
+        except CommandError as error:
+            raise BridgeError(str(error)) from None
+        for uav in sorted(about):
             holder = self._pilots.holder_of(uav)
-            if holder not in ("", self.name):
+            if holder and not same_operator(holder, self.name):
                 raise BridgeError(f"{uav} is held by {holder}, who can hand it over")
 
     def _sign(self, service: str, operation: Operation) -> None:
@@ -97,7 +98,10 @@ class PilotGate:
         if not isinstance(args, dict):
             raise BridgeError(f"{service}: args must be an object with uav")
         called = args.get("pilot")
-        if isinstance(called, str) and called not in ("", self.name):
+        if isinstance(called, str) and called.strip() and not same_operator(called, self.name):
+            called = operator_name(called)
+            if not 0 < len(called) <= MOST_CHARACTERS:
+                raise BridgeError(f"a pilot's name has 1 to {MOST_CHARACTERS} characters")
             if service != TAKE or self._pilots.held_by(self.name):
                 raise BridgeError(f"you are {self.name}, not {called[:MOST_CHARACTERS]}")
             self._crew.rename(self.name, called)
@@ -115,20 +119,3 @@ def service_of(operation: Operation) -> str:
 
 def _absolute(name: Any) -> str:
     return absolute(str(name or ""))
-
-
-def _texts_in(value: Any, depth: int = 0) -> Iterator[str]:
-    """All texts of a call's arguments, also of those that are JSON in a text."""
-    if depth > _DEEPEST:
-        return
-    if isinstance(value, str):
-        yield value
-        if value.lstrip().startswith("{"):
-            with suppress(ValueError, RecursionError):
-                yield from _texts_in(json.loads(value), depth + 1)
-    elif isinstance(value, dict):
-        for inner in value.values():
-            yield from _texts_in(inner, depth + 1)
-    elif isinstance(value, list):
-        for inner in value:
-            yield from _texts_in(inner, depth + 1)

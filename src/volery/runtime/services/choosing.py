@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 from volery.core.errors import CommandError
@@ -43,14 +44,30 @@ def offer_choices(
     def choices(_request: Any) -> Fields:
         return {
             "scenarios": list(names()),
-            "airframes": list(airframe_names()),
+            "airframes": list(_airframes()),
             "sensor_sets": list(SENSOR_SETS),
-            "sensor_set_descriptions": [describe(name) for name in SENSOR_SETS],
-            "changes_schema": json.dumps(Changes.model_json_schema()),
+            "sensor_set_descriptions": list(_descriptions()),
+            "changes_schema": _changes_schema(),
         }
 
     offer_command(graph, "/volery/load_scenario", f"{_OURS}/LoadScenario", load)
     offer_command(graph, "/volery/get_choices", f"{_OURS}/GetChoices", choices)
+
+
+@cache
+def _changes_schema() -> str:
+    """JSON schema of what can be changed; building it takes tens of milliseconds."""
+    return json.dumps(Changes.model_json_schema())
+
+
+@cache
+def _airframes() -> tuple[str, ...]:
+    return airframe_names()
+
+
+@cache
+def _descriptions() -> tuple[str, ...]:
+    return tuple(describe(name) for name in SENSOR_SETS)
 
 
 def _check_airframe(changes: Changes) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cache
 from typing import Any
 
@@ -50,18 +50,19 @@ def offer_worlds(
         if list(request.additional_sources) and not request.continue_on_error:
             reason = "there are no sources of worlds but the library of scenarios"
             raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
-        worlds = [_read(shelf, name) for name in shelf.names()]
-        return {"worlds": [_world(s, shelf) for s in worlds if passes(tags_of(s))]}
+        names = shelf.names()
+        worlds = [_read(shelf, name) for name in names]
+        return {"worlds": [_world(s, names) for s in worlds if passes(tags_of(s))]}
 
     def current(_request: Any) -> Fields:
         if loaded is None:
             raise RefusedError(_NO_WORLD, "no world is loaded")
-        return {"world": _world(loaded, shelf)}
+        return {"world": _world(loaded, shelf.names())}
 
     def load(request: Any) -> Fields:
         scenario = _wanted(request.world_resource, shelf) if on_load is not None else None
         change(None if scenario is None else WorldRequest(scenario.name))
-        return {"world": _world(scenario, shelf)} if scenario is not None else {}
+        return {"world": _world(scenario, shelf.names())} if scenario is not None else {}
 
     def unload(_request: Any) -> None:
         if loaded is None:
@@ -120,10 +121,10 @@ def _read(shelf: Shelf, name: str) -> Scenario:
     return _shipped(name) if name in library.names() else shelf.load(name)
 
 
-def _world(scenario: Scenario, shelf: Shelf) -> Any:
+def _world(scenario: Scenario, names: Collection[str]) -> Any:
     fields = {
         "name": scenario.name,
-        "world_resource": resource(scenario.name if scenario.name in shelf.names() else ""),
+        "world_resource": resource(scenario.name if scenario.name in names else ""),
         "description": scenario.description.strip(),
         "tags": tags_of(scenario),
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from functools import cache
 from pathlib import Path
 
 _FOLDER = Path(__file__).parent
@@ -10,7 +11,12 @@ _FOLDER = Path(__file__).parent
 
 def names() -> list[str]:
     """Names of all shipped scenarios, sorted."""
-    return sorted(path.stem for path in _FOLDER.glob("*.toml"))
+    return list(_names())
+
+
+@cache
+def _names() -> tuple[str, ...]:
+    return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
 
 
 def path_of(name: str) -> Path | None:

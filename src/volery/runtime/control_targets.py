@@ -1,0 +1,66 @@
+"""Which UAVs a name of the graph, or the arguments of a request, are about.
+
+The one place that decides it, for topics, services, actions and parameters. It finds at least every
+UAV that the graph would resolve a spelling to: what is doubtful counts as about the UAV.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import unicodedata
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from volery.core.errors import CommandError
+
+_SEPARATORS = re.compile(r"[/:#~.\s]+")
+_MAX_DEPTH = 16
+"""Of arguments; no message is nested so deeply."""
+
+
+def parts_of(name: str) -> frozenset[str]:
+    """All parts of a name of a topic, service, action, node or parameter, however it is spelled.
+
+    `/uav1/odom`, `uav1/gap_following:height_m`, `//uav1/land#3`, `/uav2/../uav1` are about `uav1`.
+    """
+    return frozenset(
+        part for text in {name, unicodedata.normalize("NFKC", name)} for part in _split(text)
+    )
+
+
+def names_in(value: Any, depth: int = 0) -> Iterator[str]:
+    """Parts of all texts in the arguments of a request, also of those that are JSON in a text.
+
+    Raises `CommandError` for arguments that are nested too deeply to be looked through.
+    """
+    if depth > _MAX_DEPTH:
+        raise CommandError("the arguments are nested too deeply")
+    if isinstance(value, bytes | bytearray):
+        value = bytes(value).decode("utf-8", "replace")
+    if isinstance(value, str):
+        yield from parts_of(value)
+        yield from _in_json(value, depth)
+    elif isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from names_in(key, depth + 1)
+            yield from names_in(inner, depth + 1)
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            yield from names_in(inner, depth + 1)
+
+
+def _in_json(text: str, depth: int) -> Iterator[str]:
+    if not text.lstrip("\ufeff \t\r\n").startswith(("{", "[", '"')):
+        return
+    try:
+        plain = json.loads(text)
+    except ValueError:
+        return
+    except RecursionError:
+        raise CommandError("the arguments are nested too deeply") from None
+    yield from names_in(plain, depth + 1)
+
+
+def _split(text: str) -> Iterator[str]:
+    return (part for part in _SEPARATORS.split(text) if part)

@@ -1,0 +1,158 @@
+"""Nodes that answer each other without end, partners that are silent, posts after the end."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+from whole_world import Client
+
+from volery.core.errors import CommandError, NodeError
+from volery.graph.graph import Graph
+from volery.graph.messages import String
+from volery.graph.node import Context, Node
+
+
+class Echo(Node):
+    """Answers what comes on one topic on another one."""
+
+    def __init__(self, name, hears, says, **options):
+        super().__init__(name, **options)
+        self.publisher = self.create_publisher(String, says)
+        self.create_subscription(String, hears, self.publisher.publish)
+
+
+@pytest.fixture
+def start(simulate, flat_data):
+    simulation = simulate(flat_data)
+
+    def start(name, hears, says):
+        engine = simulation._engine
+        context = Context(simulation.graph, engine, lambda: simulation.time_ns)
+        return Echo(name, hears, says, namespace="/uav1", context=context)
+
+    start.simulation = simulation
+    return start
+
+
+@pytest.mark.timeout(240, func_only=True)
+def test_two_nodes_that_answer_each_other_are_named(start):
+    start("ping", "/a", "/b")
+    start("pong", "/b", "/a")
+    start.simulation.graph.advertise("/a", String).publish(String("x"))
+    with pytest.raises(NodeError, match="without end") as caught:
+        start.simulation.step(1)
+    for word in ("'/a'", "'/b'", "/uav1/ping", "/uav1/pong"):
+        assert word in str(caught.value)
+
+
+@pytest.mark.timeout(240, func_only=True)
+def test_a_node_that_answers_itself_is_named(start):
+    start("self", "/a", "/a")
+    start.simulation.graph.advertise("/a", String).publish(String("x"))
+    with pytest.raises(NodeError, match="/uav1/self"):
+        start.simulation.step(1)
+
+
+@pytest.mark.timeout(240, func_only=True)
+def test_a_client_that_starts_such_a_loop_does_not_end_the_run(start, caplog):
+    start("ping", "/a", "/b")
+    start("pong", "/b", "/a")
+    client = Client(start.simulation)
+    with caplog.at_level(logging.WARNING):
+        client.publish("/a", String("x"))
+    assert "without end" in caplog.text
+    assert "stranger" in caplog.text
+    start.simulation.step(1)
+
+
+@pytest.mark.timeout(240, func_only=True)
+def test_a_loop_that_multiplies_ends_too(monkeypatch):
+    monkeypatch.setattr("volery.graph.graph._MAX_ANSWERS_AT_ONCE", 5_000)
+    graph = Graph(lambda: 0)
+    publisher = graph.advertise("/a", String)
+
+    def twice(published):
+        publisher.publish(published.message)
+        publisher.publish(published.message)
+
+    graph.subscribe("/a", twice)
+    publisher.publish(String("x"))
+    with pytest.raises(NodeError, match="'/a'"):
+        graph.deliver()
+
+
+def test_many_answers_to_many_messages_are_no_loop():
+    """As of a large swarm, in which each answers the one before, at many instants."""
+    now = [0]
+    graph, seen = Graph(lambda: now[0]), []
+    topics = [f"/uav{k}/hello" for k in range(300)]
+    publishers = [graph.advertise(topic, String) for topic in topics]
+    for k, topic in enumerate(topics[:-1]):
+        graph.subscribe(topic, lambda p, k=k: publishers[k + 1].publish(p.message))
+    graph.subscribe(topics[-1], seen.append)
+    for instant in range(100):
+        now[0] = instant
+        publishers[0].publish(String("x"))
+        graph.deliver()
+    assert len(seen) == 100
+
+
+# ------------------------------------------------------------------------------ silent partners
+
+
+class PressedError(Exception):
+    """What the command line raises between two steps once Ctrl-C was pressed."""
+
+
+@pytest.mark.timeout(240, func_only=True)
+def test_ctrl_c_is_heard_while_a_partner_is_silent(simulate, flat_data):
+    simulation = simulate(flat_data)
+    simulation.add_partner("silent", period_s=0.02, timeout_s=1e6)
+
+    def look(_progress):
+        if simulation.time_ns:
+            raise PressedError
+
+    with pytest.raises(PressedError):
+        simulation.run(1.0, on_progress=look)
+
+
+@pytest.mark.timeout(240, func_only=True)
+def test_quit_is_heard_while_a_partner_is_silent(simulate, flat_data):
+    simulation = simulate(flat_data)
+    simulation.add_partner("silent", period_s=0.02, timeout_s=1e6)
+    simulation.post(simulation.quit)
+    simulation.run(1.0)
+    assert simulation.quitting
+
+
+@pytest.mark.timeout(240, func_only=True)
+def test_quit_in_a_meeting_ends_the_run(simulate, flat_data):
+    simulation = simulate(flat_data)
+    simulation.add_partner("silent", period_s=0.02, timeout_s=1e6)
+
+    def look(_progress):
+        if simulation.time_ns:
+            simulation.quit()
+
+    simulation.run(1.0, on_progress=look)
+    assert simulation.time_ns == 20_000_000
+
+
+# ----------------------------------------------------------------------------- after the end
+
+
+def test_what_is_posted_after_close_fails(simulate, flat_data):
+    simulation = simulate(flat_data)
+    client = Client(simulation)
+    waiting = simulation.post(lambda: 1)
+    simulation.close()
+    for future in (waiting, simulation.post(lambda: 1), client.session.post(lambda: 1)):
+        with pytest.raises(CommandError, match="closed"):
+            future.result(1.0)
+    answers = []
+    from volery.graph.reply import Reply
+
+    client.session.call("/get_entities", None, Reply(answers.append, answers.append))
+    assert "closed" in str(answers[0])

@@ -1,0 +1,200 @@
+"""A UAV that one operator holds is out of reach for all others, however its name is spelled."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from volery.bridges.rosbridge.fields import absolute
+from volery.bridges.rosbridge.rosapi_parameters import NamedParameters, Parameters
+from volery.core.errors import BridgeError, CommandError, GraphError
+from volery.graph.graph import Graph
+from volery.graph.parameters import Parameter
+from volery.runtime.control_targets import names_in, parts_of
+from volery.runtime.pilots import Pilots, operator_name, same_operator
+from volery.scenario.faults import parse_fault
+from volery.server.crew_list import CrewList
+from volery.server.gate import PilotGate, service_of
+
+NODE, PARAMETER = "/uav1/gap_following", "height_m"
+
+
+@pytest.fixture
+def pilots():
+    pilots = Pilots(lambda: ["uav1", "uav2"])
+    pilots.take("uav1", "Anna")
+    return pilots
+
+
+@pytest.fixture
+def bob(pilots):
+    crew = CrewList()
+    crew.sign_in("Anna")
+    return PilotGate(crew.sign_in("Bob"), crew, pilots)
+
+
+def call(service, args=None):
+    return {"op": "call_service", "service": service, "args": args}
+
+
+@pytest.mark.parametrize(
+    "operation",
+    [
+        call("/rosapi/set_param", {"name": "/uav1/gap_following:height_m", "value": "9.0"}),
+        call("/rosapi/set_param", {"name": "uav1/gap_following:height_m", "value": "9.0"}),
+        call("/rosapi/set_param", {"name": "/uav1/gap_following/height_m", "value": "9.0"}),
+        call("/rosapi/set_param", ["/uav1/gap_following:height_m", "9.0"]),
+        call("/rosapi/delete_param", {"name": " /uav1/x"}),
+        call("/uav1/land"),
+        call("uav1/land"),
+        call("/uav1/land#3"),
+        call("//uav1/land"),
+        call("/uav2/../uav1/land"),
+        call("/delete_entity", {"entity": "uav1"}),
+        call("/delete_entity", ["uav1"]),
+        call("/set_entity_state", {"entity": b"uav1"}),
+        call("/volery/inject_fault", {"fault": '{"kind": "radio", "uav": "uav1"}'}),
+        call("/volery/inject_fault", {"fault": '{"kind": "radio", "uav": " uav1 "}'}),
+        call("/volery/inject_fault", {"fault": '\n {"kind": "radio", "\\u0075av": "\\u0075av1"}'}),
+        call("/volery/inject_fault", ['{"kind": "radio", "uav": "uav1"}']),
+        call("/volery/inject_fault", '[{"uav": "uav1"}]'),
+        call("/do", {"a": [[{"b": [{"c": [{"d": ["uav1"]}]}]}]]}),
+        {"op": "publish", "topic": "/uav1/cmd_vel", "msg": {}},
+        {"op": "publish", "topic": "uav1/cmd_vel", "msg": {}},
+        {"op": "advertise", "topic": "/mission/uav1/plan", "type": "x"},
+        {"op": "advertise_service", "service": "/uav1/x", "type": "x"},
+        {"op": "advertise_action", "action": "/uav1/x", "type": "x"},
+        {"op": "send_action_goal", "action": "/uav1/fly", "args": {}},
+        {"op": "send_action_goal", "action": "/fly", "args": {"uav": "uav1"}},
+    ],
+)
+def test_another_operator_cannot_command_it(bob, operation):
+    with pytest.raises(BridgeError, match="uav1 is held by Anna"):
+        bob.check(operation)
+
+
+@pytest.mark.parametrize(
+    "operation",
+    [
+        call("/uav2/land"),
+        call("/rosapi/set_param", {"name": "/uav2/gap_following:height_m", "value": "9.0"}),
+        call("/rosapi/get_param", {"name": "/uav1/gap_following:height_m"}),
+        call("/delete_entity", {"entity": "uav12"}),
+        {"op": "publish", "topic": "/uav12/cmd_vel", "msg": {}},
+        {"op": "subscribe", "topic": "/uav1/odom"},
+    ],
+)
+def test_what_is_about_others_passes(bob, operation):
+    assert bob.check(operation)
+
+
+def test_arguments_too_deep_to_be_looked_through_are_refused(bob):
+    deep = "uav1"
+    for _ in range(100):
+        deep = [deep]
+    with pytest.raises(BridgeError, match="nested too deeply"):
+        bob.check(call("/do", deep))
+    with pytest.raises(BridgeError, match="nested too deeply"):
+        bob.check(call("/do", {"text": "[" * 100_000}))
+
+
+PIECES = (
+    *("/", "//", "uav1", "uav2", "..", ".", ":", "#3", " ", "\t", "~", "{", '"', "\u200b"),
+    *("cmd_vel", "gap_following", "height_m", "UAV1", "\uff55av1"),
+)
+SPELLINGS = st.lists(st.sampled_from(PIECES), max_size=9).map("".join)
+
+
+@given(SPELLINGS)
+@example("/uav1/cmd_vel")
+@example("uav1")
+def test_whatever_the_graph_resolves_to_a_uav_is_seen_as_about_it(spelling):
+    graph, name = Graph(lambda: 0), absolute(spelling)
+    try:
+        graph.advertise(name, "std_msgs/msg/String")
+    except GraphError:
+        return
+    if name.split("/")[1] == "uav1":
+        assert "uav1" in parts_of(spelling)
+
+
+@given(SPELLINGS)
+def test_whatever_names_a_service_of_a_uav_is_seen_as_about_it(spelling):
+    name = service_of({"service": spelling})
+    if name.split("/")[1] == "uav1":
+        assert "uav1" in parts_of(name)
+
+
+@given(SPELLINGS)
+@example("/uav1/gap_following:height_m")
+@example("uav1/gap_following/height_m")
+def test_whatever_names_a_parameter_of_a_uav_is_seen_as_about_it(spelling):
+    graph = Graph(lambda: 0)
+    own = Parameter(PARAMETER, 1.0, read_only=False)
+    graph.parameters.declare(NODE, own)
+    named = NamedParameters(Parameters(), graph.parameters, ros1=False)
+    try:
+        named.set(spelling, "2.0")
+    except GraphError:
+        return
+    if own.value == 2.0:
+        assert "uav1" in set(names_in({"name": spelling, "value": "2.0"}))
+
+
+@given(st.sampled_from(["uav1", " uav1", "uav1\n", "\u00a0uav1", "uav1\u3000"]), st.booleans())
+def test_whatever_fault_is_of_a_uav_is_seen_as_about_it(uav, ascii_only):
+    text = json.dumps({"kind": "radio", "uav": uav}, ensure_ascii=ascii_only)
+    try:
+        fault = parse_fault(json.loads(text))
+    except CommandError:
+        return
+    if fault.uav == "uav1":
+        assert "uav1" in set(names_in({"fault": text}))
+
+
+# ------------------------------------------------------------------------------------- operators
+
+
+@pytest.mark.parametrize(
+    "spelling", ["Anna", "Anna ", " anna", "ANNA", "An\u200bna", "Anna\x00", "Ａnna", "\tAnna\n"]
+)
+def test_one_operator_however_the_name_is_spelled(pilots, spelling):
+    assert same_operator("Anna", spelling)
+    pilots.take("uav1", spelling)
+    assert operator_name(pilots.holder_of("uav1")).casefold() == "anna"
+    crew = CrewList()
+    crew.sign_in("Anna")
+    assert spelling in crew
+    assert crew.sign_in(spelling) not in ("Anna", spelling)
+    with pytest.raises(BridgeError, match="another pilot"):
+        crew.rename(crew.sign_in("Bob"), spelling)
+
+
+@pytest.mark.parametrize("name", ["Ann", "Anna 2", "An na", "Анна", ""])
+def test_other_operators(name):
+    assert not same_operator("Anna", name)
+
+
+def test_nobody_takes_a_name_by_spelling_it_otherwise(bob):
+    with pytest.raises(BridgeError, match="another pilot"):
+        bob.check(call("/volery/take_control", {"uav": "uav2", "pilot": "ANNA "}))
+    assert bob.name == "Bob"
+
+
+def test_whoever_is_spelled_otherwise_keeps_control(pilots):
+    crew = CrewList()
+    anna = PilotGate(crew.sign_in("anna"), crew, pilots)
+    assert anna.check(call("/uav1/land"))
+    pilots.release("uav1", "ANNA")
+    assert pilots.holder_of("uav1") == ""
+
+
+@given(st.text(max_size=60))
+def test_normal_names_stay_as_they_are(text):
+    name = operator_name(text)
+    assert operator_name(name) == name
+    assert name == name.strip()
+    assert same_operator(text, name)

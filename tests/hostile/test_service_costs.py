@@ -1,0 +1,113 @@
+"""What clients cost the simulation's thread: questions are cheap, and the rest waits its turn."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+from whole_world import Client
+
+from volery.engine.call_budget import MAX_FRACTION
+from volery.graph.messages import String
+from volery.runtime.services import choosing
+from volery.scenario import load
+from volery.scenario.shelf import Shelf
+from volery.server.read_only import READ_ONLY_SERVICES
+
+
+@pytest.fixture
+def client(simulate, flat_data):
+    return Client(simulate(flat_data))
+
+
+def test_choices_are_made_out_once(client, monkeypatch):
+    client.call("/volery/get_choices", None)
+
+    def forbidden(*_args, **_options):
+        raise AssertionError("built again")
+
+    monkeypatch.setattr(choosing.Changes, "model_json_schema", forbidden)
+    monkeypatch.setattr(choosing, "describe", forbidden)
+    assert client.call("/volery/get_choices", None).success
+
+
+def test_worlds_are_read_once(simulate, flat_data, tmp_path, monkeypatch):
+    folder = tmp_path / "scenarios" / "mine"
+    folder.mkdir(parents=True)
+    text = '[types.f450]\n[[uavs]]\ntype = "f450"\nposition_m = [0, 0]\n'
+    (folder / "scenario.toml").write_text(f'name = "mine"\n{text}')
+    shelf = Shelf(tmp_path / "scenarios")
+    client = Client(simulate(flat_data, shelf=shelf))
+    worlds = client.call("/get_available_worlds", None).worlds
+    assert "mine" in [world.name for world in worlds]
+    monkeypatch.setattr("volery.scenario.shelf.load_scenario", lambda *_, **__: 1 / 0)
+    assert len(client.call("/get_available_worlds", None).worlds) == len(worlds)
+    monkeypatch.setattr("volery.scenario.shelf.load_scenario", load.load_scenario)
+    (folder / "scenario.toml").write_text(f'name = "mine"\ndescription = "new"\n{text}')
+    worlds = client.call("/get_available_worlds", None).worlds
+    assert "new" in [world.description for world in worlds]
+
+
+def test_read_only_services_cost_little(client):
+    """CPU time of the fastest of some calls, with much room: 30 ms were usual for the slow ones."""
+    for service in sorted(READ_ONLY_SERVICES):
+        if not client.simulation.graph.has_service(service):
+            continue
+        costs = []
+        for _ in range(4):
+            before = time.thread_time()
+            client.call(service, None)
+            costs.append(time.thread_time() - before)
+        assert min(costs) < 0.02, service
+
+
+def test_a_loop_of_calls_is_deferred_in_order_and_others_are_not(client):
+    """At full speed, with services that cost 2 ms of CPU time each."""
+    simulation, taken = client.simulation, []
+
+    def burn(published):
+        until = time.thread_time() + 0.002
+        while time.thread_time() < until:
+            pass
+        taken.append(published.message.data)
+
+    simulation.graph.subscribe("/burn", burn, String)
+    client.session.advertise("/burn", String.__msgtype__)
+    for number in range(2_000):
+        client.session.publish("/burn", String(str(number)))
+    other = Client(simulation, "other")
+    other.session.advertise("/other", String.__msgtype__)
+    heard = []
+    simulation.graph.subscribe("/other", heard.append, String)
+    before_s, cpu_s = time.perf_counter(), time.thread_time()
+    simulation.step(200)
+    other.session.publish("/other", String("x"))
+    simulation.step(1)
+    assert heard
+    spent_s = 0.002 * len(taken)
+    wall_s = max(time.perf_counter() - before_s, time.thread_time() - cpu_s)
+    assert spent_s <= MAX_FRACTION * wall_s + 0.2
+    assert taken == [str(number) for number in range(len(taken))]
+    assert client.session.waiting == 2_000 - len(taken) + 0
+    simulation.take_in()
+    assert len(taken) == 2_000
+    assert client.session.waiting == 0
+
+
+def test_a_deferred_command_is_recorded_when_it_is_taken(client):
+    simulation, moments = client.simulation, []
+    note = simulation.commands.note
+
+    def watch(taken, weight):
+        moments.append(simulation._engine.moment.step)
+        note(taken, weight)
+
+    simulation.commands.note = watch
+    simulation.graph.subscribe("/burn", lambda _: time.sleep(0), String)
+    client.session.advertise("/burn", String.__msgtype__)
+    for _ in range(3_000):
+        client.session.publish("/burn", String("x" * 10))
+    simulation.step(50)
+    simulation.take_in()
+    assert len(moments) == 3_001
+    assert moments == sorted(moments)
