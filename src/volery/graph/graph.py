@@ -445,8 +445,8 @@ class Graph:
                     topic.kept[sender] = published
                 watching = [c for c in self._to_all if c.matches(topic.name)]
                 callbacks = tuple(topic.callbacks)
-            for callback in watching:
-                callback(published)
+            for listener in watching:
+                listener(published)
             if client:
                 self._hand_on_for(client, callbacks, published)
                 continue
