@@ -32,7 +32,7 @@ def client(simulate, flat_data):
 IMPOSSIBLE = {
     "under the ground": {"kind": "displacement", "uav": "uav1", "offset_m": [0, 0, -5]},
     "beyond the terrain": {"kind": "displacement", "uav": "uav1", "offset_m": [1e5, 0, 0]},
-    "key 'offset_m": {"kind": "displacement", "uav": "uav1", "offset_m": [0, 0, 1e300]},
+    "beyond -1e+06": {"kind": "displacement", "uav": "uav1", "offset_m": [0, 0, 1e300]},
     "finite": {"kind": "displacement", "uav": "uav1", "offset_m": [float("nan"), 0, 0]},
     "velocity_m_s": {"kind": "gust", "velocity_m_s": [61, 0, 0]},
     "at_s": {"kind": "motor", "uav": "uav1", "rotor": 0, "at_s": 1e300},
