@@ -1,7 +1,8 @@
 """Parameters that nodes have declared, by node and name, for who asks from outside.
 
 Numbers are finite, in lists and tables too, and lie within the bounds of the quantity that the name
-tells (`height_m`: see `core.quantities`), besides those that the node declares.
+tells (`height_m`: see `core.quantities`), besides those that the node declares. A node's own
+defaults are its author's business.
 
 What is set takes effect when the node reads `Parameter.value` next. A node that reads a value only
 once, at its start, declares it read-only, and setting it is refused rather than without effect.
@@ -79,6 +80,8 @@ class Parameter:
             raise GraphError(f"parameter '{self.name}' must be like {self._like!r}, not {value!r}")
         if self._within is not None and not self._within.holds(value):
             raise GraphError(f"parameter '{self.name}' must be {self._within}, not {value!r}")
+        if value is self._like:
+            return  # the node's own default, such as an infinity for "no limit"
         fault = fault_in(self.name, value)
         if fault is not None:
             raise GraphError(f"parameter '{self.name}': {fault}")

@@ -183,21 +183,24 @@ def test_recover_of_a_stub(tmp_path: Path, content: bytes) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("content", [b"", b"no log", b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"])
-def test_info_of_a_broken_file(tmp_path: Path, content: bytes) -> None:
+@pytest.mark.parametrize(
+    ("content", "code"),
+    [(b"", 2), (b"no log", 2), (b"\x89MCAP0\r\n", 1), (b"#ROSBAG V2.0\n", 1)],
+)
+def test_info_of_a_broken_file(tmp_path: Path, content: bytes, code: int) -> None:
     path = tmp_path / "broken.mcap"
     path.write_bytes(content)
     result = runner.invoke(app, ["info", str(path)])
-    assert result.exit_code == 1
+    assert result.exit_code == code  # 1: it is a log, and damaged
     assert result.stderr.startswith(f"error: {path}: ")
     assert len(result.stderr.splitlines()) == 1
 
 
 def test_info_and_recover_of_a_missing_file(tmp_path: Path) -> None:
     path = str(tmp_path / "none.bag")
-    for words, code in ((["info", path], 1), (["recover", path], 2)):
-        result = runner.invoke(app, words)
-        assert result.exit_code == code
+    for command in ("info", "recover"):
+        result = runner.invoke(app, [command, path])
+        assert result.exit_code == 2
         assert "none.bag: cannot read the log: No such file" in result.stderr
 
 
