@@ -14,12 +14,14 @@ from rosbags.typesys import Stores, get_typestore
 from volery.bridges.topic_patterns import renamer, topic_filter
 from volery.core.errors import GraphError, PatternError
 from volery.core.patterns import posix_search
+from volery.graph import object_count
 from volery.graph.cdr import decode_cdr, encode_cdr
 from volery.graph.definition_files import parse_definition
 from volery.graph.definition_store import DefinitionStore
 from volery.graph.json_decoding import decode_plain
 from volery.graph.json_form import JsonForm
 from volery.graph.messages import message_type, typestore
+from volery.graph.object_count import CDR, ROS1, check_objects
 from volery.graph.ros1 import ros1_codec
 from volery.graph.ros1_names import ros1_name, ros2_name
 
@@ -92,6 +94,36 @@ def ros1(mutator):
     assert len(again) == len(data)
     assert codec.encode(codec.decode(again, msgtype), msgtype) == again
     return 1
+
+
+def object_counts(mutator):
+    """What the count lets pass becomes no more objects than it may, which are few here."""
+    msgtype, form = mutator.pick(TYPES), mutator.pick((CDR, ROS1))
+    data = mutator.bytes(_seeds(msgtype, form))
+    kept, object_count.MAX_OBJECTS = object_count.MAX_OBJECTS, 10
+    try:
+        check_objects(data, msgtype, form)
+        decode = decode_cdr if form == CDR else ros1_codec().decode
+        message = decode(data, msgtype)
+    except GraphError:
+        return 1
+    finally:
+        object_count.MAX_OBJECTS = kept
+    assert _in_arrays(message) <= 10
+    return 1
+
+
+def _in_arrays(value, *, inside=False):
+    """Messages and texts within the variable arrays of a message; fixed ones are not counted."""
+    if isinstance(value, list):
+        return sum(_in_arrays(item, inside=True) for item in value)
+    if isinstance(value, str):
+        return int(inside)
+    if not hasattr(value, "__msgtype__"):
+        return 0
+    fields = {name: item for name, item in vars(value).items() if name != "__msgtype__"}
+    nested = sum(_in_arrays(item) for item in fields.values())
+    return nested + int(inside)
 
 
 def plain_values(mutator):

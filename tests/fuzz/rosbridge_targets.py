@@ -12,6 +12,7 @@ import numpy as np
 from PIL import Image
 from rosbridge_bench import STEPS, STRING, TRIGGER, Bench, trigger_response
 
+from volery.bridges.rosbridge import message_budget
 from volery.bridges.rosbridge.client_state import ClientState
 from volery.bridges.rosbridge.fragments import Assembly
 from volery.bridges.rosbridge.rosapi import RosApi
@@ -87,6 +88,44 @@ def cbor_frames(mutator):
         with contextlib.suppress(BridgeError):
             json.loads(encode_json(found))
     return 1
+
+
+def budgets(mutator):
+    """What the count lets pass holds no more than the budgets, which are small here."""
+    limits = {"MAX_VALUES": 12, "MAX_MEMBERS": 6, "MAX_CONTAINERS": 5, "MAX_APART": 10**9}
+    limits |= {"_SMALL_BYTES": 0, "_LEAST_RUN": 3, "MAX_TEXT_BYTES": 10**9}
+    kept = {name: getattr(message_budget, name) for name in limits}
+    is_cbor = mutator.chance(0.6)
+    data = mutator.bytes((*_BINARIES, *_ARRAYS) if is_cbor else _TEXTS)
+    for name, limit in limits.items():
+        setattr(message_budget, name, limit)
+    try:
+        found = decode_frame(data if is_cbor else data.decode(errors="replace"), limited=True)
+    except BridgeError:
+        return 1
+    finally:
+        for name, limit in kept.items():
+            setattr(message_budget, name, limit)
+    containers, members, values = _held(found)
+    assert containers <= 5
+    assert members <= 6
+    assert values <= 12
+    return 1
+
+
+_ARRAYS = [
+    cbor2.dumps({"op": "x", "msg": values})
+    for values in ([1] * 9, [0.5] * 9, [300] * 9, [1, 300, 0.5, None] * 2, [[], {}, [1]], ["a"] * 6)
+]
+
+
+def _held(value):
+    """Containers, members of maps and values in a decoded message; typed arrays are one value."""
+    if not isinstance(value, (dict, list)):
+        return 0, 0, 1
+    inner = [*value.keys(), *value.values()] if isinstance(value, dict) else value
+    counts = [(1, len(value) if isinstance(value, dict) else 0, 0), *map(_held, inner)]
+    return tuple(map(sum, zip(*counts, strict=True)))
 
 
 def _other_pictures():

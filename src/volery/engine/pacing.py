@@ -19,6 +19,7 @@ _PROMPT_SLICE_S = 0.001
 _FULL_SPEED_SLICE = 100
 """Steps between two looks at what other threads want, at full speed or one step after another."""
 _LONGEST_WAIT_S = 0.05
+_LATE_S = 0.05
 _SLACK_S = 0.25
 """A run that falls behind by more does not rush afterwards to catch up."""
 
@@ -166,6 +167,14 @@ class Pacer:
             if self._speed is None:
                 return 0.0
             return min(max(self._ahead_s(self._speed), 0.0), _LONGEST_WAIT_S)
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether the run has no time to spare: it is late, or runs as fast as it can."""
+        with self._changed:
+            if self._paused:
+                return False
+            return self._speed is None or self._ahead_s(self._speed) < -_LATE_S
 
     def _must_wait(self) -> bool:
         if self._paused:

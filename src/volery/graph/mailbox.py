@@ -22,6 +22,9 @@ Wake = Callable[[], None]
 MOST_RELIABLE_BYTES = 256 * 1024 * 1024
 """What may wait for a reliable subscriber, in arrays; beyond, its subscription ends."""
 
+_PART_BYTES = 100
+_NUMBER_BYTES = 8
+
 _arrivals = itertools.count()
 
 
@@ -131,3 +134,19 @@ def array_bytes(message: Any) -> int:
             inner = vars(value).values()
             size += sum(array.nbytes for array in inner if isinstance(array, np.ndarray))
     return size
+
+
+def message_bytes(message: Any) -> int:
+    """Bytes of all arrays and texts of a message, and some for each of its parts.
+
+    It looks at every part, so it is for messages that are published rarely.
+    """
+    if isinstance(message, np.ndarray):
+        return int(message.nbytes)
+    if isinstance(message, str | bytes):
+        return len(message)
+    if isinstance(message, list | Rows):
+        return sum(map(message_bytes, message))
+    if is_dataclass(message):
+        return _PART_BYTES + sum(map(message_bytes, vars(message).values()))
+    return _NUMBER_BYTES

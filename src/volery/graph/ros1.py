@@ -135,6 +135,17 @@ class Ros1Codec:
             for name, _ in self._ros1_fields(msgtype)
         ]
 
+    def described(self, msgtype: str) -> list[Any]:
+        """Kinds of the fields of the ROS 1 type in order, as `rosbags` describes them.
+
+        Raises
+        ------
+        GraphError
+            The type is unknown.
+
+        """
+        return [described for _, described in self._ros1_fields(msgtype)]
+
     def md5(self, msgtype: str) -> str:
         """ROS 1 md5 sum of a message type or of a service (`std_srvs/srv/SetBool`).
 

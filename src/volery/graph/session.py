@@ -24,9 +24,10 @@ from typing import Any, NamedTuple
 
 from volery.core.errors import GraphError, VoleryError
 from volery.graph.graph import Graph, Publisher, Subscription
-from volery.graph.mailbox import Mailbox, MailboxInfo, Wake
+from volery.graph.mailbox import Mailbox, MailboxInfo, Wake, message_bytes
 from volery.graph.messages import message_type
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
+from volery.graph.read_budget import ReadBudgets, Reading, write_budgets
 from volery.graph.reply import Reply
 
 Post = Callable[[Callable[[], Any]], "Future[Any]"]
@@ -39,6 +40,8 @@ _log = logging.getLogger(__name__)
 _MAX_FAILURES_LOGGED = 20
 """Of topics and services of one client; each is logged once."""
 
+MAX_LATCHED_BYTES = 128 * 1024 * 1024
+"""Of the latched messages of one client, which the graph keeps for late subscribers."""
 _MOST_NAMES = 20_000
 """Of UAVs that are remembered as commanded; more than any fleet has."""
 
@@ -84,12 +87,18 @@ class Gateway:
         watch: Watch | None = None,
         *,
         open_queue: Callable[[], Post] | None = None,
+        is_busy: Callable[[], bool] = lambda: False,
+        is_late: Callable[[], bool] = lambda: False,
     ) -> None:
         """Take how sessions post: `open_queue()` is asked for each client, else all use `post`.
 
         What one client posts through its queue is done in its order, at its own expense: a client
-        that costs the simulation's thread too much time waits for its turn.
+        that costs the simulation's thread too much time waits for its turn. `is_busy()` tells
+        whether the simulation has no time to spare for reading from clients, `is_late()` whether it
+        does not keep its pace; see `read_budget`.
         """
+        self.read_budgets = ReadBudgets(is_busy)
+        self.write_budgets = write_budgets(is_late)
         self.graph = graph
         self.watch: Watch = watch or _look_away
         self._post = post
@@ -162,6 +171,11 @@ class Session:
         self._posted = itertools.count(1)
         self._last_posted = 0
         self._taken = 0
+        self.reading = Reading(gateway.read_budgets.open(), lambda: self.waiting)
+        """What a bridge asks before it reads on from the client."""
+        self.writing = Reading(gateway.write_budgets.open(), lambda: 0)
+        """What it asks before it writes on."""
+        self._latched_bytes: dict[str, int] = {}
         self._watch = watch or _look_away
         self._inside = watch is None
         self._note = _look_away if watch is None else gateway.note_command
@@ -225,6 +239,7 @@ class Session:
         """Publish on `topic` no more. `GraphError` if it did not."""
         with self._lock:
             publisher = self._publishers.pop(topic, None)
+            self._latched_bytes.pop(topic, None)
         if publisher is None:
             raise GraphError(f"{self.name} does not publish '{topic}'")
         self.tell("unadvertise", topic, publisher.msgtype)
@@ -242,6 +257,9 @@ class Session:
     def publish_all(self, messages: Sequence[tuple[str, Any]]) -> None:
         """Like `publish`, of messages by topic that are taken in together, in their order."""
         known = [(self._publisher(topic), message) for topic, message in messages]
+        for publisher, message in known:
+            if publisher.latched and not self._inside:
+                self._count_latched(publisher.topic, message)
 
         def publish() -> None:
             for publisher, message in known:
@@ -254,6 +272,18 @@ class Session:
         if known:
             topics = ", ".join(topic for topic, _ in messages)
             self.post(publish).add_done_callback(lambda done: self._log_failure(done, topics))
+
+    def _count_latched(self, topic: str, message: Any) -> None:
+        """Bound what the graph keeps for late subscribers; `GraphError` where it is too much."""
+        size = message_bytes(message)
+        with self._lock:
+            others = sum(self._latched_bytes.values()) - self._latched_bytes.get(topic, 0)
+            if others + size > MAX_LATCHED_BYTES:
+                raise GraphError(
+                    f"'{topic}': the latched messages of {self.name} would have more than "
+                    f"{MAX_LATCHED_BYTES >> 20} MiB; unadvertise topics that are done with"
+                )
+            self._latched_bytes[topic] = size
 
     def _publisher(self, topic: str) -> Publisher:
         publisher = self._publishers.get(topic)
@@ -387,6 +417,8 @@ class Session:
             self.unsubscribe(mailbox)
         for service in services:
             self.withdraw(service)
+        self.reading.close()
+        self.writing.close()
         self._gateway.forget(self)
 
     @property

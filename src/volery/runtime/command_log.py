@@ -20,7 +20,7 @@ from volery.graph.messages import Published
 from volery.graph.session import Taken
 from volery.runtime.command_kinds import Weight, weight_of
 
-MOST_KEPT_BYTES = 64 * 1024 * 1024
+MOST_KEPT_BYTES = 32 * 1024 * 1024
 """Of commands that logs begun later are given (modelling choice); beyond that none are kept."""
 _OVERHEAD_BYTES = 400
 """What a kept command needs besides its content."""

@@ -123,7 +123,13 @@ class Simulation:
         starts = place(scenario, self.scene, self.terrain)
         parts = assemble(scenario, starts, self.scene)
         self.graph = Graph(lambda: self.time_ns, self.post)
-        self.gateway = Gateway(self.graph, self.post, open_queue=self._open_queue)
+        self.gateway = Gateway(
+            self.graph,
+            self.post,
+            open_queue=self._open_queue,
+            is_busy=self._is_busy,
+            is_late=lambda: self._pacer.speed is not None and self._is_busy(),
+        )
         publisher = GraphPublisher(self.graph)
         self.outlet = Outlet(parts.fleet, self.graph, publisher)
         self._engine = Engine(
@@ -660,6 +666,10 @@ class Simulation:
     def _open_queue(self) -> Post:
         """Where the commands of one external client are posted, at its own expense."""
         return self._engine.inbox.open_queue().post
+
+    def _is_busy(self) -> bool:
+        """Whether there is no time to spare for what clients send; partners are waited for."""
+        return self._pacer.is_behind and not self._partners
 
     def _check_open(self) -> None:
         if self._closed:

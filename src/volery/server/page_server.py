@@ -18,7 +18,8 @@ import uvicorn
 
 from volery.bridges.loop_thread import LoopThread
 from volery.bridges.origins import Origins
-from volery.bridges.rosbridge.wire import MOST_MESSAGE_BYTES
+from volery.bridges.rosbridge.message_budget import MAX_MESSAGE_BYTES
+from volery.bridges.unsent import bound_unsent
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, open_listener
 from volery.core.listening import LOOPBACK
@@ -92,7 +93,7 @@ class PageServer:
                 app,
                 http=http_protocol(self._socket),
                 ws="websockets-sansio",
-                ws_max_size=MOST_MESSAGE_BYTES,
+                ws_max_size=MAX_MESSAGE_BYTES,
                 ws_ping_interval=_KEEPALIVE_S,
                 ws_ping_timeout=_KEEPALIVE_S,
                 ws_per_message_deflate=False,  # costs more time than loopback and LANs do
@@ -178,7 +179,9 @@ class PageServer:
 def _listen(host: str, port: int) -> Listener:
     """A listening socket. `BridgeError` where there cannot be one."""
     try:
-        return open_listener(host, port, "page")
+        listening = open_listener(host, port, "page")
+        bound_unsent(listening)
+        return listening
     except (OSError, OverflowError) as error:
         raise BridgeError(
             f"the page's server cannot listen on {host}:{port}: "

@@ -160,6 +160,7 @@ class _Client:
                 session.complain,
                 self._closed,
                 ServerEnd(Preamble(), partial(listener.prove, sock), listener.note_stranger),
+                session.reading,
             )
         except OSError:
             session.close()

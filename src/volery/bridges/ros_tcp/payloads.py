@@ -10,6 +10,7 @@ from volery.core.errors import BridgeError, GraphError
 from volery.graph.cdr import CODING_ERRORS, decode_cdr, encode_cdr
 from volery.graph.definition_store import EMPTY_MEMBER
 from volery.graph.messages import Published, message_type, typestore
+from volery.graph.object_count import CDR, ROS1, check_objects
 from volery.graph.ros1 import ros1_codec
 from volery.graph.ros1_names import ros1_name, ros2_name
 
@@ -36,7 +37,13 @@ class Payloads(Protocol):
 
 
 class Ros1Payloads:
-    """Plain ROS 1 serialization."""
+    """Plain ROS 1 serialization.
+
+    limited: messages come from clients, and may become no more objects than `object_count` allows.
+    """
+
+    def __init__(self, *, limited: bool = False) -> None:
+        self._limited = limited
 
     def published(self, published: Published) -> list[Bytes]:
         """Bytes of a message of the graph, in parts; `GraphError` as `encode`."""
@@ -48,6 +55,8 @@ class Ros1Payloads:
 
     def decode(self, data: Bytes, msgtype: str) -> Any:
         """The message; `GraphError` where the bytes are none."""
+        if self._limited:
+            check_objects(data, msgtype, ROS1)
         return ros1_codec().decode(data, msgtype)
 
     def learn(self, msgtype: str) -> None:
@@ -60,7 +69,10 @@ class Ros1Payloads:
 
 
 class Ros2Payloads:
-    """CDR with its header of four bytes."""
+    """CDR with its header of four bytes; `limited` as of `Ros1Payloads`."""
+
+    def __init__(self, *, limited: bool = False) -> None:
+        self._limited = limited
 
     def published(self, published: Published) -> list[Bytes]:
         """Bytes of a message of the graph, in parts; `GraphError` as `encode`."""
@@ -77,6 +89,8 @@ class Ros2Payloads:
         """The message; `GraphError` where the bytes are none."""
         if len(data) == _CDR_HEADER_BYTES and not _has_fields(msgtype):
             data = bytes(data) + b"\0"  # Unity leaves out the byte that stands for nothing
+        if self._limited:
+            check_objects(data, msgtype, CDR)
         return decode_cdr(data, msgtype)
 
     def learn(self, msgtype: str) -> None:
@@ -89,11 +103,14 @@ class Ros2Payloads:
         return f"{package}/{plain}"
 
 
-def payloads_of(generation: Generation) -> Payloads:
-    """The payloads of a generation of ROS; `BridgeError` if there is none of that name."""
+def payloads_of(generation: Generation, *, limited: bool = False) -> Payloads:
+    """The payloads of a generation of ROS; `BridgeError` if there is none of that name.
+
+    limited: messages come from clients, and are refused where decoding would take too long.
+    """
     if generation not in _KINDS:
         raise BridgeError(f"generation is 'ros1' or 'ros2', not '{generation}'")
-    return _KINDS[generation]()
+    return _KINDS[generation](limited=limited)
 
 
 def topic_type(name: str) -> str:

@@ -48,12 +48,26 @@ class ServerEnd(NamedTuple):
     """Called with the protocol of a client that speaks another one."""
 
 
+class Throttle(Protocol):
+    """Tells when to read on from a peer that costs too much; `graph.read_budget.Reading`."""
+
+    def begin(self) -> None:
+        """Decoding begins."""
+
+    def end(self, frames: int, size: int) -> None:
+        """Decoding is over."""
+
+    def pause_s(self) -> float:
+        """Returns for how long not to read; 0: read on."""
+
+
 class Pipe:
     """Reads frames, hands them to `take`, and sends what the outbox gathers.
 
     broken: told why nothing that follows can be read; what it puts into the outbox is still sent.
     closed: told once why the connection has ended.
     server_end: what a server checks of a new client; None: we are the client.
+    throttle: None where the peer may send as much as it likes.
     """
 
     def __init__(
@@ -65,6 +79,7 @@ class Pipe:
         broken: Callable[[str], None],
         closed: Callable[[str], None],
         server_end: ServerEnd | None = None,
+        throttle: Throttle | None = None,
     ) -> None:
         self._loop = asyncio.get_running_loop()
         self._sock = sock
@@ -74,6 +89,8 @@ class Pipe:
         self._broken = broken
         self._closed = closed
         self._unproven = server_end
+        self._throttle = throttle
+        self._paused: asyncio.TimerHandle | None = None
         self._unsent: list[Bytes] = []
         self._blocked = False
         self._bite = _BITE_BYTES
@@ -103,6 +120,8 @@ class Pipe:
         if not self._open:
             return
         self._open = False
+        if self._paused is not None:
+            self._paused.cancel()
         self._loop.remove_reader(self._sock)
         self._loop.remove_writer(self._sock)
         self._sock.close()
@@ -131,13 +150,12 @@ class Pipe:
             self._prove(bool(frames))
             flood = len(frames) > _FRAMES_A_TURN
             self._bite = _BITE_BYTES if flood else min(2 * self._bite, _LARGEST_BITE_BYTES)
-            for frame in frames:
-                self._take(frame)
+            self._take_all(frames, count)
         except BridgeError as error:
             self._broken(str(error))
             self.finish()
-        if self._outbox.crowded and self._open and not self._ending:
-            self._reading = False  # who does not read our answers is not asked for more
+        if self._open and not self._ending and self._must_pause():
+            self._reading = False
             self._loop.remove_reader(self._sock)
 
     def _is_stranger(self, data: memoryview) -> bool:
@@ -160,6 +178,29 @@ class Pipe:
             self._unproven.prove()
             self._unproven = None
 
+    def _take_all(self, frames: list[Frame], size: int) -> None:
+        if self._throttle is None:
+            for frame in frames:
+                self._take(frame)
+            return
+        self._throttle.begin()
+        try:
+            for frame in frames:
+                self._take(frame)
+        finally:
+            self._throttle.end(len(frames), size)
+
+    def _must_pause(self) -> bool:
+        """Whether not to read on: the peer does not read our answers, or costs too much."""
+        pause_s = 0.0 if self._throttle is None else self._throttle.pause_s()
+        if pause_s and self._paused is None:
+            self._paused = self._loop.call_later(pause_s, self._pause_over)
+        return self._outbox.crowded or bool(pause_s)
+
+    def _pause_over(self) -> None:
+        self._paused = None
+        self._read_again()
+
     def _write(self) -> None:
         try:
             for _ in range(_BATCHES_A_TURN):
@@ -179,7 +220,7 @@ class Pipe:
         self._block(True)
 
     def _read_again(self) -> None:
-        if not self._reading and not self._outbox.crowded:
+        if self._open and not self._reading and not self._must_pause():
             self._reading = True
             self._loop.add_reader(self._sock, self._readable)
 

@@ -25,6 +25,7 @@ from volery.bridges.ros_tcp.wire import Frame, Generation, number_field, text_fi
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.mailbox import Wake
 from volery.graph.qos import DEFAULT_DEPTH
+from volery.graph.read_budget import Reading
 from volery.graph.reply import Reply
 from volery.graph.session import Gateway
 
@@ -51,7 +52,7 @@ class EndpointSession:
         depth: int,
         wake: Wake,
     ) -> None:
-        self._payloads = payloads_of(generation)
+        self._payloads = payloads_of(generation, limited=True)
         self._session = gateway.open(name)
         self._depth = depth
         self.outbox = Outbox(self._session, self._payloads, wake, self.complain)
@@ -75,6 +76,11 @@ class EndpointSession:
             "__remove_unity_service": self._remove_unity_service,
         }
         self.outbox.put(ros_tcp.handshake(generation, _FEATURES))
+
+    @property
+    def reading(self) -> Reading:
+        """What the client is charged for, and when to read on from it."""
+        return self._session.reading
 
     def take(self, frame: Frame) -> None:
         """Do what a frame asks for."""

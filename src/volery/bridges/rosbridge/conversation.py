@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import Any, Protocol
 
@@ -24,7 +24,7 @@ SERVICE_RESTART = 1012
 
 _LONGEST_SILENCE_S = 10.0
 """Time a client has to show its token."""
-_FRAMES_A_TURN = 32
+_FRAMES_A_TURN = 8
 """Frames sent before other clients get their turn, though the network takes more."""
 
 
@@ -105,10 +105,15 @@ async def _read(
         except TimeoutError:
             await channel.close(POLICY_VIOLATION, "no token was shown")
             return
+        peer.reading.begin()
         if peer.authorized or checkpoint is None:
             peer.receive(frame, time.monotonic())
         else:
             await checkpoint.receive(peer, frame)
+            peer.reading.begin()  # the checkpoint lets others have their turn
+        peer.reading.end(1, len(frame))
+        while (pause_s := peer.reading.pause_s()) and peer.refused is None:
+            await asyncio.sleep(pause_s)
         while peer.congested:  # it asks for more than it reads
             read.clear()
             await read.wait()
@@ -122,9 +127,12 @@ async def _write(channel: Channel, peer: RosbridgePeer, bell: Bell, read: asynci
     turns = itertools.count(1)
     while True:
         bell.silence()
-        for frame in peer.frames(time.monotonic()):
+        frames = peer.frames(time.monotonic())
+        while (frame := _next(peer, frames)) is not None:
             await channel.send(frame)
             read.set()
+            while pause_s := peer.writing.pause_s():
+                await asyncio.sleep(pause_s)
             if next(turns) % _FRAMES_A_TURN == 0:
                 await asyncio.sleep(0)
         read.set()
@@ -133,3 +141,11 @@ async def _write(channel: Channel, peer: RosbridgePeer, bell: Bell, read: asynci
         with suppress(TimeoutError):
             async with asyncio.timeout(None if due_s is None else due_s - now_s):
                 await bell.heard.wait()
+
+
+def _next(peer: RosbridgePeer, frames: Iterator[Frame]) -> Frame | None:
+    """The next frame, its making charged to the client."""
+    peer.writing.begin()
+    frame = next(frames, None)
+    peer.writing.end(1, 0 if frame is None else len(frame))
+    return frame

@@ -25,10 +25,15 @@ from volery.bridges.rosbridge.fields import read_choice, read_id, with_id
 from volery.bridges.rosbridge.forms import Forms
 from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, Assembly, split
 from volery.bridges.rosbridge.gate import Gate, refusal
+from volery.bridges.rosbridge.message_budget import (
+    MAX_MESSAGE_BYTES,
+    MAX_PICTURE_BYTES,
+    MAX_TEXT_BYTES,
+    MAX_UNAUTHORIZED_BYTES,
+)
 from volery.bridges.rosbridge.services import Post, Services
 from volery.bridges.rosbridge.topics import Topics
 from volery.bridges.rosbridge.wire import (
-    MOST_MESSAGE_BYTES,
     Frame,
     Operation,
     decode_frame,
@@ -38,6 +43,7 @@ from volery.bridges.rosbridge.wire import (
 )
 from volery.core.errors import BridgeError, VoleryError
 from volery.core.listening import shows_token
+from volery.graph.read_budget import Reading
 from volery.graph.session import Session
 
 LEVELS = ("error", "none", "warning", "info")
@@ -59,7 +65,7 @@ class Shared:
     """Simulated time."""
     token: str | None = None
     """What a client must show before anything else; None: nothing."""
-    most_bytes: int = MOST_MESSAGE_BYTES
+    most_bytes: int = MAX_MESSAGE_BYTES
     """Largest message, also once put together from fragments or a picture."""
 
 
@@ -94,6 +100,8 @@ class RosbridgePeer:
         gate: Gate | None = None,
     ) -> None:
         self.authorized = authorized or shared.token is None
+        self.on_authorized: Callable[[], None] = lambda: None
+        """Called when the client has shown the token."""
         self.refused: str | None = None
         """Why the connection must end, once it must."""
         self._session = session
@@ -103,7 +111,8 @@ class RosbridgePeer:
         self._level = LEVELS[0]
         self._outbox: deque[tuple[int, Iterator[Frame]]] = deque()
         self._waiting_bytes = 0
-        self._assembly = Assembly(shared.most_bytes)
+        self._assembly = Assembly(min(shared.most_bytes, MAX_TEXT_BYTES))
+        self._most_picture_bytes = min(shared.most_bytes, MAX_PICTURE_BYTES)
         self._numbers = itertools.count()
         self._closed = False
         self._now_s = 0.0
@@ -134,17 +143,30 @@ class RosbridgePeer:
 
     # ---------------------------------------------------------------------------------------- in
 
+    @property
+    def reading(self) -> Reading:
+        """What the client is charged for, and when to read on from it."""
+        return self._session.reading
+
+    @property
+    def writing(self) -> Reading:
+        """The same of writing to it."""
+        return self._session.writing
+
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame from the client. now_s: of a clock that never goes back."""
         if self._closed or self.refused:
             return
         self._now_s = now_s
+        if not self.authorized and len(frame) > MAX_UNAUTHORIZED_BYTES:
+            self.refused = f"not authorized: more than {MAX_UNAUTHORIZED_BYTES} bytes"
+            return
         if len(frame) > self._shared.most_bytes:
             self._status("error", f"a message of more than {self._shared.most_bytes} bytes", {})
             return
         operation: Operation = {}
         try:
-            operation = decode_frame(frame)
+            operation = decode_frame(frame, limited=True)
             self._handle(operation, now_s, 0)
         except VoleryError as error:
             self._status("error", str(error), operation)
@@ -162,9 +184,10 @@ class RosbridgePeer:
         if op == "fragment":
             whole = self._assembly.add(operation, now_s)
             if whole is not None:
-                self._handle_inner(decode_frame(whole), now_s, depth)
+                self._handle_inner(decode_frame(whole, limited=True), now_s, depth)
         elif op == "png":
-            self._handle_inner(decode_png(operation, self._shared.most_bytes), now_s, depth)
+            picture = decode_png(operation, self._most_picture_bytes, limited=True)
+            self._handle_inner(picture, now_s, depth)
         else:
             handler = self._handlers.get(op)
             if handler is None:
@@ -206,6 +229,7 @@ class RosbridgePeer:
             self.refused = "not authorized: wrong token"
             raise BridgeError(self.refused)
         self.authorized = True
+        self.on_authorized()
 
     # --------------------------------------------------------------------------------------- out
 

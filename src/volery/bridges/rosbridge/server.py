@@ -18,12 +18,15 @@ from websockets.http11 import Request, Response
 from volery.bridges.origins import Origins
 from volery.bridges.rosbridge.checkpoint import Checkpoint
 from volery.bridges.rosbridge.conversation import Bell, converse, post_to
+from volery.bridges.rosbridge.first_message import GuardedConnection, guarded
 from volery.bridges.rosbridge.forms import Forms, Generation
+from volery.bridges.rosbridge.message_budget import MAX_MESSAGE_BYTES
 from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
 from volery.bridges.rosbridge.rosapi import RosApi
 from volery.bridges.rosbridge.rosapi_parameters import Parameters
 from volery.bridges.rosbridge.tf_republisher import TfRepublisher
-from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES
+from volery.bridges.rosbridge.wire import CBOR_PROTOCOL
+from volery.bridges.unsent import bound_unsent
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, open_listener
 from volery.core.listening import check_address, check_token, shows_token, tend
@@ -88,7 +91,7 @@ class RosbridgeServer:
         path: str | None = None,
         token: str | None = None,
         anywhere: bool = False,
-        max_message_bytes: int = MOST_MESSAGE_BYTES,
+        max_message_bytes: int = MAX_MESSAGE_BYTES,
         generation: Generation = "ros2",
         origins: Sequence[str] = (),
         keepalive_s: float | None = 20.0,
@@ -151,6 +154,8 @@ class RosbridgeServer:
                 select_subprotocol=_select_subprotocol,
                 compression=None,  # deflating would cost more time than loopback and LANs do
                 max_size=self._most_bytes,
+                max_queue=1,  # what waits to be handled may be as large
+                create_connection=guarded(self._token, self._most_bytes),
                 ping_interval=self._keepalive_s,
                 ping_timeout=self._keepalive_s,
                 close_timeout=1.0,
@@ -208,6 +213,7 @@ class RosbridgeServer:
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "too many clients\n")
         if given is not None:
             self._shown.add(connection)
+            _allow(connection)
         return None
 
     async def _is_token(self, given: str, connection: ServerConnection) -> bool:
@@ -228,7 +234,9 @@ class RosbridgeServer:
         assert self._gateway is not None
         loop = asyncio.get_running_loop()
         address = connection.remote_address or ("?", 0)
-        tend(connection.transport.get_extra_info("socket"))
+        sock = connection.transport.get_extra_info("socket")
+        tend(sock)
+        bound_unsent(sock)
         session = self._gateway.open(f"rosbridge {address[0]}:{address[1]}")
         bell = Bell(loop)
         peer = RosbridgePeer(
@@ -238,6 +246,7 @@ class RosbridgeServer:
             post=post_to(loop),
             authorized=connection in self._shown,
         )
+        peer.on_authorized = lambda: _allow(connection)
         self._clients.add(connection)
         prove = partial(self._prove, connection)
         checkpoint = Checkpoint(
@@ -255,6 +264,12 @@ class RosbridgeServer:
 
 def _address_of(connection: ServerConnection) -> str:
     return str((connection.remote_address or ("?",))[0])
+
+
+def _allow(connection: ServerConnection) -> None:
+    """Take large messages: the client has shown the token."""
+    if isinstance(connection, GuardedConnection):
+        connection.allow()
 
 
 def _select_subprotocol(_connection: ServerConnection, offered: Sequence[Any]) -> Any:

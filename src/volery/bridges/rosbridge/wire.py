@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from volery.bridges.rosbridge.cbor_form import MOST_DEPTH, decode_cbor
+from volery.bridges.rosbridge.message_budget import check_cbor, check_json
 from volery.core.errors import BridgeError
 
 Frame = str | bytes
@@ -25,20 +26,24 @@ Operation = dict[str, Any]
 CBOR_PROTOCOL = "rosbridge-cbor"
 """WebSocket subprotocol by which a client learns that it may send CBOR."""
 MOST_MESSAGE_BYTES = 64 * 1024 * 1024
-"""Largest message a server takes unless told otherwise; a 4k rgb8 image has 25 MB."""
+"""Largest message that a client takes from a server; `message_budget` has what servers take."""
 
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 
 
-def decode_frame(frame: Frame) -> Operation:
+def decode_frame(frame: Frame, *, limited: bool = False) -> Operation:
     """Operation that a frame holds.
+
+    limited: it comes from a client, and may hold no more than `message_budget` allows.
 
     Raises
     ------
     BridgeError
-        It holds none.
+        It holds none, or too much.
 
     """
+    if limited:
+        check_cbor(frame) if isinstance(frame, bytes) else check_json(frame)
     found = decode_cbor(frame) if isinstance(frame, bytes) else _decode_json(frame)
     if not isinstance(found, dict) or not isinstance(found.get("op"), str):
         raise BridgeError("a message must be an object with the key 'op'")
@@ -79,8 +84,8 @@ def encode_png(text: str) -> str:
     return encode_json({"op": "png", "data": base64.b64encode(file.getvalue()).decode("ascii")})
 
 
-def decode_png(operation: Operation, most_bytes: int) -> Operation:
-    """Operation inside a picture whose pixels hold at most `most_bytes`.
+def decode_png(operation: Operation, most_bytes: int, *, limited: bool = False) -> Operation:
+    """Operation inside a picture whose pixels hold at most `most_bytes`; `limited`: as above.
 
     Raises
     ------
@@ -104,7 +109,7 @@ def decode_png(operation: Operation, most_bytes: int) -> Operation:
         inside = pixels.decode().rstrip("\n")
     except (binascii.Error, UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
         raise BridgeError(f"png: not readable: {error}") from None
-    found = decode_frame(inside)
+    found = decode_frame(inside, limited=limited)
     if found["op"] == "png":
         raise BridgeError("png: a picture inside a picture")
     return found

@@ -242,8 +242,13 @@ class _Client(asyncio.Protocol):
             self.transport.abort()
             return
         if self._port.takes_commands and not self.transport.is_closing():
-            for frame in self._parser.feed(data):
+            reading = self._session.reading
+            reading.begin()
+            frames = self._parser.feed(data)
+            for frame in frames:
                 self._take(frame)
+            reading.end(len(frames), len(data))
+            self._read_on()
             if self._parser.frames:
                 self._port.prove(self)
             if self._parser.other_version is not None and not self._told_version:
@@ -252,6 +257,17 @@ class _Client(asyncio.Protocol):
             if self._parser.too_long is not None and not self._told_length:
                 self._told_length = True
                 self._notify(self._parser.too_long)
+
+    def _read_on(self) -> None:
+        """Read from the client when its share of time allows it."""
+        if self.transport.is_closing():
+            return
+        pause_s = self._session.reading.pause_s()
+        if pause_s:
+            self.transport.pause_reading()
+            asyncio.get_running_loop().call_later(pause_s, self._read_on)
+        else:
+            self.transport.resume_reading()
 
     def pause_writing(self) -> None:
         self._paused = True

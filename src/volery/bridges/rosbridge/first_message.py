@@ -1,0 +1,54 @@
+"""Connections that take little until their client has shown the token.
+
+The first message may be short only: a longer one is refused by the length that it announces. Behind
+it nothing is read before the server has looked at it, whatever it holds. So a client may send large
+messages right behind its token, and one without a token fills no memory.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from websockets.asyncio.server import ServerConnection
+from websockets.frames import Frame, Opcode
+
+from volery.bridges.rosbridge.message_budget import MAX_UNAUTHORIZED_BYTES
+
+_MESSAGES = (Opcode.TEXT, Opcode.BINARY, Opcode.CONT)
+
+
+class GuardedConnection(ServerConnection):
+    """A connection of a server that asks for a token; see `guarded`."""
+
+    has_token = False
+    """Whether the server has a token to ask for."""
+    max_bytes = MAX_UNAUTHORIZED_BYTES
+    """Of a message from a client that is let in."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._recv_frame = self.protocol.recv_frame
+        if self.has_token:
+            self.protocol.max_message_size = MAX_UNAUTHORIZED_BYTES
+            self.protocol.recv_frame = self._recv_first  # type: ignore[method-assign]
+
+    def allow(self) -> None:
+        """Take messages of any size that the server takes: the client has shown the token."""
+        self._unguard()
+        self.transport.resume_reading()
+
+    def _recv_first(self, frame: Frame) -> None:
+        self._recv_frame(frame)
+        if frame.fin and frame.opcode in _MESSAGES:
+            self._unguard()  # what has come already may begin with a long message
+            self.transport.pause_reading()
+
+    def _unguard(self) -> None:
+        self.protocol.max_message_size = self.max_bytes
+        self.protocol.recv_frame = self._recv_frame  # type: ignore[method-assign]
+
+
+def guarded(token: str | None, max_bytes: int) -> type[GuardedConnection]:
+    """Returns the class of the connections of one server."""
+    attributes = {"has_token": token is not None, "max_bytes": max_bytes}
+    return type("GuardedConnection", (GuardedConnection,), attributes)
