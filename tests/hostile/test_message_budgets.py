@@ -20,6 +20,7 @@ from websockets.sync.client import connect
 from volery.bridges.doors import Doors
 from volery.bridges.ros_tcp.session import EndpointSession
 from volery.bridges.ros_tcp.wire import FrameParser
+from volery.bridges.rosbridge import first_message
 from volery.bridges.rosbridge import message_budget as budget
 from volery.bridges.rosbridge.cbor_form import encode_cbor
 from volery.bridges.rosbridge.server import RosbridgeServer
@@ -140,6 +141,21 @@ def test_a_long_message_of_a_stranger_is_not_received(guarded):
     with connect(guarded) as socket:
         socket.send(json.dumps({"op": "bogus"}))
         assert "not authorized" in socket.recv(10)
+
+
+def test_small_frames_are_cut_in_small_numbers(guarded, monkeypatch):
+    sizes = []
+    receive = first_message.GuardedConnection.data_received
+
+    def note(connection, data):
+        sizes.append(len(data))
+        receive(connection, data)
+
+    monkeypatch.setattr(first_message.GuardedConnection, "data_received", note)
+    with connect(f"{guarded}/?token=secret") as socket:
+        socket.send(json.dumps({"op": "bogus", "pad": "A" * 1_000_000}))
+        assert "unknown operation" in socket.recv(10)
+    assert max(sizes) <= 32 << 10
 
 
 @pytest.mark.parametrize("how", ["auth", "auth in two frames", "url", "header"])

@@ -7,6 +7,7 @@ messages right behind its token, and one without a token fills no memory.
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 from websockets.asyncio.server import ServerConnection
@@ -14,6 +15,9 @@ from websockets.frames import Frame, Opcode
 
 from volery.bridges.rosbridge.message_budget import MAX_UNAUTHORIZED_BYTES
 
+_READ_BYTES = 32 << 10
+"""At once: all frames in it are cut before anybody else has a turn. Of asyncio's 256 KiB, full of
+small frames, others would have to wait for a tenth of a second."""
 _MESSAGES = (Opcode.TEXT, Opcode.BINARY, Opcode.CONT)
 
 
@@ -31,6 +35,11 @@ class GuardedConnection(ServerConnection):
         if self.has_token:
             self.protocol.max_message_size = MAX_UNAUTHORIZED_BYTES
             self.protocol.recv_frame = self._recv_first  # type: ignore[method-assign]
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Read in small pieces; as of asyncio."""
+        transport.max_size = _READ_BYTES  # type: ignore[attr-defined]
+        super().connection_made(transport)
 
     def allow(self) -> None:
         """Take messages of any size that the server takes: the client has shown the token."""
