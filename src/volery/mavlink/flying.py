@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from volery.mavlink import landing, mission_flight, offboard, return_flight, sticks, switching
 from volery.mavlink.legs import fly_leg
+from volery.mavlink.memory import Leg
 from volery.mavlink.modes import Mode
 from volery.mavlink.setpoints import Setpoint
 
@@ -37,6 +38,8 @@ def _take_off(pilot: Autopilot, state: FlightState) -> None:
         wants_mission = pilot.parameter("COM_TAKEOFF_ACT") == 1
         goes_on = wants_mission and not switching.obstacle_to(pilot, Mode.MISSION)
         leg = memory.leg
+        if leg is None and memory.take_off_goal is not None:
+            leg = Leg(memory.take_off_goal, None, switching.cruise(pilot))
         switching.enter(pilot, Mode.MISSION if goes_on else Mode.HOLD)
         memory.leg = None if goes_on else leg
 

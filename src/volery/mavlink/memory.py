@@ -123,6 +123,8 @@ class Memory:
     landed_ns: int = 0
     take_off_height: float = math.nan
     """m above the ground that the next take-off was asked for."""
+    take_off_goal: Vector | None = None
+    """m, map: where the present take-off from the ground ends."""
     order: str = ""
     """The last one to the UAV: what modes of its own may follow."""
     ordered_ns: int = 0

@@ -94,7 +94,9 @@ def enter(pilot: Autopilot, mode: Mode) -> None:
         elif mode is Mode.TAKE_OFF:
             rise(pilot)
         elif mode is Mode.OFFBOARD:
-            order(pilot, "steer")  # it goes on as it flies until the next setpoint
+            # It continues its motion until the next setpoint; a take-off first reaches the height
+            # at which setpoints are flown.
+            order(pilot, "take_off" if pilot.state.mode == "TAKE_OFF" else "steer")
         else:
             order(pilot, "hold", pilot.vehicle.hold())
     if changed:
@@ -106,11 +108,13 @@ def rise(pilot: Autopilot) -> None:
     height = pilot.memory.take_off_height
     if not math.isfinite(height):
         height = float(pilot.parameter("MIS_TAKEOFF_ALT"))
-    if not flies(pilot):
-        pilot.memory.take_off_height = math.nan
-        order(pilot, "take_off", pilot.vehicle.take_off(max(height, 0.1)))
-        return
     x, y, z = pilot.state.position
+    if not flies(pilot):
+        height = max(height, 0.1)
+        pilot.memory.take_off_height = math.nan
+        pilot.memory.take_off_goal = x, y, z + height
+        order(pilot, "take_off", pilot.vehicle.take_off(height))
+        return
     ground = (pilot.memory.home or pilot.memory.origin)[2]
     top = z + height if math.isfinite(pilot.memory.take_off_height) else max(z, ground + height)
     pilot.memory.take_off_height = math.nan

@@ -57,6 +57,17 @@ def test_take_off_to_an_altitude_above_the_sea(flight):
     assert simulation.uavs["uav1"].position_map[2] == pytest.approx(4.0, abs=0.2)
 
 
+@pytest.mark.parametrize("height", [2.5, 6.0])
+def test_a_take_off_ends_at_the_height_that_is_set(flight, height):
+    simulation, station = flight
+    ground = simulation.uavs["uav1"].position_map[2]
+    station.up(height)
+    station.seconds(4.0)
+    assert station.present_mode == (4, 3)
+    risen = simulation.uavs["uav1"].position_map[2] - ground
+    assert risen == pytest.approx(height, abs=0.04)
+
+
 def test_an_armed_vehicle_that_does_not_start_is_disarmed(flight):
     _, station = flight
     assert station.command(ARM, 1.0) == ACCEPTED

@@ -123,6 +123,51 @@ def test_starts_from_the_ground_for_setpoints_upwards():
         assert simulation.uavs["uav1"].position_map == pytest.approx([0, 0, 3.1], abs=0.3)
 
 
+@pytest.mark.parametrize("kind", ["place", "velocity", "attitude"])
+def test_takes_over_at_once_from_a_take_off(kind):
+    """As PX4: the take-off ends where offboard begins, and the setpoint is flown."""
+    simulation, station = fly()
+    with simulation:
+        station.seconds(0.1)
+        assert station.set("MIS_TAKEOFF_ALT", 30.0) == 30.0
+        assert station.command(400, 1.0) == station.command(22) == ACCEPTED
+        station.seconds(1.2)
+        setpoint = {
+            "place": lambda: station.place(1.0, 0.0, -3.0),
+            "velocity": lambda: station.velocity(1.0, 0.0, 0.0),
+            "attitude": lambda: station.send(
+                "set_attitude_target", 0, 1, 1, 7, (1, 0, 0, 0), 0.0, 0.0, 0.0, 0.536
+            ),
+        }[kind]
+        station.stream(0.2, setpoint)
+        assert simulation.uavs["uav1"].mode.name == "TAKE_OFF"
+        assert station.mode(6) == ACCEPTED
+        station.stream(0.1, setpoint)
+        wanted = {"place": "GO_TO", "velocity": "VELOCITY", "attitude": "LOW_LEVEL"}[kind]
+        assert simulation.uavs["uav1"].mode.name == wanted
+        station.stream(2.9, setpoint, every=0.1)
+        assert station.present_mode == (6, 0)
+        assert simulation.uavs["uav1"].position_map[2] < 6.0
+        if kind == "place":
+            station.stream(3.0, setpoint, every=0.1)
+            there = simulation.uavs["uav1"].position_map
+            assert there == pytest.approx([0.0, 1.0, 3.1], abs=0.3)
+        assert not [text for text in station.texts if "takes off" in text]
+
+
+def test_takes_over_before_a_take_off_has_left_the_ground():
+    simulation, station = fly()
+    with simulation:
+        station.seconds(0.1)
+        station.stream(0.2, station.place, 0.0, 0.0, -3.0)
+        assert station.command(400, 1.0) == station.command(22) == ACCEPTED
+        station.stream(0.1, station.place, 0.0, 0.0, -3.0)
+        assert station.mode(6) == ACCEPTED
+        station.stream(6.0, station.place, 0.0, 0.0, -3.0, every=0.1)
+        assert station.present_mode == (6, 0)
+        assert simulation.uavs["uav1"].position_map == pytest.approx([0, 0, 3.1], abs=0.3)
+
+
 @pytest.mark.parametrize(("action", "mode"), [(0, (4, 3)), (3, (4, 5)), (4, (4, 6)), (5, (4, 3))])
 def test_its_loss_leads_to_the_mode_that_is_set(flight, action, mode):
     _, station, _ = flight
