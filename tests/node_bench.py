@@ -39,6 +39,9 @@ class NodeBench:
     def every(self, period_s, callback, *, wanted=None):
         self._timers.append([round(period_s * 1e9), round(period_s * 1e9), callback])
 
+    def forget(self, callback):
+        self._timers = [entry for entry in self._timers if entry[2] != callback]
+
     def at(self, time_ns, action):
         raise NotImplementedError
 

@@ -81,6 +81,9 @@ class _NoTimers:
     def every(self, *_arguments: Any, **_keywords: Any) -> None:
         """Never ring."""
 
+    def forget(self, callback: Callable[[], None]) -> None:
+        """Nothing rings."""
+
     def at(self, time_ns: int, action: Callable[[], Any]) -> None:
         """Never act."""
 

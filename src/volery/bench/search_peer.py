@@ -18,7 +18,7 @@ from typing import Any
 from volery.autonomy.cooperative_search import CooperativeSearch
 from volery.autonomy.search.calls import JOIN
 from volery.bridges.nodes.host import NodeHost
-from volery.graph.client import Answer
+from volery.graph.client import Future
 from volery.graph.link import Link
 from volery.graph.messages import Point, message_type, time_from_ns
 from volery.graph.node import Node
@@ -53,7 +53,7 @@ class Calling(Node):
         request = invitation()
         sent_ns = time.monotonic_ns()
 
-        def on_answer(answer: Answer) -> None:
+        def on_answer(answer: Future) -> None:
             back_ns = time.monotonic_ns()
             if answer.exception() is not None:
                 self.trouble = str(answer.exception())

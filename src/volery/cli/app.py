@@ -12,6 +12,7 @@ from volery.cli.guard import word_logs
 from volery.cli.log_commands import convert, info, recover, report, slam
 from volery.cli.machine_commands import bench, doctor
 from volery.cli.model_commands import export, identify, interfaces
+from volery.cli.node_logs import show_node_logs
 from volery.cli.options import PageCommand
 from volery.cli.radio_commands import comms, gcs
 
@@ -74,6 +75,7 @@ app.add_typer(service_app, name="service")
 def main() -> None:
     """Entry point of the command `volery`."""
     word_logs()
+    show_node_logs()
     app()
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from volery.cli.guard import USER_ERROR, complain
+from volery.cli.guard import USER_ERROR, complain, complain_of
 from volery.cli.interrupt import Interrupts, stopped_code, stopped_how
 from volery.cli.keys import Keys
 from volery.cli.progress import FlightProgress
@@ -128,7 +128,7 @@ class Flight:
             complain(str(error))
         except VoleryError as error:
             code, trouble = USER_ERROR, "The flight ended with an error"
-            complain(str(error))
+            complain_of(error)
         finally:
             self._wall_s = time.perf_counter() - start - self._simulation.paused_s
             closed = self._close_log()

@@ -22,6 +22,7 @@ from volery.cli.options import (
     Ros2Option,
     SilenceOption,
     ThreadsOption,
+    TracebackOption,
     TrustOption,
 )
 from volery.core.errors import BridgeError
@@ -58,6 +59,7 @@ def run(
     autopilot_timeout: SilenceOption = 10.0,
     drop_silent: DropOption = False,
     mavlink_key: MavlinkKeyOption = None,
+    traceback: TracebackOption = False,  # noqa: ARG001  # of `guarded`
 ) -> None:
     """Fly a scenario.
 
@@ -148,6 +150,7 @@ def serve(
     threads: ThreadsOption = None,
     trust: TrustOption = False,
     door: DoorsOption = None,
+    traceback: TracebackOption = False,  # noqa: ARG001
 ) -> None:
     """Serve the page until Ctrl-C: one world after the other, as its visitors choose.
 
@@ -262,6 +265,7 @@ def launch(
     lock_step: Annotated[
         float | None, typer.Option(help="The simulation waits for them each so many seconds.")
     ] = None,
+    traceback: TracebackOption = False,  # noqa: ARG001
 ) -> None:
     """Run the nodes of a launch profile in a process of their own."""
     from volery.cli.launching import launch_profile

@@ -9,6 +9,7 @@ import typer
 
 from volery.cli.guard import guarded
 from volery.cli.links import DEFAULT_VIA, WAYS
+from volery.cli.options import TracebackOption
 
 _CONTEXT = {"help_option_names": ["-h", "--help"]}
 topic_app = typer.Typer(no_args_is_help=True, context_settings=_CONTEXT)
@@ -69,6 +70,7 @@ def node(
         list[str] | None,
         typer.Option(help="Folder of ROS packages with .msg and .srv files, repeatable."),
     ] = None,
+    traceback: TracebackOption = False,  # noqa: ARG001  # of `guarded`
 ) -> None:
     """Run a node as a process of its own, on the graph of a simulation or a real vehicle."""
     from volery.cli.node import NodeOptions, run_node

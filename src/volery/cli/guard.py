@@ -7,7 +7,9 @@ import logging
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Callable, Mapping
+from contextvars import ContextVar
 from typing import ParamSpec
 
 import typer
@@ -19,6 +21,7 @@ P = ParamSpec("P")
 
 USER_ERROR = 2
 _SMALLEST, _LARGEST = 1e-9, 1e9
+_shows_traceback: ContextVar[bool] = ContextVar("volery_shows_traceback", default=False)
 
 
 class _Words(logging.Formatter):
@@ -38,6 +41,16 @@ def word_logs() -> None:
 def complain(text: str) -> None:
     """Say `error: ...` on stderr."""
     typer.echo(f"error: {text}", err=True)
+
+
+def complain_of(error: BaseException, text: str = "") -> None:
+    """Say what went wrong, and where in the user's code; with `--traceback` all frames."""
+    complain(text or str(error))
+    if _shows_traceback.get():
+        typer.echo("".join(traceback.format_exception(error)).rstrip(), err=True)
+        return
+    for note in getattr(error, "__notes__", ()):
+        typer.echo(note, err=True)
 
 
 def warn(text: str) -> None:
@@ -68,6 +81,7 @@ def guarded(command: Callable[P, None]) -> Callable[P, None]:
     @functools.wraps(command)
     def run(*arguments: P.args, **options: P.kwargs) -> None:
         StopSignals.first = None
+        _shows_traceback.set(bool(options.get("traceback")))
         try:
             _check_numbers(options)
             with StopSignals(stop_at_once, (signal.SIGTERM, signal.SIGHUP)):
@@ -76,7 +90,7 @@ def guarded(command: Callable[P, None]) -> Callable[P, None]:
             if _was_interrupted(error):
                 typer.echo("stopped", err=True)
                 raise typer.Exit(stopped_code()) from None
-            complain(str(error))
+            complain_of(error)
             raise typer.Exit(USER_ERROR) from None
         except BrokenPipeError:
             # The reader of our output went away (`volery list | head -1`): end quietly.

@@ -100,6 +100,10 @@ DropOption = Annotated[
     ),
 ]
 
+TracebackOption = Annotated[
+    bool, typer.Option("--traceback", help="Print all frames of an error.", show_default=False)
+]
+
 BatchSizeOption = Annotated[
     int, typer.Option(min=1, max=0x7F00, help="Planes a batch; linear id = it x batch + plane.")
 ]

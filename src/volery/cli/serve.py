@@ -14,7 +14,7 @@ import typer
 from volery.cli.door_checks import check_doors, token_gaps
 from volery.cli.doors import fit_out, open_doors
 from volery.cli.flight import RunOptions
-from volery.cli.guard import complain, warn
+from volery.cli.guard import complain_of, warn
 from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, serving
 from volery.cli.trust import with_trust
@@ -140,7 +140,7 @@ class _Host:
                 raise
             what = str(error) if isinstance(error, VoleryError) else _unexpected(error)
             self._trouble = f"{wanted.name}: {what}"
-            complain(self._trouble)
+            complain_of(error, self._trouble)
             self._wish.want(None if self._present is wanted else self._present)
 
     def _fly(self, scenario: Scenario) -> None:

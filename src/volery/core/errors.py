@@ -55,7 +55,15 @@ class UnreachableError(BridgeError):
 
 
 class NodeError(VoleryError):
-    """A node failed while it ran; the message names node, cause and simulated time."""
+    """A node failed: its code raised an exception, or cannot go on."""
+
+    def __init__(self, text: str, *, node: str = "", time_ns: int = 0) -> None:
+        """Take the full name of the node and the time of its failure where they are known."""
+        super().__init__(text)
+        self.node = node
+        self.time_ns = time_ns
+        self.is_reported = False
+        """Whether it has been logged as the node's failure."""
 
 
 class CommandError(VoleryError):

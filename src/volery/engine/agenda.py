@@ -66,6 +66,11 @@ class Agenda(Generic[What]):
         self._added += 1
         heapq.heappush(self._heap, entry)
 
+    def remove(self, what: What) -> None:
+        """Fire `what` no more, also after the return to a kept state."""
+        self._heap = [entry for entry in self._heap if entry.what != what]
+        heapq.heapify(self._heap)
+
     def next_step(self) -> int | None:
         """Step of the next firing, None when the agenda is empty."""
         if self._heap and ((first := self._heap[0]).wanted is None or first.wanted()):

@@ -168,6 +168,10 @@ class Engine:
         schedule = self._from_now(period_s)
         self.timer_agenda.add(callback, schedule, after_step=self.fleet.step, wanted=wanted)
 
+    def forget(self, callback: Callable[[], Any]) -> None:
+        """Call `callback`, which `every` was given, no more."""
+        self.timer_agenda.remove(callback)
+
     def at(self, time_ns: int, action: Callable[[], Any]) -> None:
         """Call `action` once, at `time_ns` of simulated time or at once if that has passed."""
         self.deadlines.add(max(time_ns, self.time_ns), action)

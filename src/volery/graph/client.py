@@ -1,4 +1,4 @@
-"""Calling services: at once, or with the answer as a later input."""
+"""Calling services: at once, or with the response as a later input."""
 
 from __future__ import annotations
 
@@ -8,73 +8,132 @@ from typing import Any
 
 from volery.core.errors import GraphError
 from volery.graph.graph import Graph
+from volery.graph.message_copies import copy_message
 from volery.graph.reply import Reply
 from volery.graph.thinking import Thinker
 from volery.graph.zero import zero_message
 
+Later = Callable[[Callable[[], None]], None]
 
-class Answer:
-    """A response that may still be on its way."""
+_MOST_LOOKS = 1000
+"""Waits for a service at one simulated time before they are taken for an endless loop."""
+
+
+class Future:
+    """A response that may still be on its way, in the shape of `rclpy.task.Future`."""
 
     def __init__(self) -> None:
         self._response: Any = None
-        self._error: GraphError | None = None
+        self._error: BaseException | None = None
         self._done = False
-        self._callbacks: list[Callable[[Answer], None]] = []
+        self._cancelled = False
+        self._callbacks: list[Callable[[Future], None]] = []
 
     def done(self) -> bool:
         """Whether the response is there, or will never be."""
-        return self._done
+        return self._done or self._cancelled
 
-    def exception(self) -> GraphError | None:
+    def cancelled(self) -> bool:
+        """Whether it was cancelled."""
+        return self._cancelled
+
+    def cancel(self) -> None:
+        """Wait for it no more; the callbacks are called."""
+        if not self.done():
+            self._cancelled = True
+            self._call_back()
+
+    def exception(self) -> BaseException | None:
         """Why there is no response; None where there is one, or may still be."""
         return self._error
 
     def result(self) -> Any:
-        """The response; `GraphError` while it is not there, or where there is none."""
-        if not self._done:
-            raise GraphError("the service has not answered yet; use add_done_callback")
+        """The response; None while it is not there. Raises the reason where there is none."""
         if self._error is not None:
             raise self._error
         return self._response
 
-    def add_done_callback(self, callback: Callable[[Answer], None]) -> None:
-        """Call `callback(answer)` with the response, at once if it is there."""
-        if self._done:
+    def add_done_callback(self, callback: Callable[[Future], None]) -> None:
+        """Call `callback(future)` with the response, at once if it is there."""
+        if self.done():
             callback(self)
         else:
             self._callbacks.append(callback)
 
-    def answer(self, response: Any) -> None:
+    def set_result(self, result: Any) -> None:
         """Set the response and call back."""
-        self._response = response
-        self._finish()
+        self._finish(result, None)
 
-    def fail(self, error: GraphError) -> None:
+    def set_exception(self, exception: BaseException) -> None:
         """Say that there will be no response, and call back."""
-        self._error = error
-        self._finish()
+        self._finish(None, exception)
 
-    def _finish(self) -> None:
-        self._done = True
-        for callback in self._callbacks:
+    def _finish(self, response: Any, error: BaseException | None) -> None:
+        if not self.done():
+            self._response, self._error, self._done = response, error, True
+            self._call_back()
+
+    def _call_back(self) -> None:
+        callbacks, self._callbacks = self._callbacks, []
+        for callback in callbacks:
             callback(self)
 
 
 class Client:
-    """Calls one service; without a request with one of zeros and empty texts."""
+    """Calls one service; without a request with one of zeros and empty texts.
 
-    def __init__(self, graph: Graph, service: str, srvtype: str, thinker: Thinker | None) -> None:
+    later: gives what does something at the run's first tick, while the node is being made; None
+    after that. run: calls back in the node's name.
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        service: str,
+        srvtype: str,
+        thinker: Thinker | None,
+        *,
+        later: Callable[[], Later | None],
+        run: Callable[[Callable[[], None], str], None],
+    ) -> None:
         self._graph = graph
         self._thinker = thinker
+        self._later = later
+        self._run = run
         self._request_type = f"{srvtype}_Request"
+        self._looks = (0, 0)  # how often it has been waited for, and when
         self.service = service
 
+    @property
+    def srv_name(self) -> str:
+        """Name of the service."""
+        return self.service
+
+    service_name = srv_name
+
     def service_is_ready(self) -> bool:
-        """Whether somebody offers the service."""
+        """Whether the service has a server."""
         return self._graph.has_service(self.service)
 
-    def call(self, request: Any | None = None) -> Any:
+    def wait_for_service(self, timeout_sec: float | None = None) -> bool:
+        """Whether the service has a server; simulated time cannot pass in here.
+
+        While a node is being made this is true: servers that start later are there when the clock
+        starts, when calls are made. `GraphError` where a callback goes on asking.
+        """
+        if self.service_is_ready() or self._later() is not None:
+            return True
+        now_ns = self._graph.now_ns()
+        count, last_ns = self._looks
+        self._looks = (count + 1 if last_ns == now_ns else 1, now_ns)
+        if timeout_sec is None or count >= _MOST_LOOKS:
+            raise GraphError(
+                f"service '{self.service}' has no server, and no time passes while a callback waits"
+                " for one; ask service_is_ready() in a timer"
+            )
+        return False
+
+    def call(self, request: Any | None = None, timeout_sec: float | None = None) -> Any:  # noqa: ARG002
         """Call and return the response, which comes at once; not for a node with a latency."""
         if self._thinker is not None:
             raise GraphError(
@@ -82,38 +141,51 @@ class Client:
             )
         return self._graph.call(self.service, self._filled(request))
 
-    def call_async(self, request: Any | None = None) -> Answer:
-        """Call; the answer comes at once, or later from a service outside.
+    def call_async(self, request: Any | None = None) -> Future:
+        """Call; the response comes at once, or later from a service outside.
 
         For a node with a latency it is input of a callback of its own.
         """
-        answer = Answer()
-        question = self._filled(request)
+        future = Future()
+        filled = self._filled(request)
+        later = self._later()
+        if later is not None and not self.service_is_ready():
+            later(lambda: self._ask(filled, future))
+        else:
+            self._ask(filled, future)
+        return future
 
-        def settle(how: Callable[[], None]) -> None:
-            if self._thinker is None:
-                how()
+    def remove_pending_request(self, future: Future) -> None:
+        """Wait for a response no more."""
+        future.cancel()
+
+    def destroy(self) -> None:
+        """Nothing is held."""
+
+    def _ask(self, request: Any, future: Future) -> None:
+        occasion = f"response of {self.service}"
+
+        def settle(how: Callable[[], None], asker: int) -> None:
+            if threading.get_ident() != asker:
+                self._graph.post(lambda: self._run(how, occasion))
+            elif self._thinker is not None:
+                self._run(how, occasion)
             else:
-                self._thinker.think(how)
+                how()  # inside the callback that asked
 
         def ask() -> None:
             here = threading.get_ident()
-
-            def come_back(how: Callable[[], None]) -> None:
-                if threading.get_ident() == here:
-                    settle(how)
-                else:
-                    self._graph.post(lambda: settle(how))
-
             reply = Reply(
-                lambda response: come_back(lambda: answer.answer(response)),
-                lambda error: come_back(lambda: answer.fail(error)),
+                lambda response: settle(lambda: future.set_result(response), here),
+                lambda error: settle(lambda: future.set_exception(error), here),
             )
-            self._graph.call_async(self.service, question, reply)
+            self._graph.call_async(self.service, request, reply)
 
         if self._thinker is None or not self._thinker.hold_back(ask):
             ask()
-        return answer
 
     def _filled(self, request: Any | None) -> Any:
-        return zero_message(self._request_type) if request is None else request
+        if request is None:
+            return zero_message(self._request_type)
+        name = getattr(request, "__msgtype__", None)
+        return copy_message(request) if name == self._request_type else request

@@ -24,6 +24,7 @@ from volery.graph.definition_files import (
     find_definition_files,
     read_definition_file,
 )
+from volery.graph.message_defaults import make_arguments_optional
 
 EMPTY_MEMBER = definition_budget.EMPTY_MEMBER
 """The byte that a message without fields has in ROS 2, and only there."""
@@ -175,6 +176,10 @@ class DefinitionStore(Typestore):
             # Where pickle finds the class again; rosbags' own module holds the newest type only.
             self.types[name].__module__ = self._module
         self._definitions.update(new)
+        for name in new:
+            make_arguments_optional(
+                name, self.types[name], self.types, self.fielddefs, self.default_of
+            )
 
 
 def _shape(fields: Any) -> Any:

@@ -130,6 +130,11 @@ class Publisher:
         self._graph.enqueue(self, self._topic, message)
 
     @property
+    def subscriptions(self) -> int:
+        """How many subscribe to this very topic."""
+        return len(self._topic.callbacks)
+
+    @property
     def heard(self) -> bool:
         """Whether a node inside subscribes to this very topic: who takes everything is none."""
         return len(self._topic.callbacks) > len(self._topic.outside)
@@ -413,6 +418,15 @@ class Graph:
         topic.messages += 1
         published = Published(topic.name, topic.msgtype, self._now_ns(), message)
         for put in tuple(topic.outside):
+            put(published)
+
+    def show_to_all(self, sender: Publisher, message: Any) -> None:
+        """Hand a message to recorders and clients outside, at once; for the last words of a run."""
+        published = Published(sender.topic, sender.msgtype, self._now_ns(), message)
+        with self._members:
+            topic = self._topics.get(sender.topic)
+            puts = (*self._to_all, *(topic.outside if topic is not None else ()))
+        for put in puts:
             put(published)
 
     def show_kept(self) -> None:

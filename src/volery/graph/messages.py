@@ -1,7 +1,8 @@
 """Messages: the ROS 2 types that Volery speaks, and what a published one carries.
 
 Types are plain dataclasses with numpy arrays from `rosbags`; no ROS installation is needed.
-Types that its store lacks come from the definition files in `definitions/`.
+Types that its store lacks come from the definition files in `definitions/`. Every argument of a
+message class may stay away, as in rclpy: see `message_defaults`.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from rosbags.typesys.stores import ros2_jazzy as _ros2
 
 from volery.core.clock import NS_PER_S, stamp_from_ns
 from volery.graph.definition_store import DefinitionStore
+from volery.graph.message_defaults import make_arguments_optional
 
 Time = _ros2.builtin_interfaces__msg__Time
 Point = _ros2.geometry_msgs__msg__Point
@@ -48,6 +50,7 @@ FluidPressure = _ros2.sensor_msgs__msg__FluidPressure
 BatteryState = _ros2.sensor_msgs__msg__BatteryState
 Imu = _ros2.sensor_msgs__msg__Imu
 JointState = _ros2.sensor_msgs__msg__JointState
+Log = _ros2.rcl_interfaces__msg__Log
 LaserEcho = _ros2.sensor_msgs__msg__LaserEcho
 LaserScan = _ros2.sensor_msgs__msg__LaserScan
 MagneticField = _ros2.sensor_msgs__msg__MagneticField
@@ -78,6 +81,23 @@ def typestore() -> DefinitionStore:
     store = DefinitionStore(get_typestore(Stores.ROS2_JAZZY), __name__)
     store.index_folder(_DEFINITIONS)
     return store
+
+
+_BASE_DEFAULTS = {("geometry_msgs/msg/Quaternion", "w"): 1.0}
+"""Defaults in the definition files of ROS 2, which the types of `rosbags` do not keep."""
+
+
+def _base_default(msgtype: str, field: str) -> Any:
+    return _BASE_DEFAULTS.get((msgtype, field))
+
+
+def _make_base_arguments_optional() -> None:
+    base = get_typestore(Stores.ROS2_JAZZY)
+    for name, cls in base.types.items():
+        make_arguments_optional(name, cls, base.types, base.fielddefs, _base_default)
+
+
+_make_base_arguments_optional()
 
 
 def add_definitions(folder: str | Path, *, foreign: bool = False) -> list[str]:

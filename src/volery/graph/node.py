@@ -4,113 +4,113 @@ A node is a class with subscriptions, publishers, timers and parameters. It neve
 in a simulation:
 
     class Watcher(Node):
-        def __init__(self, **options):
-            super().__init__("watcher", **options)
+        def __init__(self):
+            super().__init__("watcher")
             self.publisher = self.create_publisher(Twist, "cmd_vel", 10)
             self.create_subscription(LaserScan, "laser/horizontal/scan", self.on_scan, 5)
 
 Relative names live below the node's namespace (`/uav1`), names that start with `/` are absolute,
-names that start with `~/` belong to the node.
+names that start with `~/` belong to the node. Where no ROS is sourced the class may be imported as
+`rclpy.node.Node`: see `graph.nodes.imports`.
 """
 
 from __future__ import annotations
 
 import logging
-import math
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 from volery.core.errors import GraphError, NodeError, VoleryError
 from volery.graph.client import Client
-from volery.graph.graph import Graph, Publisher, Subscription, check_period
+from volery.graph.graph import Subscription, check_period
+from volery.graph.message_copies import copy_message
 from volery.graph.messages import Published, message_type
-from volery.graph.parameters import Parameter, Within
+from volery.graph.nodes.failures import add_frames, place_of
+from volery.graph.nodes.handles import NodePublisher, NodeService, NodeSubscription
+from volery.graph.nodes.launch import Context, present_launch
+from volery.graph.nodes.logger import LOG_TYPE, ROSOUT, NodeLogger
+from volery.graph.nodes.parameter_methods import ParameterMethods
+from volery.graph.nodes.ros_time import Clock
+from volery.graph.nodes.timer import Timer, Timers
+from volery.graph.parameters import ParameterSetting
 from volery.graph.qos import DEFAULT_DEPTH, QoSProfile, profile_of
-from volery.graph.thinking import Deferring, DelayedPublisher, Thinker
-from volery.scenario.access import ScenarioAccess
+from volery.graph.thinking import Thinker
+
+__all__ = ["Clock", "Context", "Node", "Timers"]
 
 _log = logging.getLogger(__name__)
 
 
-class Timers(Deferring, Protocol):
-    """Whoever can call back at simulated times."""
+class Node(ParameterMethods):
+    """Base of all nodes.
 
-    def every(
-        self,
-        period_s: float,
-        callback: Callable[[], None],
-        *,
-        wanted: Callable[[], bool] | None = None,
-    ) -> None:
-        """Call `callback` each period, first after one period; not where `wanted()` is false."""
-
-
-@dataclass(frozen=True)
-class Context:
-    """What a node stands on: a graph, timers, a clock, and the simulated time it takes to think.
-
-    With `latency_ns` above 0 the node's callbacks run on a worker and what they publish is
-    released that much later; see `graph.thinking`.
+    `context`, `namespace` and `parameter_overrides` come from the launch and need not be passed on;
+    the other arguments are those of rclpy. Of these `enable_rosout`, `allow_undeclared_parameters`
+    and `automatically_declare_parameters_from_overrides` have an effect.
     """
-
-    graph: Graph
-    timers: Timers
-    now_ns: Callable[[], int]
-    latency_ns: int = 0
-    remap: Mapping[str, str] = field(default_factory=dict)
-    """Other names for topics and services: absolute name of the node's to that of the graph."""
-    access: ScenarioAccess = field(default_factory=ScenarioAccess)
-    """What the scenario that names the node may reach."""
-
-
-class Clock:
-    """The node's clock: simulated time."""
-
-    def __init__(self, now_ns: Callable[[], int]) -> None:
-        self._now_ns = now_ns
-
-    def now_ns(self) -> int:
-        """Nanoseconds since the start of the run."""
-        return self._now_ns()
-
-
-class Node:
-    """Base of all nodes. Subclasses accept `**options` and pass them on."""
 
     def __init__(
         self,
         node_name: str,
         *,
-        context: Context,
-        namespace: str = "",
-        parameter_overrides: Mapping[str, Any] | None = None,
+        context: Context | None = None,
+        namespace: str | None = None,
+        parameter_overrides: Mapping[str, Any] | Iterable[ParameterSetting] | None = None,
+        cli_args: Sequence[str] | None = None,  # noqa: ARG002
+        use_global_arguments: bool = True,  # noqa: ARG002
+        enable_rosout: bool = True,
+        start_parameter_services: bool = True,  # noqa: ARG002
+        allow_undeclared_parameters: bool = False,
+        automatically_declare_parameters_from_overrides: bool = False,
+        **_options: Any,
     ) -> None:
-        self._name = node_name
-        self._namespace = namespace.rstrip("/")
+        if context is None:
+            launch = present_launch()
+            if launch is None:
+                raise GraphError(
+                    f"node {node_name}: nothing launches it; name its class in a scenario, run it "
+                    "with `volery node`, or give a context"
+                )
+            context, namespace = launch.context, launch.namespace or namespace
+            parameter_overrides = _joined(parameter_overrides, launch.parameters)
         self._context = context
-        self._overrides = dict(parameter_overrides or {})
-        self._parameters: dict[str, Parameter] = {}
-        self._held: list[Callable[[], None]] = []
-        """What gives back a publisher, a subscription, a service."""
-        self._destroyed = False
-        self._busy_s = 0.0
-        self._thinker = (
+        self.__name = node_name
+        self.__namespace = ("/" + namespace.strip("/")).rstrip("/") if namespace else ""
+        self.__held: dict[Any, Callable[[], None]] = {}
+        """What the node has made, and what gives it back."""
+        self.__timers: list[Timer] = []
+        self.__destroyed = False
+        self.__busy_s = 0.0
+        self.__thinker = (
             Thinker(node_name, context.latency_ns, context.timers, context.now_ns)
             if context.latency_ns
             else None
         )
+        super().__init__(
+            node_name,
+            self.full_name,
+            context.graph.parameters,
+            parameter_overrides,
+            before_set=self.join,
+            allow_undeclared=allow_undeclared_parameters,
+        )
         context.graph.enter(self.full_name)
+        publish = None
+        if enable_rosout:
+            publish = self.create_publisher(message_type(LOG_TYPE), ROSOUT, latched=True).publish
+        self.__logger = NodeLogger(self.full_name[1:].replace("/", "."), self.__now_ns, publish)
+        if automatically_declare_parameters_from_overrides:
+            self.declare_overrides()
 
     # ------------------------------------------------------------------------------ the contract
 
     @classmethod
     def warm_ups(cls) -> Sequence[Callable[[], None]]:
-        """Functions that let the kernels compile that the node calls, each some of them.
+        """Functions that let the numba code compile that the node calls, each some of it.
 
-        A node with kernels overrides it. The functions are a module's, not made on the spot, and
+        A node with such code overrides it. The functions are a module's, not made on the spot, and
         call what the node calls, with input made up for it, whose arrays have the types and layouts
         of the real ones. They are called before the clock of a run starts, in any order and maybe
         in another process, for what is compiled later stops the flight; those of Volery's own nodes
@@ -120,119 +120,151 @@ class Node:
 
     def get_name(self) -> str:
         """Name without namespace."""
-        return self._name
+        return self.__name
 
     def get_namespace(self) -> str:
         """Namespace, such as `/uav1`."""
-        return self._namespace or "/"
+        return self.__namespace or "/"
 
     @property
     def full_name(self) -> str:
         """Name with namespace, such as `/uav1/gap_following`."""
-        return f"{self._namespace}/{self._name}"
+        return f"{self.__namespace}/{self.__name}"
+
+    def get_fully_qualified_name(self) -> str:
+        """Name with namespace, such as `/uav1/gap_following`."""
+        return self.full_name
 
     def get_clock(self) -> Clock:
         """The clock that stamps are compared with."""
-        return Clock(self._now_ns)
+        return Clock(self.__now_ns)
+
+    def get_logger(self) -> NodeLogger:
+        """The node's logger."""
+        return self.__logger
 
     def create_publisher(
         self,
         msg_type: type[Any],
         topic: str,
-        qos: int | QoSProfile = DEFAULT_DEPTH,
+        qos_profile: int | QoSProfile = DEFAULT_DEPTH,
         *,
         latched: bool = False,
-    ) -> Publisher:
+        **_options: Any,
+    ) -> NodePublisher:
         """Publish `msg_type` on `topic`; each subscriber decides how messages wait for it.
 
         `latched`, or durability TRANSIENT_LOCAL, hands the last message to those who subscribe
         later.
         """
-        latched = profile_of(qos).latched or latched
+        latched = profile_of(qos_profile).latched or latched
         publisher = self._context.graph.advertise(self.resolve(topic), msg_type, latched=latched)
         publisher.owner = self.full_name
-        self._held.append(publisher.cancel)
-        return publisher if self._thinker is None else DelayedPublisher(publisher, self._thinker)
+        handle = NodePublisher(publisher, self.__thinker)
+        self.__held[handle] = handle.cancel
+        return handle
 
     def create_subscription(
         self,
         msg_type: type[Any],
         topic: str,
-        callback: Callable[[Any], None],
-        qos: int | QoSProfile = DEFAULT_DEPTH,
-    ) -> Subscription:
+        callback: Callable[[Any], Any],
+        qos_profile: int | QoSProfile = DEFAULT_DEPTH,
+        **_options: Any,
+    ) -> NodeSubscription:
         """Call `callback(message)` for each message of `topic`.
 
-        qos: what happens where messages come faster than they are taken, which can only be in a
-        process of its own. A depth keeps the newest so many; see `graph.qos.QoSProfile`.
+        qos_profile: what happens where messages come faster than they are taken, which can only be
+        in a process of its own. A depth keeps the newest so many; see `graph.qos.QoSProfile`.
         """
-        profile = profile_of(qos)
-
         name = self.resolve(topic)
-        occasion = f"message on {name}"
+        occasion = f"message on {name}{_name_of(callback)}"
 
         def receive(published: Published) -> None:
-            self._run(partial(callback, published.message), occasion)
+            self.__run(partial(callback, published.message), occasion)
 
-        subscription = self._context.graph.subscribe(name, receive, msg_type, qos=profile)
-        self._held.append(subscription.cancel)
-        return subscription
-
-    def create_timer(self, period_s: float, callback: Callable[[], None]) -> None:
-        """Call `callback` each `period_s` of simulated time."""
-        check_period(period_s)
-        self._context.timers.every(
-            period_s,
-            lambda: self._run(callback, "timer", heavy=True),
-            wanted=lambda: not self._destroyed,
+        subscription: Subscription = self._context.graph.subscribe(
+            name, receive, msg_type, qos=profile_of(qos_profile)
         )
+        handle = NodeSubscription(subscription, name, callback)
+        self.__held[handle] = handle.cancel
+        return handle
+
+    def create_timer(
+        self,
+        timer_period_sec: float,
+        callback: Callable[[], Any],
+        callback_group: Any = None,  # noqa: ARG002
+        clock: Any = None,  # noqa: ARG002
+        autostart: bool = True,
+    ) -> Timer:
+        """Call `callback` each `timer_period_sec` of simulated time."""
+        check_period(timer_period_sec)
+        occasion = f"timer{_name_of(callback)}"
+        timer = Timer(
+            timer_period_sec,
+            callback,
+            lambda: self.__run(timer.callback, occasion, heavy=True),
+            self._context.timers,
+            self.__now_ns,
+            self.__defer,
+            autostart=autostart,
+        )
+        self.__held[timer] = timer.destroy
+        self.__timers.append(timer)
+        return timer
 
     def create_service(
-        self, srv_type: str, service: str, callback: Callable[[Any, Any], Any]
-    ) -> None:
-        """Offer a service: `callback(request, response)` returns the response, at once."""
-        response_type = message_type(f"{srv_type}_Response")
+        self,
+        srv_type: str | type[Any],
+        srv_name: str,
+        callback: Callable[[Any, Any], Any],
+        **_options: Any,
+    ) -> NodeService:
+        """Offer a service: `callback(request, response)` returns the response, at once.
+
+        srv_type: a class such as `std_srvs.srv.Trigger`, or its name, `std_srvs/srv/Trigger`.
+        """
+        kind, name, graph = service_type(srv_type), self.resolve(srv_name), self._context.graph
+        response_type = message_type(f"{kind}_Response")
+        occasion = f"service {name}{_name_of(callback)}"
+
+        def respond(request: Any) -> Any:
+            response = self.__guarded_service(
+                lambda: callback(request, response_type()), occasion, response_type
+            )
+            return copy_message(response)
 
         def handle(request: Any) -> Any:
-            if self._thinker is None:
-                return callback(request, _blank(response_type))
-            return self._thinker.answer(lambda: callback(request, _blank(response_type)))
+            if self.__thinker is None:
+                return respond(request)
+            return self.__thinker.answer(lambda: respond(request))
 
-        name, graph = self.resolve(service), self._context.graph
-        graph.offer(name, srv_type, handle)
-        self._held.append(lambda: graph.withdraw(name))
+        graph.offer(name, kind, handle)
+        service = NodeService(name, kind, lambda: graph.withdraw(name))
+        self.__held[service] = service.destroy
+        return service
 
-    def create_client(self, srv_type: str, service: str) -> Client:
-        """Client of a service of type `srv_type`, e.g. `std_srvs/srv/Trigger`."""
-        message_type(f"{srv_type}_Request")
-        return Client(self._context.graph, self.resolve(service), srv_type, self._thinker)
+    def create_client(self, srv_type: str | type[Any], srv_name: str, **_options: Any) -> Client:
+        """Client of a service of a type as `create_service` takes it."""
+        kind = service_type(srv_type)
+        message_type(f"{kind}_Request")
+        return Client(
+            self._context.graph,
+            self.resolve(srv_name),
+            kind,
+            self.__thinker,
+            later=self.__later,
+            run=self.__run,
+        )
 
-    def declare_parameter(
-        self,
-        name: str,
-        default: Any,
-        *,
-        read_only: bool = True,
-        least: float | None = None,
-        most: float = math.inf,
-    ) -> Parameter:
-        """Declare a parameter; an override given at start wins over the default.
+    def destroy_publisher(self, publisher: NodePublisher) -> bool:
+        """Publish no more; whether the node had it."""
+        return self.__give_back(publisher)
 
-        Unless it is `read_only` it may be set while the node runs, which then reads
-        `Parameter.value` each time anew. A number with a `least` value is finite, and `most` at
-        most. `GraphError` for what does not fit.
-        """
-        value = self._overrides.pop(name, default)
-        within = None if least is None else Within(least, most)
-        try:
-            parameter = Parameter(
-                name, value, like=default, within=within, read_only=read_only, before_set=self.join
-            )
-        except GraphError as error:
-            raise GraphError(f"node {self._name}: {error}") from None
-        self._context.graph.parameters.declare(self.full_name, parameter)
-        self._parameters[name] = parameter
-        return parameter
+    def destroy_subscription(self, subscription: NodeSubscription) -> bool:
+        """Receive no more; whether the node had it."""
+        return self.__give_back(subscription)
 
     def declare_folder(self, name: str, default: str) -> str:
         """Declare a read-only parameter that names a folder of the node's files; its value.
@@ -248,47 +280,74 @@ class Node:
             )
         return folder
 
-    def get_parameter(self, name: str) -> Parameter:
-        """A declared parameter."""
-        try:
-            return self._parameters[name]
-        except KeyError:
-            raise GraphError(f"node {self._name}: parameter '{name}' is not declared") from None
+    def destroy_timer(self, timer: Timer) -> bool:
+        """End a timer for good; whether the node had it."""
+        if timer in self.__timers:
+            self.__timers.remove(timer)
+        return self.__give_back(timer)
+
+    def destroy_service(self, service: NodeService) -> bool:
+        """Offer a service no more; whether the node had it."""
+        return self.__give_back(service)
+
+    def destroy_client(self, client: Client) -> bool:
+        """Nothing is held by a client; True."""
+        client.destroy()
+        return True
 
     def destroy_node(self) -> None:
         """Give back what the node holds; nothing of it runs afterwards."""
         self._context.graph.parameters.forget(self.full_name)
-        if self._thinker is not None:
-            self._thinker.close()
-        self._destroyed = True
-        while self._held:
-            self._held.pop()()
+        if self.__thinker is not None:
+            self.__thinker.close()
+        self.__destroyed = True
+        while self.__held:
+            self.__held.popitem()[1]()
 
     # ----------------------------------------------------------------------------------- helpers
 
     def join(self) -> None:
         """Wait until no callback of the node is running."""
-        if self._thinker is not None:
-            self._thinker.join()
+        if self.__thinker is not None:
+            self.__thinker.join()
 
-    def _now_ns(self) -> int:
-        return self._context.now_ns() if self._thinker is None else self._thinker.now_ns()
+    def __now_ns(self) -> int:
+        return self._context.now_ns() if self.__thinker is None else self.__thinker.now_ns()
 
-    def _run(self, callback: Callable[[], None], occasion: str, *, heavy: bool = False) -> None:
-        if self._destroyed:
+    def __defer(self, action: Callable[[], Any]) -> None:
+        """Do something at once, or when the output of the present callback is released."""
+        if self.__thinker is None or not self.__thinker.hold_back(action):
+            action()
+
+    def __later(self) -> Callable[[Callable[[], None]], None] | None:
+        """While a node is being made: has something done at the run's first tick."""
+        if present_launch() is None:
+            return None
+        timers, now_ns = self._context.timers, self._context.now_ns
+        return lambda action: timers.at(now_ns(), lambda: self.__run(action, "first call"))
+
+    def __give_back(self, handle: Any) -> bool:
+        give_back = self.__held.pop(handle, None)
+        if give_back is not None:
+            self.__defer(give_back)
+        return give_back is not None
+
+    def __run(self, callback: Callable[[], Any], occasion: str, *, heavy: bool = False) -> None:
+        if self.__destroyed:
             return
-        if self._thinker is None:
+        if self.__thinker is None:
             before = time.thread_time()
             try:
-                self._guarded(callback, occasion)
+                self.__guarded(callback, occasion)
             finally:
-                self._busy_s += time.thread_time() - before
+                self.__busy_s += time.thread_time() - before
         else:
             client = self._context.graph.acting_client
-            self._thinker.think(partial(self._guarded, callback, occasion, client), heavy=heavy)
+            work = partial(self.__guarded, callback, occasion, client)
+            self.__thinker.think(work, heavy=heavy)
 
-    def _guarded(self, callback: Callable[[], None], occasion: str, client: str = "") -> None:
-        """Call back; a failure becomes a `NodeError` that tells whose it was.
+    def __guarded(self, callback: Callable[[], Any], occasion: str, client: str = "") -> None:
+        """Call back; a failure becomes a `NodeError` that names node, callback, time and line.
 
         client: the external client that caused it, where this runs later than its command; then
         the failure is logged, and does not end the run.
@@ -300,51 +359,95 @@ class Node:
                 cause = f"node {self.full_name}: {occasion}, caused by {client}"
                 _log.warning("%s, failed", cause, exc_info=error)
                 return
-            if isinstance(error, VoleryError):
+            if isinstance(error, NodeError) and error.node:
                 raise
-            at = f"{self._now_ns() / 1e9:.3f} s"
-            raise NodeError(
-                f"node {self.full_name} failed at {at} in its {occasion}: "
-                f"{type(error).__name__}: {error}"
-            ) from error
+            raise self.__failure(error, occasion) from error
+
+    def __guarded_service(
+        self, callback: Callable[[], Any], occasion: str, response_type: type[Any]
+    ) -> Any:
+        """Respond; what a service refuses with an error of Volery's is the caller's to know."""
+        try:
+            response = callback()
+            if not isinstance(response, response_type):
+                raise TypeError(f"returned {response!r}, not the response")
+        except VoleryError:
+            raise
+        except Exception as error:
+            raise self.__failure(error, occasion) from error
+        return response
+
+    def __failure(self, error: Exception, occasion: str) -> NodeError:
+        now_ns = self.__now_ns()
+        what = str(error) if isinstance(error, VoleryError) else f"{type(error).__name__}: {error}"
+        failure = NodeError(
+            f"node {self.full_name} failed at {now_ns / 1e9:.3f} s in its {occasion}: "
+            f"{what}{place_of(error)}",
+            node=self.full_name,
+            time_ns=now_ns,
+        )
+        add_frames(failure, error)
+        return failure
 
     def resolve(self, name: str) -> str:
         """Absolute name of a topic or service, as the launch profile wants it."""
         if name.startswith("~/"):
-            name = f"{self._namespace}/{self._name}/{name[2:]}"
+            name = f"{self.__namespace}/{self.__name}/{name[2:]}"
         elif not name.startswith("/"):
-            name = f"{self._namespace}/{name}"
+            name = f"{self.__namespace}/{name}"
         return self._context.remap.get(name, name)
+
+    def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:  # noqa: ARG002
+        """Absolute name of a topic."""
+        return self.resolve(topic)
+
+    def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:  # noqa: ARG002
+        """Absolute name of a service."""
+        return self.resolve(service)
 
     @property
     def busy_s(self) -> float:
         """CPU time that its callbacks have taken so far."""
-        return self._busy_s if self._thinker is None else self._thinker.busy_s
+        return self.__busy_s if self.__thinker is None else self.__thinker.busy_s
 
     @property
     def has_worker(self) -> bool:
         """Whether its callbacks run on a thread of its own."""
-        return self._thinker is not None
+        return self.__thinker is not None
 
-    def unused_overrides(self) -> list[str]:
-        """Overrides that no `declare_parameter` asked for: most likely misspelt."""
-        return sorted(self._overrides)
+    def save_base_state(self) -> Any:
+        """What a snapshot holds beside the node's own state: parameters, timers, logger."""
+        timers = [timer.get_state() for timer in self.__timers]
+        return self.parameter_values(), timers, self.__logger.get_state()
 
-    def declared_parameters(self) -> list[str]:
-        """Names of all declared parameters."""
-        return sorted(self._parameters)
-
-    def parameter_values(self) -> dict[str, Any]:
-        """Values of the parameters that may be set while the node runs, by name."""
-        return {k: p.value for k, p in self._parameters.items() if not p.read_only}
-
-    def put_back_parameters(self, values: Mapping[str, Any]) -> None:
-        """Set what `parameter_values` gave."""
-        for name, value in values.items():
-            self._parameters[name].value = value
+    def restore_base_state(self, state: Any) -> None:
+        """Go back to what `save_base_state` gave."""
+        values, timers, logger = state
+        self.put_back_parameters(values)
+        for timer, kept in zip(self.__timers, timers, strict=False):
+            timer.set_state(kept)
+        self.__logger.set_state(logger)
 
 
-def _blank(response_type: type[Any]) -> Any:
-    zero = {"bool": False, "str": "", "int": 0, "float": 0.0}
-    names = [f for f in fields(response_type) if not f.name.startswith("__")]
-    return response_type(**{f.name: zero.get(str(f.type)) for f in names})
+def service_type(srv_type: str | type[Any]) -> str:
+    """Name of a service type, `std_srvs/srv/Trigger`, of a class or a name."""
+    if isinstance(srv_type, str):
+        return srv_type
+    name = getattr(srv_type, "__srvtype__", None)
+    if name is None:
+        raise GraphError(f"{srv_type!r} is no service type of Volery's; import it from PACKAGE.srv")
+    return str(name)
+
+
+def _name_of(callback: Callable[..., Any]) -> str:
+    """` (NAME)` of a callback that has one."""
+    name = getattr(callback, "__name__", "")
+    return f" ({name})" if name and name != "<lambda>" else ""
+
+
+def _joined(
+    own: Mapping[str, Any] | Iterable[ParameterSetting] | None, launched: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Overrides in the node's code and those of its launch, which win."""
+    given = own if isinstance(own, Mapping) else {s.name: s.value for s in own or ()}
+    return {**given, **launched}

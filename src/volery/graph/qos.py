@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 from volery.core.errors import GraphError
 
@@ -20,6 +21,7 @@ def check_depth(depth: int) -> None:
 class ReliabilityPolicy(StrEnum):
     """What happens where a subscriber is too slow."""
 
+    SYSTEM_DEFAULT = "system_default"
     BEST_EFFORT = "best_effort"
     """The oldest message goes, and is counted."""
     RELIABLE = "reliable"
@@ -29,26 +31,44 @@ class ReliabilityPolicy(StrEnum):
 class DurabilityPolicy(StrEnum):
     """What those get who subscribe late."""
 
+    SYSTEM_DEFAULT = "system_default"
     VOLATILE = "volatile"
     TRANSIENT_LOCAL = "transient_local"
     """The publisher's last message."""
 
 
-@dataclass(frozen=True)
+class HistoryPolicy(StrEnum):
+    """How many messages wait."""
+
+    KEEP_LAST = "keep_last"
+    KEEP_ALL = "keep_all"
+    """As many as may wait at all; the depth does not count."""
+    SYSTEM_DEFAULT = "system_default"
+
+
+@dataclass
 class QoSProfile:
     """Quality of service of a publisher or subscription.
 
     Inside the simulation nothing ever waits or is lost; the depth and reliability of a subscription
     count where it goes through a door. Durability counts for publishers alone: every subscription
-    gets what is latched.
+    gets what is latched. rclpy's `deadline`, `lifespan` and `liveliness` are without effect.
     """
 
     depth: int = DEFAULT_DEPTH
     """Messages that wait at most with best effort."""
     reliability: ReliabilityPolicy = ReliabilityPolicy.BEST_EFFORT
     durability: DurabilityPolicy = DurabilityPolicy.VOLATILE
+    history: HistoryPolicy = HistoryPolicy.KEEP_LAST
+    deadline: Any = None
+    lifespan: Any = None
+    liveliness: Any = None
+    liveliness_lease_duration: Any = None
+    avoid_ros_namespace_conventions: bool = False
 
     def __post_init__(self) -> None:
+        if self.history == HistoryPolicy.KEEP_ALL:
+            self.depth = MOST_DEPTH
         check_depth(self.depth)
 
     @property
@@ -70,4 +90,7 @@ qos_profile_sensor_data = QoSProfile(depth=5)
 
 def profile_of(qos: int | QoSProfile) -> QoSProfile:
     """A profile, or that of a depth. `GraphError` for a depth that cannot be."""
-    return qos if isinstance(qos, QoSProfile) else QoSProfile(qos)
+    if not isinstance(qos, QoSProfile):
+        return QoSProfile(qos)
+    check_depth(qos.depth)
+    return qos

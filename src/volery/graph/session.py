@@ -22,10 +22,11 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from volery.core.errors import GraphError, VoleryError
+from volery.core.errors import GraphError, NodeError, VoleryError
 from volery.graph.graph import Graph, Publisher, Subscription
 from volery.graph.mailbox import Mailbox, MailboxInfo, Wake, message_bytes
 from volery.graph.messages import message_type
+from volery.graph.nodes.failures import report_failure
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
 from volery.graph.read_budget import ReadBudgets, Reading, write_budgets
 from volery.graph.reply import Reply
@@ -334,6 +335,9 @@ class Session:
                 self._graph.call_async(service, request, reply)
             except GraphError as error:
                 reply.fail(error)
+            except NodeError as error:
+                report_failure(self._graph, error, is_raised=False)
+                raise
 
         self.post(ask).add_done_callback(
             lambda asked: _tell_failure(asked, reply, service, self.name)

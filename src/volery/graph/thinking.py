@@ -18,7 +18,6 @@ from queue import SimpleQueue
 from typing import Any, Protocol
 
 from volery.core.errors import GraphError
-from volery.graph.graph import Publisher
 
 Action = Callable[[], Any]
 
@@ -126,7 +125,9 @@ class Thinker:
         return True
 
     def join(self) -> None:
-        """Have everything worked on, and wait for it."""
+        """Have everything worked on, and wait for it; on the worker itself do nothing."""
+        if self._thought() is not None:
+            return
         self._hand_over()
         if self._last is not None:
             self._last.wait()
@@ -179,26 +180,3 @@ class Thinker:
             thought.error = error
         finally:
             self.busy_s += time.thread_time() - before
-
-
-class DelayedPublisher(Publisher):
-    """Publisher of a node with a latency: a callback's messages leave when its time is up."""
-
-    def __init__(self, publisher: Publisher, thinker: Thinker) -> None:
-        self._publisher = publisher
-        self._thinker = thinker
-
-    @property
-    def topic(self) -> str:
-        """Name of the topic."""
-        return self._publisher.topic
-
-    @property
-    def wanted(self) -> bool:
-        """Whether anybody would receive a message."""
-        return self._publisher.wanted
-
-    def publish(self, message: Any) -> None:
-        """Publish `message` after the latency; outside of callbacks at once."""
-        if not self._thinker.hold_back(lambda: self._publisher.publish(message)):
-            self._publisher.publish(message)

@@ -21,8 +21,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from volery.core.errors import ScenarioError
+from volery.core.errors import ScenarioError, VoleryError
 from volery.graph.node import Context, Node
+from volery.graph.nodes.failures import add_frames, place_of
+from volery.graph.nodes.imports import provide_ros_imports
+from volery.graph.nodes.launch import Launch, make_node
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.schema import NodeEntry, Scenario
 
@@ -36,12 +39,10 @@ def start_node(
     """Import and construct a node. Raises `ScenarioError` naming the key in the scenario."""
     node_class = find_node(entry, where, access)
     try:
-        node: Node = node_class(
-            context=context, namespace=namespace, parameter_overrides=entry.parameters
-        )
+        node: Node = make_node(node_class, Launch(context, namespace, entry.parameters))
     except Exception as error:
         _check_base(getattr(error, "obj", None), entry, where)
-        raise ScenarioError(f"{where}: node '{entry.node}' does not start: {error}") from error
+        raise _broken(f"{where}: node '{entry.node}' does not start", error) from error
     _check_base(node, entry, where)
     unused = node.unused_overrides()
     if unused:
@@ -151,10 +152,11 @@ def _installed_only(access: ScenarioAccess) -> Iterator[None]:
 
 def _find_class(path: str, where: str) -> type[Any]:
     module_name, class_name = path.split(":")
+    provide_ros_imports()
     try:
         module = importlib.import_module(module_name)
     except Exception as error:
-        raise ScenarioError(f"{where}: node '{path}' cannot be imported: {error}") from error
+        raise _broken(f"{where}: node '{path}' cannot be imported", error) from error
     try:
         found = getattr(module, class_name)
     except AttributeError:
@@ -162,5 +164,25 @@ def _find_class(path: str, where: str) -> type[Any]:
             f"{where}: module '{module_name}' has no class '{class_name}'"
         ) from None
     if not (isinstance(found, type) and issubclass(found, Node)):
-        raise ScenarioError(f"{where}: '{path}' is no subclass of volery.graph.node.Node")
+        raise ScenarioError(
+            f"{where}: '{path}' is no subclass of volery.graph.node.Node{_hint(found)}"
+        )
     return found
+
+
+def _hint(found: Any) -> str:
+    bases = [base.__module__ for base in getattr(found, "__mro__", ())]
+    if "rclpy.node" not in bases:
+        return ""
+    return (
+        ", but of the rclpy of a sourced ROS: run Volery in a shell where none is sourced, or run "
+        "the node with ros2 run and open --door ros2"
+    )
+
+
+def _broken(what: str, error: Exception) -> ScenarioError:
+    """An error of the node's code, with its line and the frames of the user's files."""
+    kind = "" if isinstance(error, VoleryError) else f"{type(error).__name__}: "
+    failure = ScenarioError(f"{what}: {kind}{error}{place_of(error)}")
+    add_frames(failure, error)
+    return failure

@@ -12,8 +12,8 @@ from volery.graph.publishing import GraphPublisher
 from volery.runtime.digest import Digest
 from volery.sensors.samples import Samples
 
-NOT_OF_THE_WORLD = ("/volery/", "/ground_truth/tf")
-"""Topics that tell of the simulation and who takes part in it, and of poses that are in already."""
+NOT_OF_THE_WORLD = ("/volery/", "/ground_truth/tf", "/rosout")
+"""Topics of the simulation and its clients, of poses that are in already, and of nodes' logs."""
 
 
 class Outlet:

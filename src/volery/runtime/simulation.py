@@ -23,6 +23,7 @@ from volery.engine.partners import Partner, check_terms
 from volery.engine.stepping import OnSteps, StepRequest
 from volery.graph.graph import Graph
 from volery.graph.node import Node
+from volery.graph.nodes.failures import reported_failures
 from volery.graph.publishing import GraphPublisher
 from volery.graph.session import Gateway, Post
 from volery.runtime.assembly import assemble
@@ -229,7 +230,8 @@ class Simulation:
         """Advance by physics steps (1 ms each unless the scenario says otherwise)."""
         self._check_open()
         check_steps(steps)
-        self._engine.advance_to(self._engine.fleet.step + steps)
+        with reported_failures(self.graph):
+            self._engine.advance_to(self._engine.fleet.step + steps)
 
     def run(
         self,
@@ -248,7 +250,8 @@ class Simulation:
         self._check_open()
         if seconds is not None:
             check_seconds(seconds)
-        self._loop.run(seconds, speed, on_progress)
+        with reported_failures(self.graph):
+            self._loop.run(seconds, speed, on_progress)
 
     def wait_at_end(self, on_wait: Callable[[], None]) -> None:
         """Stay paused at the end for clients, until they reset, continue or quit; see `end`.

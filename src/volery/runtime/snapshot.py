@@ -42,12 +42,12 @@ class Snapshot:
 
 
 def keep_nodes(nodes: Sequence[Node]) -> NodeStates:
-    """States of nodes, None of one that does not offer it, and values of their parameters."""
+    """States of nodes, None of one that does not offer it, and what every node has."""
     for node in nodes:
         node.join()
     return {
         key: copy.deepcopy(
-            (node.get_state() if isinstance(node, KeepsState) else None, node.parameter_values())
+            (node.get_state() if isinstance(node, KeepsState) else None, node.save_base_state())
         )
         for key, node in _keyed(nodes)
     }
@@ -56,9 +56,9 @@ def keep_nodes(nodes: Sequence[Node]) -> NodeStates:
 def put_back_nodes(nodes: Sequence[Node], states: NodeStates) -> None:
     """Give all nodes back what `keep_nodes` kept."""
     for key, node in _keyed(nodes):
-        state, values = copy.deepcopy(states[key])
+        state, base = copy.deepcopy(states[key])
         node.join()
-        node.put_back_parameters(values)
+        node.restore_base_state(base)
         if isinstance(node, KeepsState):
             node.set_state(state)
 

@@ -48,6 +48,9 @@ class Clockwork:
         self._count += 1
         heapq.heappush(self._due, (time_ns, self._count, action))
 
+    def forget(self, callback: Callable[[], Any]) -> None:
+        """Its `wanted` says so."""
+
     def every(self, period_s: float, callback: Callable[[], Any], *, wanted: Any = None) -> None:
         period = round(period_s * S)
 

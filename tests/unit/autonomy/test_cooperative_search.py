@@ -48,6 +48,9 @@ class Timers:
         assert wanted()
         self.callbacks.append(callback)
 
+    def forget(self, callback):
+        self.callbacks.remove(callback)
+
 
 class Bodies:
     """Kinematic UAVs and their down cameras around the nodes of a team."""

@@ -14,12 +14,12 @@ from volery.bridges.nodes.host import NodeHost
 from volery.bridges.ros2.client import Ros2Client
 from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
-from volery.bridges.ros2.parameter_values import parameter_message, plain_of
 from volery.cli.topics import list_topics
 from volery.core.errors import GraphError
 from volery.graph.link import call_and_wait
 from volery.graph.messages import Clock, String, Time, message_type
 from volery.graph.node import Node
+from volery.graph.parameter_values import parameter_message, plain_of
 
 TRIGGER = "std_srvs/srv/Trigger"
 STRING = "std_msgs/msg/String"

@@ -28,7 +28,6 @@ from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms, join_ros2
 from volery.bridges.ros2.middleware import Profile, ServiceSpec
 from volery.bridges.ros2.names import NodeName
-from volery.bridges.ros2.parameter_values import parameter_message, plain_of
 from volery.bridges.rosbridge.beside import WithRosApi
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.cdr import decode_cdr, encode_cdr
@@ -43,6 +42,7 @@ from volery.graph.messages import (
     time_from_ns,
     typestore,
 )
+from volery.graph.parameter_values import parameter_message, plain_of
 from volery.graph.parameters import Parameter
 from volery.graph.zero import zero_message
 

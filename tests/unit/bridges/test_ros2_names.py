@@ -21,12 +21,12 @@ from volery.bridges.ros2.names import (
     service_of,
     topic_of,
 )
-from volery.bridges.ros2.parameter_values import plain_of, type_of, value_message
 from volery.bridges.ros2.profiles import common_profile, profile_of
 from volery.bridges.ros2.type_hashes import message_hash, service_hash
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.cdr import decode_cdr, encode_cdr
 from volery.graph.messages import add_definitions, typestore
+from volery.graph.parameter_values import plain_of, type_of, value_message
 
 
 @pytest.mark.parametrize("name", ["/a", "/uav1/laser/horizontal/scan", "/_hidden/x9", "/a__b"])

@@ -57,6 +57,9 @@ class Aboard:
     def every(self, _period_s: float, callback: Callable[[], None], **_options: Any) -> None:
         self.rings.append(callback)
 
+    def forget(self, callback: Callable[[], None]) -> None:
+        self.rings.remove(callback)
+
     def at(self, _time_ns: int, _action: Callable[[], Any]) -> None:
         raise AssertionError
 

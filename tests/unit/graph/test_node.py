@@ -15,6 +15,9 @@ class FakeTimers:
     def every(self, period_s, callback, *, wanted=None):
         self.entries.append((period_s, callback))
 
+    def forget(self, callback):
+        self.entries = [entry for entry in self.entries if entry[1] != callback]
+
 
 @pytest.fixture
 def context():

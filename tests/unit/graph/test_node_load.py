@@ -14,6 +14,9 @@ class _NoTimers:
     def every(self, *_arguments: Any, **_options: Any) -> None:
         """Never ring."""
 
+    def forget(self, *_arguments: Any) -> None:
+        """Nothing rings."""
+
     def at(self, *_arguments: Any) -> None:
         """Never act."""
 

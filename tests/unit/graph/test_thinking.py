@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from volery.core.errors import GraphError, NodeError
+from volery.core.errors import NodeError
 from volery.graph.messages import Odometry, String
 from volery.graph.node import Node
 
@@ -147,7 +147,7 @@ def test_service_answer_is_a_later_input(simulate, scenario):
 
 def test_waiting_for_a_service_is_refused(simulate, scenario):
     simulation = simulate(scenario(Impatient, 0.05))
-    with pytest.raises(GraphError, match="use call_async"):
+    with pytest.raises(NodeError, match="use call_async"):
         simulation.run(0.2)
 
 

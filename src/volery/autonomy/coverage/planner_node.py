@@ -27,7 +27,7 @@ from volery.autonomy.coverage.waypoints import Heights, route_waypoints
 from volery.core import rotations
 from volery.core.errors import PlanError
 from volery.core.kept import keep, put_back
-from volery.graph.client import Answer
+from volery.graph.client import Future
 from volery.graph.messages import (
     Float32,
     OccupancyGrid,
@@ -258,7 +258,7 @@ class CoveragePlanner(Node):
                 self._goals[number].publish(reports.goal_message(goal, now))
 
     def _ask_to_take_off(self, number: int, flight: Flight) -> None:
-        def on_answer(answer: Answer) -> None:
+        def on_answer(answer: Future) -> None:
             refused = answer.exception() is not None or not answer.result().success
             if refused and flight.is_level and flight.phase is Phase.TAKE_OFF:
                 self._begin(flight)  # it is in the air already; else it will be lost in time

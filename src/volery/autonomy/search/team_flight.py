@@ -18,7 +18,7 @@ from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
 from volery.core.kept import keep, put_back
 from volery.core.vectors import norm
-from volery.graph.client import Answer, Client
+from volery.graph.client import Client, Future
 from volery.graph.messages import Odometry, Point, Twist, header, message_type
 from volery.graph.node import Node
 
@@ -133,7 +133,7 @@ class TeamFlight(Node):
     def ask(self, client: Client, request: Any | None = None, then: Any = None) -> None:
         """Call a service; `then(response)` is called with an answer, if one ever comes."""
 
-        def on_answer(answer: Answer) -> None:
+        def on_answer(answer: Future) -> None:
             if then is not None and answer.exception() is None:
                 then(answer.result())
 

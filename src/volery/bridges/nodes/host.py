@@ -24,7 +24,8 @@ from volery.core.errors import GraphError
 from volery.graph.graph import Subscription
 from volery.graph.link import Link
 from volery.graph.messages import Clock, Published, Time, message_type
-from volery.graph.node import Context
+from volery.graph.nodes.failures import reported_failures
+from volery.graph.nodes.launch import Context
 from volery.graph.qos import QoSProfile
 
 ClockKind = Literal["auto", "simulated", "wall"]
@@ -41,6 +42,8 @@ class _Alarm:
     number: int
     period_ns: int = field(compare=False)
     action: Callable[[], Any] = field(compare=False)
+    callback: Callable[[], Any] | None = field(default=None, compare=False)
+    """What `every` was given."""
 
 
 class NodeHost:
@@ -94,7 +97,13 @@ class NodeHost:
                 callback()
 
         period_ns = ns_from_s(period_s)
-        self._set(_Alarm(self.now_ns() + period_ns, next(self._numbers), period_ns, ring))
+        alarm = _Alarm(self.now_ns() + period_ns, next(self._numbers), period_ns, ring, callback)
+        self._set(alarm)
+
+    def forget(self, callback: Callable[[], None]) -> None:
+        """Call `callback`, which `every` was given, no more."""
+        self._alarms = [alarm for alarm in self._alarms if alarm.callback != callback]
+        heapq.heapify(self._alarms)
 
     def at(self, time_ns: int, action: Callable[[], Any]) -> None:
         """Call `action` once, at `time_ns` or as soon as possible."""
@@ -162,8 +171,9 @@ class NodeHost:
 
     def spin(self, until: Callable[[], bool] | None = None) -> None:
         """Serve the nodes until `stop`, or until `until()` is true; errors of nodes end it."""
-        while not self._stopped and not (until is not None and until()):
-            self.spin_once(_LONGEST_WAIT_S)
+        with reported_failures(self.graph):
+            while not self._stopped and not (until is not None and until()):
+                self.spin_once(_LONGEST_WAIT_S)
 
     def spin_once(self, timeout_s: float) -> None:
         """Wait for something to do, at most `timeout_s`, and do it."""

@@ -118,6 +118,10 @@ class MirroredGraph(Graph):
             begin(freed[-1][1])
             yield from freed
 
+    def show_to_all(self, sender: Publisher, message: Any) -> None:
+        """Publish a message."""
+        sender.publish(message)
+
     # ---------------------------------------------------------------------------------- services
 
     def offer(self, service: str, srvtype: str, handler: Callable[[Any], Any]) -> None:
@@ -186,6 +190,11 @@ class _RemotePublisher(Publisher):
     def wanted(self) -> bool:
         """True: somebody may listen."""
         return True
+
+    @property
+    def subscriptions(self) -> int:
+        """1: somebody may listen."""
+        return 1
 
     def publish(self, message: Any) -> None:
         """Send a message."""

@@ -14,6 +14,7 @@ from typing import Any
 
 from volery.bridges.ros1.local_addresses import provide_local_addresses
 from volery.core.errors import BridgeError
+from volery.graph.nodes.imports import withdraw_ros_imports
 
 _DEBIAN = Path("/usr/lib/python3/dist-packages")
 _PACKAGES = "python3-rospy python3-rosmaster ros-std-msgs"
@@ -40,6 +41,7 @@ def rospy_is_installed() -> bool:
 
 @cache
 def _load() -> Any:
+    withdraw_ros_imports()  # rospy imports ROS 1's own messages
     added = [] if importlib.util.find_spec("rospy") else _folders()
     # At the end, and only for now: whatever this environment has itself must win, numpy above all.
     sys.path.extend(added)

@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 
 from volery.bridges.ros2.middleware import Participant
 from volery.core.errors import BridgeError
+from volery.graph.nodes.imports import withdraw_ros_imports
 
 Kind = Literal["dds", "zenoh", "rclpy"]
 
@@ -40,6 +41,7 @@ class Ros2Terms(NamedTuple):
 
 def join_ros2(terms: Ros2Terms) -> Participant:
     """Take part in a ROS 2 graph. `BridgeError` tells what is missing."""
+    withdraw_ros_imports()
     package = _PACKAGES[terms.middleware]
     if importlib.util.find_spec(package) is None:
         raise BridgeError(_MISSING[terms.middleware])

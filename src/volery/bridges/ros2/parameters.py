@@ -13,13 +13,13 @@ import numpy as np
 from volery.bridges.ros2.complaints import Complaints
 from volery.bridges.ros2.middleware import Handle, Participant, ServiceSpec, TopicSpec
 from volery.bridges.ros2.names import NodeName, check_name
-from volery.bridges.ros2.parameter_values import NOT_SET, plain_of, type_of, value_message
 from volery.bridges.ros2.profiles import profile_of
 from volery.bridges.ros2.services import answerer
 from volery.bridges.ros2.worker import Worker
 from volery.core.errors import GraphError
 from volery.graph.cdr import encode_cdr
 from volery.graph.messages import message_type, time_from_ns
+from volery.graph.parameter_values import NOT_SET, plain_of, type_of, value_message
 from volery.graph.parameters import Parameters
 from volery.graph.reply import Reply
 from volery.graph.zero import zero_message

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import Any
 
 from volery.core.clock import ns_from_s
-from volery.core.errors import NodeError
 from volery.graph.graph import Graph
 from volery.graph.messages import Published
 from volery.graph.node import Context
@@ -23,7 +22,8 @@ class LogHost:
     def __init__(self) -> None:
         self._now_ns: int | None = None
         self.graph = Graph(self.now_ns)
-        self._alarms: list[tuple[int, int, int, Callable[[], None]]] = []
+        self._alarms: list[tuple[int, int, int, Callable[[], Any]]] = []
+        self._forgotten: list[Callable[[], None]] = []
         self._numbers = itertools.count()
         self._publishers: dict[str, Any] = {}
 
@@ -45,15 +45,19 @@ class LogHost:
         """Call `callback` each period of the log's time."""
 
         def ring() -> None:
-            if wanted is None or wanted():
+            if callback not in self._forgotten and (wanted is None or wanted()):
                 callback()
 
         period = ns_from_s(period_s)
         heapq.heappush(self._alarms, (self.now_ns() + period, next(self._numbers), period, ring))
 
-    def at(self, time_ns: int, action: Callable[[], Any]) -> None:  # noqa: ARG002
-        """Refuse: nodes here think in no time."""
-        raise NodeError("a node over a log has no latency")
+    def forget(self, callback: Callable[[], None]) -> None:
+        """Call `callback`, which `every` was given, no more."""
+        self._forgotten.append(callback)
+
+    def at(self, time_ns: int, action: Callable[[], Any]) -> None:
+        """Call `action` once, at `time_ns` of the log's time."""
+        heapq.heappush(self._alarms, (time_ns, next(self._numbers), 0, action))
 
     def listen(self, topic: str, callback: Callable[[Any], None]) -> None:
         """Call back with each message that a node publishes on a topic."""
@@ -92,7 +96,8 @@ class LogHost:
         while self._alarms and self._alarms[0][0] <= time_ns:
             due, number, period, ring = heapq.heappop(self._alarms)
             self._now_ns = max(self.now_ns(), due)
-            heapq.heappush(self._alarms, (due + period, number, period, ring))
+            if period:
+                heapq.heappush(self._alarms, (due + period, number, period, ring))
             ring()
             self.graph.deliver()
         self._now_ns = time_ns

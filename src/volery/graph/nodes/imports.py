@@ -1,0 +1,135 @@
+"""Stand-ins for ROS's Python packages, so that a node file of ROS 2 runs where no ROS is sourced.
+
+`from geometry_msgs.msg import Twist`, `from std_srvs.srv import Trigger` and `from rclpy.node
+import Node` work once `provide_ros_imports` was called, which loading a node does. The finder comes
+after all others: what is installed, a sourced ROS above all, comes first. Code that loads a real
+ROS later calls `withdraw_ros_imports` before that.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from functools import cache
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any
+
+from volery.core.errors import GraphError
+from volery.graph.messages import message_type, typestore
+
+_KINDS = ("msg", "srv", "action")
+
+
+class _Finder(MetaPathFinder):
+    """Finds `rclpy`, its modules, and the packages of all message types that are known."""
+
+    def find_spec(
+        self,
+        fullname: str,
+        path: Sequence[str] | None,
+        target: ModuleType | None = None,  # noqa: ARG002
+    ) -> ModuleSpec | None:
+        """As of `MetaPathFinder`; below a package that is none of ours nothing is found."""
+        package, _, rest = fullname.partition(".")
+        if rest and getattr(path, "stand_in", None) is None:
+            return None
+        filler = _filler(package, rest)
+        if filler is None:
+            return None
+        return ModuleSpec(fullname, _Loader(filler), is_package=not rest)
+
+
+class _Path(list[str]):
+    """`__path__` of a stand-in, by which its parts are known."""
+
+    stand_in = True
+
+
+class _Loader(Loader):
+    """Fills a module."""
+
+    def __init__(self, fill: Callable[[ModuleType], None]) -> None:
+        self._fill = fill
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType | None:  # noqa: ARG002
+        """None: an ordinary module."""
+        return None
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Give the module its contents."""
+        if hasattr(module, "__path__"):
+            module.__path__ = _Path()
+        self._fill(module)
+
+
+_FINDER = _Finder()
+
+
+def provide_ros_imports() -> None:
+    """Let imports find the stand-ins from now on, after everything that is installed."""
+    if _FINDER not in sys.meta_path:
+        sys.meta_path.append(_FINDER)
+
+
+def withdraw_ros_imports() -> None:
+    """Let imports find real packages alone; who has imported a stand-in keeps it."""
+    if _FINDER in sys.meta_path:
+        sys.meta_path.remove(_FINDER)
+    for name, module in list(sys.modules.items()):
+        if isinstance(getattr(getattr(module, "__spec__", None), "loader", None), _Loader):
+            del sys.modules[name]
+
+
+def _filler(package: str, rest: str) -> Callable[[ModuleType], None] | None:
+    """What fills a module; None where it is none of ours."""
+    if package == "rclpy":
+        name = f"rclpy.{rest}" if rest else "rclpy"
+        return (lambda module: vars(module).update(_rclpy()[name])) if name in _rclpy() else None
+    names = [name for name in typestore().names() if name.startswith(f"{package}/")]
+    if not names or rest not in ("", *_KINDS):
+        return None
+    if not rest:
+        return lambda _module: None
+    parts = {_root(name, rest) for name in names if name.split("/")[1] == rest}
+    return lambda module: _fill_types(module, package, rest, sorted(parts))
+
+
+@cache
+def _rclpy() -> dict[str, dict[str, Any]]:
+    from volery.graph.nodes.rclpy_modules import contents  # it needs the node itself
+
+    return contents()
+
+
+def _root(name: str, kind: str) -> str:
+    last = name.split("/")[2]
+    return last if kind == "msg" else last.split("_")[0]
+
+
+def _fill_types(module: ModuleType, package: str, kind: str, names: list[str]) -> None:
+    def find(name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        try:
+            found = _type(package, kind, name)
+        except (KeyError, GraphError):
+            raise AttributeError(f"{package}.{kind} has no type '{name}'") from None
+        setattr(module, name, found)
+        return found
+
+    module.__getattr__ = find  # type: ignore[method-assign]
+    module.__all__ = names  # type: ignore[attr-defined]
+
+
+@cache
+def _type(package: str, kind: str, name: str) -> Any:
+    """Class of a message, or one that holds the messages of a service or action."""
+    full = f"{package}/{kind}/{name}"
+    if kind == "msg":
+        return message_type(full)
+    parts = ("Request", "Response") if kind == "srv" else ("Goal", "Result", "Feedback")
+    found: dict[str, Any] = {part: message_type(f"{full}_{part}") for part in parts}
+    mark = "__srvtype__" if kind == "srv" else "__actiontype__"
+    return type(name, (), {**found, mark: full, "__module__": f"{package}.{kind}"})

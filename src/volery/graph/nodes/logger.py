@@ -1,0 +1,169 @@
+"""Loggers in the shape of rclpy's: levels, `once`, `throttle_duration_sec`, `skip_first`.
+
+What a node logs goes to Python's `logging`, as logger `volery.nodes.NAME` (the command line shows
+it at the terminal), and to `/rosout`, from where it reaches recordings and clients. Times are the
+node's: simulated ones in a simulation. File and line tell one statement from another.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Callable
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+from volery.core.clock import NS_PER_S, ns_from_s
+from volery.graph.messages import message_type, time_from_ns
+from volery.graph.nodes import PYTHON_LOGGER
+
+ROSOUT = "/rosout"
+LOG_TYPE = "rcl_interfaces/msg/Log"
+
+Place = tuple[str, str, int]
+"""File, function and line of a call."""
+
+
+class LoggingSeverity(IntEnum):
+    """Levels, numbered as in `rcl_interfaces/msg/Log` and in Python's `logging`."""
+
+    UNSET = 0
+    DEBUG = 10
+    INFO = 20
+    WARN = 30
+    ERROR = 40
+    FATAL = 50
+
+
+class NodeLogger:
+    """Logger of a node, or a child of one."""
+
+    def __init__(
+        self,
+        name: str,
+        now_ns: Callable[[], int],
+        publish: Callable[[Any], None] | None,
+        parent: NodeLogger | None = None,
+    ) -> None:
+        self.name = name
+        self._now_ns = now_ns
+        self._publish = publish
+        self._parent = parent
+        self._level = LoggingSeverity.UNSET
+        self._last_ns: dict[Place, int] = {}
+        """When each throttled or only once wanted statement was last logged."""
+        self._seen: set[Place] = set()
+        """Statements that skip their first time and have had it."""
+        self._python = logging.getLogger(f"{PYTHON_LOGGER}.{name}")
+
+    # ------------------------------------------------------------------------------------ levels
+
+    def set_level(self, level: LoggingSeverity | int) -> None:
+        """Log nothing below `level`; UNSET: that of the parent, INFO without one."""
+        self._level = LoggingSeverity(level)
+
+    def get_effective_level(self) -> LoggingSeverity:
+        """The least level that is logged."""
+        if self._level:
+            return self._level
+        return LoggingSeverity.INFO if self._parent is None else self._parent.get_effective_level()
+
+    def is_enabled_for(self, severity: LoggingSeverity | int) -> bool:
+        """Whether that level is logged."""
+        return severity >= self.get_effective_level()
+
+    def get_child(self, name: str) -> NodeLogger:
+        """Logger of a part of the node, named below this one."""
+        return NodeLogger(f"{self.name}.{name}", self._now_ns, self._publish, self)
+
+    # ------------------------------------------------------------------------------------ logging
+
+    def debug(self, message: str, **options: Any) -> bool:
+        """Log at level DEBUG; whether that was done."""
+        return self._log(message, LoggingSeverity.DEBUG, options)
+
+    def info(self, message: str, **options: Any) -> bool:
+        """Log at level INFO; whether that was done."""
+        return self._log(message, LoggingSeverity.INFO, options)
+
+    def warning(self, message: str, **options: Any) -> bool:
+        """Log at level WARN; whether that was done."""
+        return self._log(message, LoggingSeverity.WARN, options)
+
+    def warn(self, message: str, **options: Any) -> bool:
+        """Log at level WARN; whether that was done."""
+        return self._log(message, LoggingSeverity.WARN, options)
+
+    def error(self, message: str, **options: Any) -> bool:
+        """Log at level ERROR; whether that was done."""
+        return self._log(message, LoggingSeverity.ERROR, options)
+
+    def fatal(self, message: str, **options: Any) -> bool:
+        """Log at level FATAL; whether that was done."""
+        return self._log(message, LoggingSeverity.FATAL, options)
+
+    def log(self, message: str, severity: LoggingSeverity | int, **options: Any) -> bool:
+        """Log at a level; whether that was done."""
+        return self._log(message, LoggingSeverity(severity), options)
+
+    def _log(self, message: str, severity: LoggingSeverity, options: dict[str, Any]) -> bool:
+        if not self.is_enabled_for(severity):
+            return False
+        frame = sys._getframe(2)
+        place = (frame.f_code.co_filename, frame.f_code.co_qualname, frame.f_lineno)
+        now_ns = self._now_ns()
+        if options and not self._is_due(place, now_ns, **options):
+            return False
+        python_log(self._python, self.name, now_ns, severity, str(message))
+        if self._publish is not None:
+            self._publish(log_message(self.name, now_ns, severity, str(message), place))
+        return True
+
+    def _is_due(
+        self,
+        place: Place,
+        now_ns: int,
+        *,
+        once: bool = False,
+        throttle_duration_sec: float | None = None,
+        skip_first: bool = False,
+        throttle_time_source_type: Any = None,  # noqa: ARG002  # simulated time always
+    ) -> bool:
+        if skip_first and place not in self._seen:
+            self._seen.add(place)
+            return False
+        last_ns = self._last_ns.get(place)
+        if last_ns is not None and last_ns <= now_ns:  # later ones are of before a reset
+            if once:
+                return False
+            if throttle_duration_sec and now_ns - last_ns < ns_from_s(throttle_duration_sec):
+                return False
+        if once or throttle_duration_sec:
+            self._last_ns[place] = now_ns
+        return True
+
+    def get_state(self) -> Any:
+        """Which statements have been logged when."""
+        return dict(self._last_ns), set(self._seen)
+
+    def set_state(self, state: Any) -> None:
+        """Go back to a state that `get_state` gave."""
+        self._last_ns, self._seen = dict(state[0]), set(state[1])
+
+
+def log_message(name: str, time_ns: int, severity: LoggingSeverity, text: str, place: Place) -> Any:
+    """`rcl_interfaces/msg/Log`; of the file its name, which is the same on every machine."""
+    file, function, line = place
+    stamp = time_from_ns(time_ns)
+    log: type[Any] = message_type(LOG_TYPE)
+    return log(stamp, int(severity), name, text, Path(file).name, function, line)
+
+
+def python_log(
+    logger: logging.Logger, name: str, time_ns: int, severity: LoggingSeverity, text: str
+) -> None:
+    """Hand a line to Python's `logging`, with the node and its time beside it."""
+    seconds, rest = divmod(time_ns, NS_PER_S)
+    extra = {"node": name, "node_time": f"{seconds}.{rest:09d}"}
+    logger.log(int(severity), "%s", text, extra=extra)

@@ -1,0 +1,259 @@
+"""The parameters of a node, in the shape of rclpy's `Node`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, ClassVar
+
+from volery.core.errors import GraphError
+from volery.graph.messages import message_type
+from volery.graph.parameters import (
+    Parameter,
+    ParameterNotDeclaredError,
+    Parameters,
+    ParameterSetting,
+    ParameterType,
+    Within,
+    like_of,
+)
+
+OnSet = Callable[[list[ParameterSetting]], Any]
+"""Gets what is to be set, returns a `SetParametersResult`."""
+
+
+class ParameterMethods:
+    """What `Node` offers for its parameters.
+
+    Unless its declaration says otherwise, a parameter of a class with `settable_parameters` may be
+    set while the node runs, as with rclpy; else it keeps its value from the node's start.
+    """
+
+    settable_parameters: ClassVar[bool] = False
+
+    def __init__(
+        self,
+        name: str,
+        full_name: str,
+        declared: Parameters,
+        overrides: Mapping[str, Any] | Iterable[ParameterSetting] | None,
+        *,
+        before_set: Callable[[], None],
+        allow_undeclared: bool,
+    ) -> None:
+        self.__name, self.__full_name, self.__declared = name, full_name, declared
+        if not isinstance(overrides, Mapping):
+            overrides = {setting.name: setting.value for setting in overrides or ()}
+        self.__overrides = dict(overrides)
+        self.__parameters: dict[str, Parameter] = {}
+        self.__on_set: list[OnSet] = []
+        self.__before_set = before_set
+        self.__allow_undeclared = allow_undeclared
+        self.__asks = True
+        """Whether the callbacks are asked; not for several at once, which were asked together."""
+
+    # ---------------------------------------------------------------------------------- declaring
+
+    def declare_parameter(
+        self,
+        name: str,
+        value: Any = None,
+        descriptor: Any = None,
+        ignore_override: bool = False,
+        *,
+        read_only: bool | None = None,
+        least: float | None = None,
+        most: float = math.inf,
+    ) -> Parameter:
+        """Declare a parameter; an override given at start wins over the default `value`.
+
+        Unless it is `read_only` it may be set while the node runs, which then reads
+        `Parameter.value` each time anew. A number with a `least` value is finite, and `most` at
+        most. descriptor: a `ParameterDescriptor`, with a description, bounds and `read_only`. A
+        `ParameterType` in place of a value has the override alone give one. `GraphError` for what
+        does not fit.
+        """
+        like = like_of(value) if isinstance(value, ParameterType) else value
+        default = None if isinstance(value, ParameterType) else value
+        given = self.__overrides.pop(name, default)
+        start = default if ignore_override else given
+        if read_only is None:
+            read_only = not self.settable_parameters if descriptor is None else descriptor.read_only
+        if descriptor is not None and descriptor.dynamic_typing:
+            like = None
+        within = _bounds(descriptor) if least is None else Within(least, most)
+        try:
+            parameter = Parameter(
+                name,
+                start,
+                like=None if start is None else like,
+                within=None if start is None else within,
+                read_only=read_only,
+                before_set=self.__before_set,
+                agrees=self.__ask,
+                description="" if descriptor is None else descriptor.description,
+            )
+            self.__ask(parameter, start)
+        except GraphError as error:
+            raise type(error)(f"node {self.__name}: {error}") from None
+        self.__declared.declare(self.__full_name, parameter)
+        self.__parameters[name] = parameter
+        return parameter
+
+    def declare_parameters(
+        self, namespace: str, parameters: Sequence[tuple[Any, ...]], ignore_override: bool = False
+    ) -> list[Parameter]:
+        """Declare several: (name,), (name, value) or (name, value, descriptor), below a prefix."""
+        prefix = f"{namespace}." if namespace else ""
+        padded = [(*entry, None, None)[:3] for entry in parameters]
+        return [
+            self.declare_parameter(f"{prefix}{name}", value, descriptor, ignore_override)
+            for name, value, descriptor in padded
+        ]
+
+    def declare_overrides(self) -> None:
+        """Declare whatever was given at the node's start."""
+        for name, value in list(self.__overrides.items()):
+            self.declare_parameter(name, value)
+
+    def undeclare_parameter(self, name: str) -> None:
+        """Have a parameter no more. `GraphError` for one that is read-only, or not there."""
+        if self.__find(name).read_only:
+            raise GraphError(f"node {self.__name}: parameter '{name}' is read-only")
+        self.__declared.undeclare(self.__full_name, name)
+        del self.__parameters[name]
+
+    # ------------------------------------------------------------------------------------ reading
+
+    def has_parameter(self, name: str) -> bool:
+        """Whether a parameter is declared."""
+        return name in self.__parameters
+
+    def get_parameter(self, name: str) -> Parameter:
+        """A declared parameter. `ParameterNotDeclaredError` where there is none."""
+        if self.__allow_undeclared and name not in self.__parameters:
+            return Parameter(name, None)
+        return self.__find(name)
+
+    def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
+        """Declared parameters, in the order of the names."""
+        return [self.get_parameter(name) for name in names]
+
+    def get_parameter_or(self, name: str, alternative_value: Any = None) -> Any:
+        """A declared parameter, or the alternative."""
+        if name in self.__parameters:
+            return self.__parameters[name]
+        return Parameter(name, None) if alternative_value is None else alternative_value
+
+    def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
+        """Parameters whose names begin with `prefix` and a dot, by the rest of the name."""
+        start = f"{prefix}." if prefix else ""
+        found = self.__parameters.items()
+        return {name[len(start) :]: one for name, one in found if name.startswith(start)}
+
+    def describe_parameter(self, name: str) -> Any:
+        """`rcl_interfaces/msg/ParameterDescriptor` of a parameter."""
+        return self.__find(name).describe()
+
+    def describe_parameters(self, names: Sequence[str]) -> list[Any]:
+        """Descriptors, in the order of the names."""
+        return [self.describe_parameter(name) for name in names]
+
+    def get_parameter_type(self, name: str) -> ParameterType:
+        """Type of a parameter's value."""
+        return self.__find(name).type_
+
+    def declared_parameters(self) -> list[str]:
+        """Names of all declared parameters."""
+        return sorted(self.__parameters)
+
+    def unused_overrides(self) -> list[str]:
+        """Overrides that no `declare_parameter` asked for: most likely misspelt."""
+        return [] if self.__allow_undeclared else sorted(self.__overrides)
+
+    # ------------------------------------------------------------------------------------ setting
+
+    def set_parameters(self, parameter_list: Sequence[ParameterSetting]) -> list[Any]:
+        """Set parameters one by one; for each a `SetParametersResult` with the reason."""
+        return [self.__set([setting]) for setting in parameter_list]
+
+    def set_parameters_atomically(self, parameter_list: Sequence[ParameterSetting]) -> Any:
+        """Set all parameters or none; one `SetParametersResult`."""
+        return self.__set(parameter_list)
+
+    def add_on_set_parameters_callback(self, callback: OnSet) -> OnSet:
+        """Ask `callback` before parameters are set, which its result allows or refuses.
+
+        The one that was added last is asked first.
+        """
+        self.__on_set.insert(0, callback)
+        return callback
+
+    def remove_on_set_parameters_callback(self, callback: OnSet) -> None:
+        """Ask `callback` no more."""
+        self.__on_set.remove(callback)
+
+    def __set(self, settings: Sequence[ParameterSetting]) -> Any:
+        result = message_type("rcl_interfaces/msg/SetParametersResult")
+        try:
+            for setting in settings:
+                known = setting.name in self.__parameters
+                if not known and not self.__allow_undeclared:
+                    self.__find(setting.name)
+                if known:
+                    self.__parameters[setting.name].check(setting.value)
+            self.__consult(settings)
+            self.__asks = False
+            for setting in settings:
+                if setting.name in self.__parameters:
+                    self.__parameters[setting.name].set(setting.value)
+                else:
+                    self.declare_parameter(setting.name, setting.value, read_only=False)
+        except ParameterNotDeclaredError:
+            raise
+        except GraphError as error:
+            return result(successful=False, reason=str(error))
+        finally:
+            self.__asks = True
+        return result(successful=True)
+
+    def __ask(self, parameter: Parameter, value: Any) -> None:
+        if self.__asks:
+            self.__consult([ParameterSetting(parameter.name, value=value)])
+
+    def __consult(self, settings: Sequence[ParameterSetting]) -> None:
+        for callback in tuple(self.__on_set):
+            answer = callback(list(settings))
+            if not answer.successful:
+                names = ", ".join(setting.name for setting in settings)
+                raise GraphError(answer.reason or f"{names}: the node refuses the value")
+
+    def __find(self, name: str) -> Parameter:
+        try:
+            return self.__parameters[name]
+        except KeyError:
+            raise ParameterNotDeclaredError(
+                f"node {self.__name}: parameter '{name}' is not declared"
+            ) from None
+
+    # ---------------------------------------------------------------------------------- snapshots
+
+    def parameter_values(self) -> dict[str, Any]:
+        """Values of the parameters that may be set while the node runs, by name."""
+        return {k: p.value for k, p in self.__parameters.items() if not p.read_only}
+
+    def put_back_parameters(self, values: Mapping[str, Any]) -> None:
+        """Set what `parameter_values` gave."""
+        for name, value in values.items():
+            if name in self.__parameters:
+                self.__parameters[name].value = value
+
+
+def _bounds(descriptor: Any) -> Within | None:
+    """Bounds in a descriptor."""
+    if descriptor is None:
+        return None
+    for ranges in (descriptor.floating_point_range, descriptor.integer_range):
+        if len(ranges):
+            return Within(ranges[0].from_value, ranges[0].to_value)
+    return None

@@ -1,0 +1,184 @@
+"""What `rclpy` and its modules hold for a node file where no ROS is sourced."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from types import SimpleNamespace
+from typing import Any
+
+from volery.core.errors import GraphError
+from volery.graph import parameters, qos
+from volery.graph.client import Client, Future
+from volery.graph.messages import message_type
+from volery.graph.node import Node as VoleryNode
+from volery.graph.nodes import handles, logger, ros_time
+from volery.graph.nodes.timer import Timer
+
+
+class Node(VoleryNode):
+    """Node as of `rclpy.node`: unless declared read-only, parameters may be set while it runs."""
+
+    settable_parameters = True
+
+
+class CallbackGroup:
+    """Callbacks of a node run one after the other, whatever their group."""
+
+
+class MutuallyExclusiveCallbackGroup(CallbackGroup):
+    """As of `rclpy.callback_groups`."""
+
+
+class ReentrantCallbackGroup(CallbackGroup):
+    """As of `rclpy.callback_groups`."""
+
+
+class ExternalShutdownException(Exception):  # noqa: N818  # the name that rclpy gives it
+    """Never raised: Volery ends nodes by `destroy_node`."""
+
+
+class ROSInterruptException(Exception):  # noqa: N818
+    """Never raised."""
+
+
+class LivelinessPolicy(StrEnum):
+    """Without effect."""
+
+    AUTOMATIC = "automatic"
+    MANUAL_BY_TOPIC = "manual_by_topic"
+    SYSTEM_DEFAULT = "system_default"
+
+
+class _Init:
+    """What `rclpy.init()` returns; it may be a `with` statement's."""
+
+    def __enter__(self) -> _Init:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        """Do nothing."""
+
+
+def _init(*_arguments: Any, **_options: Any) -> _Init:
+    """Do nothing: Volery has begun."""
+    return _Init()
+
+
+def _shutdown(*_arguments: Any, **_options: Any) -> None:
+    """Do nothing: Volery ends nodes."""
+
+
+def _ok(*_arguments: Any, **_options: Any) -> bool:
+    """Whether nodes run: True."""
+    return True
+
+
+def _spin(*_arguments: Any, **_options: Any) -> None:
+    raise GraphError(
+        "Volery spins its nodes: name the class in a scenario or run it with `volery node`, and "
+        "wait for a response with add_done_callback instead of spin_until_future_complete"
+    )
+
+
+class Executor:
+    """An executor, which Volery's nodes have no use for."""
+
+    def __init__(self, *_arguments: Any, **_options: Any) -> None:
+        _spin()
+
+
+def contents() -> dict[str, dict[str, Any]]:
+    """Names and values of each module."""
+    descriptor = message_type("rcl_interfaces/msg/ParameterDescriptor")
+    result = message_type("rcl_interfaces/msg/SetParametersResult")
+    policies = {
+        "ReliabilityPolicy": qos.ReliabilityPolicy,
+        "QoSReliabilityPolicy": qos.ReliabilityPolicy,
+        "DurabilityPolicy": qos.DurabilityPolicy,
+        "QoSDurabilityPolicy": qos.DurabilityPolicy,
+        "HistoryPolicy": qos.HistoryPolicy,
+        "QoSHistoryPolicy": qos.HistoryPolicy,
+        "LivelinessPolicy": LivelinessPolicy,
+        "QoSLivelinessPolicy": LivelinessPolicy,
+    }
+    profiles = {
+        "qos_profile_sensor_data": qos.qos_profile_sensor_data,
+        "qos_profile_system_default": qos.QoSProfile(),
+        "qos_profile_services_default": qos.QoSProfile(),
+        "qos_profile_parameters": qos.QoSProfile(depth=1000),
+    }
+    presets = SimpleNamespace(
+        SENSOR_DATA=SimpleNamespace(value=qos.qos_profile_sensor_data),
+        SYSTEM_DEFAULT=SimpleNamespace(value=qos.QoSProfile()),
+        SERVICES_DEFAULT=SimpleNamespace(value=qos.QoSProfile()),
+        PARAMETERS=SimpleNamespace(value=qos.QoSProfile(depth=1000)),
+    )
+    spins = ("spin", "spin_once", "spin_until_future_complete")
+    return {
+        "rclpy": {
+            "init": _init,
+            "shutdown": _shutdown,
+            "try_shutdown": _shutdown,
+            "ok": _ok,
+            "create_node": Node,
+            "Parameter": parameters.ParameterSetting,
+            **dict.fromkeys(spins, _spin),
+        },
+        "rclpy.node": {
+            "Node": Node,
+            "ParameterDescriptor": descriptor,
+            "SetParametersResult": result,
+        },
+        "rclpy.parameter": {"Parameter": parameters.ParameterSetting},
+        "rclpy.qos": {
+            "QoSProfile": qos.QoSProfile,
+            "QoSPresetProfiles": presets,
+            **policies,
+            **profiles,
+        },
+        "rclpy.time": {"Time": ros_time.Time, "Duration": ros_time.Duration},
+        "rclpy.duration": {"Duration": ros_time.Duration},
+        "rclpy.clock": {
+            "Clock": ros_time.Clock,
+            "ROSClock": ros_time.Clock,
+            "ClockType": ros_time.ClockType,
+        },
+        "rclpy.clock_type": {"ClockType": ros_time.ClockType},
+        "rclpy.constants": {"S_TO_NS": 10**9},
+        "rclpy.logging": {
+            "LoggingSeverity": logger.LoggingSeverity,
+            "get_logger": _free_logger,
+        },
+        "rclpy.timer": {"Timer": Timer},
+        "rclpy.publisher": {"Publisher": handles.NodePublisher},
+        "rclpy.subscription": {"Subscription": handles.NodeSubscription},
+        "rclpy.service": {"Service": handles.NodeService},
+        "rclpy.client": {"Client": Client},
+        "rclpy.task": {"Future": Future},
+        "rclpy.callback_groups": {
+            "CallbackGroup": CallbackGroup,
+            "MutuallyExclusiveCallbackGroup": MutuallyExclusiveCallbackGroup,
+            "ReentrantCallbackGroup": ReentrantCallbackGroup,
+        },
+        "rclpy.executors": {
+            "ExternalShutdownException": ExternalShutdownException,
+            "Executor": Executor,
+            "SingleThreadedExecutor": Executor,
+            "MultiThreadedExecutor": Executor,
+        },
+        "rclpy.exceptions": {
+            "ParameterNotDeclaredException": parameters.ParameterNotDeclaredError,
+            "ParameterAlreadyDeclaredException": parameters.ParameterAlreadyDeclaredError,
+            "InvalidParameterValueException": GraphError,
+            "InvalidParameterTypeException": GraphError,
+            "ParameterImmutableException": GraphError,
+            "ROSInterruptException": ROSInterruptException,
+        },
+    }
+
+
+def _free_logger(name: str) -> logger.NodeLogger:
+    """A logger of no node, with the computer's time and without `/rosout`."""
+    import time
+
+    return logger.NodeLogger(name, time.time_ns, None)

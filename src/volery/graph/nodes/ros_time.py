@@ -1,0 +1,175 @@
+"""Times, durations and clocks in the shape of `rclpy.time`, `rclpy.duration` and `rclpy.clock`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+from functools import total_ordering
+from typing import Any
+
+from volery.core.clock import NS_PER_S
+from volery.graph.messages import Time as TimeMessage
+from volery.graph.messages import message_type
+
+_LONGEST_NS = 2**63
+
+
+class ClockType(IntEnum):
+    """What a clock counts."""
+
+    ROS_TIME = 1
+    SYSTEM_TIME = 2
+    STEADY_TIME = 3
+
+
+@total_ordering
+class Duration:
+    """A span of time, which may be negative."""
+
+    def __init__(self, *, seconds: float = 0, nanoseconds: int = 0) -> None:
+        self._ns = int(seconds * NS_PER_S) + int(nanoseconds)
+        if not -_LONGEST_NS <= self._ns < _LONGEST_NS:
+            raise OverflowError("a duration has 64 bits of nanoseconds")
+
+    @property
+    def nanoseconds(self) -> int:
+        """Length, ns."""
+        return self._ns
+
+    def to_msg(self) -> Any:
+        """`builtin_interfaces/msg/Duration`."""
+        return message_type("builtin_interfaces/msg/Duration")(*divmod(self._ns, NS_PER_S))
+
+    @classmethod
+    def from_msg(cls, msg: Any) -> Duration:
+        """Duration of a message."""
+        return cls(seconds=msg.sec, nanoseconds=msg.nanosec)
+
+    def __eq__(self, other: object) -> bool:
+        return self._ns == other._ns if isinstance(other, Duration) else NotImplemented
+
+    def __lt__(self, other: Duration) -> bool:
+        return self._ns < other._ns if isinstance(other, Duration) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._ns)
+
+    def __add__(self, other: Duration) -> Duration:
+        if not isinstance(other, Duration):
+            return NotImplemented
+        return Duration(nanoseconds=self._ns + other._ns)
+
+    def __sub__(self, other: Duration) -> Duration:
+        if not isinstance(other, Duration):
+            return NotImplemented
+        return Duration(nanoseconds=self._ns - other._ns)
+
+    def __repr__(self) -> str:
+        return f"Duration(nanoseconds={self._ns})"
+
+
+class Time:
+    """An instant of a clock, ns since its start."""
+
+    def __init__(
+        self,
+        *,
+        seconds: float = 0,
+        nanoseconds: int = 0,
+        clock_type: ClockType = ClockType.SYSTEM_TIME,
+    ) -> None:
+        if seconds < 0 or nanoseconds < 0:
+            raise ValueError("a time is not negative")
+        self._ns = int(seconds * NS_PER_S) + int(nanoseconds)
+        if self._ns >= _LONGEST_NS:
+            raise OverflowError("a time has 63 bits of nanoseconds")
+        self._clock_type = clock_type
+
+    @property
+    def nanoseconds(self) -> int:
+        """Nanoseconds since the clock's start."""
+        return self._ns
+
+    def seconds_nanoseconds(self) -> tuple[int, int]:
+        """Whole seconds, and the rest in ns."""
+        return divmod(self._ns, NS_PER_S)
+
+    @property
+    def clock_type(self) -> ClockType:
+        """The kind of its clock."""
+        return self._clock_type
+
+    def to_msg(self) -> TimeMessage:
+        """`builtin_interfaces/msg/Time`."""
+        return TimeMessage(*divmod(self._ns, NS_PER_S))
+
+    @classmethod
+    def from_msg(cls, msg: Any, clock_type: ClockType = ClockType.ROS_TIME) -> Time:
+        """Time of a message, such as a header's stamp."""
+        return cls(seconds=msg.sec, nanoseconds=msg.nanosec, clock_type=clock_type)
+
+    def __add__(self, other: Duration) -> Time:
+        if not isinstance(other, Duration):
+            return NotImplemented
+        return Time(nanoseconds=self._ns + other.nanoseconds, clock_type=self._clock_type)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        """The duration since another time of the same clock, or an earlier time."""
+        if isinstance(other, Time):
+            return Duration(nanoseconds=self._ns - self._comparable(other))
+        if isinstance(other, Duration):
+            return Time(nanoseconds=self._ns - other.nanoseconds, clock_type=self._clock_type)
+        return NotImplemented
+
+    def _comparable(self, other: Time) -> int:
+        if self._clock_type != other.clock_type:
+            raise TypeError(
+                f"times of different clocks: {self._clock_type.name} and {other.clock_type.name}"
+            )
+        return other.nanoseconds
+
+    def __eq__(self, other: object) -> bool:
+        return self._ns == self._comparable(other) if isinstance(other, Time) else NotImplemented
+
+    def __lt__(self, other: Time) -> bool:
+        return self._ns < self._comparable(other) if isinstance(other, Time) else NotImplemented
+
+    def __le__(self, other: Time) -> bool:
+        return self._ns <= self._comparable(other) if isinstance(other, Time) else NotImplemented
+
+    def __gt__(self, other: Time) -> bool:
+        return self._ns > self._comparable(other) if isinstance(other, Time) else NotImplemented
+
+    def __ge__(self, other: Time) -> bool:
+        return self._ns >= self._comparable(other) if isinstance(other, Time) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash((self._ns, self._clock_type))
+
+    def __repr__(self) -> str:
+        return f"Time(nanoseconds={self._ns}, clock_type={self._clock_type.name})"
+
+
+class Clock:
+    """A node's clock: simulated time inside a simulation and where the graph has a `/clock`."""
+
+    def __init__(
+        self, now_ns: Callable[[], int], *, clock_type: ClockType = ClockType.ROS_TIME
+    ) -> None:
+        self._now_ns = now_ns
+        self._clock_type = clock_type
+
+    @property
+    def clock_type(self) -> ClockType:
+        """ROS_TIME."""
+        return self._clock_type
+
+    def now(self) -> Time:
+        """The present time."""
+        return Time(nanoseconds=self._now_ns(), clock_type=self._clock_type)
+
+    def now_ns(self) -> int:
+        """The present time as nanoseconds since the start of the run."""
+        return self._now_ns()

@@ -1,0 +1,142 @@
+"""Timers in the shape of rclpy's: they can be cancelled, restarted and destroyed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from volery.core.clock import ns_from_s
+from volery.graph.thinking import Deferring
+
+
+class Timers(Deferring, Protocol):
+    """Calls back at simulated times."""
+
+    def every(
+        self,
+        period_s: float,
+        callback: Callable[[], None],
+        *,
+        wanted: Callable[[], bool] | None = None,
+    ) -> None:
+        """Call `callback` each period, first after one period; not where `wanted()` is false."""
+
+    def forget(self, callback: Callable[[], None]) -> None:
+        """Call `callback`, which `every` was given, no more."""
+
+
+class Timer:
+    """Calls back each period of the node's time; made by `Node.create_timer`.
+
+    `cancel` stops it, `reset` starts its period anew.
+    """
+
+    def __init__(
+        self,
+        period_s: float,
+        callback: Callable[[], Any],
+        ring: Callable[[], None],
+        timers: Timers,
+        now_ns: Callable[[], int],
+        defer: Callable[[Callable[[], Any]], Any],
+        *,
+        autostart: bool = True,
+    ) -> None:
+        """Take what the node knows: `ring()` calls back; `defer` does a change when it may act."""
+        self.callback = callback
+        self._ring = ring
+        self._timers = timers
+        self._now_ns = now_ns
+        self._defer = defer
+        self._period_ns = ns_from_s(period_s)
+        self._cancelled = not autostart
+        self._destroyed = False
+        self._due_ns: int | None = None
+        """After a restart: when it rings next; None: it still keeps the phase it began with."""
+        self._is_armed = False
+        """Whether the next ring after a restart has been asked for."""
+        self._started_ns = self._last_ns = now_ns()
+        timers.every(period_s, self._on_period, wanted=self._keeps_first_phase)
+
+    # ---------------------------------------------------------------------------------- as of rclpy
+
+    @property
+    def timer_period_ns(self) -> int:
+        """Period, ns."""
+        return self._period_ns
+
+    def cancel(self) -> None:
+        """Call back no more, until `reset`."""
+        self._defer(lambda: self._set_cancelled(now=True))
+
+    def is_canceled(self) -> bool:
+        """Whether it is cancelled."""
+        return self._cancelled
+
+    def reset(self) -> None:
+        """Begin the period anew, also after `cancel`: the next call comes one period from now."""
+        self._defer(self._restart)
+
+    def is_ready(self) -> bool:
+        """Whether the next call is due."""
+        return not self._cancelled and self.time_until_next_call() <= 0
+
+    def time_since_last_call(self) -> int:
+        """Since the last call, or its start, ns."""
+        return self._now_ns() - self._last_ns
+
+    def time_until_next_call(self) -> int:
+        """Until the next call, ns."""
+        now_ns = self._now_ns()
+        if self._due_ns is not None:
+            return self._due_ns - now_ns
+        return self._period_ns - (now_ns - self._started_ns) % self._period_ns
+
+    def destroy(self) -> None:
+        """End it for good."""
+        self._destroyed = True
+        self._timers.forget(self._on_period)
+
+    # -------------------------------------------------------------------------------------- inside
+
+    def _keeps_first_phase(self) -> bool:
+        return self._due_ns is None and not self._cancelled and not self._destroyed
+
+    def _set_cancelled(self, *, now: bool) -> None:
+        self._cancelled = now
+
+    def _on_period(self) -> None:
+        self._last_ns = self._now_ns()
+        self._ring()
+
+    def _restart(self) -> None:
+        if self._destroyed:
+            return
+        self._cancelled = False
+        self._last_ns = self._now_ns()
+        self._due_ns = self._last_ns + self._period_ns
+        self._arm()
+
+    def _arm(self) -> None:
+        if not self._is_armed and self._due_ns is not None:
+            self._is_armed = True
+            self._timers.at(self._due_ns, self._on_due)
+
+    def _on_due(self) -> None:
+        self._is_armed = False
+        if self._due_ns is None or self._cancelled or self._destroyed:
+            return
+        if self._now_ns() >= self._due_ns:  # else it was restarted meanwhile
+            self._due_ns += self._period_ns
+            self._arm()
+            self._on_period()
+        else:
+            self._arm()
+
+    def get_state(self) -> Any:
+        """What a snapshot keeps."""
+        return self._cancelled, self._due_ns, self._is_armed, self._last_ns
+
+    def set_state(self, state: Any) -> None:
+        """Go back to a kept state."""
+        self._cancelled, self._due_ns, self._is_armed, self._last_ns = state

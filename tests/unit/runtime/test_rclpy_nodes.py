@@ -1,0 +1,164 @@
+"""Node files written for rclpy run in a scenario as they are."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from volery.core.errors import NodeError, ScenarioError
+from volery.graph.messages import Log, String
+from volery.graph.nodes.imports import withdraw_ros_imports
+from volery.graph.parameters import ParameterSetting
+
+FOLDER = Path(__file__).parent / "rclpy_nodes"
+
+
+@pytest.fixture(autouse=True)
+def no_stand_ins_left(monkeypatch):
+    """Each test loads its modules anew and leaves no stand-ins."""
+    monkeypatch.chdir(FOLDER)
+    yield
+    withdraw_ros_imports()
+    for name in [name for name in sys.modules if name in ("minimal_nodes", "broken_nodes")]:
+        del sys.modules[name]
+
+
+@pytest.fixture
+def fly(simulate, flat_data):
+    """Run with nodes of `minimal_nodes`; returns simulation and what was logged."""
+
+    def run(*names, seconds=2.4, **entry):
+        nodes = [{"node": f"minimal_nodes:{name}", **entry} for name in names]
+        flat_data["types"]["f450"]["nodes"] = nodes
+        simulation = simulate(flat_data)
+        logs = []
+        simulation.graph.subscribe("/rosout", lambda p: logs.append(p.message), Log)
+        simulation.run(seconds)
+        return simulation, logs
+
+    return run
+
+
+def test_a_publisher_with_a_timer(fly):
+    simulation, logs = fly("Talker")
+    said = [(entry.stamp.sec, entry.stamp.nanosec, entry.msg) for entry in logs]
+    assert said == [
+        (k // 2, k % 2 * 500_000_000, f"publishing 'hello {k - 1}'") for k in range(1, 5)
+    ]
+    first = logs[0]
+    assert (first.name, first.level) == ("uav1.talker", Log.INFO)
+    assert (first.file, first.function) == ("minimal_nodes.py", "Talker.timer_callback")
+    assert simulation.nodes[0].count == 4
+
+
+def test_a_subscriber_with_parameters(fly):
+    simulation, _ = fly("Talker", "Listener", parameters={})
+    listener = simulation.nodes[1]
+    assert listener.lines == ["heard hello 0", "again hello 1", "again hello 2", "again hello 3"]
+    results = listener.set_parameters(
+        [ParameterSetting("speed", value=3.0), ParameterSetting("speed", value=2)]
+    )
+    assert [(r.successful, r.reason) for r in results] == [(False, "too fast"), (True, "")]
+    assert listener.get_parameter("speed").get_parameter_value().double_value == 2.0
+    outside = simulation.graph.parameters.get("/uav1/listener", "speed")
+    outside.set(0.5)
+    assert listener.get_parameter("speed").value == 0.5
+    with pytest.raises(Exception, match="too fast"):
+        outside.set(5.0)
+
+
+def test_a_client_that_waits_for_a_service_of_a_later_node(fly):
+    simulation, logs = fly("AddClient", "AddServer", seconds=3.2)
+    client = simulation.nodes[0]
+    assert client.sums == [42, 43, 44]
+    assert [entry.msg for entry in logs] == ["42 at 1", "43 at 2", "44 at 3"]
+
+
+def test_nodes_with_a_latency_too(fly):
+    simulation, _ = fly("AddClient", "AddServer", "Talker", "Listener", latency_s=0.05, seconds=3.4)
+    client, _, _, listener = simulation.nodes
+    assert client.sums == [42, 43, 44]
+    assert len(listener.lines) == 6
+
+
+def test_what_a_node_says_while_it_is_made_is_recorded(simulate, flat_data, tmp_path, monkeypatch):
+    (tmp_path / "early_words.py").write_text(
+        "from rclpy.node import Node\n"
+        "class Early(Node):\n"
+        "    def __init__(self):\n"
+        "        super().__init__('early')\n"
+        "        self.get_logger().warning('one')\n"
+        "        self.get_logger().debug('too low')\n"
+        "        self.get_logger().error('two')\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    flat_data["types"]["f450"]["nodes"] = [{"node": "early_words:Early"}]
+    simulation = simulate(flat_data)
+    heard = []
+    simulation.graph.subscribe_all(heard.append)
+    simulation.run(0.01)
+    assert [(p.message.level, p.message.msg) for p in heard if p.topic == "/rosout"] == [
+        (30, "one"),
+        (40, "two"),
+    ]
+
+
+def test_a_message_may_be_used_again_after_its_publication(simulate, flat_data):
+    simulation = simulate(flat_data)
+    from volery.graph.node import Context, Node
+
+    context = Context(simulation.graph, simulation._engine, lambda: simulation.time_ns)
+    node = Node("again", context=context)
+    heard = []
+    node.create_subscription(String, "text", lambda m: heard.append(m.data))
+    publisher, message = node.create_publisher(String, "text"), String()
+    for text in ("a", "b"):
+        message.data = text
+        publisher.publish(message)
+    simulation.run(0.01)
+    assert heard == ["a", "b"]
+
+
+def test_an_installed_package_comes_before_a_stand_in(tmp_path, monkeypatch, simulate, flat_data):
+    (tmp_path / "std_msgs" / "msg").mkdir(parents=True)
+    (tmp_path / "std_msgs" / "__init__.py").write_text("")
+    (tmp_path / "std_msgs" / "msg" / "__init__.py").write_text("String = 'real'")
+    (tmp_path / "sees_real.py").write_text(
+        "from std_msgs.msg import String\n"
+        "from rclpy.node import Node\n"
+        "class Sees(Node):\n"
+        "    def __init__(self):\n"
+        "        super().__init__('sees')\n"
+        "        self.seen = String\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    flat_data["types"]["f450"]["nodes"] = [{"node": "sees_real:Sees"}]
+    assert simulate(flat_data).nodes[0].seen == "real"
+    for name in ("std_msgs", "std_msgs.msg"):
+        sys.modules.pop(name, None)
+
+
+def test_unknown_types_and_modules_are_import_errors(tmp_path, monkeypatch, simulate, flat_data):
+    monkeypatch.chdir(tmp_path)
+    for k, line in enumerate(("from std_msgs.msg import Strin", "import rclpy.nothing")):
+        (tmp_path / f"wrong_import_{k}.py").write_text(f"{line}\n")
+        flat_data["types"]["f450"]["nodes"] = [{"node": f"wrong_import_{k}:X"}]
+        with pytest.raises(ScenarioError, match=rf"cannot be imported: .*wrong_import_{k}.py:1"):
+            simulate(flat_data)
+
+
+def test_spinning_says_that_volery_does_it(simulate, flat_data, tmp_path, monkeypatch):
+    (tmp_path / "spins.py").write_text(
+        "import rclpy\n"
+        "from rclpy.node import Node\n"
+        "class Spins(Node):\n"
+        "    def __init__(self):\n"
+        "        super().__init__('spins')\n"
+        "        self.create_timer(0.1, self.on_timer)\n"
+        "    def on_timer(self):\n"
+        "        rclpy.spin_once(self)\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    flat_data["types"]["f450"]["nodes"] = [{"node": "spins:Spins"}]
+    with pytest.raises(NodeError, match=r"add_done_callback.*\(spins.py:8\)"):
+        simulate(flat_data).run(0.2)
