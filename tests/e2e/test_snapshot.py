@@ -11,6 +11,34 @@ from volery.graph.messages import Odometry, String
 from volery.graph.node import Node
 
 
+class Counting(Node):
+    """Counts in its own way, keeps no state, and publishes from the start."""
+
+    step = 1
+
+    def __init__(self, **options):
+        super().__init__(f"counting_{self.step}", **options)
+        self.count = 0
+        self.out = self.create_publisher(String, "counted", latched=True)
+        self.out.publish(String(f"start {self.step}"))
+        self.create_subscription(String, "counted", self.on_counted)
+        self.create_timer(0.1, self.on_timer)
+        self.heard = []
+
+    def on_timer(self):
+        self.count += self.step
+        self.out.publish(String(str(self.count)))
+
+    def on_counted(self, message):
+        self.heard.append(message.data)
+
+
+class CountingTwice(Counting):
+    """Counts by two."""
+
+    step = 2
+
+
 class Forgetful(Node):
     """Counts odometry, and does not offer its count."""
 
@@ -93,10 +121,38 @@ def test_node_that_keeps_no_state_is_named(simulate, flat_data):
     flat_data["types"]["f450"]["nodes"] = [{"node": f"{__name__}:Forgetful"}]
     simulation = simulate(flat_data)
     simulation.run(0.1)
-    with pytest.raises(SnapshotError, match="/uav1/forgetful offers no get_state"):
+    with pytest.raises(SnapshotError, match=r"set_state\(state\): /uav1/forgetful\."):
         simulation.snapshot()
-    with pytest.raises(SnapshotError, match="/uav1/forgetful"):
-        simulation.reset()
+
+
+@pytest.mark.parametrize("latency_s", [0.0, 0.02])
+def test_reset_makes_a_node_without_state_anew(simulate, flat_data, latency_s):
+    entry = {"node": f"{__name__}:Counting", "latency_s": latency_s}
+    keeping = {"node": "volery.autonomy.gap_following:GapFollowing"}
+    twice = {**entry, "node": f"{__name__}:CountingTwice"}
+    flat_data["types"]["f450"]["nodes"] = [keeping, entry, twice]
+
+    def fly(simulation):
+        simulation.uavs["uav1"].take_off(2.0)
+        simulation.run(1.0)
+        return simulation.digest(), [node.count for node in simulation.nodes[1:]]
+
+    fresh, used = simulate(flat_data), simulate(flat_data)
+    for simulation in (fresh, used):
+        simulation.enable_digest()
+    expected = fly(fresh)
+    assert expected[1] == [10, 20]
+    used.run(0.77)
+    for _ in range(3):
+        used.reset()
+        assert fly(used) == expected
+    assert len(used._engine.timer_agenda._heap) == len(fresh._engine.timer_agenda._heap)
+    used.reset_uav("uav1")
+    assert counts(used) == [0, 0]
+    used.run(0.5)
+    assert counts(used) == [5, 10]
+    used.reset()
+    assert fly(used) == expected
 
 
 def test_snapshot_of_another_simulation_is_refused(simulate, flat_data):

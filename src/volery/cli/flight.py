@@ -16,6 +16,7 @@ from volery.cli.keys import Keys
 from volery.cli.progress import FlightProgress
 from volery.cli.record_size import warn_of_size
 from volery.cli.steering import steer
+from volery.cli.waiting import DEFAULT_TIMEOUT_S, start_paused, wait_for_clients
 from volery.core.counting import counted
 from volery.core.errors import RecordingError, VoleryError
 
@@ -71,6 +72,11 @@ class RunOptions:
     """Wall time that an autopilot in lock step may be silent ..."""
     drop_silent: bool = False
     """... and whether it is then waited for no more; else the run ends."""
+    start_paused: bool = False
+    wait_for: tuple[str, ...] = ()
+    """Names of nodes and clients outside that must be there before the first step ..."""
+    wait_timeout_s: float = DEFAULT_TIMEOUT_S
+    """... within so much wall time."""
     mavlink_key: Path | None = None
     """File with the text that signs MAVLink."""
 
@@ -120,6 +126,7 @@ class Flight:
         start = time.perf_counter()
         try:
             with self._keys:
+                self._await_clients()
                 self._simulation.run(speed=self._options.speed, on_progress=self._on_progress)
         except _StoppedError:
             code, trouble = stopped_code(), f"Stopped {stopped_how()}"
@@ -141,6 +148,15 @@ class Flight:
         if not code and self._options.page is not None and not self._options.exit_at_end:
             self._stay()
         return code
+
+    def _await_clients(self) -> None:
+        """Do what is to be done before the first step."""
+        options, simulation = self._options, self._simulation
+        names, timeout_s = options.wait_for, options.wait_timeout_s
+        if not wait_for_clients(simulation, names, timeout_s, lambda: self._interrupts.pressed):
+            raise _StoppedError
+        if options.start_paused:
+            start_paused(simulation, can_be_resumed=bool(options.doors) or options.page is not None)
 
     def _stay(self) -> None:
         """Keep the page open until Ctrl-C; what is flown past the end leaves no files."""
@@ -248,3 +264,4 @@ class Flight:
             typer.echo(f"report  {report}")
         if self._options.digest:
             typer.echo(f"digest  {self._simulation.digest()}")
+            typer.echo(f"topics  {self._simulation.digest(by_topic=True)}")

@@ -25,6 +25,7 @@ from volery.cli.options import (
     TracebackOption,
     TrustOption,
 )
+from volery.cli.waiting import DEFAULT_TIMEOUT_S
 from volery.core.errors import BridgeError
 
 
@@ -37,6 +38,9 @@ def run(
     no_nodes: run_words.NoNodes = False,
     trust: TrustOption = False,
     speed: run_words.Speed = None,
+    start_paused: run_words.StartPaused = False,
+    wait_for: run_words.WaitFor = None,
+    wait_timeout: run_words.WaitTimeout = DEFAULT_TIMEOUT_S,
     threads: ThreadsOption = None,
     replay_commands: run_words.ReplayCommands = None,
     record: run_words.Record = None,
@@ -104,6 +108,9 @@ def run(
         px4_dir=px4_dir,
         autopilot_timeout_s=autopilot_timeout,
         drop_silent=drop_silent,
+        start_paused=start_paused,
+        wait_for=tuple(name for names in wait_for or () for name in names.split(",") if name),
+        wait_timeout_s=wait_timeout,
         mavlink_key=mavlink_key,
     )
     code = fly(options)

@@ -55,6 +55,8 @@ def launch_profile(
             link = join_late(late, host)
             if lock_step_s is not None:
                 host.join_lock_step(profile.name, lock_step_s)
+            for node in started:
+                host.announce(node.full_name)
             names = ", ".join(node.get_name() for node in started)
             typer.echo(f"{names} run on {way}; Ctrl-C ends them", err=True)
             host.spin(LinkTold(link, way))

@@ -77,6 +77,7 @@ def run_node(options: NodeOptions) -> None:
             link = join_late(late, host)
             if options.lock_step_s is not None:
                 host.join_lock_step(node.get_name(), options.lock_step_s)
+            host.announce(node.full_name)
             typer.echo(f"{node.get_name()} runs on {via}; Ctrl-C ends it", err=True)
             _check_namespace(link, namespace)
             host.spin(LinkTold(link, via))

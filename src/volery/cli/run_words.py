@@ -34,6 +34,22 @@ Speed = Annotated[
         rich_help_panel=FLIGHT,
     ),
 ]
+StartPaused = Annotated[
+    bool,
+    typer.Option("--start-paused", help="Pause before the first step.", rich_help_panel=FLIGHT),
+]
+WaitFor = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME[,..]",
+        help="Wait for these nodes or clients before the first step, repeatable.",
+        rich_help_panel=FLIGHT,
+    ),
+]
+WaitTimeout = Annotated[
+    float,
+    typer.Option(min=0.1, help="Wall seconds that --wait-for waits.", rich_help_panel=FLIGHT),
+]
 ReplayCommands = Annotated[
     Path | None,
     typer.Option(
@@ -77,7 +93,7 @@ Digest = Annotated[
     bool,
     typer.Option(
         "--digest",
-        help="Print the SHA-256 over all states and messages.",
+        help="Print the SHA-256 over all states and messages, in order and by topic.",
         rich_help_panel=FILES,
     ),
 ]

@@ -177,8 +177,13 @@ class Engine:
         self.deadlines.add(max(time_ns, self.time_ns), action)
 
     def wait_for(self, partner: Partner, period_s: float) -> None:
-        """Meet `partner` each period of simulated time, first after one period."""
-        self.partner_agenda.add(partner, self._from_now(period_s), after_step=self.fleet.step)
+        """Meet `partner` each period of simulated time, first after one period.
+
+        One that `meets_at_start` is met at time 0 too, where the run has not begun.
+        """
+        at_start = partner.meets_at_start and self.fleet.step == 0
+        after_step = -1 if at_start else self.fleet.step
+        self.partner_agenda.add(partner, self._from_now(period_s), after_step=after_step)
 
     def advance_to(
         self, step: int, *, until: Callable[[], bool] | None = None, in_pieces: bool = False

@@ -44,6 +44,7 @@ class Partner:
         on_meeting: Callable[[int], None] | None = None,
         is_there: Callable[[], bool] | None = None,
         restarts: bool = False,
+        meets_at_start: bool = False,
         period_s: float = 0.0,
     ) -> None:
         """Take the terms of `add_partner`.
@@ -55,6 +56,7 @@ class Partner:
         self.timeout_s = timeout_s
         self.period_s = period_s
         self.restarts = restarts
+        self.meets_at_start = meets_at_start
         self._on_timeout = on_timeout
         self._on_meeting = on_meeting
         self._is_there = is_there

@@ -501,13 +501,30 @@ class Graph:
         return {"queue": queue, "topics": topics}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state; topics, subscribers and services stay as they are."""
+        """Go back to a kept state; topics, subscribers and services stay as they are.
+
+        What nodes had published that have been destroyed since then is left out.
+        """
         lasting = [letter for letter in self._queue if letter.sender.lasting]
-        self._queue = deque([*lasting, *state["queue"]])
+        kept = [letter for letter in state["queue"] if not _has_gone(letter.sender)]
+        self._queue = deque([*lasting, *kept])
         with self._members:
             for name, topic in self._topics.items():
-                messages, kept = state["topics"].get(name, (0, {}))
-                topic.messages, topic.kept = messages, dict(kept)
+                messages, latched = state["topics"].get(name, (0, {}))
+                topic.messages = messages
+                topic.kept = {p: m for p, m in latched.items() if not _has_gone(p)}
+
+    @contextmanager
+    def in_place_of(self, state: dict[str, Any]) -> Iterator[None]:
+        """Queue what is published meanwhile where `state` has what destroyed nodes published."""
+        queue = state["queue"]
+        first = next((k for k, letter in enumerate(queue) if _has_gone(letter.sender)), len(queue))
+        behind = sum(not _has_gone(letter.sender) for letter in queue[first:])
+        after = [self._queue.pop() for _ in range(behind)]
+        try:
+            yield
+        finally:
+            self._queue.extend(reversed(after))
 
     def _drop_unused(self, topic: _Topic) -> None:
         """Forget the oldest unused topics where clients have left very many."""
@@ -613,6 +630,11 @@ def _request(service: _Service, request: Any | None) -> Any:
     if request is None:
         return zero_message(f"{service.srvtype}_Request")
     return request
+
+
+def _has_gone(sender: Publisher) -> bool:
+    """Whether a publisher was of a node that has been destroyed."""
+    return bool(sender.owner) and sender.cancelled
 
 
 def _check_name(name: str) -> None:

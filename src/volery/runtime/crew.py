@@ -119,6 +119,11 @@ class Crew:
             if start.takes_off and start.name in chosen:
                 self.uavs[start.name].take_off()
 
+    def restart_nodes(self, name: str) -> None:
+        """Make the nodes of one UAV anew."""
+        self._end_nodes_of(name)
+        self.start_nodes()
+
     def end_nodes(self) -> None:
         """End all nodes."""
         while self.nodes:
@@ -180,15 +185,17 @@ class Crew:
         return self.scenario.types[start.type_name].sensors
 
     def _dismiss(self, name: str) -> None:
-        own = [node for node in self.nodes if node.get_namespace() == f"/{name}"]
-        for node in own:
-            node.destroy_node()
-            self.nodes.remove(node)
+        self._end_nodes_of(name)
         for close in self._closes.pop(name):
             close()
         self.publisher.retire(name)
         self.uavs.pop(name).move_to(None)
         del self.beginnings[name]
+
+    def _end_nodes_of(self, name: str) -> None:
+        for node in [node for node in self.nodes if node.get_namespace() == f"/{name}"]:
+            node.destroy_node()
+            self.nodes.remove(node)
 
     def _restart_sensors(self, fresh: set[str]) -> None:
         keys = {(f.id.uav, f.id.name): f.key for f in self.fitted if f.id.uav_name in fresh}

@@ -30,6 +30,7 @@ from volery.runtime.snapshot import (
     check_partners,
     keep_nodes,
     put_back_nodes,
+    without_state,
 )
 
 
@@ -71,13 +72,15 @@ class Keeper:
 
     def snapshot(self) -> Snapshot:
         """The present state."""
-        self._check("a snapshot", self.crew.nodes)
+        check_nodes(self.crew.nodes, "a snapshot")
+        self._check("a snapshot")
         self.engine.state_check.look()
         return Snapshot(self.engine.time_ns, id(self), self.crew.starts, self._state())
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go to a kept state."""
-        self._check("to restore a state", self.crew.nodes)
+        check_nodes(self.crew.nodes, "to restore a state")
+        self._check("to restore a state")
         if not isinstance(snapshot, Snapshot):
             raise SnapshotError(f"not a snapshot: {snapshot!r}")
         if snapshot.owner != id(self):
@@ -89,12 +92,15 @@ class Keeper:
 
     def reset(self, seed: int) -> None:
         """Go back to the start and the UAVs of the start, with other random streams."""
-        self._check("a reset", self.crew.nodes, to_start=True)
-        if self.crew.starts != self._starts:
+        self._check("a reset", to_start=True)
+        changed = self.crew.starts != self._starts
+        if changed or without_state(self.crew.nodes):
             self.crew.end_nodes()  # all of them, so that they are started in the same order
+        if changed:
             self.crew.regroup(self._starts)
         self._put_back(self._start)
-        self.crew.start_nodes()
+        with self.graph.in_place_of(self._start["graph"]):
+            self.crew.start_nodes()
         fleet = self.engine.fleet
         rows = np.arange(len(fleet))
         fleet.seed_turbulence(seed, rows, fleet.names)
@@ -110,15 +116,17 @@ class Keeper:
         """Put one UAV back to its start while the others fly on."""
         fleet = self.engine.fleet
         name = fleet.names[row]
-        nodes = self._nodes_of(name)
-        self._check("a reset", nodes)
+        self._check("a reset")
         begun = self.crew.beginnings[name]
         check_free(fleet, row, begun.fleet["position"][0, begun.row])
         rows = np.array([row])
         fleet.restart(begun.fleet, rows, np.array([begun.row]))
         self.engine.collisions.forget(rows)
         self._restart_sensors(rows, [f for f in self.crew.fitted if f.id.uav == row])
-        put_back_nodes(nodes, self._new_nodes)
+        if without_state(self._nodes_of(name)):
+            self.crew.restart_nodes(name)
+        else:
+            put_back_nodes(self._nodes_of(name), self._new_nodes)
         self.faults.mend(name)
         self.crew.take_off([name])
 
@@ -128,8 +136,7 @@ class Keeper:
     def _restart_sensors(self, rows: Any, fitted: Sequence[Fitted]) -> None:
         self.engine.restart_sensors(rows, {(f.id.uav, f.id.name): f.key for f in fitted})
 
-    def _check(self, what: str, nodes: Sequence[Node], *, to_start: bool = False) -> None:
-        check_nodes(nodes, what)
+    def _check(self, what: str, *, to_start: bool = False) -> None:
         check_partners(self.partners, what, to_start=to_start)
         if not self.engine.stands:
             raise SnapshotError(f"{what} is not possible in the middle of a tick; use post()")

@@ -24,6 +24,7 @@ from volery.engine.stepping import OnSteps, StepRequest
 from volery.graph.graph import Graph
 from volery.graph.node import Node
 from volery.graph.nodes.failures import reported_failures
+from volery.graph.nodes.presence import outside_nodes
 from volery.graph.publishing import GraphPublisher
 from volery.graph.session import Gateway, Post
 from volery.runtime.assembly import assemble
@@ -403,6 +404,7 @@ class Simulation:
         on_meeting: Callable[[int], None] | None = None,
         is_there: Callable[[], bool] | None = None,
         restarts: bool = False,
+        meets_at_start: bool = False,
     ) -> Partner:
         """Wait for an outside program each `period_s` of simulated time; see `engine.partners`.
 
@@ -410,6 +412,7 @@ class Simulation:
         is waited for no more. `on_meeting(time_ns)` is called when a meeting begins; a partner that
         is not there any more, as `is_there()` says, is waited for no more. `restarts`: it begins
         anew where a meeting's time is earlier than the last one's, so that `reset` is possible.
+        `meets_at_start`: before the first step it is met at time 0 too, not only after a period.
         """
         self._check_open()
         check_terms(period_s, timeout_s, on_timeout, self._engine.fleet.dt_ns)
@@ -422,6 +425,7 @@ class Simulation:
             on_meeting=on_meeting,
             is_there=is_there,
             restarts=restarts,
+            meets_at_start=meets_at_start,
             period_s=period_s,
         )
         self._partners.append(partner)
@@ -471,7 +475,8 @@ class Simulation:
 
         All that follows is what a fresh simulation does, but for the world: a grid map is the one
         of the start again, terrain and trees stay as they are (a scenario's `world.seed` fixes them
-        apart from all other randomness). UAVs that were spawned go, deleted ones come back.
+        apart from all other randomness). UAVs that were spawned go, deleted ones come back. Nodes
+        are as new: where one does not offer its state, all are made anew.
         """
         self._check_open()
         if seed is not None:
@@ -618,6 +623,13 @@ class Simulation:
         return present
 
     @property
+    def client_names(self) -> frozenset[str]:
+        """Nodes outside, by full name, lock-step partners, and clients of doors that have them."""
+        partners = (partner.name for partner in self._partners if not partner.has_left)
+        sessions = (info.name for info in self.gateway.sessions() if " " in info.name)
+        return frozenset((*outside_nodes(self.graph), *partners, *sessions))
+
+    @property
     def uav_names(self) -> tuple[str, ...]:
         """Names in fleet order."""
         return tuple(self.uavs)
@@ -641,11 +653,15 @@ class Simulation:
         """Fingerprint all states and messages from now on; call before the first step."""
         self.outlet.enable_digest()
 
-    def digest(self) -> str:
-        """SHA-256 over all states and sensor messages since `enable_digest`."""
-        if self.outlet.digest is None:
+    def digest(self, *, by_topic: bool = False) -> str:
+        """SHA-256 over all states and sensor messages since `enable_digest`, in their order.
+
+        `by_topic`: whatever the order between topics, as for a comparison with nodes outside.
+        """
+        digest = self.outlet.digest
+        if digest is None:
             raise CommandError("call enable_digest() before the run")
-        return self.outlet.digest.hexdigest()
+        return digest.hexdigest_by_topic() if by_topic else digest.hexdigest()
 
     # ----------------------------------------------------------------------------------- building
 

@@ -71,14 +71,19 @@ def _keyed(nodes: Sequence[Node]) -> Iterator[tuple[NodeKey, Node]]:
         seen[namespace] += 1
 
 
+def without_state(nodes: Sequence[Node]) -> list[Node]:
+    """The nodes that do not offer their state: a start has them made anew."""
+    return [node for node in nodes if not isinstance(node, KeepsState)]
+
+
 def check_nodes(nodes: Sequence[Node], what: str) -> None:
-    """Refuse `what` where a node cannot take part in it."""
-    for node in nodes:
-        if not isinstance(node, KeepsState):
-            raise SnapshotError(
-                f"{what} is not possible: node {node.full_name} offers no "
-                "get_state() and set_state(state)"
-            )
+    """Refuse `what` where nodes cannot take part in it."""
+    lacking = ", ".join(node.full_name for node in without_state(nodes))
+    if lacking:
+        raise SnapshotError(
+            f"{what} in mid-flight needs the state of every node; without get_state() and "
+            f"set_state(state): {lacking}. A reset to the start needs none"
+        )
 
 
 def check_partners(partners: Sequence[Partner], what: str, *, to_start: bool = False) -> None:

@@ -63,7 +63,7 @@ class FakeSimulation:
     def enable_digest(self) -> None:
         self._digest = True
 
-    def digest(self) -> str:
+    def digest(self, *, by_topic: bool = False) -> str:
         assert self._digest
         return "ab" * 32
 

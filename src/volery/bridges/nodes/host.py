@@ -26,6 +26,8 @@ from volery.graph.link import Link
 from volery.graph.messages import Clock, Published, Time, message_type
 from volery.graph.nodes.failures import reported_failures
 from volery.graph.nodes.launch import Context
+from volery.graph.nodes.presence import TYPE as PRESENCE_TYPE
+from volery.graph.nodes.presence import presence_topic
 from volery.graph.qos import QoSProfile
 
 ClockKind = Literal["auto", "simulated", "wall"]
@@ -165,7 +167,20 @@ class NodeHost:
         answer = self.graph.call("/volery/join_lock_step", request)
         if not answer.success:
             raise GraphError(f"no lock step: {answer.message}")
+        self._begin_periods()
         self._set_clock(answer.now)
+
+    def _begin_periods(self) -> None:
+        """Let timers begin now: the wall time since they were made is none of the simulation's."""
+        if self._simulated_ns is None:
+            now_ns = self.now_ns()
+            for alarm in self._alarms:
+                alarm.due_ns = now_ns + alarm.period_ns
+            heapq.heapify(self._alarms)
+
+    def announce(self, node: str) -> None:
+        """Say that the node of this full name is ready, for `volery run --wait-for`."""
+        self._link.advertise(presence_topic(node), PRESENCE_TYPE)
 
     # --------------------------------------------------------------------------------------- run
 

@@ -1,0 +1,70 @@
+"""Before the first step: waits for nodes and clients outside, holds the clock."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import typer
+
+from volery.core.errors import CommandError
+
+DEFAULT_TIMEOUT_S = 60.0
+_PERIOD_S = 0.02
+
+
+def wait_for_clients(
+    simulation: Any,
+    names: Sequence[str],
+    timeout_s: float,
+    is_stopped: Callable[[], bool],
+) -> bool:
+    """Wait until all `names` are connected; False where `is_stopped()` before that.
+
+    A name is that of a node outside, `/uav1/watcher` or `watcher`, of a lock-step partner, or of a
+    client as the page lists it; one word of it is enough: `rosbridge`. `CommandError` names those
+    that do not come within `timeout_s` of wall time.
+    """
+    until = time.monotonic() + timeout_s
+    missing = _missing(simulation, names)
+    if missing:
+        typer.echo(f"waits for {', '.join(missing)}, at most {timeout_s:g} s", err=True)
+    while missing:
+        if is_stopped():
+            return False
+        if time.monotonic() >= until:
+            present = ", ".join(sorted(simulation.client_names)) or "none"
+            raise CommandError(
+                f"--wait-for: {', '.join(missing)} not connected within {timeout_s:g} s; "
+                f"connected: {present}"
+            )
+        time.sleep(_PERIOD_S)
+        simulation.take_in()
+        before, missing = missing, _missing(simulation, names)
+        for name in before:
+            if name not in missing:
+                typer.echo(f"{name} is connected", err=True)
+    return True
+
+
+def start_paused(simulation: Any, *, can_be_resumed: bool) -> None:
+    """Hold the clock before the first step. `CommandError` where nothing could let it go on."""
+    if not (can_be_resumed or sys.stdin.isatty()):
+        raise CommandError(
+            "--start-paused: nothing can let this run go on; open the page (--page) or a door "
+            "(--door rosbridge), or start it at a terminal"
+        )
+    simulation.pause()
+    typer.echo(
+        "paused before the first step: space at this terminal, Play on the page or "
+        "/set_simulation_state lets it go on",
+        err=True,
+    )
+
+
+def _missing(simulation: Any, names: Sequence[str]) -> list[str]:
+    present = simulation.client_names
+    words = {word for name in present for word in (name, *name.split(), name.rpartition("/")[2])}
+    return [name for name in names if name not in words]

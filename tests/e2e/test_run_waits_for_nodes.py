@@ -1,0 +1,124 @@
+"""Nodes in processes of their own from the first step on: the same run to the byte, topic by topic."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+
+import pytest
+from typer.testing import CliRunner
+
+from volery.cli.app import app
+
+NODE = """\
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class Climbing(Node):
+    def __init__(self):
+        super().__init__("climbing")
+        self.command = self.create_publisher(Twist, "cmd_vel", 1)
+        self.said = self.create_publisher(String, "said", 1)
+        self.create_subscription(Odometry, "odom", self.on_odometry, 10)
+        self.create_timer(0.05, self.on_timer)
+        self.height = 0.0
+
+    def on_odometry(self, message):
+        self.height = message.pose.pose.position.z
+        self.said.publish(String(data=f"at {self.height:.9f}"))
+
+    def on_timer(self):
+        command = Twist()
+        command.linear.x = 0.5
+        command.linear.z = 1.0 - self.height
+        self.command.publish(command)
+"""
+SCENARIO = """\
+name = "climb"
+duration_s = 2.0
+
+[types.f450]
+[[types.f450.sensors]]
+kind = "odometry"
+[[types.f450.sensors]]
+kind = "imu"
+[[types.f450.nodes]]
+node = "climbing_node:Climbing"
+
+[[uavs]]
+type = "f450"
+position_m = [0.0, 0.0]
+on_start = "take_off"
+"""
+HANG_S = 300
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "climbing_node.py").write_text(NODE)
+    (tmp_path / "climb.toml").write_text(SCENARIO)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def free_port():
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return found.getsockname()[1]
+
+
+def digests(text):
+    """In order, and by topic."""
+    return re.search(r"digest +(\w+)", text)[1], re.search(r"topics +(\w+)", text)[1]
+
+
+def fly_with_node_outside():
+    port = free_port()
+    volery = [sys.executable, "-m", "volery.cli"]
+    door = ["--door", f"rosbridge={port}", "--wait-for", "climbing", "--wait-timeout", f"{HANG_S}"]
+    words = ["run", "climb.toml", "--no-nodes", "--speed", "max", "--digest", *door]
+    way = ["--via", f"rosbridge://127.0.0.1:{port}", "--namespace", "/uav1"]
+    with (
+        subprocess.Popen([*volery, *words], stdout=subprocess.PIPE, text=True) as run,
+        subprocess.Popen(
+            [*volery, "node", "climbing_node:Climbing", *way, "--lock-step", "0.001"],
+            stderr=subprocess.DEVNULL,
+        ) as node,
+    ):
+        try:
+            return digests(run.communicate(timeout=HANG_S)[0])
+        finally:
+            run.kill()
+            os.kill(node.pid, signal.SIGINT)
+            node.wait(HANG_S)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("folder")
+def test_a_lock_step_node_in_its_own_process_is_byte_for_byte_the_one_inside():
+    inside = CliRunner().invoke(app, ["run", "climb.toml", "--digest"])
+    assert inside.exit_code == 0, inside.output
+    first, second = fly_with_node_outside(), fly_with_node_outside()
+    assert first == second
+    assert first[1] == digests(inside.output)[1]
+
+
+def test_what_does_not_come_is_named():
+    words = ["run", "hover", "--wait-for", "a,/uav1/b", "--wait-timeout", "0.1"]
+    result = CliRunner().invoke(app, [*words, "--door", f"rosbridge={free_port()}"])
+    assert result.exit_code == 2
+    assert "waits for a, /uav1/b, at most 0.1 s" in result.output
+    assert "a, /uav1/b not connected within 0.1 s; connected: none" in result.output
+
+
+def test_a_start_that_nothing_can_resume_is_refused():
+    result = CliRunner().invoke(app, ["run", "hover", "--start-paused"])
+    assert result.exit_code == 2
+    assert "nothing can let this run go on" in result.output

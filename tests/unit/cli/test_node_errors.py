@@ -1,0 +1,128 @@
+"""What a user sees of an exception in a node: file, line and frames, at the terminal and in logs."""
+
+import logging
+
+import pytest
+from mcap.reader import make_reader
+from typer.testing import CliRunner
+
+from volery.cli import node_logs
+from volery.cli.app import app
+from volery.graph.cdr import decode_cdr
+from volery.graph.nodes import PYTHON_LOGGER
+
+BROKEN = """\
+import json
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class Broken(Node):
+    def __init__(self):
+        super().__init__("broken")
+        self.get_logger().info("begins")
+        self.divisor = 0
+        self.create_timer(0.1, self.on_timer)
+
+    def on_timer(self):
+        self.helper()
+
+    def helper(self):
+        return 1 / self.divisor
+
+
+class Wrong(Broken):
+    def helper(self):
+        self.create_publisher(String, "text", 1).publish("no message")
+
+
+class Deep(Broken):
+    def helper(self):
+        json.loads("{")
+
+
+class Unborn(Node):
+    def __init__(self):
+        super().__init__("unborn")
+        self.nothing.here()
+"""
+SCENARIO = """\
+name = "broken"
+duration_s = 1.0
+
+[types.f450]
+[[types.f450.nodes]]
+node = "{node}"
+
+[[uavs]]
+type = "f450"
+position_m = [0.0, 0.0]
+"""
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    """Run a scenario with a node of BROKEN; returns the result and the log's path."""
+    monkeypatch.chdir(tmp_path)
+    logger = logging.getLogger(PYTHON_LOGGER)
+    before = list(logger.handlers), logger.level, logger.propagate
+
+    def go(node, *words):
+        module = f"broken_{node.lower()}"
+        (tmp_path / f"{module}.py").write_text(BROKEN)
+        (tmp_path / "broken.toml").write_text(SCENARIO.format(node=f"{module}:{node}"))
+        node_logs.show_node_logs()
+        command = ["run", "broken.toml", "--record", "log.mcap", "--overwrite", *words]
+        return CliRunner().invoke(app, command), tmp_path / "log.mcap"
+
+    yield go
+    logger.handlers, logger.level, logger.propagate = before
+
+
+def fatal_of(log):
+    with log.open("rb") as file:
+        found = make_reader(file).iter_messages(topics=["/rosout"])
+        return [decode_cdr(entry.data, "rcl_interfaces/msg/Log") for _, _, entry in found]
+
+
+def test_the_users_frames_are_shown_and_recorded(run):
+    result, log = run("Broken")
+    assert result.exit_code == 2, result.output
+    told = result.output
+    assert "[INFO] [0.000000000] [uav1.broken]: begins" in told
+    assert (
+        "error: node /uav1/broken failed at 0.100 s in its timer (on_timer): "
+        "ZeroDivisionError: division by zero (broken_broken.py:17)" in told
+    )
+    assert 'broken_broken.py", line 14, in on_timer' in told
+    assert 'broken_broken.py", line 17, in helper\n    return 1 / self.divisor' in told
+    assert "/volery/graph/" not in told
+    begun, fatal = fatal_of(log)
+    assert (begun.level, begun.msg) == (20, "begins")
+    assert (fatal.level, fatal.name, fatal.line) == (50, "uav1.broken", 17)
+    assert fatal.stamp.nanosec == 100_000_000
+    assert "in its timer (on_timer)" in fatal.msg
+    assert "line 17, in helper" in fatal.msg
+
+
+def test_errors_of_volery_and_of_libraries_point_to_the_users_line_too(run):
+    told = run("Wrong")[0].output
+    assert "carries std_msgs/msg/String, not None (broken_wrong.py:22)" in told
+    told = run("Deep")[0].output
+    assert "JSONDecodeError" in told
+    assert "(broken_deep.py:27)" in told
+    assert "json/decoder.py" not in told
+
+
+def test_traceback_shows_all(run):
+    told = run("Broken", "--traceback")[0].output
+    assert "Traceback (most recent call last)" in told
+    assert "/graph/node.py" in told
+
+
+def test_a_constructor_that_fails_shows_its_line(run):
+    result, _ = run("Unborn")
+    assert result.exit_code == 2
+    assert "does not start: AttributeError: " in result.output
+    assert "(broken_unborn.py:33)" in result.output
+    assert 'broken_unborn.py", line 33, in __init__' in result.output
