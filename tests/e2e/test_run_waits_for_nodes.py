@@ -1,4 +1,4 @@
-"""Nodes in processes of their own from the first step on: the same run to the byte, topic by topic."""
+"""Nodes in processes of their own from the first step on: the same run, topic by topic."""
 
 from __future__ import annotations
 

@@ -132,10 +132,15 @@ def test_reset_makes_a_node_without_state_anew(simulate, flat_data, latency_s):
     twice = {**entry, "node": f"{__name__}:CountingTwice"}
     flat_data["types"]["f450"]["nodes"] = [keeping, entry, twice]
 
+    def counts(simulation):
+        for node in simulation.nodes:
+            node.join()
+        return [node.count for node in simulation.nodes[1:]]
+
     def fly(simulation):
         simulation.uavs["uav1"].take_off(2.0)
         simulation.run(1.0)
-        return simulation.digest(), [node.count for node in simulation.nodes[1:]]
+        return simulation.digest(), counts(simulation)
 
     fresh, used = simulate(flat_data), simulate(flat_data)
     for simulation in (fresh, used):

@@ -1,4 +1,4 @@
-"""What a user sees of an exception in a node: file, line and frames, at the terminal and in logs."""
+"""What a user sees of an exception in a node: file, line and frames; in logs too."""
 
 import logging
 
