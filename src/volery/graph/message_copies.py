@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
 from volery.core.errors import GraphError
+from volery.graph.message_defaults import is_plain_name
 from volery.graph.messages import typestore
 from volery.graph.zero import DTYPES
 
@@ -36,6 +37,8 @@ def message_copier(msgtype: str) -> Copy:
     store = typestore()
     cls: Any = store.types[msgtype]
     described = dict(store.fielddefs[msgtype][1])
+    if not all(is_plain_name(name) for name in described):
+        raise GraphError(f"{msgtype}: a field's name is no name in Python")
     scope: dict[str, Any] = {"_cls": cls}
     values = []
     for name in (field.name for field in fields(cls) if field.name in described):

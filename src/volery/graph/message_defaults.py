@@ -46,7 +46,7 @@ def make_arguments_optional(
 
     It is made when the first message is: most types are never used.
     """
-    if any(keyword.iskeyword(field.name) for field in fields(cls)):
+    if not all(is_plain_name(field.name) for field in fields(cls)):
         return
 
     def first(self: Any, *values: Any, **named: Any) -> None:
@@ -56,6 +56,11 @@ def make_arguments_optional(
 
     first.__qualname__ = f"{cls.__qualname__}.__init__"
     cls.__init__ = first
+
+
+def is_plain_name(name: str) -> bool:
+    """Whether a field's name may stand in code that is made."""
+    return name.isidentifier() and not keyword.iskeyword(name)
 
 
 def _constructor(
