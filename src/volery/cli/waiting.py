@@ -27,6 +27,8 @@ def wait_for_clients(
     client as the page lists it; one word of it is enough: `rosbridge`. `CommandError` names those
     that do not come within `timeout_s` of wall time.
     """
+    if not names:
+        return True
     until = time.monotonic() + timeout_s
     missing = _missing(simulation, names)
     if missing:

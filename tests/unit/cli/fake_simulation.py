@@ -38,6 +38,7 @@ class FakeSimulation:
         self.city = None
         self.events: list[Event] = []
         self.stage_seconds = {"lidars": 0.2, "dynamics": 0.1}
+        self.picture_rates: dict[str, float] = {}
         self.closed = False
         self.paused, self.paused_s = False, 0.0
         self.speed: float | None = None
