@@ -83,7 +83,7 @@ def fly_with_node_outside():
     port = free_port()
     volery = [sys.executable, "-m", "volery.cli"]
     door = ["--door", f"rosbridge={port}", "--wait-for", "climbing", "--wait-timeout", f"{HANG_S}"]
-    words = ["run", "climb.toml", "--no-nodes", "--speed", "max", "--digest", *door]
+    words = ["run", "climb.toml", "--trust", "--no-nodes", "--speed", "max", "--digest", *door]
     way = ["--via", f"rosbridge://127.0.0.1:{port}", "--namespace", "/uav1"]
     with (
         subprocess.Popen([*volery, *words], stdout=subprocess.PIPE, text=True) as run,
@@ -103,7 +103,7 @@ def fly_with_node_outside():
 @pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_a_lock_step_node_in_its_own_process_is_byte_for_byte_the_one_inside():
-    inside = CliRunner().invoke(app, ["run", "climb.toml", "--digest"])
+    inside = CliRunner().invoke(app, ["run", "climb.toml", "--trust", "--digest"])
     assert inside.exit_code == 0, inside.output
     first, second = fly_with_node_outside(), fly_with_node_outside()
     assert first == second

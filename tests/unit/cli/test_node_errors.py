@@ -72,7 +72,7 @@ def run(tmp_path, monkeypatch):
         (tmp_path / f"{module}.py").write_text(BROKEN)
         (tmp_path / "broken.toml").write_text(SCENARIO.format(node=f"{module}:{node}"))
         node_logs.show_node_logs()
-        command = ["run", "broken.toml", "--record", "log.mcap", "--overwrite", *words]
+        command = ["run", "broken.toml", "--trust", "--record", "log.mcap", "--overwrite", *words]
         return CliRunner().invoke(app, command), tmp_path / "log.mcap"
 
     yield go
