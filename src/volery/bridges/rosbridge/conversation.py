@@ -25,7 +25,7 @@ SERVICE_RESTART = 1012
 _LONGEST_SILENCE_S = 10.0
 """Time a client has to show its token."""
 _FRAMES_A_TURN = 8
-"""Frames sent before other clients get their turn, though the network takes more."""
+"""Frames read or sent before other clients get their turn, though there are more."""
 
 
 class Channel(Protocol):
@@ -97,6 +97,7 @@ async def _read(
     channel: Channel, peer: RosbridgePeer, read: asyncio.Event, checkpoint: Checkpoint | None
 ) -> None:
     """Hand the client's frames to its peer until it leaves or must go."""
+    turns = itertools.count(1)
     while peer.refused is None:
         silence_s = None if peer.authorized else _LONGEST_SILENCE_S
         try:
@@ -112,6 +113,8 @@ async def _read(
             await checkpoint.receive(peer, frame)
             peer.reading.begin()  # the checkpoint lets others have their turn
         peer.reading.end(1, len(frame))
+        if next(turns) % _FRAMES_A_TURN == 0:  # `recv` does not wait where a frame is there
+            await asyncio.sleep(0)
         while (pause_s := peer.reading.pause_s()) and peer.refused is None:
             await asyncio.sleep(pause_s)
         while peer.congested:  # it asks for more than it reads
