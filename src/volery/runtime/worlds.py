@@ -122,6 +122,7 @@ def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
             region=forest.region_m,
             share=forest.share,
             species=forest.species,
+            species_map=forest.species_map,
             seed=scenario.world_seed,
             terrain=terrain,
         )

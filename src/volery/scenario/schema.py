@@ -60,6 +60,9 @@ class InventoryForest(Data):
     kind: Literal["inventory"]
     file: str
     species: str
+    """Of trees for which the inventory names none, or one that neither ships nor is mapped."""
+    species_map: Annotated[dict[str, str], Field(max_length=10_000)] = Field(default_factory=dict)
+    """The inventory's names of species to names of shipped ones."""
     region_m: tuple[float, float, float, float] | None = None
     """x_min, y_min, x_max, y_max; trees with x_min <= x < x_max are kept. None keeps all."""
     share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0

@@ -21,6 +21,7 @@ from volery.core.counting import counted
 from volery.core.errors import ScenarioError
 from volery.core.rng import generator
 from volery.world.inventory import Inventory, read_inventory
+from volery.world.species_map import shipped_species
 from volery.world.terrain import Terrain
 from volery.world.trees import BREAST_HEIGHT_M, Species, TreeModel, grow_models, load_species
 
@@ -86,22 +87,29 @@ def forest_from_inventory(
     share: float = 1.0,
     seed: int = 0,
     diameters: str | None = None,
+    species_map: Mapping[str, str] | None = None,
 ) -> Forest:
     """Forest of surveyed trees; what was not measured is drawn from the species' laws.
 
     inventory: a CSV file or what `read_inventory` made of one.
-    species: species of trees for which the inventory names none.
+    species: species of trees for which the inventory names none, or one that does not ship; one
+    warning counts the latter. species_map: shipped species by the inventory's names.
     region: (x0, y0, x1, y1) in m; trees with x0 <= x < x1 and y0 <= y < y1 stay. None keeps all.
     share: of the trees, from 0 to 1, chosen at random.
     diameters: name of the species' spread from which missing diameters come (None: its "stand").
 
     Sizes are drawn for the whole inventory before the region is cut out, so a tree is the same in
     every region and with every share. Raises DataFileError for a bad file, ScenarioError for an
-    unknown species.
+    unknown `species` or one in `species_map`.
     """
     trees = inventory if isinstance(inventory, Inventory) else read_inventory(inventory)
     load_species(species)
-    names = np.array([name or species for name in trees.species], dtype=object)
+    where = (
+        f"inventory {Path(inventory).name}" if isinstance(inventory, str | Path) else "inventory"
+    )
+    names = np.array(
+        shipped_species(trees.species, species, species_map or {}, where), dtype=object
+    )
     dbh, height = trees.dbh_m.copy(), trees.height_m.copy()
     for name in sorted(set(names.tolist())):
         _draw_missing(

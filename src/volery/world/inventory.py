@@ -1,8 +1,8 @@
 """Reading tree inventories: CSV files with a heading row and one tree a row.
 
 Columns `x_m` and `y_m` are required; `dbh_cm`, `height_m` and `species` may follow in any order,
-and an empty field means "not measured". All bad rows are reported together, with their row numbers
-in the file (the heading is row 1).
+and an empty field means "not measured". Species may have any name (see `species_map`). All bad rows
+are reported together, with their row numbers in the file (the heading is row 1).
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from volery.core.counting import counted
 from volery.core.errors import DataFileError
-from volery.world.trees import species_names
 
 _REQUIRED = ("x_m", "y_m")
 _OPTIONAL = ("dbh_cm", "height_m", "species")
@@ -71,11 +70,10 @@ def read_inventory(path: str | Path) -> Inventory:
     faults: list[str] = []
     numbers: list[list[float]] = []
     names: list[str] = []
-    known = frozenset(species_names())
     for number, row in enumerate(rows[1:], start=2):
         if not any(field.strip() for field in row):
             continue
-        fault, values, name = _parse(row, columns, len(rows[0]), known)
+        fault, values, name = _parse(row, columns, len(rows[0]))
         if fault:
             faults.append(f"row {number}: {fault}")
         else:
@@ -107,9 +105,7 @@ def _columns(path: Path, heading: list[str]) -> dict[str, int]:
     return {name: heading.index(name) for name in heading}
 
 
-def _parse(
-    row: list[str], columns: dict[str, int], width: int, known: frozenset[str]
-) -> tuple[str, list[float], str]:
+def _parse(row: list[str], columns: dict[str, int], width: int) -> tuple[str, list[float], str]:
     """What is wrong with a row ("" if nothing), x, y, dbh and height in m, species."""
     if len(row) != width:
         return f"{counted(len(row), 'field')}, the heading has {width}", [], ""
@@ -130,8 +126,6 @@ def _parse(
             return f"{column} {value:g} {fault}", [], ""
         values.append(value / 100.0 if column == "dbh_cm" else value)
     name = row[columns["species"]].strip() if "species" in columns else ""
-    if name and name not in known:
-        return f"unknown species; known: {', '.join(sorted(known))}", [], ""
     return "", values, name
 
 

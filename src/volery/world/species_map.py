@@ -1,0 +1,95 @@
+"""Which shipped species stands for each species that an inventory names.
+
+An inventory of a real forest names species that do not ship. A map names the shipped species for
+some of them; all others stand as the species that the scenario names, and one warning counts them.
+"""
+
+from __future__ import annotations
+
+import difflib
+import logging
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+
+from volery.core.counting import counted
+from volery.core.errors import ScenarioError
+from volery.world.trees import species_names
+
+_log = logging.getLogger(__name__)
+
+_MAX_SHOWN = 5
+"""Species that a warning names."""
+_MAX_LETTERS = 40
+"""Of a species' name in a warning."""
+
+
+def shipped_species(
+    names: Sequence[str], fallback: str, species_map: Mapping[str, str], where: str
+) -> list[str]:
+    """Return the shipped species of each tree; `fallback` for those of unknown or no species.
+
+    names: of the trees, as the inventory has them. Letter case does not matter, and spaces are as
+    good as underscores. species_map: inventory's name to shipped species. where: names the
+    inventory in the warning about unknown species. Raises `ScenarioError` where the map names a
+    species that does not ship.
+    """
+    known = {name: name for name in species_names()}
+    chosen = {**known, **_checked(species_map)}
+    keys = [_key(name) for name in names]
+    unknown = Counter(
+        name.strip() for name, key in zip(names, keys, strict=True) if key and key not in chosen
+    )
+    if unknown:
+        _warn(f"{where}: {_told(unknown)} stand as {fallback}; map them in {_TABLE}")
+    present = set(keys)
+    unused = sorted(name for name in species_map if _key(name) not in present)
+    if unused:
+        _warn(f"{where}: no tree is of the species {_shown(unused)} in {_TABLE}")
+    return [chosen.get(key, fallback) for key in keys]
+
+
+_TABLE = "[world.forest.species_map]"
+
+
+def _checked(species_map: Mapping[str, str]) -> dict[str, str]:
+    """The map by keys that compare. Raises `ScenarioError` for a target that does not ship."""
+    allowed = species_names()
+    for name, target in species_map.items():
+        if target not in allowed:
+            near = difflib.get_close_matches(target, allowed, n=1)
+            hint = f"; did you mean '{near[0]}'?" if near else "."
+            raise ScenarioError(
+                f"species_map.{_plain(name)!r}: unknown tree species '{_plain(target)}'{hint} "
+                f"Allowed: {', '.join(allowed)}"
+            )
+    return {_key(name): target for name, target in species_map.items()}
+
+
+def _key(name: str) -> str:
+    return "_".join(name.casefold().split())
+
+
+def _told(unknown: Counter[str]) -> str:
+    most = [f"{_plain(name)} {count}" for name, count in unknown.most_common(_MAX_SHOWN)]
+    rest = ", ..." if len(unknown) > _MAX_SHOWN else ""
+    trees = counted(sum(unknown.values()), "tree")
+    kinds = counted(len(unknown), "species", "species")
+    return f"{trees} of {kinds} that are not known ({', '.join(most)}{rest})"
+
+
+def _shown(names: Sequence[str]) -> str:
+    rest = ", ..." if len(names) > _MAX_SHOWN else ""
+    return ", ".join(_plain(name) for name in names[:_MAX_SHOWN]) + rest
+
+
+def _plain(name: str) -> str:
+    """A name as a terminal may show it: short, and no control characters."""
+    short = name if len(name) <= _MAX_LETTERS else f"{name[:_MAX_LETTERS]}..."
+    return "".join(letter if letter.isprintable() else "?" for letter in short)
+
+
+@lru_cache(maxsize=100)
+def _warn(text: str) -> None:
+    """Log a warning once, however often the same forest is built."""
+    _log.warning("%s", text)
