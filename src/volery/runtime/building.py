@@ -100,10 +100,12 @@ def check_free(fleet: Fleet, row: int, position_map: NDArray[np.float64]) -> Non
 
 def add_bodies(scene: Scene, starts: Sequence[Start], *, copies: int = 1) -> None:
     """Make the UAVs' bodies visible to the sensors of their own copy."""
-    kinds = {start.airframe.name: start.airframe for start in starts}
-    order = list(kinds)
+    kinds: list[Airframe] = []
+    for start in starts:
+        if start.airframe not in kinds:  # files may give two airframes one name
+            kinds.append(start.airframe)
     scene.set_bodies(
-        [body_shape(airframe) for airframe in kinds.values()],
-        [order.index(start.airframe.name) for start in starts],
+        [body_shape(airframe) for airframe in kinds],
+        [kinds.index(start.airframe) for start in starts],
         copies=copies,
     )

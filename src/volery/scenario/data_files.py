@@ -3,34 +3,34 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from pathlib import Path
 from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from volery.core.errors import DataFileError, reason_of
+from volery.core.errors import DataFileError
 from volery.scenario.base import Bounded, implausible
+from volery.scenario.data_file_bases import FileData, read_toml, read_with_bases
 from volery.scenario.load import describe_validation_error
 
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def load_data_file(path: Path, model: type[Model]) -> Model:
-    """Read `path` into `model`. Raises `DataFileError` naming file, key and what is allowed."""
+def load_data_file(path: Path, model: type[Model], bases: Path | None = None) -> Model:
+    """Read `path` into `model`. Raises `DataFileError` naming file, key and what is allowed.
+
+    bases: folder of the shipped parts of this kind, which the file may change (`base = "vlp_16"`);
+    None: the file stands alone.
+    """
+    file = FileData(read_toml(path), (path,)) if bases is None else read_with_bases(path, bases)
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataFileError(f"{path}: cannot be read: {reason_of(error)}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise DataFileError(f"{path}: not valid TOML: {error}") from None
-    try:
-        value = model.model_validate(data)
+        value = model.model_validate(file.data)
     except ValidationError as error:
-        raise DataFileError(describe_validation_error(error, str(path), model, data)) from None
-    fault = None if isinstance(value, Bounded) else implausible(value)
-    if fault is not None:
-        raise DataFileError(f"{path}: key '{fault[0]}': {fault[1]}")
+        fault = describe_validation_error(error, file.where, model, file.data)
+        raise DataFileError(fault) from None
+    wrong = None if isinstance(value, Bounded) else implausible(value)
+    if wrong is not None:
+        raise DataFileError(f"{file.where}: key '{wrong[0]}': {wrong[1]}")
     return value
 
 

@@ -8,9 +8,8 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from volery.scenario.data_files import load_data_file
 from volery.sensors.echo_kernels import MOST_ECHOES, LidarConstants
-from volery.sensors.model import SensorModel, find_model
+from volery.sensors.model import SensorModel, find_model, read_model
 from volery.sensors.scan_patterns import ScanPattern, TableScan
 from volery.world.materials import REFLECTIVITY
 
@@ -182,7 +181,7 @@ def load_lidar(name: str | Path = "utm_30lx", folder: Path | None = None) -> Lid
     Raises `DataFileError` naming file, key and what is allowed.
     """
     path = find_model(name, "LIDAR", folder)
-    return _placed(load_data_file(path, LidarModel), path.parent)
+    return _placed(read_model(path, LidarModel), path.parent)
 
 
 def _placed(model: LidarModel, folder: Path) -> LidarModel:

@@ -23,9 +23,14 @@ def load_model(kind: type[Model], what: str, name: str | Path, folder: Path | No
 
     `what` names the kind of sensor in errors. Raises `DataFileError` naming file and key.
     """
-    return load_data_file(find_model(name, what, folder), kind)
+    return read_model(find_model(name, what, folder), kind)
 
 
 def find_model(name: str | Path, what: str, folder: Path | None) -> Path:
     """Path of a model's file; see `load_model`."""
     return find_data_file(str(name), _SHIPPED, f"{what} model", folder)
+
+
+def read_model(path: Path, kind: type[Model]) -> Model:
+    """Model of a file, with its base. Raises `DataFileError` naming file and key."""
+    return load_data_file(path, kind, _SHIPPED)

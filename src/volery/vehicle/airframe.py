@@ -283,4 +283,5 @@ def load_airframe(name: str | Path, folder: Path | None = None) -> Airframe:
 
     Raises DataFileError that names the file, each wrong key and what is allowed there.
     """
-    return load_data_file(find_data_file(str(name), _AIRFRAMES, "airframe", folder), Airframe)
+    path = find_data_file(str(name), _AIRFRAMES, "airframe", folder)
+    return load_data_file(path, Airframe, _AIRFRAMES)

@@ -155,9 +155,8 @@ def load_identified(name: str, folder: Path | None = None) -> IdentifiedModel:
 
     Raises DataFileError that names the file, each wrong key and what is allowed there.
     """
-    return load_data_file(
-        find_data_file(name, _MODELS, "identified model", folder), IdentifiedModel
-    )
+    path = find_data_file(name, _MODELS, "identified model", folder)
+    return load_data_file(path, IdentifiedModel, _MODELS)
 
 
 @inner_kernel

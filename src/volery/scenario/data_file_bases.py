@@ -1,0 +1,113 @@
+"""Data files that change another one: `base` names a shipped part or a file in the same folder.
+
+A file reaches nothing outside its own folder and the shipped parts, whoever it comes from.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from volery.core.errors import DataFileError, reason_of
+from volery.scenario.merging import merged
+
+_KEY = "base"
+_TEXTS = ("title", "source")
+"""Where a part says in words what it is; its `name` is a word then."""
+_MAX_FILES = 10
+"""In a chain of bases."""
+_MAX_SHOWN = 60
+"""Letters of a base's name in an error."""
+
+
+@dataclass(frozen=True)
+class FileData:
+    """What a data file says, together with its bases."""
+
+    data: dict[str, Any]
+    """Of the file, laid over that of its bases; without the key `base`."""
+    files: tuple[Path, ...]
+    """The file, its base, the base of that, and so on."""
+
+    @property
+    def where(self) -> str:
+        """The files, as errors name them."""
+        path, *bases = self.files
+        shown = ", ".join(f"'{base.name}'" for base in bases)
+        return f"{path} (base {shown})" if bases else str(path)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Tables of a TOML file. Raises `DataFileError` naming the file."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataFileError(f"{path}: cannot be read: {reason_of(error)}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise DataFileError(f"{path}: not valid TOML: {error}") from None
+
+
+def read_with_bases(path: Path, shipped: Path) -> FileData:
+    """Read a data file and its bases; parts of `shipped` may be named without `.toml`.
+
+    A file with a base has a name of its own, which says that it is changed where the file gives
+    none. Raises `DataFileError` naming the file whose base does not exist or leads back to it.
+    """
+    files, contents = [path], [read_toml(path)]
+    while _KEY in contents[-1]:
+        base = _path_of_base(files[-1], contents[-1].pop(_KEY), shipped)
+        if base.resolve() in [file.resolve() for file in files]:
+            chain = " -> ".join(file.name for file in (*files, base))
+            raise DataFileError(f"{files[-1]}: key '{_KEY}': the bases go in a circle: {chain}")
+        if len(files) == _MAX_FILES:
+            raise DataFileError(f"{path}: key '{_KEY}': at most {_MAX_FILES} files in a chain")
+        files.append(base)
+        contents.append(read_toml(base))
+    data = contents.pop()
+    for file, changes in zip(files[-2::-1], reversed(contents), strict=True):
+        data = merged(data, _with_names(changes, data, file))
+    return FileData(data, tuple(files))
+
+
+def _path_of_base(path: Path, name: Any, shipped: Path) -> Path:
+    """Path of the base that the file `path` names."""
+    fault = f"{path}: key '{_KEY}':"
+    known = sorted(file.stem for file in shipped.glob("*.toml"))
+    allowed = f"{', '.join(known)}, or a .toml file in the same folder"
+    if not isinstance(name, str):
+        raise DataFileError(f"{fault} a name is needed: {allowed}")
+    if name in known:
+        return shipped / f"{name}.toml"
+    shown = name if len(name) <= _MAX_SHOWN else f"{name[:_MAX_SHOWN]}..."
+    if not name.endswith(".toml"):
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"; did you mean '{near[0]}'?" if near else "."
+        raise DataFileError(f"{fault} no '{shown}' ships{hint} Allowed: {allowed}")
+    if Path(name).name != name:
+        raise DataFileError(f"{fault} '{shown}' lies in another folder. Allowed: {allowed}")
+    base = path.parent / name
+    if not _is_file_in(base, path.parent):
+        raise DataFileError(f"{fault} there is no file '{shown}' in {path.parent}")
+    return base
+
+
+def _is_file_in(path: Path, folder: Path) -> bool:
+    """Whether it is a file of the folder itself, not a link to another place."""
+    try:
+        return path.is_file() and path.resolve().parent == folder.resolve()
+    except (OSError, RuntimeError, ValueError):  # too long, a circle of links, or no path at all
+        return False
+
+
+def _with_names(changes: dict[str, Any], data: dict[str, Any], file: Path) -> dict[str, Any]:
+    """The changes with what tells the part from its base, where the file itself does not say it."""
+    origin = f"changed in {file.name}"
+    texts = [key for key in _TEXTS if key in data]
+    if not texts:
+        return {"name": f"{data.get('name', '')}, {origin}", **changes}
+    own = {key: f"{data[key]}, {origin}" for key in texts}
+    return {"name": re.sub("[^a-z0-9_]", "_", file.stem.lower()), **own, **changes}
