@@ -7,6 +7,7 @@ from working import tab_to
 
 pytestmark = pytest.mark.slow
 
+DESKTOP = {"width": 1440, "height": 900}
 SIZES = {"laptop": {"width": 1366, "height": 768}, "phone": {"width": 390, "height": 844}}
 PANELS = ("Topics", "Plots", "Services", "Log", "Faults", "Recordings")
 
@@ -75,3 +76,75 @@ def test_panels_work_by_keyboard_alone(browsing, served):
     page.keyboard.press("Tab")  # to the name
     page.keyboard.press("Enter")
     row.locator("[data-path='pose.pose.position.z']").wait_for()
+
+
+# --------------------------------------------------------------------- nothing is cut or covered
+
+
+def clipped(page):
+    """Labels of buttons that are wider than their buttons show."""
+    return page.evaluate("""[...document.querySelectorAll(".mantine-Button-label")]
+        .filter((label) => label.scrollWidth > label.clientWidth + 1)
+        .map((label) => label.textContent)""")
+
+
+def is_on_top(page, element):
+    """Whether the middle and both ends of an element can be clicked."""
+    box = element.bounding_box()
+    y = box["y"] + box["height"] / 2
+    return all(
+        element.evaluate("(element, [x, y]) => element.contains(document.elementFromPoint(x, y))",
+                         [x, y])
+        for x in (box["x"] + 6, box["x"] + box["width"] / 2, box["x"] + box["width"] - 6)
+    )  # fmt: skip
+
+
+def test_labels_are_whole_and_the_prompt_lies_free(browsing, served):
+    page = browsing.open(served.url + "#uav=uav1", viewport=DESKTOP)
+    page.get_by_role("button", name="Reset", exact=True).click()
+    page.get_by_role("button", name="New seed").wait_for()
+    assert clipped(page) == []
+    page.keyboard.press("Escape")
+    page.get_by_role("button", name="Add UAVs").click()
+    page.get_by_role("button", name="By click").wait_for()
+    assert clipped(page) == []
+    panel_button(page, "Inspector").click()
+    page.get_by_label("Go to a place that is clicked").click()
+    prompt = page.get_by_role("status").filter(has_text="uav1 flies there")
+    prompt.wait_for()
+    assert clipped(page) == []
+    assert is_on_top(page, prompt)
+    prompt.get_by_role("button", name="Cancel (Esc)").click()
+    prompt.wait_for(state="detached")
+
+
+# ------------------------------------------------------------------------------ a phone's sheet
+
+
+def drag(page, element, to_y):
+    box = element.bounding_box()
+    x = box["x"] + box["width"] / 2
+    page.mouse.move(x, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(x, to_y, steps=4)
+    page.mouse.up()
+
+
+def test_panels_of_a_phone_leave_half_of_the_page_to_the_scene(browsing, served):
+    size = SIZES["phone"]
+    page = browsing.open(served.url + "#uav=uav1", viewport=size)
+    panel_button(page, "Inspector").click()
+    panel = page.get_by_role("complementary", name="Inspector")
+    handle = page.get_by_role("separator", name="Height of Inspector")
+    handle.wait_for()
+    drag(page, handle, 0)
+    half = size["height"] / 2
+    assert panel.bounding_box()["height"] == pytest.approx(half, abs=1)
+    scene = page.get_by_role("main").bounding_box()
+    assert scene["y"] + scene["height"] == pytest.approx(half, abs=1)
+    assert scene["height"] > 0.35 * size["height"]
+    keep_picture(page, "phone_sheet")
+    drag(page, handle, size["height"] - 200)
+    assert panel.bounding_box()["height"] == pytest.approx(200, abs=12)
+    drag(page, handle, size["height"] - 5)
+    panel.wait_for(state="detached")

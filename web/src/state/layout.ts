@@ -1,5 +1,6 @@
 import { create } from "zustand";
 import { keep, readKept } from "../lib/kept.ts";
+import { sheetOf } from "../lib/sheet.ts";
 
 export type Dock = "left" | "right" | "bottom";
 
@@ -17,6 +18,8 @@ export interface Tile {
 interface Layout extends Record<Dock, string> {
   /** Width, of the bottom one height, in pixels. */
   sizes: Record<Dock, number>;
+  /** Height of a phone's sheet, in pixels. */
+  sheet: number;
   shown: Record<Overlay, boolean>;
   /** Windows by name: the map, a topic of pictures. */
   tiles: Record<string, Tile>;
@@ -25,7 +28,8 @@ interface Layout extends Record<Dock, string> {
 }
 
 const KEY = "volery.layout";
-const NARROW_PX = 700;
+/** As in `page.css`: up to this width a panel is a sheet below the scene. */
+export const NARROW_PX = 700;
 export const LEAST_SIZE: Record<Dock, number> = { left: 200, right: 260, bottom: 140 };
 
 const USUAL: Layout = {
@@ -33,6 +37,7 @@ const USUAL: Layout = {
   right: "",
   bottom: "",
   sizes: { left: 270, right: 330, bottom: 280 },
+  sheet: 360,
   shown: { map: true, pictures: false },
   tiles: {},
   pictures: [],
@@ -40,7 +45,7 @@ const USUAL: Layout = {
 
 export const useLayout = create<Layout>(() => {
   const layout = readKept(KEY, USUAL);
-  // On a phone panels cover the scene: it begins without them.
+  // On a phone a panel takes half of the page: it begins without one.
   if (!isNarrow()) return layout;
   return { ...layout, left: "", right: "", bottom: "", shown: { map: false, pictures: false } };
 });
@@ -70,6 +75,13 @@ export function resizeDock(dock: Dock, size: number): void {
   const room = dock === "bottom" ? window.innerHeight : window.innerWidth;
   const fitting = Math.round(Math.max(LEAST_SIZE[dock], Math.min(size, room * 0.6)));
   useLayout.setState(({ sizes }) => ({ sizes: { ...sizes, [dock]: fitting } }));
+}
+
+/** Let a phone's sheet be so high, px; one that is dragged to the foot of the page closes. */
+export function resizeSheet(dock: Dock, height: number): void {
+  const { sheet, closes } = sheetOf(height, window.innerHeight);
+  if (closes) closePanel(dock);
+  else useLayout.setState({ sheet });
 }
 
 export function toggleOverlay(overlay: Overlay): void {

@@ -1,6 +1,6 @@
 // UAVs that come, go and are put somewhere.
 
-import { RefusedError, ask } from "./asking.ts";
+import { RefusedError, ask, order } from "./asking.ts";
 import type { Place } from "./flight.ts";
 import { link } from "../link.ts";
 
@@ -46,6 +46,11 @@ export async function spawn(uri: string, places: readonly Place[]): Promise<stri
 
 export async function remove(entity: string): Promise<void> {
   await ask("/delete_entity", "simulation_interfaces/srv/DeleteEntity", { entity });
+}
+
+/** Put a UAV back to its start, repaired and charged, while the others fly on. */
+export async function resetUav(name: string): Promise<void> {
+  await order("/volery/reset_uav", "volery_interfaces/srv/ByName", { name });
 }
 
 /** Put a UAV or a thing somewhere; pose in the map. It stands still there. */

@@ -6,6 +6,7 @@ import { GoTo } from "./GoTo.tsx";
 import { Orders } from "./Orders.tsx";
 import { Pilots } from "./Pilots.tsx";
 import { Removal } from "./Removal.tsx";
+import { Repair } from "./Repair.tsx";
 import { Sensors } from "./Sensors.tsx";
 
 /** All of the selected UAV: how it is, what it measures, what it can be told. */
@@ -35,6 +36,7 @@ export default function Inspector() {
           />
           <Mode />
         </Group>
+        <Repair key={`repair ${selected}`} uav={selected} />
         <Orders key={`orders ${selected}`} uav={selected} />
         <Figures />
         <GoTo key={selected} uav={selected} />

@@ -62,7 +62,7 @@ export function Spawn({ close }: { close: () => void }) {
           value={count}
           onChange={(value) => setCount(Math.max(1, Math.min(256, Number(value))))}
         />
-        <Group gap="xs" grow>
+        <Group gap="xs" grow preventGrowOverflow={false}>
           <Button
             disabled={disabled}
             variant="default"

@@ -1,0 +1,37 @@
+import { Button, Tooltip } from "@mantine/core";
+import { Wrench } from "lucide-react";
+import { useState } from "react";
+import { resetUav } from "../../link/commands.ts";
+import { useConnection } from "../../state/connection.ts";
+import { succeeds, tellSuccess } from "../../state/notices.ts";
+import { useWhyNot } from "../../state/rights.ts";
+import { useVehicles } from "../../state/vehicles.ts";
+
+/** Puts a crashed UAV back to its start while the others fly on. */
+export function Repair({ uav }: { uav: string }) {
+  const crashed = useVehicles(
+    ({ list }) => list.find(({ name }) => name === uav)?.crashed ?? false,
+  );
+  const volery = useConnection((connection) => connection.volery);
+  const whyNot = useWhyNot();
+  const [busy, setBusy] = useState(false);
+  if (!volery || !crashed) return null;
+  const repair = async () => {
+    setBusy(true);
+    if (await succeeds(`Repair ${uav}`, resetUav(uav))) tellSuccess(`${uav} is back at its start`);
+    setBusy(false);
+  };
+  return (
+    <Tooltip label={whyNot ?? "Repaired and charged, with new sensors; the others fly on"}>
+      <Button
+        color="orange"
+        leftSection={<Wrench size={16} />}
+        disabled={whyNot !== null}
+        loading={busy}
+        onClick={() => void repair()}
+      >
+        Repair: back to its start
+      </Button>
+    </Tooltip>
+  );
+}
