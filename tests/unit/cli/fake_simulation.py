@@ -40,6 +40,7 @@ class FakeSimulation:
         self.stage_seconds = {"lidars": 0.2, "dynamics": 0.1}
         self.picture_rates: dict[str, float] = {}
         self.closed = False
+        self.picture_rates: dict[str, float] = {}
         self.paused, self.paused_s = False, 0.0
         self.speed: float | None = None
         self._digest = False
