@@ -12,6 +12,7 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -263,30 +264,28 @@ def test_a_file_system_without_locks_is_written(tmp_path, monkeypatch):
 # ------------------------------------------------------------------------------------- full disks
 
 
-@pytest.fixture
-def small_disk():
-    """No file grows beyond 40 kB, in this process."""
+@contextmanager
+def small_disk(size):
+    """No file of this process grows beyond `size` bytes, that of the tests' output included."""
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-
-    def at_most(size):
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
-
-    yield at_most
-    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_recover_on_a_full_disk_leaves_nothing(tmp_path, small_disk, suffix):
+def test_recover_on_a_full_disk_leaves_nothing(tmp_path, suffix):
     path = tmp_path / f"flight{suffix}"
     log = open_log(path, compression="none")
     for k in range(60):
         log.write(Published("/text", "std_msgs/msg/String", k, String(os.urandom(20_000).hex())))
     log.abort()
-    small_disk(40_000)
-    with pytest.raises(RecordingError, match="cannot write the log: File too large"):
+    expected = pytest.raises(RecordingError, match="cannot write the log: File too large")
+    with small_disk(40_000), expected:
         recover(path)
     assert list(tmp_path.iterdir()) == [path]
-    small_disk(-1)
     assert recover(path).messages > 10
 
 
@@ -310,9 +309,8 @@ def test_recover_that_is_stopped_leaves_nothing(tmp_path, monkeypatch, suffix):
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_a_log_that_cannot_be_begun_leaves_nothing(tmp_path, small_disk, suffix):
-    small_disk(10)
-    with pytest.raises(RecordingError, match="File too large"):
+def test_a_log_that_cannot_be_begun_leaves_nothing(tmp_path, suffix):
+    with small_disk(10), pytest.raises(RecordingError, match="File too large"):
         open_log(tmp_path / f"flight{suffix}")
     assert list(tmp_path.iterdir()) == []
 
