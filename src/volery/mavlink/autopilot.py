@@ -15,7 +15,15 @@ import math
 from typing import Any
 
 from volery.core.errors import CommandError
-from volery.mavlink import failsafes, flying, messages, streams, switching
+from volery.mavlink import (
+    calibration,
+    failsafes,
+    flying,
+    gripper,
+    messages,
+    streams,
+    switching,
+)
 from volery.mavlink.codec import AUTOPILOT, Codec, Parser, dialect
 from volery.mavlink.framing import Framer
 from volery.mavlink.geography import Earth
@@ -102,13 +110,15 @@ class Autopilot:
         memory.state = state
         if first:
             memory.origin = memory.home = state.position
-        if not memory.has_receiver:
+        if not (memory.has_receiver or memory.fix_denied):
             memory.fix_ns = state.time_ns
         switching.follow_vehicle(self, state)
         if state.time_ns >= memory.next_check_ns:
             memory.next_check_ns = state.time_ns + failsafes.PERIOD_NS
             failsafes.check(self, state)
             keep_transfers_going(self)
+            calibration.update(self)
+            gripper.update(self)
         flying.fly(self, state)
         streams.send_due(self)
 

@@ -7,8 +7,26 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 from volery.core.errors import CommandError
-from volery.mavlink import arming, feasibility, home, plans, requests, switching, transfers
-from volery.mavlink.codec import dialect
+from volery.mavlink import (
+    arming,
+    calibration,
+    failure_injection,
+    feasibility,
+    gripper,
+    home,
+    plans,
+    requests,
+    switching,
+    transfers,
+)
+from volery.mavlink.acknowledgement import (
+    ACCEPTED,
+    DENIED,
+    FAILED,
+    TEMPORARILY_REJECTED,
+    UNSUPPORTED,
+    acknowledge,
+)
 from volery.mavlink.fence import breach
 from volery.mavlink.modes import Mode, mode_of
 
@@ -17,9 +35,6 @@ if TYPE_CHECKING:
     from volery.mavlink.memory import Source
     from volery.mavlink.vehicle import Vector
 
-ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
-UNSUPPORTED_FRAME = 8
-"""MAV_RESULT."""
 DO_SET_MODE = 176
 _FENCE_TELLS = (0, 1)
 """GF_ACTION of fences that keep nobody from flying there."""
@@ -38,11 +53,7 @@ class Command(NamedTuple):
 
 def take(pilot: Autopilot, source: Source, command: Command) -> None:
     """Do it, and answer whoever asked."""
-    link, system, component = source
-    result = do(pilot, source, command)
-    ack = dialect().MAVLink_command_ack_message
-    progress = 0  # PX4's, where the protocol would have 255
-    pilot.send(ack(command.number, result, progress, 0, system, component), link)
+    acknowledge(pilot, source, command.number, do(pilot, source, command))
 
 
 def do(pilot: Autopilot, source: Source, command: Command) -> int:
@@ -237,11 +248,14 @@ _HANDLERS: dict[int, Callable[[Autopilot, Source, Command], int]] = {
     185: _terminate,
     192: _reposition,
     193: _pause,
+    gripper.DO_GRIPPER: gripper.act,
     224: _jump,
+    calibration.CALIBRATE: calibration.start,
     246: _reboot,
     300: _start_mission,
     400: _arm,
     401: _check,
+    failure_injection.INJECT_FAILURE: failure_injection.inject,
     510: requests.get_interval,
     511: requests.set_interval,
     512: requests.send,

@@ -31,7 +31,7 @@ def breach(pilot: Autopilot, place: Vector) -> str:
         item = items[k]
         corners = 1
         if item.command in (plans.CIRCLE_IN, plans.CIRCLE_OUT):
-            held = math.dist(_point(pilot, item), place[:2]) <= item.params[0]
+            held = math.dist(_point(pilot, item), place[:2]) < item.params[0]
         elif item.command in (plans.POLYGON_IN, plans.POLYGON_OUT):
             corners = int(item.params[0])
             held = _contains([_point(pilot, one) for one in items[k : k + corners]], place)

@@ -5,6 +5,7 @@ Services carry everything: what is asked first is done first, and what is refuse
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
 
@@ -22,6 +23,7 @@ _LANDING_SPEED = "volery_interfaces/srv/SetLandingSpeed"
 _GO_TO = "volery_interfaces/srv/GoTo"
 _SET_TARGET = "volery_interfaces/srv/SetPositionTarget"
 _SET_ATTITUDE = "volery_interfaces/srv/SetAttitudeTarget"
+_INJECT = "volery_interfaces/srv/InjectFault"
 _TARGET = "mavros_msgs/msg/PositionTarget"
 _ATTITUDE = "mavros_msgs/msg/AttitudeTarget"
 _NO_PLACE, _NO_VELOCITY, _NO_PUSH = 7, 7 << 3, 7 << 6
@@ -41,6 +43,8 @@ class GraphVehicle:
         }
         self._take_off = node.create_client(_TAKE_OFF_TO, "take_off_to")
         self._sink = node.create_client(_LANDING_SPEED, "set_landing_speed")
+        self._inject = node.create_client(_INJECT, "/volery/inject_fault")
+        self._uav = node.get_namespace().strip("/")
         self._go_to = node.create_client(_GO_TO, "go_to")
 
     def take_off(self, height_m: float) -> str:
@@ -106,6 +110,12 @@ class GraphVehicle:
         message.type_mask = _NO_ATTITUDE
         message.body_rate, message.thrust = Vector3(*rates), thrust
         self._turn(message)
+
+    def fail(self, fault: dict[str, Any]) -> str:
+        """As `Vehicle`."""
+        request = zero_message(f"{_INJECT}_Request")
+        request.fault = json.dumps({**fault, "uav": self._uav})
+        return _ask(self._inject, request)
 
     def _steer(
         self,

@@ -101,6 +101,25 @@ class Mission:
     complete: bool = False
 
 
+@dataclass
+class Gripper:
+    """What the gripper has reached and does (GRIPPER_ACTIONS), and whose command that is."""
+
+    reached: int = 1
+    action: int | None = None
+    source: Source | None = None
+    end_ns: int = 0
+
+
+@dataclass
+class Calibration:
+    """A calibration under way; percent: the last one reported, -1: none."""
+
+    sensor: str
+    start_ns: int
+    percent: int = -1
+
+
 class Return(NamedTuple):
     """Where a way home leads, and how far it has come."""
 
@@ -161,6 +180,12 @@ class Memory:
     has_receiver: bool = False
     """Whether satellite fixes come at all."""
     fix_lost: bool = False
+    fix_denied: bool = False
+    """Whether a UAV without a receiver has no fix: an injected failure."""
+    gripper: Gripper = field(default_factory=Gripper)
+    calibration: Calibration | None = None
+    shells: dict[Source, str] = field(default_factory=dict)
+    """Unfinished lines of the system shell."""
     pressure: float = math.nan
     """Pa, of the barometer; nan: there is none."""
     air_temperature: float = math.nan

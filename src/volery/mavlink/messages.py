@@ -11,6 +11,7 @@ from volery.mavlink import (
     file_protocol,
     offboard,
     parameter_protocol,
+    shell,
     sticks,
     transfers,
 )
@@ -94,4 +95,5 @@ HANDLERS: dict[str, Callable[[Autopilot, Source, Any], None]] = {
     "MISSION_SET_CURRENT": transfers.set_current,
     "FILE_TRANSFER_PROTOCOL": file_protocol.answer_file_request,
     "LOG_REQUEST_LIST": file_protocol.list_logs,
+    "SERIAL_CONTROL": shell.take,
 }

@@ -75,6 +75,7 @@ DEFAULTS: dict[str, Parameter] = {
     "RTL_MIN_DIST": Parameter(10.0, 0.5, 100.0, "m from home: nearer returns do not climb"),
     "RTL_RETURN_ALT": Parameter(60.0, 0.0, 150.0, "m above home: height of a return"),
     "SYS_AUTOSTART": Parameter(4001, 0, 9999999, "PX4's number of a generic quadrotor", fixed=True),
+    "SYS_FAILURE_EN": Parameter(0, 0, 1, "1: failures may be injected"),
 }
 NAMES = tuple(sorted(DEFAULTS))
 CHECK = "_HASH_CHECK"

@@ -112,7 +112,7 @@ def _fault_of_place(item: Item, kind: int) -> int:  # noqa: PLR0911
     if kind != FENCE and not (math.isfinite(item.altitude) and abs(item.altitude) < 1e5):
         return INVALID_Z
     circle = item.command in (CIRCLE_IN, CIRCLE_OUT)
-    if circle and not item.params[0] > 0.0:
+    if circle and not item.params[0] >= 0.0:  # PX4 takes 0, which holds nothing
         return INVALID_PARAM1
     if item.command in (POLYGON_IN, POLYGON_OUT) and not 3 <= item.params[0] <= MOST_ITEMS[FENCE]:
         return INVALID_PARAM1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -93,6 +93,9 @@ class Vehicle(Protocol):
 
     def tilt(self, attitude: Quaternion, thrust: float) -> None:
         """Hold an attitude, with a share of the full thrust."""
+
+    def fail(self, fault: dict[str, Any]) -> str:
+        """Injects a fault of the simulation, without its `uav`."""
 
     def spin(self, rates: Vector, thrust: float) -> None:
         """Hold body rates, with a share of the full thrust."""
