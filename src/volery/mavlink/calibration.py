@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from volery.mavlink.memory import Source
 
 CALIBRATE = 241
-_OFFERED = {
+_OFFERED: dict[tuple[float, ...], str] = {
     (1, 0, 0, 0, 0): "gyro",
     (0, 0, 1, 0, 0): "baro",
     (0, 0, 0, 0, 2): "level",

@@ -212,7 +212,7 @@ def test_plans_come_back_as_they_went(flight):
         ([(1, *do(197)[1:])], 0, 3),
         ([do(DELAY, NAN)], 0, 6),
         ([(5001, 0, (3.0, 0, 0, 0), LATITUDE, LONGITUDE, 0.0)] * 2, 1, 5),  # a corner is missing
-        ([(5003, 0, (0.0, 0, 0, 0), LATITUDE, LONGITUDE, 0.0)], 1, 6),
+        ([(5003, 0, (-1.0, 0, 0, 0), LATITUDE, LONGITUDE, 0.0)], 1, 6),
         ([at(0, 0, 3)], 1, 3),  # no waypoints in fences
     ],
 )
