@@ -7,6 +7,7 @@ inputs move at once (`validate`). Needs scipy: the extra `volery[identify]`.
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any, Literal
 
 import numpy as np
@@ -21,6 +22,7 @@ from volery.control.identification_flights import (
     velocity_errors,
 )
 from volery.core.errors import VoleryError
+from volery.core.extras import missing_package
 from volery.vehicle.airframe import GRAVITY, Airframe
 from volery.vehicle.identified import (
     FirstOrder,
@@ -39,7 +41,7 @@ _MOST_DEAD_TIME_S = 0.1
 
 def identify(airframe: Airframe, order: Literal[1, 2] = 2) -> IdentifiedModel:
     """The model of an airframe's closed loops; roll and pitch of first or second order."""
-    optimize = _scipy_optimize()
+    optimize = _scipy("optimize")
     flights = [chirps_of_attitude(airframe, axis) for axis in range(3)]
     tilts = flights[:2]
 
@@ -145,7 +147,7 @@ def _fit_drag(airframe: Airframe) -> Array:
 
 def _answer(loop: FirstOrder | SecondOrder, dead_time: float, wanted: Array) -> Array:
     """What a loop makes of an input (K,), held from sample to sample, beginning at rest."""
-    from scipy.signal import lfilter
+    lfilter = _scipy("signal").lfilter
 
     whole = int(dead_time / SAMPLE_S)
     part = dead_time / SAMPLE_S - whole
@@ -191,11 +193,9 @@ def _shown(value: Any) -> str:
     return repr(value)
 
 
-def _scipy_optimize() -> Any:
+def _scipy(part: str) -> Any:
+    """A module of scipy. `VoleryError` where it is not installed."""
     try:
-        from scipy import optimize
+        return import_module(f"scipy.{part}")
     except ImportError:
-        raise VoleryError(
-            "identification needs scipy: install it with pip install 'volery[identify]'"
-        ) from None
-    return optimize
+        raise VoleryError(missing_package("identification", "scipy", "identify")) from None

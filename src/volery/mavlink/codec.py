@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 from volery.core.errors import BridgeError
+from volery.core.extras import missing_package
 
 AUTOPILOT = 1
 """MAV_COMP_ID_AUTOPILOT1."""
@@ -19,9 +20,7 @@ def dialect() -> Any:
     try:
         from pymavlink.dialects.v20 import common
     except ImportError:
-        raise BridgeError(
-            'MAVLink needs pymavlink: pip install "volery[mavlink]" brings it'
-        ) from None
+        raise BridgeError(missing_package("MAVLink", "pymavlink", "mavlink")) from None
     return common
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.planning.voxel_space import VoxelSpace
 from volery.core.errors import NodeError, PlanError
+from volery.core.extras import missing_package
 
 Array = NDArray[np.float64]
 
@@ -72,7 +73,7 @@ def _search(space: VoxelSpace, begin: Array, end: Array, search: Search, seed: i
     try:
         from ompl import base, geometric, util
     except ImportError:
-        raise NodeError('planning needs ompl: pip install "volery[autonomy]"') from None
+        raise NodeError(missing_package("planning", "ompl", "autonomy")) from None
     util.setLogLevel(util.LogLevel.LOG_NONE)
     util.RNG.setSeed(1 + seed % 1_000_000_000)
     states = base.RealVectorStateSpace(3)

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from volery.core.errors import VoleryError
+from volery.core.extras import missing_package
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -42,7 +43,7 @@ def open_browser(*flags: str) -> Iterator[Browser]:
     try:
         from playwright.sync_api import sync_playwright
     except ModuleNotFoundError:
-        raise VoleryError('this needs playwright: pip install "volery[bench]"') from None
+        raise VoleryError(missing_package("this", "playwright", "bench")) from None
     path = browser_path()
     if path is None:
         raise VoleryError("this needs a Chromium: apt-get install chromium, or VOLERY_BROWSER")

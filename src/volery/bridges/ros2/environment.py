@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 
 from volery.bridges.ros2.middleware import Participant
 from volery.core.errors import BridgeError
+from volery.core.extras import missing_package
 from volery.graph.nodes.imports import withdraw_ros_imports
 
 Kind = Literal["dds", "zenoh", "rclpy"]
@@ -17,10 +18,9 @@ MOST_DOMAIN = 232
 """Beyond, the ports of DDS do not fit into 16 bits (RTPS 2.5, 9.6.2.3)."""
 
 _PACKAGES = {"dds": "cyclonedds", "zenoh": "zenoh", "rclpy": "rclpy"}
-_INSTALL = 'use pip install "volery[ros2]"'
 _MISSING = {
-    "dds": f"ROS 2 over dds needs the package cyclonedds, which is not installed; {_INSTALL}",
-    "zenoh": f"ROS 2 over zenoh needs the package zenoh, which is not installed; {_INSTALL}",
+    "dds": missing_package("ROS 2 over dds", "cyclonedds", "ros2"),
+    "zenoh": missing_package("ROS 2 over zenoh", "eclipse-zenoh", "ros2"),
     "rclpy": "there is no rclpy: source a ROS 2 (. /opt/ros/jazzy/setup.sh) that is built for this "
     "version of Python; without one use ros2 in place of rclpy",
 }

@@ -1,0 +1,105 @@
+"""What lacks a package says which command installs it; README and docs list all extras."""
+
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from volery.core.errors import VoleryError
+
+ROOT = Path(__file__).parents[3]
+EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+
+
+def loop_closures():
+    from volery.autonomy.slam.pose_graph import load_gtsam
+
+    load_gtsam()
+
+
+def mapping():
+    from volery.autonomy.mapping.octree import new_tree
+
+    new_tree(0.1)
+
+
+def planning():
+    from volery.autonomy.planning.global_path import _search
+
+    _search(None, np.zeros(3), np.ones(3), None, 1)
+
+
+def mavlink():
+    from volery.mavlink.codec import dialect
+
+    dialect.__wrapped__()
+
+
+def identification():
+    from volery.control.identify import identify
+    from volery.vehicle.airframe import load_airframe
+
+    identify(load_airframe("f450"))
+
+
+def answers_of_loops():
+    from volery.control.identify import _answer
+    from volery.vehicle.identified import FirstOrder
+
+    _answer(FirstOrder(kind="first_order", time_constant_s=0.1), 0.0, np.ones(3))
+
+
+def ros2(middleware):
+    from volery.bridges.ros2.environment import Ros2Terms, join_ros2
+
+    return lambda: join_ros2(Ros2Terms(middleware))
+
+
+def browser():
+    from volery.bench.page.browser import open_browser
+
+    with open_browser():
+        pass
+
+
+@pytest.mark.parametrize(
+    ("module", "package", "extra", "use"),
+    [
+        ("gtsam", "gtsam", "autonomy", loop_closures),
+        ("pyoctomap", "pyoctomap", "autonomy", mapping),
+        ("ompl", "ompl", "autonomy", planning),
+        ("pymavlink.dialects.v20", "pymavlink", "mavlink", mavlink),
+        ("scipy", "scipy", "identify", identification),
+        ("scipy.signal", "scipy", "identify", answers_of_loops),
+        ("cyclonedds", "cyclonedds", "ros2", ros2("dds")),
+        ("zenoh", "eclipse-zenoh", "ros2", ros2("zenoh")),
+        ("playwright.sync_api", "playwright", "bench", browser),
+    ],
+)
+def test_what_lacks_a_package_says_which_command_installs_it(
+    monkeypatch, module, package, extra, use
+):
+    assert any(re.match(rf"{package}\b", each) for each in EXTRAS[extra])
+    for name in [n for n in sys.modules if n == module or n.startswith(f"{module}.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(VoleryError) as caught:
+        use()
+    assert re.search(rf'needs? {package}: pip install "volery\[{extra}\]"', str(caught.value))
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/extras.md"])
+def test_readme_and_docs_list_all_extras(name):
+    table = [line for line in (ROOT / name).read_text().splitlines() if line.startswith("| `")]
+    listed = [each for line in table for each in re.findall(r"`(\w+)`", line.split("|")[1])]
+    assert sorted(set(listed) & set(EXTRAS)) == sorted(EXTRAS)
+
+
+def test_docs_name_only_extras_that_exist():
+    for path in [ROOT / "README.md", *ROOT.glob("docs/*.md")]:
+        for group in re.findall(r"(?:volery|\.)\[([a-z0-9,]+)\]", path.read_text()):
+            unknown = set(group.split(",")) - set(EXTRAS)
+            assert not unknown, f"{path.name}: {unknown}"
