@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from volery.core.errors import CommandError
+from volery.scenario.schema import Scenario
 
 
 def check_steps(steps: Any) -> None:
@@ -21,6 +22,21 @@ def check_seconds(seconds: Any) -> None:
     number = isinstance(seconds, int | float | np.number)
     if not (number and math.isfinite(seconds) and seconds >= 0.0):
         raise CommandError(f"seconds must be finite and not negative, not {seconds!r}")
+
+
+def check_reset_seed(scenario: Scenario, seed: Any) -> None:
+    """`CommandError` unless a reset to `seed` gives what a fresh run with it does.
+
+    A reset keeps the world; it cannot where the scenario's seed grows the world.
+    """
+    check_seed(seed)
+    if scenario.has_seeded_world and seed != scenario.seed:
+        raise CommandError(
+            f"a reset keeps the world, which scenario '{scenario.name}' grows from its seed "
+            f"{scenario.seed}, so it cannot go on with seed {seed}. For another world make a new "
+            f"simulation of scenario.with_(seed={seed}). For resets in this world fix it first: "
+            f'scenario.with_(world={{"seed": {scenario.seed}}})'
+        )
 
 
 def check_seed(seed: Any) -> None:

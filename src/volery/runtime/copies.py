@@ -29,7 +29,7 @@ from volery.core.clock import ns_from_s, s_from_ns
 from volery.core.counting import counted
 from volery.core.errors import CommandError, ScenarioError
 from volery.runtime.building import place
-from volery.runtime.checks import check_seconds, check_seed, check_steps
+from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
 from volery.runtime.copy_block import CopyBlock, CopyEvent, Reading
 from volery.runtime.uav import Uav
 from volery.runtime.warm_up.needs import needs_of
@@ -45,8 +45,10 @@ class Copies:
     """`count` copies of `scenario`, each with `n` UAVs.
 
     seeds: one for each copy; by default the scenario's and those after it. threads: results do not
-    depend on their number. A copy does what `Simulation` does with the same seed and the same
-    world (`world.seed` fixes it). Raises `ScenarioError` where the scenario cannot be built.
+    depend on their number. All copies share the world that the scenario's seed grows: `scenario` is
+    the one given with that world fixed (`world.seed`), and a copy of seed s does what
+    `Simulation(copies.scenario.with_(seed=s))` does. Raises `ScenarioError` where the scenario
+    cannot be built.
     """
 
     def __init__(
@@ -63,6 +65,7 @@ class Copies:
             seeds = range(scenario.seed, scenario.seed + count)
         if len(seeds) != count:
             raise ScenarioError(_without_seeds(count, len(seeds)))
+        scenario = scenario.with_(world={"seed": scenario.world_seed})
         self.scenario = scenario
         with compiled(needs_of(scenario, nodes=False)):
             self.terrain = build_terrain(scenario)
@@ -138,7 +141,7 @@ class Copies:
         """Put `copies` (all by default) back to the start, with the seeds they have or new ones."""
         chosen = self._chosen(copies)
         for seed in seeds or ():
-            check_seed(seed)
+            check_reset_seed(self.scenario, seed)
         if seeds is not None and len(seeds) != len(chosen):
             raise CommandError(_without_seeds(len(chosen), len(seeds)))
         for block, first in zip(self._blocks, self._first, strict=True):

@@ -29,7 +29,7 @@ from volery.graph.publishing import GraphPublisher
 from volery.graph.session import Gateway, Post
 from volery.runtime.assembly import assemble
 from volery.runtime.building import place
-from volery.runtime.checks import check_seconds, check_seed, check_steps
+from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
 from volery.runtime.command_log import CommandLog
 from volery.runtime.crew import Crew
 from volery.runtime.end_of_run import EndOfRun
@@ -473,14 +473,15 @@ class Simulation:
     def reset(self, seed: int | None = None) -> None:
         """Go back to the start, with the scenario's seed or another one.
 
-        All that follows is what a fresh simulation does, but for the world: a grid map is the one
-        of the start again, terrain and trees stay as they are (a scenario's `world.seed` fixes them
-        apart from all other randomness). UAVs that were spawned go, deleted ones come back. Nodes
-        are as new: where one does not offer its state, all are made anew.
+        All that follows is what a fresh simulation of `scenario.with_(seed=seed)` does. A grid map
+        is the one of the start again; UAVs that were spawned go, deleted ones come back. Nodes are
+        as new: where one does not offer its state, all are made anew. Raises `CommandError` for
+        another seed where the scenario's seed grew trees or city, which a reset keeps; `world.seed`
+        fixes them apart from all other randomness.
         """
         self._check_open()
         if seed is not None:
-            check_seed(seed)
+            check_reset_seed(self.scenario, seed)
         self._keeper.reset(self.scenario.seed if seed is None else seed)
         self._pacer.drop_steps("the simulation was reset")
         self._pacer.jumped(self.time_ns)

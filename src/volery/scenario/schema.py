@@ -415,6 +415,24 @@ class Scenario(Data):
         return self.seed if self.world.seed is None else self.world.seed
 
     @property
+    def has_seeded_world(self) -> bool:
+        """Whether its seed grows trees or a city: there are some, and no `world.seed`."""
+        world = self.world
+        return world.seed is None and (world.forest is not None or world.city is not None)
+
+    def with_(self, **changes: Any) -> Scenario:
+        """Return a copy with other values of its keys, checked as a file is.
+
+        Tables merge key by key, all else is replaced; `with_(seed=7, world={"seed": 1})` leaves the
+        rest of the world as it is. Raises `ScenarioError` naming key and what is allowed.
+        """
+        from volery.scenario.load import parse_scenario  # it needs this class
+        from volery.scenario.merging import merged
+
+        data = merged(self.model_dump(exclude_unset=True), changes)
+        return parse_scenario(data, where=f"{self.name}: with_()", access=self.access)
+
+    @property
     def access(self) -> ScenarioAccess:
         """Where its files may lie and which code it may start; see `load_scenario`."""
         return self._access

@@ -1,0 +1,80 @@
+"""Resets with another seed: a fresh simulation of that seed, or a refusal that says what to do."""
+
+import numpy as np
+import pytest
+
+from volery.core.errors import CommandError
+from volery.runtime import Copies, Simulation
+from volery.scenario.load import parse_scenario
+
+DATA = {
+    "name": "gusty",
+    "duration_s": 10.0,
+    "types": {"t": {"sensors": [{"kind": "imu"}, {"kind": "odometry"}]}},
+    "uavs": [{"type": "t", "position_m": [0, 0, 5]}],
+    "world": {"wind": {"velocity_m_s": [3, 0, 0], "turbulence": "moderate"}},
+}
+FOREST = {"kind": "procedural", "region_m": [20, 20, 40, 40], "trees": 3, "species": {"palm": 1}}
+
+
+@pytest.fixture
+def open_air():
+    return parse_scenario(DATA)
+
+
+@pytest.fixture
+def forest(open_air):
+    return open_air.with_(world={"forest": FOREST})
+
+
+def digest_of(simulation):
+    simulation.enable_digest()
+    simulation.run(0.3)
+    return simulation.digest()
+
+
+@pytest.mark.parametrize("world", [{}, {"seed": 3, "forest": FOREST}])
+def test_where_the_seed_grows_nothing_a_reset_is_a_fresh_simulation(open_air, world):
+    scenario = open_air.with_(world=world)
+    assert not scenario.has_seeded_world
+    with Simulation(scenario) as used, Simulation(scenario.with_(seed=7)) as fresh:
+        used.run(0.2)
+        used.reset(seed=7)
+        assert digest_of(used) == digest_of(fresh)
+
+
+@pytest.mark.parametrize("advice", ["new", "fixed"])
+def test_where_the_seed_grows_the_world_other_seeds_are_refused_with_what_to_do(forest, advice):
+    with Simulation(forest) as simulation:
+        simulation.run(0.1)
+        with pytest.raises(CommandError) as caught:
+            simulation.reset(seed=7)
+        text = str(caught.value)
+        assert "a reset keeps the world, which scenario 'gusty' grows from its seed 1" in text
+        assert simulation.time_s == pytest.approx(0.1)
+        simulation.reset(seed=1)
+        simulation.reset()
+    if advice == "new":
+        assert "scenario.with_(seed=7)" in text
+        changed = forest.with_(seed=7)
+    else:
+        assert 'scenario.with_(world={"seed": 1})' in text
+        changed = forest.with_(world={"seed": 1})
+    with Simulation(changed) as simulation, Simulation(forest) as old:
+        simulation.reset(seed=7)
+        positions = [each.forest.position_map for each in (simulation, old)]
+        assert np.array_equal(*positions) == (advice == "fixed")
+
+
+def test_copies_fix_the_world_that_they_share(forest):
+    with Copies(forest, 2) as copies:
+        assert copies.scenario.world.seed == 1
+        copies.run(copies.common_period_s)
+        copies.reset([1], seeds=[7])
+        copies.run(0.2)
+        with Simulation(copies.scenario.with_(seed=7)) as alone:
+            alone.run(0.2)
+            position = alone.uavs["uav1"].position_map
+        np.testing.assert_array_equal(copies.state().position_map[1, 0], position)
+        with pytest.raises(CommandError, match="a seed must be a whole number"):
+            copies.reset(seeds=[1, -1])
