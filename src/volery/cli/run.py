@@ -19,6 +19,7 @@ from volery.cli.progress import FlightProgress
 from volery.cli.repeating import recorded_flight, recorded_scenario
 from volery.cli.targets import check_record, check_report
 from volery.cli.trust import with_trust
+from volery.core.collector import spared_objects
 from volery.core.errors import CommandError, ScenarioError
 from volery.scenario.changes import LogRequest
 
@@ -93,7 +94,7 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
             simulation.repeat(flight)
         try:
             interrupts.be_gentle()
-            with open_doors(simulation, options), page.showing(simulation):
+            with open_doors(simulation, options), page.showing(simulation), spared_objects():
                 code = Flight(simulation, options, progress, interrupts).fly()
         finally:
             simulation.close()

@@ -18,6 +18,7 @@ from volery.cli.guard import complain_of, warn
 from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, serving
 from volery.cli.trust import with_trust
+from volery.core.collector import spared_objects
 from volery.core.errors import VoleryError
 from volery.scenario import changes
 from volery.scenario.changes import LogRequest
@@ -159,7 +160,8 @@ class _Host:
         ) as simulation:
             self._present, self._wish.quit = scenario, simulation.quit
             self._interrupts.be_gentle()
-            with open_doors(simulation, first), page.showing(simulation, self._trouble):
+            shown = page.showing(simulation, self._trouble)
+            with open_doors(simulation, first), shown, spared_objects():
                 self._trouble = ""
                 typer.echo(f"flying  {scenario.name}", err=True)
                 self._stay(simulation)
@@ -178,7 +180,8 @@ class _Host:
             self._wish.quit = player.quit
             self._interrupts.be_gentle()
             first, page = self._options.first, self._page
-            with open_doors(player, first), page.showing(player, self._trouble):
+            shown = page.showing(player, self._trouble)
+            with open_doors(player, first), shown, spared_objects():
                 self._trouble = ""
                 typer.echo(f"playing {log.name}", err=True)
                 while not (self._wish.asked or player.quitting or self._interrupts.pressed):
