@@ -24,7 +24,7 @@ from volery.runtime.graph_building import announce_sensors, start_nodes, start_s
 from volery.runtime.outlet import Outlet
 from volery.runtime.placement import Start, check_room
 from volery.runtime.pose_aids import PoseAids
-from volery.runtime.sensor_fitting import Fitted
+from volery.runtime.sensor_fitting import Fitted, refit
 from volery.runtime.services.offering import Close
 from volery.runtime.services.uav_services import offer_uav_services
 from volery.runtime.uav import Uav
@@ -118,6 +118,12 @@ class Crew:
         for start in self.starts:
             if start.takes_off and start.name in chosen:
                 self.uavs[start.name].take_off()
+
+    def reseed(self, seed: int) -> None:
+        """Let sensors that begin anew, and UAVs that come, have the random streams of `seed`."""
+        if seed != self.scenario.seed:
+            self.scenario = self.scenario.model_copy(update={"seed": seed})
+            self.fitted = refit(self.fitted, seed)
 
     def restart_nodes(self, name: str) -> None:
         """Make the nodes of one UAV anew."""

@@ -22,7 +22,7 @@ from volery.runtime.grid_world import GridWorld
 from volery.runtime.outlet import Outlet
 from volery.runtime.placement import Start
 from volery.runtime.run_loop import RunLoop
-from volery.runtime.sensor_fitting import Fitted, refit
+from volery.runtime.sensor_fitting import Fitted
 from volery.runtime.snapshot import (
     NodeStates,
     Snapshot,
@@ -106,7 +106,8 @@ class Keeper:
         fleet.seed_turbulence(seed, rows, fleet.names)
         if self.radio is not None:
             self.radio.reseed(seed)
-        self._restart_sensors(rows, refit(self.crew.fitted, seed))
+        self.crew.reseed(seed)
+        self._restart_sensors(rows, self.crew.fitted)
         for partner in self.partners:
             if not partner.has_left:
                 self.engine.wait_for(partner, partner.period_s)
@@ -144,6 +145,7 @@ class Keeper:
     def _state(self) -> dict[str, Any]:
         digest = self.outlet.digest
         return {
+            "seed": self.crew.scenario.seed,
             "engine": self.engine.get_state(),
             "graph": self.graph.get_state(),
             "faults": self.faults.get_state(),
@@ -158,6 +160,7 @@ class Keeper:
         }
 
     def _put_back(self, state: dict[str, Any]) -> None:
+        self.crew.reseed(state["seed"])
         put_back_nodes(self.crew.nodes, state["nodes"])
         self.grid_world.set_state(state["grid_map"])
         self.engine.set_state(state["engine"])

@@ -78,3 +78,29 @@ def test_copies_fix_the_world_that_they_share(forest):
         np.testing.assert_array_equal(copies.state().position_map[1, 0], position)
         with pytest.raises(CommandError, match="a seed must be a whole number"):
             copies.reset(seeds=[1, -1])
+
+
+def test_what_begins_after_a_reset_has_the_random_streams_of_its_seed(open_air):
+    """A new UAV and one put back to its start, also after a return to a snapshot."""
+
+    def flown(scenario, first):
+        with Simulation(scenario) as simulation:
+            if first is not None:
+                kept = first(simulation)
+                simulation.restore(kept)
+            simulation.enable_digest()
+            simulation.run(0.2)
+            simulation.spawn_uav("uav2", "t", [20.0, 0.0, 5.0])
+            simulation.reset_uav("uav1")
+            simulation.run(0.4)
+            return simulation.digest()
+
+    def reset(simulation):
+        simulation.reset(seed=7)
+        kept = simulation.snapshot()
+        simulation.reset(seed=8)
+        return kept
+
+    fresh = flown(open_air.with_(seed=7), None)
+    assert flown(open_air, reset) == fresh
+    assert flown(open_air, None) != fresh
