@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from functools import cache
 from pathlib import Path
 
@@ -15,6 +16,8 @@ import volery
 from volery.scenario.data_files import load_data_file
 from volery.scenario.load import load_scenario
 from volery.sensors.beam_file import read_beams
+from volery.sensors.lidar_model import load_lidar
+from volery.vehicle.airframe import load_airframe
 from volery.world.inventory import read_inventory
 from volery.world.terrain import Terrain
 from volery.world.trees.species import Species
@@ -77,6 +80,21 @@ def sensor_models(mutator):
     if sensor["kind"] == "camera":
         sensor |= {"width": 40, "height": 30}
     return _flown({"sensors": [sensor, *_estimated(sensor["kind"])]})
+
+
+def based_files(mutator):
+    """Chains and circles of files that change each other, one of them a scanner or an airframe."""
+    load, folder = mutator.pick(
+        ((load_lidar, "sensors/models"), (load_airframe, "vehicle/airframes"))
+    )
+    names = ("one.toml", "two.toml", "three.toml")
+    for name in names:
+        base = mutator.pick((*names, *names, "vlp_16", "f450", "utm_30lx", "../x.toml", "", "x\0y"))
+        lines = changed_text(mutator, mutator.pick(_texts(folder))).splitlines()
+        part = lines[: mutator.pick((0, 3, 12, len(lines)))]
+        write(path_of(name), "\n".join([f"base = {json.dumps(base)}", *part, ""]))
+    refused_or_read(lambda: load(path_of(names[0])))
+    return 1
 
 
 def _estimated(kind):

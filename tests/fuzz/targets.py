@@ -66,6 +66,7 @@ TARGETS = {
     "airframes": data_file_targets.airframes,
     "identified_models": data_file_targets.identified_models,
     "sensor_models": data_file_targets.sensor_models,
+    "based_files": data_file_targets.based_files,
     "beam_tables": data_file_targets.beam_tables,
     "wind_tables": data_file_targets.wind_tables,
     "tree_tables": data_file_targets.tree_tables,
@@ -83,5 +84,5 @@ BUILT = (
     "height_tables",
 )
 """Those that build simulations and fly them: some tenths of a second a check."""
-LOADED = ("scenario_files", "scenario_changes", "launch_profiles", "tree_species")
+LOADED = ("scenario_files", "scenario_changes", "launch_profiles", "tree_species", "based_files")
 """Those that load files of schemas: some milliseconds a check."""
