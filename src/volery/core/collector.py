@@ -1,8 +1,8 @@
 """Python's garbage collector in a process that serves clients while it simulates.
 
-A full collection looks at every object that the process holds. With the modules of Volery and of its
-compiler loaded that takes a fifth of a second, in which neither the simulation nor any client gets
-on, and messages of busy clients bring one about every two seconds.
+A full collection looks at every object that the process holds. With the modules of Volery and of
+its compiler loaded that takes a fifth of a second, in which neither the simulation nor any client
+gets on, and messages of busy clients bring one about every two seconds.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _THRESHOLDS = (5_000, 20, 100)
-"""Full collections come after ten million objects that stay: those of young objects find what becomes
-garbage in a run."""
+"""Full collections come after ten million objects that stay; those of young objects find what
+becomes garbage in a run."""
 
 
 @contextmanager
