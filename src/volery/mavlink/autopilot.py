@@ -19,7 +19,6 @@ from volery.mavlink import (
     calibration,
     failsafes,
     flying,
-    gripper,
     messages,
     streams,
     switching,
@@ -118,7 +117,6 @@ class Autopilot:
             failsafes.check(self, state)
             keep_transfers_going(self)
             calibration.update(self)
-            gripper.update(self)
         flying.fly(self, state)
         streams.send_due(self)
 

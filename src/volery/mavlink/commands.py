@@ -14,6 +14,7 @@ from volery.mavlink import (
     feasibility,
     gripper,
     home,
+    orbit,
     plans,
     requests,
     switching,
@@ -151,6 +152,13 @@ def _reposition(pilot: Autopilot, _source: Source, command: Command) -> int:
     return result
 
 
+def _orbit(pilot: Autopilot, source: Source, command: Command) -> int:
+    altitude = command.params[6]
+    height = _height_in_map(pilot, altitude, command.frame)
+    result = orbit.prepare(pilot, source, command, height)
+    return _switch(pilot, Mode.ORBIT) if result == ACCEPTED else result
+
+
 def _change_speed(pilot: Autopilot, _source: Source, command: Command) -> int:
     speed = command.params[1]
     if speed in (-1.0, -2.0):  # as it was
@@ -242,6 +250,7 @@ _HANDLERS: dict[int, Callable[[Autopilot, Source, Command], int]] = {
     plans.RETURN_TO_LAUNCH: _return,
     plans.LAND: _land,
     plans.TAKE_OFF: _take_off,
+    orbit.DO_ORBIT: _orbit,
     DO_SET_MODE: _set_mode,
     plans.CHANGE_SPEED: _change_speed,
     plans.SET_HOME: _set_home,

@@ -6,7 +6,16 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from volery.mavlink import landing, mission_flight, offboard, return_flight, sticks, switching
+from volery.mavlink import (
+    follow_target,
+    landing,
+    mission_flight,
+    offboard,
+    orbit,
+    return_flight,
+    sticks,
+    switching,
+)
 from volery.mavlink.legs import fly_leg
 from volery.mavlink.memory import Leg
 from volery.mavlink.modes import Mode
@@ -60,10 +69,12 @@ def _land(pilot: Autopilot, state: FlightState) -> None:
 _FLIGHTS: dict[Mode, Callable[[Autopilot, FlightState], None]] = {
     Mode.ALTITUDE: sticks.fly_altitude,
     Mode.POSITION: sticks.fly_position,
+    Mode.ORBIT: orbit.fly,
     Mode.TAKE_OFF: _take_off,
     Mode.HOLD: _hold,
     Mode.MISSION: mission_flight.fly,
     Mode.RETURN: return_flight.fly,
     Mode.LAND: _land,
+    Mode.FOLLOW_TARGET: follow_target.fly,
     Mode.OFFBOARD: offboard.fly,
 }

@@ -1,7 +1,6 @@
-"""The gripper: it releases and grabs, as PX4's without a sensor, and carries nothing.
+"""The gripper: it releases and grabs at once, and carries nothing.
 
-`payload_deliverer.cpp` of PX4 1.18: it starts grabbed; an action is IN_PROGRESS until its time is
-over, another action cancels it.
+A PX4 with a gripper says IN_PROGRESS first, which MAVSDK 4.1 takes for an unknown result.
 """
 
 from __future__ import annotations
@@ -9,14 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from volery.mavlink.acknowledgement import (
-    ACCEPTED,
-    CANCELLED,
-    DENIED,
-    IN_PROGRESS,
-    TEMPORARILY_REJECTED,
-    acknowledge,
-)
+from volery.mavlink.acknowledgement import ACCEPTED, DENIED
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot import Autopilot
@@ -24,35 +16,12 @@ if TYPE_CHECKING:
     from volery.mavlink.memory import Source
 
 DO_GRIPPER = 211
-RELEASE, GRAB = 0, 1
-"""GRIPPER_ACTIONS."""
-_ACTION_NS = 1_000_000_000
-"""Duration of an action (modelling choice)."""
+_ACTIONS = (0, 1)
+"""GRIPPER_ACTIONS: release, grab."""
 
 
-def act(pilot: Autopilot, source: Source, command: Command) -> int:
-    """Starts DO_GRIPPER's action."""
-    gripper, action = pilot.memory.gripper, command.params[1]
-    if not math.isfinite(action) or round(action) not in (RELEASE, GRAB):
-        return DENIED
-    wanted = round(action)
-    if gripper.action is not None:
-        if wanted == gripper.action:
-            return TEMPORARILY_REJECTED
-        if gripper.source is not None:
-            acknowledge(pilot, gripper.source, DO_GRIPPER, CANCELLED)
-    elif wanted == gripper.reached:
-        return ACCEPTED
-    gripper.action, gripper.source = wanted, source
-    gripper.end_ns = pilot.memory.now_ns + _ACTION_NS
-    return IN_PROGRESS
-
-
-def update(pilot: Autopilot) -> None:
-    """Ends an action whose time is over."""
-    gripper = pilot.memory.gripper
-    if gripper.action is None or pilot.memory.now_ns < gripper.end_ns:
-        return
-    gripper.reached, gripper.action = gripper.action, None
-    if gripper.source is not None:
-        acknowledge(pilot, gripper.source, DO_GRIPPER, ACCEPTED)
+def act(_pilot: Autopilot, _source: Source, command: Command) -> int:
+    """Does DO_GRIPPER's action."""
+    action = command.params[1]
+    known = math.isfinite(action) and round(action) in _ACTIONS
+    return ACCEPTED if known else DENIED

@@ -37,10 +37,10 @@ def fly_leg(pilot: Autopilot, leg: Leg) -> bool:
         leg.locked = True
         switching.order(pilot, "go_to", pilot.vehicle.go_to(leg.target, leg.yaw))
         return False
-    speed = min(leg.speed, _approach(level, float(pilot.parameter("MPC_ACC_HOR"))))
+    speed = min(leg.speed, approach_speed(level, float(pilot.parameter("MPC_ACC_HOR"))))
     way = "UP" if z > 0.0 else "DN"
     limit = min(float(pilot.parameter(f"MPC_Z_{kind}_{way}")) for kind in ("V_AUTO", "VEL_MAX"))
-    climb = min(limit, _approach(abs(z), 0.5 * float(pilot.parameter("MPC_ACC_HOR"))))
+    climb = min(limit, approach_speed(abs(z), 0.5 * float(pilot.parameter("MPC_ACC_HOR"))))
     share = speed / level if level > 1e-6 else 0.0
     velocity = (share * x, share * y, math.copysign(climb, z))
     pilot.vehicle.steer(velocity, leg.yaw, 0.0)
@@ -54,7 +54,7 @@ def bearing(pilot: Autopilot, target: tuple[float, float, float]) -> float | Non
     return math.atan2(dy, dx) if math.hypot(dx, dy) > 1.0 else None
 
 
-def _approach(distance: float, brake: float) -> float:
+def approach_speed(distance: float, brake: float) -> float:
     """m/s from which `brake` m/s^2 stops in time; proportional near the place."""
     linear = brake / _GAIN**2
     if distance <= linear:

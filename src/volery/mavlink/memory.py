@@ -102,13 +102,28 @@ class Mission:
 
 
 @dataclass
-class Gripper:
-    """What the gripper has reached and does (GRIPPER_ACTIONS), and whose command that is."""
+class Orbit:
+    """A circle to fly on. center: m, map; radius: m, positive: clockwise; speed: m/s."""
 
-    reached: int = 1
-    action: int | None = None
-    source: Source | None = None
-    end_ns: int = 0
+    center: Vector
+    radius: float
+    speed: float
+    facing: int
+    """ORBIT_YAW_BEHAVIOUR."""
+    initial_yaw: float
+    """rad, map."""
+    approaches: bool = True
+
+
+@dataclass
+class Target:
+    """Estimate of what is followed: m, m/s, map, at a time."""
+
+    position: Vector
+    velocity: Vector
+    time_ns: int
+    course: float | None = None
+    """rad, map; None: it has not moved yet."""
 
 
 @dataclass
@@ -182,7 +197,8 @@ class Memory:
     fix_lost: bool = False
     fix_denied: bool = False
     """Whether a UAV without a receiver has no fix: an injected failure."""
-    gripper: Gripper = field(default_factory=Gripper)
+    orbit: Orbit | None = None
+    followed: Target | None = None
     calibration: Calibration | None = None
     shells: dict[Source, str] = field(default_factory=dict)
     """Unfinished lines of the system shell."""

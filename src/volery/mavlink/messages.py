@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from volery.mavlink import (
     commands,
     file_protocol,
+    follow_target,
     offboard,
     parameter_protocol,
     shell,
@@ -83,6 +84,7 @@ HANDLERS: dict[str, Callable[[Autopilot, Source, Any], None]] = {
     "SET_POSITION_TARGET_LOCAL_NED": offboard.take_local,
     "SET_POSITION_TARGET_GLOBAL_INT": offboard.take_global,
     "SET_ATTITUDE_TARGET": offboard.take_attitude,
+    "FOLLOW_TARGET": follow_target.take,
     "MANUAL_CONTROL": sticks.take,
     "MISSION_COUNT": transfers.begin_upload,
     "MISSION_ITEM_INT": transfers.take_item,

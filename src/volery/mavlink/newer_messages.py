@@ -19,6 +19,7 @@ _ADVANCED = 1
 """MAV_MODE_PROPERTY_ADVANCED, which PX4 says of all but altitude and position."""
 _STANDARD = {
     Mode.POSITION: 1,
+    Mode.ORBIT: 2,
     Mode.ALTITUDE: 4,
     Mode.RETURN: 5,
     Mode.MISSION: 6,
@@ -26,7 +27,7 @@ _STANDARD = {
     Mode.TAKE_OFF: 8,
 }
 """MAV_STANDARD_MODE; the others have a name instead."""
-_NAMES = {Mode.HOLD: b"Hold", Mode.OFFBOARD: b"Offboard"}
+_NAMES = {Mode.HOLD: b"Hold", Mode.OFFBOARD: b"Offboard", Mode.FOLLOW_TARGET: b"Follow Target"}
 _OLDEST, _SPOKEN = 100, 200
 """Versions of MAVLink, times a hundred: frames of both are heard, those of 2 sent."""
 

@@ -20,6 +20,8 @@ def missing(pilot: Autopilot, mode: Mode) -> str:
         return "no manual control input"
     if mode is Mode.OFFBOARD and not offboard_is_fresh(pilot):
         return "no offboard signal"
+    if mode is Mode.ORBIT and pilot.memory.orbit is None:
+        return "no orbit was asked for"
     if mode is Mode.MISSION and not pilot.memory.plans[plans.MISSION]:
         return "no valid mission"
     return ""

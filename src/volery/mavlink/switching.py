@@ -86,6 +86,8 @@ def enter(pilot: Autopilot, mode: Mode) -> None:
     memory.mode = mode
     memory.leg = memory.way_home = memory.target = None
     memory.altitude_target = math.nan
+    if mode is not Mode.FOLLOW_TARGET:
+        memory.followed = None
     if mode is not Mode.MISSION:
         memory.mission.entered = False
     if memory.armed and flies(pilot):

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from volery.core.frames import ned_of_enu
-from volery.mavlink import arming, motion, newer_messages, plans
+from volery.mavlink import arming, motion, newer_messages, orbit, plans
 from volery.mavlink.codec import dialect
 from volery.mavlink.modes import Mode
 from volery.mavlink.release import custom_version, flight_version
@@ -208,6 +208,7 @@ BUILDERS: dict[int, Callable[[Autopilot], Any]] = {
     245: _extended_sys_state,
     300: newer_messages.protocol_version,
     331: motion.odometry,
+    360: orbit.status,
     436: newer_messages.current_mode,
 }
 """By message id; a builder returns None where there is nothing to tell."""

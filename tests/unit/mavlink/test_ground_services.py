@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from flying_bench import NAN, fly
 
-ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED, IN_PROGRESS, CANCELLED = range(7)
+ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 GRIPPER, CALIBRATE, INJECT = 211, 241, 420
 RELEASE, GRAB = 0.0, 1.0
 GPS, MOTOR, AIRSPEED = 4.0, 101.0, 8.0
@@ -33,19 +33,8 @@ def test_a_fence_takes_a_circle_without_a_radius_which_holds_nothing(flight, com
 
 def test_the_gripper_releases_and_grabs(flight):
     _, station = flight
-    assert station.command(GRIPPER, 1.0, GRAB) == ACCEPTED  # as it is from the beginning
-    assert station.command(GRIPPER, 1.0, RELEASE) == IN_PROGRESS
-    assert station.last("COMMAND_ACK").progress == 255
-    assert station.command(GRIPPER, 1.0, RELEASE) == REJECTED
-    station.seconds(1.2)
-    assert station.last("COMMAND_ACK").result == ACCEPTED
-    station.send("command_long", 1, 1, GRIPPER, 0, 1.0, GRAB, 0, 0, 0, 0, 0)
-    station.send("command_long", 1, 1, GRIPPER, 0, 1.0, RELEASE, 0, 0, 0, 0, 0)
-    assert [m.result for m in station.of("COMMAND_ACK")[-3:]] == [
-        IN_PROGRESS,
-        CANCELLED,
-        IN_PROGRESS,
-    ]
+    for action in (RELEASE, GRAB):
+        assert station.command(GRIPPER, 1.0, action) == ACCEPTED
     for action in (NAN, 2.0, -1.0):
         assert station.command(GRIPPER, 1.0, action) == DENIED
 

@@ -131,7 +131,7 @@ def test_streams_come_at_their_rates(profile):
         station.heard.clear()
         station.seconds(10.0)
         counts = Counter(message.get_msgId() for message in station.heard)
-        silent = {29, 83, 85}  # no barometer; targets: nothing is flown; the battery is ideal
+        silent = {29, 83, 85, 360}  # no barometer; no targets, no orbit; the battery is ideal
         if 147 not in counts:
             silent |= {147}
         assert 436 in RATES_HZ[profile]  # not of pymavlink's, so it is not heard
@@ -220,15 +220,15 @@ def test_modes_and_versions_are_told_in_messages_that_pymavlink_lacks(station):
     assert station.command(512, 300.0) == ACCEPTED
     assert station.command(519, 1.0) == ACCEPTED
     assert station.command(512, 436.0) == ACCEPTED
-    assert station.command(512, 435.0, 4.0) == ACCEPTED
-    assert station.command(512, 435.0, 9.0) == DENIED
+    assert station.command(512, 435.0, 5.0) == ACCEPTED
+    assert station.command(512, 435.0, 11.0) == DENIED
     assert payloads(taken, 300, "<HHH16s") == [(200, 100, 200, bytes(16))] * 2
     assert payloads(taken, 436, "<IIB") == [(50593792, 50593792, 0)]  # hold is no standard mode
-    hold = (50593792, 1, 8, 4, 0, b"Hold".ljust(35, b"\0"))
+    hold = (50593792, 1, 10, 5, 0, b"Hold".ljust(35, b"\0"))
     assert payloads(taken, 435, "<IIBBB35s") == [hold]
     assert station.command(512, 435.0, 0.0) == ACCEPTED
     modes = payloads(taken, 435, "<IIBBB35s")[1:]
-    assert [mode[3] for mode in modes] == [1, 2, 3, 4, 5, 6, 7, 8]
+    assert [mode[3] for mode in modes] == list(range(1, 11))
     assert {mode[4]: mode[0] >> 16 for mode in modes}[7] == 0x0604  # landing
 
 
