@@ -153,8 +153,8 @@ def _reposition(pilot: Autopilot, _source: Source, command: Command) -> int:
 
 
 def _orbit(pilot: Autopilot, source: Source, command: Command) -> int:
-    altitude = command.params[6]
-    height = _height_in_map(pilot, altitude, command.frame)
+    # Above the sea in any frame, as PX4 reads it: MAVSDK sends it as relative.
+    height = _height_in_map(pilot, command.params[6], None)
     result = orbit.prepare(pilot, source, command, height)
     return _switch(pilot, Mode.ORBIT) if result == ACCEPTED else result
 
