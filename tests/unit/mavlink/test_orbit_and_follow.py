@@ -22,7 +22,7 @@ def flight():
 
 
 def orbit(station, radius=10.0, speed=3.0, facing=0.0, north=0.0, height=6.0):
-    """DO_ORBIT as MAVSDK sends it: a relative frame with a height above the sea, as PX4 reads it."""
+    """As MAVSDK sends it: relative frame, yet a height above the sea, as PX4 reads it."""
     x, y = round((LATITUDE + north * M) * 1e7), round(LONGITUDE * 1e7)
     params = (radius, speed, facing, NAN, x, y, ALTITUDE + height)
     station.send("command_int", 1, 1, 3, ORBIT, 0, 0, *params)
