@@ -94,7 +94,7 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
             simulation.repeat(flight)
         try:
             interrupts.be_gentle()
-            with open_doors(simulation, options), page.showing(simulation), spared_objects():
+            with spared_objects(), open_doors(simulation, options), page.showing(simulation):
                 code = Flight(simulation, options, progress, interrupts).fly()
         finally:
             simulation.close()

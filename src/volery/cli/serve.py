@@ -161,7 +161,7 @@ class _Host:
             self._present, self._wish.quit = scenario, simulation.quit
             self._interrupts.be_gentle()
             shown = page.showing(simulation, self._trouble)
-            with open_doors(simulation, first), shown, spared_objects():
+            with spared_objects(), open_doors(simulation, first), shown:
                 self._trouble = ""
                 typer.echo(f"flying  {scenario.name}", err=True)
                 self._stay(simulation)
@@ -181,7 +181,7 @@ class _Host:
             self._interrupts.be_gentle()
             first, page = self._options.first, self._page
             shown = page.showing(player, self._trouble)
-            with open_doors(player, first), shown, spared_objects():
+            with spared_objects(), open_doors(player, first), shown:
                 self._trouble = ""
                 typer.echo(f"playing {log.name}", err=True)
                 while not (self._wish.asked or player.quitting or self._interrupts.pressed):

@@ -11,7 +11,7 @@ from volery.core.errors import BridgeError
 
 LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 PROBES = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
-"""The kernel asks a peer who is silent for 5 s, every 5 s, at most 3 times, whether it lives."""
+"""The system asks a peer who is silent for 5 s, every 5 s, at most 3 times, whether it lives."""
 
 
 def check_address(host: str, *, anywhere: bool, flag: str) -> None:

@@ -20,7 +20,7 @@ def open_websocket(
 ) -> socket.socket:
     """A connection after its handshake. `OSError` where the server does not take it.
 
-    receive_buffer: bytes that the kernel keeps for a reader who does not read.
+    receive_buffer: bytes that the system keeps for a reader who does not read.
     """
     sock = socket.socket()
     try:
