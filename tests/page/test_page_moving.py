@@ -220,6 +220,39 @@ def test_new_uavs_stand_where_one_clicks(page, served):
     page.get_by_role("option", name="uav4").wait_for(state="detached")
 
 
+# ------------------------------------------------------------------------- attitude and height
+
+
+def test_the_inspector_shows_attitude_and_height(page, served):
+    display = inspect(page, "uav2").get_by_role("img", name="Attitude and height above ground")
+    display.wait_for()
+
+    def height(_page):
+        return float(display.locator("[data-height]").text_content().removesuffix(" m") or "nan")
+
+    wait_until(page, lambda page: abs(height(page) - HOMES["uav2"][2]) < 0.3)
+    turned = display.locator("[data-horizon]").get_attribute("transform")
+    roll, nose = (float(value) for value in re.findall(r"(-?[\d.]+)\)", turned.replace("0 ", "")))
+    assert abs(roll) < 8.0  # degrees: it holds
+    assert abs(nose) < 12.0
+
+
+# --------------------------------------------------------------------------- the first picture
+
+
+@pytest.mark.parametrize("viewport", [WIDE, {"width": 390, "height": 700}])
+def test_the_first_picture_frames_all_uavs(browsing, served, homes, viewport):
+    page = browsing.open(served.url, viewport=viewport)
+    page.keyboard.press("m")
+    wait_for_picture(page)
+    page.wait_for_timeout(1500)  # until the view has settled
+    box = page.get_by_label("Scene", exact=True).bounding_box()
+    seen = np.array([project(page, place(served, uav)) for uav in HOMES])
+    inside = (seen - (box["x"], box["y"])) / (box["width"], box["height"])
+    assert ((inside > 0.0) & (inside < 1.0)).all(), inside
+    assert np.ptp(seen[:, 0]) > 0.6 * min(box["width"], box["height"])
+
+
 # --------------------------------------------------------------------------------- crashes
 
 

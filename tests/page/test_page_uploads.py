@@ -68,6 +68,29 @@ def forest():
     return "\n".join(["x_m,y_m,dbh_cm", *rows]).encode()
 
 
+def scenario():
+    return b"""
+name = "of_mine"
+duration_s = 36000.0
+[world.forest]
+kind = "procedural"
+region_m = [-4.0, -4.0, 4.0, 4.0]
+trees = 9
+minimum_spacing_m = 0.5
+[world.forest.species]
+broadleaf = 1.0
+[types.f450]
+airframe = "f450"
+[[types.f450.sensors]]
+kind = "ground_truth"
+[[uavs]]
+type = "f450"
+count = 2
+position_m = [-10.0, -10.0]
+last_position_m = [-10.0, 10.0]
+"""
+
+
 KINDS = {
     "field.csv": ("Grid map", csv, "grid_map"),
     "plan.png": ("Grid map", png, "grid_map"),
@@ -75,6 +98,7 @@ KINDS = {
     "town.geojson": ("City", geojson, "city"),
     "hall.glb": ("Mesh", glb, "open"),
     "grove.csv": ("Forest", forest, "forest"),
+    "flight.toml": ("Scenario", scenario, "forest"),
 }
 WRONG = {
     "two.csv": ("Grid map", b"0,1\n0,2\n", "line 2, column 2"),
@@ -83,6 +107,7 @@ WRONG = {
     "half.geojson": ("City", b"{", "not valid JSON"),
     "nothing.glb": ("Mesh", b"glTF" + b"\0" * 40, "nothing.glb"),
     "columns.csv": ("Forest", b"x,y\n1,2\n", "unknown column 'x'"),
+    "spy.toml": ("Scenario", scenario() + b'[[nodes]]\nnode = "os:system"\n', "shipped nodes only"),
     "notes.obj": ("Grid map", b"v 0 0 0\n", "not from '.obj'"),
 }
 
@@ -177,7 +202,7 @@ def test_wrong_files_are_refused_with_the_reason_and_nothing_is_lost(page, serve
     before = status(served)["stamp"]["sec"]
     for name, (kind, content, why) in WRONG.items():
         bring(page, name, kind, content)
-        refused = page.get_by_role("alert").filter(has_text="cannot be flown in")
+        refused = page.get_by_role("alert").filter(has_text="cannot be flown")
         refused.filter(has_text=re.compile(re.escape(why))).wait_for()
     keep_picture(page, "wrong_upload")
     assert json.loads(served.ask("scenarios")) == known

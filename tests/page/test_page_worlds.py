@@ -116,7 +116,10 @@ def test_a_card_is_chosen_with_uavs_airframe_and_sensors(page, served):
         dialog.get_by_role("checkbox", name="sonar").uncheck()
 
     page.get_by_role("button", name=re.compile("choose another one")).click()
-    picture = page.get_by_role("button", name=re.compile("^hover: ")).locator("img")
+    card = page.get_by_role("button", name=re.compile("^hover: "))
+    for told in ("1 UAV: f450", "sonar, IMU", "open ground"):
+        card.get_by_text(told).wait_for()
+    picture = card.locator("img")
     until(lambda: picture.evaluate("image => image.naturalWidth") > 100)  # a real picture
     keep_picture(page, "cards")
     page.keyboard.press("Escape")

@@ -150,6 +150,56 @@ def test_names_are_ours(called, name, tmp_path):
     assert name_for(called, Shelf(tmp_path)) == name
 
 
+OWN = """# my flight
+name = "mine"
+description = '''
+name = "not this one"
+[neither]
+'''
+[types.f450]
+airframe = "f450"
+[[types.f450.sensors]]
+kind = "imu"
+[[uavs]]
+type = "f450"
+position_m = [0.0, 0.0]
+"""
+
+
+def test_a_scenario_keeps_all_but_its_name(checked):
+    scenario = checked("scenario", ".toml", OWN.encode())
+    assert scenario.name == "yard"
+    assert scenario.description.startswith('name = "not this one"')
+    assert scenario.uav_count == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("name = ", "not valid TOML"),
+        ("x = " + "[" * 5000, "TOML|nested too deep"),
+        (OWN.replace("name", "title", 1), "name on a line of its own"),
+        (OWN.replace("f450", "f999", 2), "f999"),
+        (OWN + "last_position_m = [9.0, 0.0]\ncount = 1001\n", "at most 1000"),
+        (OWN + '[[nodes]]\nnode = "os:system"\n', "does not ship with Volery"),
+        (OWN + '[[nodes]]\nnode = "volery.server.page:STATIC"\n', "does not ship"),
+        (
+            OWN
+            + '[world.forest]\nkind = "inventory"\nspecies = "broadleaf"\nfile = "/etc/passwd"\n',
+            "that may be read",
+        ),
+        (
+            OWN
+            + '[[world.meshes]]\nname = "a"\nfile = "../../other/a.stl"\nposition_m = [0, 0, 0]\n',
+            "that may be read",
+        ),
+    ],
+)
+def test_a_scenario_of_a_stranger_reaches_nothing_of_the_server(checked, text, why):
+    with pytest.raises(VoleryError, match=why):
+        checked("scenario", ".toml", text.encode())
+
+
 @pytest.fixture(scope="module")
 def server(tmp_path_factory):
     with serving(uploads=tmp_path_factory.mktemp("run") / "uploads") as server:
@@ -164,6 +214,17 @@ def test_a_good_file_over_http_can_be_loaded(server):
     assert (card["name"], card["world"], card["uploaded"]) == ("my_hall", "grid_map", True)
 
 
+def test_a_scenario_over_http_can_be_loaded(server):
+    answer = ask(server, "/api/uploads?kind=scenario&name=My%20Flight.toml", "POST", OWN.encode())
+    assert (answer.status, answer.json) == (201, {"scenario": "my_flight"}), answer.body
+    cards = {card["name"]: card for card in ask(server, "/api/scenarios").json}
+    assert cards["my_flight"]["airframes"] == ["f450"]
+    answer = ask(server, "/api/uploads?kind=scenario&name=b.toml", "POST", b"name = [")
+    assert answer.status == 422
+    assert "b.toml: not valid TOML" in answer.error
+    assert "/" not in answer.error
+
+
 def test_a_bad_file_over_http_leaves_nothing_behind(server):
     before = ask(server, "/api/scenarios").json
     answer = ask(server, "/api/uploads?kind=grid_map&name=hall.csv", "POST", b"0,x\n")
@@ -176,7 +237,7 @@ def test_a_bad_file_over_http_leaves_nothing_behind(server):
 @pytest.mark.parametrize(
     ("query", "body", "status", "why"),
     [
-        ("kind=virus&name=a.csv", b"x", 400, "kind must be one of grid_map, city, mesh, forest"),
+        ("kind=virus&name=a.csv", b"x", 400, "one of grid_map, city, mesh, forest, scenario"),
         ("kind=mesh&name=a.exe", b"x", 415, "'.exe'"),
         ("kind=mesh", b"x", 415, "is read from"),
         ("kind=forest&name=a.csv", b"", 400, "empty"),

@@ -40,9 +40,11 @@ export function DropZone() {
     <div className="drop-zone">
       <Upload size={48} />
       <Text size="lg" fw={600}>
-        Drop a map to fly in it
+        Drop a map or a scenario to fly it
       </Text>
-      <Text c="dimmed">Grid (CSV, PNG, MovingAI), GeoJSON, glTF, OBJ, STL, forest inventory</Text>
+      <Text c="dimmed">
+        Grid (CSV, PNG, MovingAI), GeoJSON, glTF, OBJ, STL, forest inventory, scenario (TOML)
+      </Text>
     </div>
   );
 }

@@ -7,5 +7,6 @@ it("files are told apart by their endings, tables by their first line", () => {
   expect(kindOf("maze.map", "type octile")).toBe("grid_map");
   expect(kindOf("plot.csv", "\n0,1,0\n1,0,0")).toBe("grid_map");
   expect(kindOf("plot.csv", "x_m,y_m,dbh_cm,species\n1,2,30,oak")).toBe("forest");
+  expect(kindOf("flight.toml", "name = 'flight'")).toBe("scenario");
   expect(kindOf("notes.docx", "")).toBeNull();
 });

@@ -10,6 +10,7 @@ const BY_ENDING: Readonly<Record<string, UploadKind>> = {
   gltf: "mesh",
   obj: "mesh",
   stl: "mesh",
+  toml: "scenario",
 };
 
 export const ENDINGS = [...Object.keys(BY_ENDING), "csv"].map((ending) => `.${ending}`).join(",");

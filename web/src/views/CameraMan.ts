@@ -1,4 +1,5 @@
 import { Group, Quaternion, Vector3, type PerspectiveCamera } from "three";
+import { FrameBox } from "../lib/framing.ts";
 import { POSE } from "../link/protocol.ts";
 import { pickUav } from "../scene/stage/picking.ts";
 import type { Moment, Part } from "../scene/stage/part.ts";
@@ -43,7 +44,15 @@ export class CameraMan implements Part {
   private readonly blend = new Blend();
   private readonly hands: Hands;
   private readonly around: Surroundings;
-  private readonly uav = { position: new Vector3(), quaternion: new Quaternion(), reach: 0.3 };
+  private readonly uav = {
+    name: "",
+    position: new Vector3(),
+    quaternion: new Quaternion(),
+    reach: 0.3,
+  };
+  private readonly box = new FrameBox();
+  /** Whether the poses of all UAVs are known. */
+  private complete = false;
   private readonly uavCamera: Eye = {
     position: new Vector3(),
     quaternion: new Quaternion(),
@@ -71,7 +80,8 @@ export class CameraMan implements Part {
       },
       uav: null,
       uavCamera: null,
-      spread: 0,
+      group: { middle: [0, 0, 0], radius: 0 },
+      aspect: 1,
     };
     this.hands = new Hands(element, {
       click: (x, y) => this.pick(x, y),
@@ -87,6 +97,7 @@ export class CameraMan implements Part {
 
   update({ width, height, stepS }: Moment): void {
     this.screen = { width, height };
+    this.around.aspect = width / Math.max(1, height);
     this.lookAround();
     const { name, cameraVersion, camera: kept } = useView.getState();
     if (name !== this.entered || cameraVersion !== this.cameraVersion) {
@@ -110,10 +121,10 @@ export class CameraMan implements Part {
     this.ended.abort();
   }
 
-  /** Whether the first picture had better wait for the first UAV. */
+  /** Whether the first picture waits for the poses of the UAVs. */
   private waits(stepS: number): boolean {
     this.waitedS += stepS;
-    return this.around.uav === null && this.waitedS < LONGEST_WAIT_S;
+    return !this.complete && this.waitedS < LONGEST_WAIT_S;
   }
 
   /** Every view begins from somewhere: the first one from where orbit would. */
@@ -164,26 +175,31 @@ export class CameraMan implements Part {
     const { poses } = shown;
     this.around.uav = null;
     this.around.uavCamera = null;
+    this.complete = false;
     if (uav === undefined || at < 0 || !Number.isFinite(poses[at])) return;
+    this.uav.name = uav.name;
     this.uav.position.fromArray(poses, at);
     this.uav.quaternion.fromArray(poses, at + 3);
     this.uav.reach = reachOf(uav.airframe);
     this.around.uav = this.uav;
-    this.around.spread = this.spread();
+    this.gather();
     if (cameraOfUav(uav.name, this.uavCamera)) this.around.uavCamera = this.uavCamera;
   }
 
-  private spread(): number {
-    let farthest = 0;
+  /** Measures the selected UAV and those near it. */
+  private gather(): void {
+    const { box, around } = this;
+    const { position } = this.uav;
+    this.complete = true;
+    box.clear();
     for (const { row } of fleet.uavs) {
       const at = row * POSE;
-      if (at < 0) continue;
       const [x, y, z] = [shown.poses[at]!, shown.poses[at + 1]!, shown.poses[at + 2]!];
-      const { position } = this.uav;
-      const distance = Math.hypot(x - position.x, y - position.y, z - position.z);
-      if (distance < NEIGHBOURS_M) farthest = Math.max(farthest, distance);
+      if (at < 0 || !Number.isFinite(x)) this.complete = false;
+      else if (Math.hypot(x - position.x, y - position.y, z - position.z) < NEIGHBOURS_M)
+        box.add(x, y, z);
     }
-    return farthest;
+    box.measure(around.group);
   }
 
   private save(stepS: number): void {

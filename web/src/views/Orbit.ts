@@ -1,4 +1,5 @@
 import { Vector3 } from "three";
+import { fittingDistance } from "../lib/framing.ts";
 import type { CameraPose } from "../state/view.ts";
 import type { Input } from "./input.ts";
 import {
@@ -31,6 +32,9 @@ export class Orbit implements Rig {
   private follows = true;
   private placed = false;
   private readonly way = new Vector3();
+  /** From the UAV that is followed to what the camera looks at: the middle of its group, at first. */
+  private readonly offset = new Vector3();
+  private followed = "";
 
   enter(eye: Eye, around: Surroundings, kept: CameraPose | null): void {
     if (kept !== null) {
@@ -58,9 +62,12 @@ export class Orbit implements Rig {
       return;
     }
     this.placed = true;
-    this.target.copy(around.uav.position);
+    const { uav, group, aspect } = around;
+    this.followed = uav.name;
+    this.target.fromArray(group.middle);
+    this.offset.copy(this.target).sub(uav.position);
     this.pitch = -0.3;
-    this.distance = clamp(14 * around.uav.reach, 2.4 * around.spread, 90);
+    this.distance = clamp(14 * uav.reach, fittingDistance(group.radius, FOV, aspect), 120);
     this.settle();
   }
 
@@ -72,6 +79,7 @@ export class Orbit implements Rig {
   focus(around: Surroundings): void {
     if (around.uav === null) return;
     this.follows = true;
+    this.offset.set(0, 0, 0);
     this.distance = clamp(9 * around.uav.reach, this.distance, 16 * around.uav.reach);
   }
 
@@ -81,7 +89,7 @@ export class Orbit implements Rig {
     this.pitch = clamp(-STEEPEST, this.pitch - TURN * input.turnY, STEEPEST);
     this.distance = clamp(NEAREST_M, this.distance * input.zoom, FARTHEST_M);
     if (input.panX !== 0 || input.panY !== 0) this.pan(input, eye);
-    if (this.follows && around.uav !== null) this.target.copy(around.uav.position);
+    if (this.follows && around.uav !== null) this.follow(around.uav);
     this.ease(stepS);
     wayOf(this.shown.yaw, this.shown.pitch, this.way);
     eye.position.copy(this.shownTarget).addScaledVector(this.way, -this.shown.distance);
@@ -89,6 +97,13 @@ export class Orbit implements Rig {
     eye.position.z = Math.max(eye.position.z, ground);
     lookFromTo(eye.position, this.shownTarget, eye.quaternion);
     eye.fov = FOV;
+  }
+
+  /** Another UAV is looked at itself, not the middle of its group. */
+  private follow({ name, position }: NonNullable<Surroundings["uav"]>): void {
+    if (name !== this.followed) this.offset.set(0, 0, 0);
+    this.followed = name;
+    this.target.copy(position).add(this.offset);
   }
 
   private ease(stepS: number): void {

@@ -1,4 +1,5 @@
 import { Matrix4, Quaternion, Vector3 } from "three";
+import type { Frame } from "../lib/framing.ts";
 import type { CameraPose } from "../state/view.ts";
 import type { Input } from "./input.ts";
 
@@ -17,6 +18,7 @@ export interface Surroundings {
   walk: (from: readonly [number, number], to: readonly [number, number]) => [number, number];
   /** The selected UAV as it is shown; null: there is none. */
   uav: {
+    name: string;
     position: Vector3;
     quaternion: Quaternion;
     /** From its middle to its farthest rotor, m. */
@@ -24,8 +26,10 @@ export interface Surroundings {
   } | null;
   /** Camera of the selected UAV; null: it has none. */
   uavCamera: Eye | null;
-  /** All UAVs near the selected one: how far away the farthest is, m. */
-  spread: number;
+  /** What encloses the selected UAV and those near it, m. */
+  group: Frame;
+  /** Width over height of the picture. */
+  aspect: number;
 }
 
 /** One way of looking at the scene. */

@@ -15,7 +15,7 @@ from pathlib import Path
 from volery.core.errors import VoleryError
 from volery.scenario.shelf import Shelf
 from volery.server.bounded_process import bound_this_process
-from volery.server.uploads.kinds import BOUNDS
+from volery.server.uploads.kinds import BOUNDS, SCENARIO
 from volery.server.uploads.making import toml_of
 
 
@@ -24,13 +24,19 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
 
     Raises `VoleryError` where the file is no such thing, or no UAV finds a place.
     """
-    from volery.runtime.building import place
+    from volery.runtime.building import check_types, place
     from volery.runtime.worlds import build_city, build_forest, build_scene, build_terrain
     from volery.scenario.load import load_scenario
+    from volery.server.uploads.scenario_file import check_contents, text_of
 
     target = path.parent / Shelf.FILE
-    target.write_text(toml_of(kind, path, name, called), encoding="utf-8")
+    own = kind == SCENARIO
+    text = text_of(path, name) if own else toml_of(kind, path, name, called)
+    target.write_text(text, encoding="utf-8")
     scenario = load_scenario(target, confined=True)
+    if own:
+        check_contents(scenario)
+        check_types(scenario)
     terrain = build_terrain(scenario)
     city = build_city(scenario, terrain)
     forest = build_forest(scenario, terrain, city)

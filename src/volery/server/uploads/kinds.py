@@ -20,14 +20,19 @@ class Kind(NamedTuple):
     what: str
 
 
+SCENARIO = "scenario"
+"""Kind of a whole scenario; the others are worlds that the server puts UAVs into."""
 KINDS = {
     "grid_map": Kind((".csv", ".txt", ".png", ".map"), 8_000_000, "a matrix of 0 and 1"),
     "city": Kind((".geojson", ".json"), 32_000_000, "outlines of buildings as GeoJSON"),
     "mesh": Kind((".glb", ".obj", ".stl"), 64_000_000, "a mesh in metres"),
     "forest": Kind((".csv",), 8_000_000, "trees: x_m, y_m[, dbh_cm, height_m, species]"),
+    SCENARIO: Kind((".toml",), 256_000, "a scenario"),
 }
 MOST_UPLOADS = 200
 """Scenarios in the folder."""
+MAX_UAVS = 1_000
+"""In a scenario."""
 MOST_CELLS = 1_000_000
 MOST_TREES = 50_000
 MOST_TRIANGLES = 2_000_000

@@ -62,7 +62,7 @@ export async function rebuildScenario(scenario: string, more: ScenarioChanges): 
   await loadScenario(scenario, { ...kept, ...more });
 }
 
-export const UPLOAD_KINDS = ["grid_map", "city", "mesh", "forest"] as const;
+export const UPLOAD_KINDS = ["grid_map", "city", "mesh", "forest", "scenario"] as const;
 export type UploadKind = (typeof UPLOAD_KINDS)[number];
 
 /** Make a scenario of a file; its name. */

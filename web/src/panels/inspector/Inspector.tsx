@@ -1,6 +1,7 @@
 import { Badge, Group, ScrollArea, Select, Stack, Text } from "@mantine/core";
 import { select, useVehicles } from "../../state/vehicles.ts";
 import { colourOf, modeText } from "../vehicles/modes.ts";
+import { Attitude } from "./Attitude.tsx";
 import { Figures } from "./Figures.tsx";
 import { GoTo } from "./GoTo.tsx";
 import { Orders } from "./Orders.tsx";
@@ -38,6 +39,7 @@ export default function Inspector() {
         </Group>
         <Repair key={`repair ${selected}`} uav={selected} />
         <Orders key={`orders ${selected}`} uav={selected} />
+        <Attitude key={`attitude ${selected}`} uav={selected} />
         <Figures />
         <GoTo key={selected} uav={selected} />
         <Pilots uav={selected} />

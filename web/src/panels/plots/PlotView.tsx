@@ -1,6 +1,7 @@
 import { ActionIcon, CloseButton, Group, Text, useComputedColorScheme } from "@mantine/core";
 import { Download, Maximize2, X } from "lucide-react";
 import { useEffect, useRef, useState } from "react";
+import { minSpanOf } from "../../lib/plotRange.ts";
 import { csvOf } from "../../lib/series.ts";
 import { download } from "../../lib/download.ts";
 import { nameOf, removeLine, removePlot, usePlots, type Plot } from "../../state/plots.ts";
@@ -31,6 +32,7 @@ export function PlotView({ plot, paused }: { plot: Plot; paused: boolean }) {
       name: nameOf(line),
       colour: colourOf(i),
       series: seriesOf(line),
+      minSpan: minSpanOf(line.path),
     }));
     const made = new Drawing(element, lines, LOOKS[scheme]);
     drawing.current = made;

@@ -1,10 +1,13 @@
 import uPlot from "uplot";
+import { widened } from "../../lib/plotRange.ts";
 import { columnsOf, type Series } from "../../lib/series.ts";
 
 export interface Drawn {
   name: string;
   colour: string;
   series: Series;
+  /** Least span of its axis; NaN: by its values. */
+  minSpan: number;
 }
 
 export interface Look {
@@ -31,6 +34,8 @@ export class Drawing {
     look: Look,
   ) {
     const { width, height } = place.getBoundingClientRect();
+    const spans = lines.map(({ minSpan }) => minSpan).filter((span) => !Number.isNaN(span));
+    const minSpan = spans.length === 0 ? NaN : Math.max(...spans);
     const axis = {
       stroke: look.text,
       grid: { stroke: look.grid, width: 1 },
@@ -41,7 +46,10 @@ export class Drawing {
         width: Math.max(60, width),
         height: Math.max(60, height),
         legend: { show: false },
-        scales: { x: { time: false, auto: false, range: (_plot, from, to) => [from, to] } },
+        scales: {
+          x: { time: false, auto: false, range: (_plot, from, to) => [from, to] },
+          y: { range: (_plot, min, max) => rangeOf(min, max, minSpan) },
+        },
         axes: [
           { ...axis, size: 26, values: (_plot, marks) => marks.map((mark) => `${round(mark)} s`) },
           {
@@ -103,6 +111,12 @@ export class Drawing {
     this.zoomed = [plot.posToVal(left, "x"), plot.posToVal(left + width, "x")];
     plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
   }
+}
+
+/** As uPlot has it, around at least `minSpan`; without values from 0 to 1. */
+function rangeOf(min: number | null, max: number | null, minSpan: number): uPlot.Range.MinMax {
+  if (min === null || max === null) return [0, 1];
+  return uPlot.rangeNum(...widened(min, max, minSpan), 0.1, true);
 }
 
 /** A mark with the digits that tell it from the next one. */

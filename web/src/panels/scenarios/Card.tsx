@@ -1,5 +1,6 @@
 import { Badge, Group, Text, UnstyledButton } from "@mantine/core";
 import { Building2, Grid3x3, Mountain, Trees } from "lucide-react";
+import { contentsOf } from "../../lib/cardText.ts";
 import type { ScenarioCard } from "../../link/commands.ts";
 
 const ICONS = { forest: Trees, city: Building2, grid_map: Grid3x3, open: Mountain };
@@ -12,7 +13,8 @@ interface CardProps {
 
 /** A scenario as a picture, its name and what flies there. */
 export function Card({ card, present, choose }: CardProps) {
-  const { name, description, uavs, airframes, picture, world, uploaded } = card;
+  const { name, description, picture, world, uploaded } = card;
+  const contents = contentsOf(card);
   const Icon = ICONS[world] ?? Mountain;
   return (
     <UnstyledButton
@@ -44,8 +46,10 @@ export function Card({ card, present, choose }: CardProps) {
           {description}
         </Text>
         <Text size="xs" mt={4}>
-          {uavs} × {airframes.join(", ")}
+          {contents.uavs}
         </Text>
+        <Text size="xs">{contents.sensors}</Text>
+        <Text size="xs">{contents.world}</Text>
       </div>
     </UnstyledButton>
   );

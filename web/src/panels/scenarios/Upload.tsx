@@ -15,10 +15,15 @@ const KINDS: { kind: UploadKind; label: string; description: string }[] = [
   { kind: "city", label: "City", description: "Outlines of buildings: GeoJSON" },
   { kind: "mesh", label: "Mesh", description: "Any geometry: glTF (.glb), OBJ, STL" },
   { kind: "forest", label: "Forest", description: "An inventory of trees: CSV" },
+  {
+    kind: "scenario",
+    label: "Scenario",
+    description: "A whole scenario: TOML, with models and nodes that ship with Volery",
+  },
 ];
 const PEEK_BYTES = 4096;
 
-/** A map of the user's own becomes a scenario. */
+/** A map or a scenario of the user's own joins the scenarios. */
 export default function Upload() {
   const file = useWindows((windows) => windows.file);
   const [kind, setKind] = useState<UploadKind | null>(null);
@@ -44,7 +49,7 @@ export default function Upload() {
     setBusy(false);
   };
   return (
-    <Modal opened onClose={closeWindow} title="Upload a map" size="md">
+    <Modal opened onClose={closeWindow} title="Upload a map or a scenario" size="md">
       <Stack gap="sm">
         <Group justify="space-between" wrap="nowrap">
           <Text truncate fw={600}>
@@ -70,7 +75,7 @@ export default function Upload() {
           </Stack>
         </Radio.Group>
         {trouble !== "" && (
-          <Alert color="red" role="alert" title="The file cannot be flown in">
+          <Alert color="red" role="alert" title="The file cannot be flown">
             <span className="reason">{trouble}</span>
           </Alert>
         )}
