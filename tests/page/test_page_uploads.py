@@ -106,7 +106,7 @@ WRONG = {
     "empty.map": ("Grid map", b"type octile\n", "empty.map"),
     "half.geojson": ("City", b"{", "not valid JSON"),
     "nothing.glb": ("Mesh", b"glTF" + b"\0" * 40, "nothing.glb"),
-    "columns.csv": ("Forest", b"x,y\n1,2\n", "unknown column 'x'"),
+    "columns.csv": ("Forest", b"x,y\n1,2\n", "unknown name"),
     "spy.toml": ("Scenario", scenario() + b'[[nodes]]\nnode = "os:system"\n', "shipped nodes only"),
     "notes.obj": ("Grid map", b"v 0 0 0\n", "not from '.obj'"),
 }
