@@ -118,6 +118,22 @@ def test_labels_are_whole_and_the_prompt_lies_free(browsing, served):
     prompt.wait_for(state="detached")
 
 
+def test_a_saved_layout_is_restored(browsing, served):
+    page = browsing.open(served.url, viewport={"width": 1000, "height": 600})
+    panel_button(page, "Plots").click()
+    page.get_by_role("button", name="Layouts").click()
+    page.get_by_label("Name of the layout").fill("tuning")
+    page.get_by_role("button", name="Save", exact=True).click()
+    page.get_by_role("button", name="Restore tuning").wait_for()
+    page.keyboard.press("Escape")
+    panel_button(page, "Plots").click()
+    plots = page.get_by_role("complementary", name="Plots")
+    plots.wait_for(state="detached")
+    page.get_by_role("button", name="Layouts").click()
+    page.get_by_role("button", name="Restore tuning").click()
+    plots.wait_for()
+
+
 # ------------------------------------------------------------------------------ a phone's sheet
 
 

@@ -6,6 +6,7 @@ import { useSimulation } from "../../state/simulation.ts";
 import { openWindow } from "../../state/windows.ts";
 import { Health } from "../Health.tsx";
 import { ColourScheme } from "./ColourScheme.tsx";
+import { Layouts } from "./Layouts.tsx";
 import { LinkBadge } from "./LinkBadge.tsx";
 import { TimeControls } from "./TimeControls.tsx";
 
@@ -26,6 +27,7 @@ export function TopBar() {
         <LinkBadge />
         <OverlayButton overlay="map" label="Map (M)" icon={<MapIcon size={18} />} />
         <OverlayButton overlay="pictures" label="Pictures (P)" icon={<Images size={18} />} />
+        <Layouts />
         <ColourScheme />
         <Tooltip label="Keys (?)">
           <ActionIcon
