@@ -45,4 +45,4 @@ def test_a_service_whose_client_left_fails_at_once(bench, client, how):
     getattr(client, how)()
     began = time.monotonic()
     assert isinstance(come.get(timeout=10.0), GraphError)
-    assert time.monotonic() - began < 2.0
+    assert time.monotonic() - began < 9.0  # not the ten seconds of the wait

@@ -218,7 +218,11 @@ def broken(_request):
 
 @pytest.mark.parametrize(
     ("service", "body", "words"),
-    [("/nobody", b"", "nobody offers"), ("/broken", b"", "oh"), ("/do", b"x", "Trigger")],
+    [
+        ("/nobody", b"", "nobody offers"),
+        ("/broken", b"", "'/broken' failed"),
+        ("/do", b"x", "Trigger"),
+    ],
 )
 def test_a_call_that_fails_ends_too(loop, client, service, body, words):
     loop.graph.offer("/broken", TRIGGER, broken)

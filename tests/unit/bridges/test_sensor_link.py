@@ -202,9 +202,9 @@ def test_forged_heads_inside_of_each_other_cost_no_more_than_linear_time() -> No
     for start in range(0, size, HEAD_BYTES):
         heads.append(encode_head(Kind.IMU, 1, 0, 0, max(size - start - 28, 0)))
     stream = b"".join(heads)
-    began = time.perf_counter()
+    began = time.process_time()
     _, parser = parse(stream)
-    assert time.perf_counter() - began < 2.0
+    assert time.process_time() - began < 2.0
     assert parser.corrupt > 5
 
 
@@ -220,11 +220,11 @@ def test_memory_is_bounded_by_one_frame() -> None:
 def test_many_small_pieces_of_a_big_frame_take_linear_time() -> None:
     frame = encode_frame(Kind.IMAGE, 1, 0, 0, bytes(20_000_000))
     parser, found = FrameParser(), []
-    began = time.perf_counter()
+    began = time.process_time()
     for start in range(0, len(frame), 4096):
         found += parser.feed(frame[start : start + 4096])
     assert len(found) == 1
-    assert time.perf_counter() - began < 2.0
+    assert time.process_time() - began < 2.0
 
 
 def test_struct_layout_is_packed() -> None:
