@@ -20,6 +20,7 @@ from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.cli.launching import start_profile
 from volery.runtime.node_loading import start_node
+from volery.scenario.access import ScenarioAccess
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import NodeEntry
 
@@ -182,5 +183,5 @@ def test_shipped_profiles_start_the_nodes_of_the_scenario(name: str) -> None:
         context = Context(simulation.graph, simulation._engine, simulation.graph.now_ns)
         for entry in autonomy:
             plain = NodeEntry(node=entry.node, parameters=entry.parameters)
-            node = start_node(plain, context, profile.namespace, name, None)
+            node = start_node(plain, context, profile.namespace, name, ScenarioAccess())
             node.destroy_node()

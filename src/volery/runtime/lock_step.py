@@ -4,7 +4,7 @@ A client calls `/volery/join_lock_step`, subscribes `/volery/lock_step/NAME/go` 
 `/volery/lock_step/NAME/done`, both `rosgraph_msgs/Clock`. At each meeting the simulation sends the
 time on `go`, after everything that it has published until then, and stands still until the same
 time comes back on `done`; what the client published before is in force from the next physics step.
-A client that joins before the first step is met at time 0 too, then each period.
+A client that joins before the first step may ask to be met at time 0 too.
 Who unadvertises `done`, or loses the connection, has left. After a reset the times begin anew.
 """
 
@@ -56,7 +56,7 @@ class _Meetings:
             on_meeting=self._begin,
             is_there=self._is_there,
             restarts=request.restarts,
-            meets_at_start=True,
+            meets_at_start=request.meets_at_start,
         )
         self._go = graph.advertise(f"/volery/lock_step/{name}/go", Clock)
         self._subscription = graph.subscribe(self._done, self._end, Clock)

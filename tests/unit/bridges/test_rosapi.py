@@ -146,7 +146,7 @@ def test_parameters_of_nodes_are_set_or_refused(ask):
     node = Flier(ask.bench.graph, namespace="/uav1")
     assert ask("set_param", name="/uav1/flier:height_m", value="2")["successful"]
     assert node.height.value == 2
-    assert ask("get_param", name="/uav1/flier/height_m")["value"] == "2"
+    assert ask("get_param", name="/uav1/flier/height_m")["value"] == "2.0"
     assert ask("set_param", name="/uav1/flier/height_m", value="2.5")["successful"]
     refused = {
         ("/uav1/flier:route", "[]"): "read-only",

@@ -2244,6 +2244,7 @@ export interface volery_interfaces_JoinLockStep_Request {
   timeout_s: number;
   stop_when_silent: boolean;
   restarts: boolean;
+  meets_at_start: boolean;
 }
 
 export interface volery_interfaces_JoinLockStep_Response {

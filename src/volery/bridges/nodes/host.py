@@ -162,7 +162,12 @@ class NodeHost:
         self.graph.hold_back(go, lambda published: self._set_clock(published.message.clock))
         srvtype = "volery_interfaces/srv/JoinLockStep"
         request = message_type(f"{srvtype}_Request")(
-            name, period_s, timeout_s, stop_when_silent=False, restarts=False
+            name,
+            period_s,
+            timeout_s,
+            stop_when_silent=False,
+            restarts=False,
+            meets_at_start=True,
         )
         answer = self.graph.call("/volery/join_lock_step", request)
         if not answer.success:
