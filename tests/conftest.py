@@ -1,6 +1,7 @@
 """Scenarios that many tests fly."""
 
 import copy
+import sys
 
 import pytest
 from hypothesis import settings
@@ -95,3 +96,12 @@ def simulate():
     yield build
     for simulation in made:
         simulation.close()
+
+
+@pytest.fixture
+def without_ros1(monkeypatch):
+    """No message packages of a ROS 1 that other tests have joined in this process."""
+    monkeypatch.setattr(sys, "path", [part for part in sys.path if "dist-packages" not in part])
+    for name, module in list(sys.modules.items()):
+        if "dist-packages" in (getattr(module, "__file__", None) or ""):
+            monkeypatch.delitem(sys.modules, name)

@@ -61,7 +61,7 @@ position_m = [0.0, 0.0]
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch):
+def run(tmp_path, monkeypatch, without_ros1):
     """Run a scenario with a node of BROKEN; returns the result and the log's path."""
     monkeypatch.chdir(tmp_path)
     logger = logging.getLogger(PYTHON_LOGGER)

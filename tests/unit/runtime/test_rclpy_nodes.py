@@ -14,7 +14,7 @@ FOLDER = Path(__file__).parent / "rclpy_nodes"
 
 
 @pytest.fixture(autouse=True)
-def no_stand_ins_left(monkeypatch):
+def no_stand_ins_left(monkeypatch, without_ros1):
     """Each test loads its modules anew and leaves no stand-ins."""
     monkeypatch.chdir(FOLDER)
     yield
