@@ -16,7 +16,7 @@ from volery.cli.asking import topic_types
 from volery.cli.guard import warn
 from volery.cli.links import DEFAULT_VIA, ROS2_WAYS, LinkTold, await_link, join_late
 from volery.cli.yaml_form import from_yaml
-from volery.core.errors import BridgeError
+from volery.core.errors import BridgeError, VoleryError
 
 if TYPE_CHECKING:
     from volery.graph.link import Link
@@ -86,9 +86,12 @@ def run_node(options: NodeOptions) -> None:
 
 
 def _check_namespace(link: Link, namespace: str) -> None:
-    """Warn where the graph has no topic of the node's UAV."""
+    """Warn where the graph has no topic of the node's UAV, if the graph lists its topics."""
     uav = namespace.strip("/")
-    topics = topic_types(link)
+    try:
+        topics = topic_types(link)
+    except VoleryError:  # ROS 1 has no rosapi unless it is started
+        return
     names = sorted({topic.split("/")[1] for topic in topics if topic.count("/") > 1})
     if uav and uav not in names and topics:
         uavs = [name for name in names if f"/{name}/odom" in topics]

@@ -5,6 +5,7 @@ import pytest
 from volery.cli.node import _check_namespace
 from volery.cli.services import refusal_of
 from volery.cli.topics import Window
+from volery.core.errors import GraphError
 from volery.graph.messages import message_type
 from volery.graph.zero import zero_message
 
@@ -50,6 +51,13 @@ class Topics:
         return self._topics
 
 
+class Silent:
+    """A graph that cannot say which topics it has, such as that of ROS 1 without rosapi."""
+
+    def call(self, service, request, reply):
+        reply.fail(GraphError(f"nobody offers service '{service}'"))
+
+
 def test_a_node_without_its_uav_is_warned_of(capsys):
     graph = Topics("/uav1/odom", "/uav2/odom", "/clock")
     _check_namespace(graph, "/uav9")
@@ -57,4 +65,5 @@ def test_a_node_without_its_uav_is_warned_of(capsys):
     for namespace in ("/uav1", "uav2", "/"):
         _check_namespace(graph, namespace)
     _check_namespace(Topics(), "/uav9")  # it is not told what there is
+    _check_namespace(Silent(), "/uav9")
     assert capsys.readouterr().err == ""
