@@ -11,8 +11,8 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-_THRESHOLDS = (700, 10, 1_000)
-"""Those of Python, but for full collections: they come after seven million objects that stay. The
+_THRESHOLDS = (700, 10, 30)
+"""Those of Python, but for full collections: they come a third as often. The
 small steps find what becomes garbage in a run, in some milliseconds each."""
 
 
