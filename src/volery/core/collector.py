@@ -12,8 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _THRESHOLDS = (700, 10, 30)
-"""Those of Python, but for full collections: they come a third as often. The
-small steps find what becomes garbage in a run, in some milliseconds each."""
+"""Those of Python, but for full collections, which come a third as often."""
 
 
 @contextmanager
