@@ -10,6 +10,8 @@ connection is unproven until its first valid frame. Where there is no room, the 
 connection ends; where there is none, the new one is refused. Both are counted and logged now and
 then. Out of file descriptors, asyncio's own loop would log a traceback for each attempt; here a
 reserved descriptor serves to refuse the client.
+
+A server whose clients speak first gets a connection when its first request has come, see `Opening`.
 """
 
 from __future__ import annotations
@@ -20,10 +22,12 @@ import logging
 import os
 import socket
 import time
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from volery.core.connection_limits import SHARED, ConnectionLimits
 from volery.core.rare_log import RareLog
+from volery.core.waiting_room import Look, Waiting, WaitingRoom
 
 MAX_UNPROVEN = 64
 """Connections to one listener that have sent no valid frame (modelling choice)."""
@@ -37,12 +41,24 @@ _PAUSE_S = 0.001
 _log = logging.getLogger(__name__)
 
 
+class Opening(NamedTuple):
+    """How connections begin where clients speak first: they wait until `look` finds them ready."""
+
+    look: Callable[[bytes], Look]
+    """What their first bytes show."""
+    patience_s: float | None = None
+    """How long they may wait; None: as long as there is room."""
+    greeting: bytes = b""
+    """Sent to each at once."""
+
+
 class Listener(socket.socket):
     """Accepts connections within limits. All methods belong to the thread of its server.
 
     name: of the server, for logs. limits: what it shares with others. max_connections: of this
     listener, above which the oldest unproven one gives way; None: those of `limits`. max_unproven:
-    as MAX_UNPROVEN; None: no limit of their own, where clients may listen in silence.
+    as MAX_UNPROVEN; None: no limit of their own, where clients may listen in silence. opening: how
+    connections begin; None: the server gets them at once.
     """
 
     def __init__(
@@ -52,6 +68,7 @@ class Listener(socket.socket):
         limits: ConnectionLimits = SHARED,
         max_connections: int | None = None,
         max_unproven: int | None = MAX_UNPROVEN,
+        opening: Opening | None = None,
     ) -> None:
         super().__init__(family, socket.SOCK_STREAM)
         self._name = name
@@ -67,24 +84,33 @@ class Listener(socket.socket):
         self._reserve: int | None = os.open(os.devnull, os.O_RDONLY)
         self.refusals = RareLog(_log)
         """What was refused and ended, by reason."""
+        self._greeting = b"" if opening is None else opening.greeting
+        self._room: WaitingRoom | None = None
+        if opening is not None and WaitingRoom.is_available:
+            number = super().fileno()
+            self._room = WaitingRoom(number, opening.look, opening.patience_s, self._expire)
 
     def add_port(self) -> None:
         """Adds the port to the name in logs."""
         self._name = f"{self._name}, port {self.getsockname()[1]}"
 
+    def fileno(self) -> int:
+        """Returns the descriptor that is readable when `accept` has something to do."""
+        return super().fileno() if self._room is None else self._room.fileno()
+
     def accept(self) -> tuple[socket.socket, Any]:
-        """As of `socket.socket`, for a connection that there is room for.
+        """As of `socket.socket`, for a connection that there is room for and that is ready.
 
         Raises
         ------
         BlockingIOError
-            None waits, or the server shall close some first.
+            None is ready, or the server shall close some first.
 
         """
         for _ in range(_REFUSALS_A_TURN):
             if self._evicted >= _EVICTIONS_A_TURN:
                 break
-            accepted = self._accept_one()
+            accepted = self._accept_one() if self._room is None else self._attend(self._room)
             if accepted is not None:
                 return accepted
         raise BlockingIOError(errno.EAGAIN, "others have their turn")
@@ -109,13 +135,37 @@ class Listener(socket.socket):
         self._note("ends connections whose requests do not come in time")
 
     def close(self) -> None:
-        """Stops listening; connections stay open."""
+        """Stops listening; connections that the server has got stay open."""
+        if self._room is not None:
+            self._room.close()
         if self._reserve is not None:
             os.close(self._reserve)
             self._reserve = None
         super().close()
 
     # ---------------------------------------------------------------------------------- internal
+
+    def _attend(self, room: WaitingRoom) -> tuple[socket.socket, Any] | None:
+        """Does one thing that is to be done; returns a connection that has become ready."""
+        event = room.next_event()
+        if event.descriptor not in room:
+            accepted = self._accept_one()
+            if accepted is not None:
+                room.admit(*accepted)
+            return None
+        look = room.look(event)
+        if look is not None and look.is_ready:
+            waiting = room.release(event.descriptor)
+            return waiting.sock, waiting.address
+        if look is not None and look.stranger is not None:
+            self.note_stranger(look.stranger)
+        if look is None or look.stranger is not None:
+            room.release(event.descriptor).sock.close()
+        return None
+
+    def _expire(self, waiting: Waiting) -> None:
+        self.note_slow_client()
+        waiting.sock.close()
 
     def _accept_one(self) -> tuple[socket.socket, Any] | None:
         """Accepts the next connection; None: it was refused."""
@@ -132,6 +182,9 @@ class Listener(socket.socket):
             self._note(f"refuses connections: there are {reason}")
             accepted.close()
             return None
+        if self._greeting:
+            with contextlib.suppress(OSError):  # gone already
+                accepted.send(self._greeting)
         return accepted, address
 
     def _enter(self, accepted: _Accepted, address: str) -> str | None:
@@ -159,9 +212,12 @@ class Listener(socket.socket):
         if descriptor is None:
             return False
         oldest = self._unproven.pop(descriptor)
+        self._note(f"ends idle connections: there are {reason}")
+        if self._room is not None and descriptor in self._room:
+            self._room.release(descriptor).sock.close()
+            return True
         oldest.is_evicted = True
         self._evicted += 1
-        self._note(f"ends idle connections: there are {reason}")
         with contextlib.suppress(OSError):  # its client has left
             oldest.shutdown(socket.SHUT_RDWR)  # its server sees the end of the stream
         return True
@@ -215,6 +271,7 @@ def open_listener(
     limits: ConnectionLimits = SHARED,
     max_connections: int | None = None,
     max_unproven: int | None = MAX_UNPROVEN,
+    opening: Opening | None = None,
 ) -> Listener:
     """Returns a socket that listens on the first address of `host`; port 0 takes a free one.
 
@@ -223,7 +280,7 @@ def open_listener(
     """
     found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     family, _, _, _, address = min(found, key=lambda entry: entry[0] != socket.AF_INET)
-    listener = Listener(family, name, limits, max_connections, max_unproven)
+    listener = Listener(family, name, limits, max_connections, max_unproven, opening)
     try:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(address)

@@ -21,13 +21,14 @@ from volery.bridges.origins import Origins
 from volery.bridges.rosbridge.message_budget import MAX_MESSAGE_BYTES
 from volery.bridges.unsent import bound_unsent
 from volery.core.errors import BridgeError
-from volery.core.listener import Listener, open_listener
+from volery.core.listener import Listener, Opening, open_listener
 from volery.core.listening import LOOPBACK
 from volery.core.rare_log import RepeatFilter
+from volery.core.waiting_room import look_at_http
 from volery.scenario.schema import Scenario
 from volery.scenario.shelf import Shelf
 from volery.server.app import make_app
-from volery.server.http_protocol import http_protocol
+from volery.server.http_protocol import HEAD_TIMEOUT_S, http_protocol
 from volery.server.rights import check_rights
 from volery.server.settings import PageSettings
 from volery.server.site import Site, Situation, State, World
@@ -179,7 +180,8 @@ class PageServer:
 def _listen(host: str, port: int) -> Listener:
     """A listening socket. `BridgeError` where there cannot be one."""
     try:
-        listening = open_listener(host, port, "page")
+        opening = Opening(look_at_http, HEAD_TIMEOUT_S)
+        listening = open_listener(host, port, "page", opening=opening)
         bound_unsent(listening)
         return listening
     except (OSError, OverflowError) as error:

@@ -19,12 +19,13 @@ from volery.bridges.doors import wake_of
 from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.pipe import Pipe, ServerEnd
-from volery.bridges.ros_tcp.session import EndpointSession
+from volery.bridges.ros_tcp.session import FEATURES, EndpointSession
 from volery.bridges.ros_tcp.wire import MOST_PAYLOAD_BYTES, FrameParser, Generation
 from volery.core.errors import BridgeError
-from volery.core.listener import Listener, open_listener
+from volery.core.listener import Listener, Opening, open_listener
 from volery.core.listening import check_address
 from volery.core.preamble import Preamble
+from volery.core.waiting_room import look_at_binary
 from volery.graph.mailbox import Wake
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.session import Gateway
@@ -90,7 +91,8 @@ class RosTcpEndpoint:
     async def start(self, gateway: Gateway) -> None:
         """Listen. `BridgeError` where the port is in use or the host is not ours."""
         loop = asyncio.get_running_loop()
-        self._listener = _listen(self._host, self.port)
+        greeting = ros_tcp.handshake(self._generation, FEATURES)
+        self._listener = _listen(self._host, self.port, greeting)
         self.port = self._listener.getsockname()[1]
         self._tasks = [
             loop.create_task(self._accept(gateway, self._listener)),
@@ -176,9 +178,10 @@ class _Client:
         self._session.close()
 
 
-def _listen(host: str, port: int) -> Listener:
+def _listen(host: str, port: int, greeting: bytes) -> Listener:
+    opening = Opening(look_at_binary, greeting=greeting)
     try:
-        return open_listener(host, port, "ROS-TCP")
+        return open_listener(host, port, "ROS-TCP", opening=opening)
     except (OSError, OverflowError) as error:
         if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
             raise BridgeError(

@@ -35,7 +35,7 @@ MOST_REGISTRATIONS = 10_000
 _FIRST_REQUEST = 1001
 """As ROS-TCP-Endpoint counts."""
 
-_FEATURES = (ros_tcp.QUEUE_SIZE, ros_tcp.REMOVE, ros_tcp.RESPONSE_ERROR)
+FEATURES = (ros_tcp.QUEUE_SIZE, ros_tcp.REMOVE, ros_tcp.RESPONSE_ERROR)
 
 Fields = dict[str, Any]
 Body = Callable[[Frame], None]
@@ -75,7 +75,6 @@ class EndpointSession:
             "__remove_ros_service": self._remove_ros_service,
             "__remove_unity_service": self._remove_unity_service,
         }
-        self.outbox.put(ros_tcp.handshake(generation, _FEATURES))
 
     @property
     def reading(self) -> Reading:

@@ -28,10 +28,11 @@ from volery.bridges.rosbridge.tf_republisher import TfRepublisher
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL
 from volery.bridges.unsent import bound_unsent
 from volery.core.errors import BridgeError
-from volery.core.listener import Listener, open_listener
+from volery.core.listener import Listener, Opening, open_listener
 from volery.core.listening import check_address, check_token, shows_token, tend
 from volery.core.rare_log import RepeatFilter
 from volery.core.token_guesses import TokenGuesses
+from volery.core.waiting_room import look_at_http
 from volery.graph.session import Gateway
 
 _log = logging.getLogger(__name__)
@@ -144,7 +145,8 @@ class RosbridgeServer:
         self._gateway = gateway
         self._shared = Shared(Forms(self._generation), graph.now_ns, self._token, self._most_bytes)
         try:
-            self._listener = open_listener(self.host, self.port, "rosbridge")
+            opening = Opening(look_at_http, HANDSHAKE_TIMEOUT_S)
+            self._listener = open_listener(self.host, self.port, "rosbridge", opening=opening)
             self._server = await serve(
                 self._serve,
                 sock=self._listener,
