@@ -144,7 +144,7 @@ def _command(message: Any, content: Any) -> Command:
 
 
 def _records_of(log: ChunkedLog, topic: str, *, following: bool = False) -> Iterator[LogRecord]:
-    """Messages of a topic, and with `following` also the one after each.
+    """Messages of a topic, and with `following` also the one after each, if its topic is known.
 
     `RecordingError` where the chunks that are said to hold them unpack to more than any log does.
     """
@@ -157,6 +157,6 @@ def _records_of(log: ChunkedLog, topic: str, *, following: bool = False) -> Iter
         content = log.content(chunk)
         budget.spend(len(content.data))
         for head in content.heads:
-            if wanted or head.channel in channels:
+            if head.channel in channels or (wanted and head.channel in log.topics):
                 yield log.record(content, head)
             wanted = following and head.channel in channels
