@@ -48,6 +48,13 @@ def test_worlds_are_read_once(simulate, flat_data, tmp_path, monkeypatch):
     assert "new" in [world.description for world in worlds]
 
 
+def test_lists_of_entities_make_no_shapes(client, monkeypatch):
+    """Half a millisecond for each UAV."""
+    monkeypatch.setattr("volery.runtime.services.entity_views.body_shape", lambda _: 1 / 0)
+    assert client.call("/get_entities", None).entities == ["uav1"]
+    assert len(client.call("/get_entities_states", None).states) == 1
+
+
 def test_read_only_services_cost_little(client):
     """CPU time of the fastest of some calls, with much room: 30 ms were usual for the slow ones."""
     for service in sorted(READ_ONLY_SERVICES):

@@ -7,7 +7,8 @@ from xmlrpc.client import ServerProxy, dumps
 import pytest
 
 from volery.bridges.ros1.environment import load_rospy, rospy_is_installed
-from volery.bridges.ros1.web_pages import is_of_a_page, refuse_web_pages
+from volery.bridges.ros1.port_guards import guard_ports
+from volery.bridges.ros1.web_pages import is_of_a_page
 
 
 @pytest.mark.parametrize(
@@ -30,8 +31,8 @@ def test_what_only_programs_send(headers, expected):
 @pytest.mark.skipif(not rospy_is_installed(), reason="rospy is not installed")
 def test_programs_are_answered_and_pages_refused():
     load_rospy()
-    refuse_web_pages()
-    refuse_web_pages()  # a second time nothing happens
+    guard_ports()
+    guard_ports()  # a second time nothing happens
     import rosgraph.xmlrpc
 
     server = rosgraph.xmlrpc.ThreadingXMLRPCServer(("127.0.0.1", 0), 0)

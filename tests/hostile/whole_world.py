@@ -167,8 +167,8 @@ def put(message, path, value):
     setattr(message, path[-1], value)
 
 
-def offer_rosapi(simulation):
-    """Offer what rosbridge's server does beside the simulation."""
-    api = RosApi(simulation.gateway, "ros2", simulation.graph.now_ns)
+def offer_rosapi(run):
+    """Offer what rosbridge's server does beside a simulation or a player."""
+    api = RosApi(run.gateway, "ros2", run.graph.now_ns)
     api.start()
     return api

@@ -148,6 +148,19 @@ class Inbox:
             self._news.wait(timeout_s)
         self._news.clear()
 
+    def serve(self, hand_out: Callable[[], None], idle_s: float = math.inf) -> None:
+        """Call what waits and whose turn it is, with all that follows, in rounds.
+
+        hand_out: delivers what a round has published, at the expense of the round's clients.
+        idle_s: as of `work_off`.
+        """
+        while self.work_off(idle_s):
+            hand_out()
+            self.end_round()
+            if not self.is_cut:
+                return
+            idle_s = 0.0
+
     def work_off(self, idle_s: float = math.inf) -> bool:
         """Call what waits and whose turn it is; whether there was anything.
 

@@ -208,12 +208,7 @@ class Engine:
 
         idle_s: wall time to spare, in which clients may do more than their budget; see `Inbox`.
         """
-        while self.inbox.work_off(idle_s):
-            self._hand_out()
-            self.inbox.end_round()
-            if not self.inbox.is_cut:
-                break
-            idle_s = 0.0
+        self.inbox.serve(self._hand_out, idle_s)
         self.take_repeats()
 
     def take_repeats(self) -> None:

@@ -22,6 +22,7 @@ from volery.bridges.logs.flights import Origin, origin_of
 from volery.bridges.logs.playback import Playback
 from volery.core.clock import NS_PER_S, ns_from_s, s_from_ns
 from volery.core.errors import CommandError, RecordingError, VoleryError
+from volery.engine.call_budget import CallBudget
 from volery.engine.commands import Inbox
 from volery.graph.graph import Graph
 from volery.graph.messages import Clock, time_from_ns
@@ -46,6 +47,7 @@ _SLACK_S = 0.25
 _STEP_NS = 1_000_000
 """A physics step where the log does not tell of its scenario."""
 _GLANCE_S = 0.05
+_NEWCOMERS = "new subscribers"
 
 
 class Player:
@@ -78,7 +80,13 @@ class Player:
         self._playback = Playback(self.path)
         self._inbox = Inbox()
         self.graph = Graph(lambda: self._playback.now_ns, self._inbox.post)
-        self.gateway = Gateway(self.graph, self._inbox.post)
+        self.gateway = Gateway(
+            self.graph,
+            self._inbox.post,
+            open_queue=lambda: self._inbox.open_queue().post,
+            is_busy=lambda: self._is_busy,
+            is_late=lambda: self._is_late,
+        )
         self.loop = loop
         self.quitting = False
         """Whether somebody called `quit`."""
@@ -90,6 +98,10 @@ class Player:
         self._speed = speed
         self._base_ns, self._base_wall = 0, 0.0
         """It was, or is, to be at this time at that wall time."""
+        self._is_late = False
+        """Whether it does not keep its pace at present."""
+        self._budget = CallBudget()
+        """For reading the log again, for all new subscribers together."""
         self._clock = self.graph.advertise("/clock", Clock)
         self._clock_due = self._state_due = 0.0
         self._playback.open(self.graph)
@@ -156,7 +168,7 @@ class Player:
 
     def pause(self) -> None:
         """Stand still."""
-        self._paused = True
+        self._paused, self._is_late = True, False
         self._tell_soon()
 
     def resume(self) -> None:
@@ -229,8 +241,8 @@ class Player:
         """Play and serve clients for so long."""
         until = time.perf_counter() + timeout_s
         while True:
-            self._inbox.work_off()
-            self._playback.show_to_newcomers()
+            self._serve()
+            self._show_to_newcomers()
             self._play()
             self._tell()
             self.graph.deliver()
@@ -257,6 +269,31 @@ class Player:
         """Between two looks while it plays: none as fast as possible."""
         return 0.0 if self._speed is None else _SLICE_S
 
+    @property
+    def _is_busy(self) -> bool:
+        """Whether it has no time to spare for clients."""
+        return not self._paused and (self._is_late or self._speed is None)
+
+    @property
+    def _idle_s(self) -> float:
+        """Wall time that clients may take now without being charged for it."""
+        if self._paused:
+            return math.inf
+        return 0.0 if self._is_busy else _SLICE_S
+
+    def _serve(self) -> None:
+        """Do what clients have asked for."""
+        self._inbox.serve(self.graph.deliver, self._idle_s)
+
+    def _show_to_newcomers(self) -> None:
+        """Publish to new subscribers what was published last, as soon as the budget has it."""
+        self._budget.earn()
+        if self._budget.may_spend(_NEWCOMERS):
+            before_s = time.thread_time()
+            self._playback.show_to_newcomers()
+            self.graph.deliver()
+            self._budget.spend(_NEWCOMERS, time.thread_time() - before_s)
+
     def _play(self) -> None:
         """Publish what is due, at most a slice of wall time long."""
         if self._paused:
@@ -267,6 +304,7 @@ class Player:
         while not over and time.perf_counter() - begun < _SLICE_S:
             self.graph.deliver()
             over = self._playback.advance(due_ns)
+        self._is_late = not over and self._speed is not None
         if over and self.time_ns >= self._playback.end_ns:
             if self.loop:
                 self.seek(self.start_s)

@@ -7,6 +7,7 @@ last message before the present time, so that what is shown is what was the case
 from __future__ import annotations
 
 from collections.abc import Iterable, Set
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -80,12 +81,14 @@ class Playback:
             except GraphError as error:
                 self.refused.setdefault(topic.topic, str(error))
 
-    @property
-    def topics(self) -> list[PlayedTopic]:
-        """All topics of the log, by name."""
+    @cached_property
+    def topics(self) -> tuple[PlayedTopic, ...]:
+        """All topics of the log, by name; to count their messages takes long in a long log."""
         counts = self.log.counts()
         found = self.log.topics.items()
-        return sorted(PlayedTopic(t.topic, t.msgtype, counts[channel]) for channel, t in found)
+        return tuple(
+            sorted(PlayedTopic(t.topic, t.msgtype, counts[channel]) for channel, t in found)
+        )
 
     @property
     def trouble(self) -> str:

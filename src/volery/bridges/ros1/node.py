@@ -12,9 +12,9 @@ from typing import Any
 
 from volery.bridges.ros1.environment import load_rospy
 from volery.bridges.ros1.master import Ros1Master
+from volery.bridges.ros1.port_guards import guard_ports
 from volery.bridges.ros1.raw import raw_message_class, raw_service_class
 from volery.bridges.ros1.registrar import Ros1Registrar
-from volery.bridges.ros1.web_pages import refuse_web_pages
 from volery.core.errors import BridgeError, GraphError, UnreachableError
 from volery.core.listening import check_address
 from volery.graph.ros1 import ros1_codec, ros2_name
@@ -241,7 +241,7 @@ def _warn_of_loopback(master: Ros1Master) -> None:
 
 def _begin(rospy: Any, name: str, uri: str) -> None:
     os.environ["ROS_MASTER_URI"] = uri
-    refuse_web_pages()
+    guard_ports()
     setting = "ROS_PYTHON_LOG_CONFIG_FILE"
     before = os.environ.get(setting)
     os.environ[setting] = before or str(Path(__file__).with_name("logging.yaml"))

@@ -75,7 +75,7 @@ class Entities:
         return {"info": filled(f"{_MSG}/EntityInfo", info)}
 
     def _bounds(self, request: Any) -> Fields:
-        shape = self._find(request.entity).shape
+        shape = self._find(request.entity).make_shape()
         corners = np.vstack([mesh.vertices for mesh, _material in shape.parts])
         points = [_vector(corners.max(axis=0)), _vector(corners.min(axis=0))]
         return {"bounds": filled(f"{_MSG}/Bounds", {"type": BoundsType.BOX, "points": points})}
