@@ -19,6 +19,7 @@ from volery.cli.progress import FlightProgress
 from volery.cli.repeating import recorded_flight, recorded_scenario
 from volery.cli.targets import check_record, check_report
 from volery.cli.trust import with_trust
+from volery.core.allocator import return_large_blocks
 from volery.core.collector import spared_objects
 from volery.core.errors import CommandError, ScenarioError
 from volery.scenario.changes import LogRequest
@@ -85,6 +86,7 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
     threads = _THREADS if options.threads is None else options.threads
     change = _Change(options)
     page.building(scenario)
+    return_large_blocks()
     with FlightProgress(scenario.name, scenario.duration_s) as progress:
         simulation = Simulation(
             scenario, threads=threads, recordings=options.recordings, on_load=change.ask

@@ -18,6 +18,7 @@ from volery.cli.guard import complain_of, warn
 from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, serving
 from volery.cli.trust import with_trust
+from volery.core.allocator import return_large_blocks
 from volery.core.collector import spared_objects
 from volery.core.errors import VoleryError
 from volery.scenario import changes
@@ -63,6 +64,7 @@ def serve(options: ServeOptions) -> None:
         warn(gap)
     first = _first_scenario(with_trust(options.first))
     shelf = Shelf(options.page.uploads, options.page.recordings, given=first)
+    return_large_blocks()
     with Interrupts() as interrupts, serving(options.page, shelf) as page:
         host = _Host(options, page, interrupts, _Wish(first, options.first.speed, shelf))
         while host.goes_on:

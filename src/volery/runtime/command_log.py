@@ -45,6 +45,7 @@ class CommandLog:
         self._publisher.lasting = True
         self._kept: list[_Kept] = []
         self._kept_bytes = 0
+        self._has_lost_some = False
         self._next_number = 0
         self._ended = False
         self.repeats = False
@@ -84,27 +85,37 @@ class CommandLog:
     def earlier(self) -> Iterator[Published]:
         """Messages of all commands so far, for a log that is begun now.
 
-        Where they were too many to be kept, only the last one: by its number a reader sees what is
-        missing.
+        Where they were too many to be kept, only the last one, without its content: by its number
+        a reader sees that others are missing.
         """
         for kept in self._kept:
             yield Published(records.TOPIC, records.TYPE, self._engine.time_ns, _whole(kept))
 
     def _keep(self, kept: _Kept) -> None:
+        if self._has_lost_some:
+            self._kept = [_bare(kept)]
+            return
         if kept.cdr is None:
             size = array_bytes(kept.taken.content)
         else:
             size = len(kept.cdr)
             kept = kept._replace(taken=kept.taken._replace(content=None))
         self._kept_bytes += size + _OVERHEAD_BYTES
-        if self._kept_bytes > MOST_KEPT_BYTES:
-            self._kept.clear()
-        self._kept.append(kept)
+        if self._kept and self._kept_bytes > MOST_KEPT_BYTES:
+            self._has_lost_some = True
+            self._kept = [_bare(kept)]
+        else:
+            self._kept.append(kept)
 
 
 def _accept(_taken: Taken) -> str:
     """Refuse nothing."""
     return ""
+
+
+def _bare(kept: _Kept) -> _Kept:
+    """A command without its content."""
+    return kept._replace(taken=kept.taken._replace(content=None), cdr=b"")
 
 
 def _whole(kept: _Kept) -> object:

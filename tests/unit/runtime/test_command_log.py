@@ -184,6 +184,19 @@ def test_what_is_kept_has_a_bound(tmp_path, flying, monkeypatch):
         read_flight(tmp_path / "x.mcap")
 
 
+def test_what_is_kept_beyond_its_bound_holds_no_content(flying, monkeypatch):
+    monkeypatch.setattr(command_log, "MOST_KEPT_BYTES", 10_000)
+    session = flying.gateway.open("camera")
+    session.advertise("/picture", "sensor_msgs/msg/CompressedImage")
+    for _ in range(3):
+        picture = zero_message("sensor_msgs/msg/CompressedImage")
+        picture.data = np.zeros(6_000, np.uint8)
+        session.publish("/picture", picture)
+    flying.take_in()
+    (only,) = flying.commands.earlier()
+    assert (only.message.number, len(only.message.cdr), only.message.follows) == (3, 0, False)
+
+
 @pytest.mark.parametrize("name", library.names())
 def test_a_scenario_comes_back_from_its_log(name):
     scenario = load_scenario(name)

@@ -30,6 +30,7 @@ from volery.bench.hostile.websocket import (
 STALLED_CLIENTS = 50
 PUBLISHED_HZ = 10_000
 LARGE_BYTES = 60_000_000
+LARGEST_TAKEN_BYTES = 9_999_000
 MOST_HALF_OPEN = 500
 _STORM_PAUSE_S = 0.001
 _BURST = 100
@@ -85,9 +86,9 @@ def large_json(port: int, _ros_tcp: int, ends: float) -> int:
 
 
 def large_image(port: int, _ros_tcp: int, ends: float) -> int:
-    """Images of 25 MB as CBOR, which are legitimate, without a pause."""
+    """Images as large as the server takes, as CBOR, without a pause."""
     topic = {"op": "advertise", "topic": "/hostile/image", "type": "sensor_msgs/Image"}
-    pixels = 25_000_000
+    pixels = LARGEST_TAKEN_BYTES
     parts = (
         b"\xa3\x62op\x67publish\x65topic\x6e/hostile/image\x63msg\xa1\x64data\x5a",
         struct.pack(">I", pixels),

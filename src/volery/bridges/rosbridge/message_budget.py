@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from volery.core.errors import BridgeError
 
-MAX_MESSAGE_BYTES = 32 * 1024 * 1024
-"""Of any message: a 4k rgb8 image has 25 MB. Taking in more would delay other clients by over
-50 ms, for a WebSocket's message is copied several times."""
+MAX_MESSAGE_BYTES = 10_000_000
+"""Of any message unless a server has another limit; as `max_message_size` of rosbridge_server. A
+WebSocket's message is copied several times: 25 MB would delay other clients by 50 to 100 ms."""
 MAX_TEXT_BYTES = 16 * 1024 * 1024
 """Of a message as JSON: 12 MB as base64 text."""
 MAX_PICTURE_BYTES = 4 * 1024 * 1024
