@@ -33,6 +33,8 @@ MAX_UNPROVEN = 64
 """Connections to one listener that have sent no valid frame (modelling choice)."""
 _BACKLOG = 128
 _REFUSALS_A_TURN = 64
+_READY_A_TURN = 4
+"""New connections that the server gets before those that it has get their turn again."""
 _EVICTIONS_A_TURN = 16
 """After so many the server gets its turn, to close what was ended."""
 _NO_DESCRIPTORS = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
@@ -81,6 +83,8 @@ class Listener(socket.socket):
         """By file descriptor, the oldest first."""
         self._evicted = 0
         """Connections that have been ended and not yet closed."""
+        self._num_given = 0
+        """Connections that the server has got in this turn."""
         self._reserve: int | None = os.open(os.devnull, os.O_RDONLY)
         self.refusals = RareLog(_log)
         """What was refused and ended, by reason."""
@@ -107,13 +111,12 @@ class Listener(socket.socket):
             None is ready, or the server shall close some first.
 
         """
-        for _ in range(_REFUSALS_A_TURN):
-            if self._evicted >= _EVICTIONS_A_TURN:
-                break
-            accepted = self._accept_one() if self._room is None else self._attend(self._room)
-            if accepted is not None:
-                return accepted
-        raise BlockingIOError(errno.EAGAIN, "others have their turn")
+        accepted = self._next_accepted()
+        if accepted is None:
+            self._num_given = 0
+            raise BlockingIOError(errno.EAGAIN, "none is ready, or others have their turn")
+        self._num_given += 1
+        return accepted
 
     def prove(self, connection: Any) -> None:
         """Notes a valid frame of the client of `connection`, a socket or a transport."""
@@ -144,6 +147,17 @@ class Listener(socket.socket):
         super().close()
 
     # ---------------------------------------------------------------------------------- internal
+
+    def _next_accepted(self) -> tuple[socket.socket, Any] | None:
+        """Returns the next connection; None: the server shall do something else now."""
+        with contextlib.suppress(BlockingIOError):
+            for _ in range(_REFUSALS_A_TURN):
+                if self._evicted >= _EVICTIONS_A_TURN or self._num_given >= _READY_A_TURN:
+                    break
+                accepted = self._accept_one() if self._room is None else self._attend(self._room)
+                if accepted is not None:
+                    return accepted
+        return None
 
     def _attend(self, room: WaitingRoom) -> tuple[socket.socket, Any] | None:
         """Does one thing that is to be done; returns a connection that has become ready."""

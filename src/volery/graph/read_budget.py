@@ -143,11 +143,16 @@ class Reading:
         """Decoding begins, in the thread that goes on with it until `end`."""
         self._began_s = time.thread_time()
 
-    def end(self, frames: int, size: int) -> None:
-        """Charge the client for what began, and for taking so many frames and bytes in."""
+    def end(self, frames: int, size: int) -> float:
+        """Charge the client for what began, and for taking so many frames and bytes in.
+
+        Returns the charge in s.
+        """
         spent_s = time.thread_time() - self._began_s
-        self._budget.charge(spent_s + frames * FRAME_S + size * BYTE_S)
+        cost_s = spent_s + frames * FRAME_S + size * BYTE_S
+        self._budget.charge(cost_s)
         self._unsettled_bytes += size
+        return cost_s
 
     def pause_s(self) -> float:
         """Returns for how long not to read from the client; 0: read on. Ask again afterwards."""

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import gc
+import itertools
 import socket
 
 import pytest
@@ -105,6 +106,23 @@ def test_the_oldest_gives_way():
             for reader, writer in clients[1:]:
                 writer.write(REQUEST)
                 assert await reader.readexactly(len(REQUEST)) == REQUEST
+
+    played(scene)
+
+
+def test_new_connections_come_a_few_at_a_turn():
+    async def scene():
+        async with Server(HTTP) as server:
+            socks = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(20)]
+            for sock in socks:
+                sock.sendall(REQUEST)
+            counts = [server.num_connections]
+            while counts[-1] < 20:
+                await asyncio.sleep(0)
+                counts.append(server.num_connections)
+            assert max(b - a for a, b in itertools.pairwise(counts)) <= 4
+            for sock in socks:
+                sock.close()
 
     played(scene)
 

@@ -55,8 +55,8 @@ class Throttle(Protocol):
     def begin(self) -> None:
         """Decoding begins."""
 
-    def end(self, frames: int, size: int) -> None:
-        """Decoding is over."""
+    def end(self, frames: int, size: int) -> float:
+        """Decoding is over. Returns what it has cost, in s."""
 
     def pause_s(self) -> float:
         """Returns for how long not to read; 0: read on."""

@@ -6,7 +6,6 @@ await converse(channel, bell, peer)
 from __future__ import annotations
 
 import asyncio
-import itertools
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -24,8 +23,8 @@ SERVICE_RESTART = 1012
 
 _LONGEST_SILENCE_S = 10.0
 """Time a client has to show its token."""
-_FRAMES_A_TURN = 8
-"""Frames read or sent before other clients get their turn, though there are more."""
+_TURN_S = 0.3e-3
+"""CPU time of frames read or sent before other clients get their turn, though there are more."""
 
 
 class Channel(Protocol):
@@ -39,6 +38,20 @@ class Channel(Protocol):
 
     async def close(self, code: int = ..., reason: str = ...) -> None:
         """Take leave."""
+
+
+class Turns:
+    """Lets other clients have their turn in the loop after each `_TURN_S` that this one takes."""
+
+    def __init__(self) -> None:
+        self._spent_s = 0.0
+
+    async def spend(self, cost_s: float) -> None:
+        """Adds what a frame has cost."""
+        self._spent_s += cost_s
+        if self._spent_s >= _TURN_S:
+            self._spent_s = 0.0
+            await asyncio.sleep(0)
 
 
 class Bell:
@@ -97,7 +110,7 @@ async def _read(
     channel: Channel, peer: RosbridgePeer, read: asyncio.Event, checkpoint: Checkpoint | None
 ) -> None:
     """Hand the client's frames to its peer until it leaves or must go."""
-    turns = itertools.count(1)
+    turns = Turns()
     while peer.refused is None:
         silence_s = None if peer.authorized else _LONGEST_SILENCE_S
         try:
@@ -112,9 +125,8 @@ async def _read(
         else:
             await checkpoint.receive(peer, frame)
             peer.reading.begin()  # the checkpoint lets others have their turn
-        peer.reading.end(1, len(frame))
-        if next(turns) % _FRAMES_A_TURN == 0:  # `recv` does not wait where a frame is there
-            await asyncio.sleep(0)
+        cost_s = peer.reading.end(1, len(frame))
+        await turns.spend(cost_s)  # `recv` does not wait where a frame is there
         while (pause_s := peer.reading.pause_s()) and peer.refused is None:
             await asyncio.sleep(pause_s)
         while peer.congested:  # it asks for more than it reads
@@ -127,17 +139,19 @@ async def _read(
 
 async def _write(channel: Channel, peer: RosbridgePeer, bell: Bell, read: asyncio.Event) -> None:
     """Send what the peer has to say, as fast as the client reads."""
-    turns = itertools.count(1)
+    turns = Turns()
     while True:
         bell.silence()
         frames = peer.frames(time.monotonic())
-        while (frame := _next(peer, frames)) is not None:
+        while True:
+            frame, cost_s = _next(peer, frames)
+            if frame is None:
+                break
             await channel.send(frame)
             read.set()
             while pause_s := peer.writing.pause_s():
                 await asyncio.sleep(pause_s)
-            if next(turns) % _FRAMES_A_TURN == 0:
-                await asyncio.sleep(0)
+            await turns.spend(cost_s)
         read.set()
         now_s = time.monotonic()
         due_s = peer.due_s(now_s)
@@ -146,9 +160,8 @@ async def _write(channel: Channel, peer: RosbridgePeer, bell: Bell, read: asynci
                 await bell.heard.wait()
 
 
-def _next(peer: RosbridgePeer, frames: Iterator[Frame]) -> Frame | None:
-    """The next frame, its making charged to the client."""
+def _next(peer: RosbridgePeer, frames: Iterator[Frame]) -> tuple[Frame | None, float]:
+    """Returns the next frame and the s that making it costs, charged to the client."""
     peer.writing.begin()
     frame = next(frames, None)
-    peer.writing.end(1, 0 if frame is None else len(frame))
-    return frame
+    return frame, peer.writing.end(1, 0 if frame is None else len(frame))
