@@ -24,6 +24,7 @@ from volery.mavlink import (
     switching,
 )
 from volery.mavlink.codec import AUTOPILOT, Codec, Parser, dialect
+from volery.mavlink.flight_log import FlightLog
 from volery.mavlink.framing import Framer
 from volery.mavlink.geography import Earth
 from volery.mavlink.memory import Link, Memory, Source
@@ -54,6 +55,7 @@ class Autopilot:
         self.build = build
         self.earth = Earth(*build.origin)
         self.memory = Memory()
+        self.log = FlightLog()
         self._codec = Codec(system)
         self._parser = Parser()
         self._framer = Framer()
@@ -80,6 +82,7 @@ class Autopilot:
     def close_link(self, number: int) -> None:
         """Forget a link."""
         self.memory.links.pop(number, None)
+        self.log.transfers.forget(number)
 
     def send(self, message: Any, link: int = ALL_LINKS) -> None:
         """Send a message on one link, or on all of them."""
@@ -89,8 +92,16 @@ class Autopilot:
             self._sent.append((one.number, self._codec.pack(message, one.sequence)))
             one.sequence = (one.sequence + 1) % 256
 
+    def send_payload(self, number: int, payload: bytes, link: int) -> None:
+        """Send the packed fields of a message on one link: for messages that come in thousands."""
+        one = self.memory.links.get(link)
+        if one is not None:
+            self._sent.append((link, self._codec.frame(number, payload, one.sequence)))
+            one.sequence = (one.sequence + 1) % 256
+
     def say(self, severity: int, text: str) -> None:
         """Tell people something."""
+        self.log.note(self, severity, text)
         for message in status_texts(severity, text):
             self.send(message)
 
@@ -118,7 +129,9 @@ class Autopilot:
             keep_transfers_going(self)
             calibration.update(self)
         flying.fly(self, state)
+        self.log.update(self)
         streams.send_due(self)
+        self.log.transfers.send_some(self)
 
     def announce(self) -> None:
         """Tell of a change of mode at once."""

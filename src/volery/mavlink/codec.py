@@ -76,11 +76,19 @@ class Codec:
         if payload is None:
             payload = message.on_wire = _payload_of(message)
         number = type(message).id  # some have a field of that name
+        return self._framed(number, payload, sequence, message.crc_extra)
+
+    def frame(self, number: int, payload: bytes, sequence: int) -> bytes:
+        """A frame of a message's packed fields."""
+        payload = payload.rstrip(b"\0") or b"\0"
+        return self._framed(number, payload, sequence, crc_extra_of(number))
+
+    def _framed(self, number: int, payload: bytes, sequence: int, crc_extra: int) -> bytes:
         head = _HEAD.pack(
             _MAGIC, len(payload), 0, 0, sequence, *self._source, number & 0xFFFF, number >> 16
         )
         frame: bytes = head + payload
-        return frame + _CHECK.pack(check_of(frame[1:] + bytes((message.crc_extra,))))
+        return frame + _CHECK.pack(check_of(frame[1:] + bytes((crc_extra,))))
 
 
 def _payload_of(message: Any) -> bytes:

@@ -1,7 +1,6 @@
-"""Files and logs, of which there are none here: asked for, that is said, so that nobody waits.
+"""Answers MAVLink FTP as a server without files, so that no client waits.
 
-MAVLink FTP: its header and what a server without files answers: `mavlink_ftp.cpp` of PX4
-1.18. Logs: MAVLink's log protocol has one LOG_ENTRY for "there are none".
+Its header and answers: `mavlink_ftp.cpp` of PX4 1.18.
 """
 
 from __future__ import annotations
@@ -40,8 +39,3 @@ def answer_file_request(pilot: Autopilot, source: Source, message: Any) -> None:
     link, system, component = source
     answer = dialect().MAVLink_file_transfer_protocol_message
     pilot.send(answer(0, system, component, (head + data).ljust(_PAYLOAD, b"\0")), link)
-
-
-def list_logs(pilot: Autopilot, source: Source, _message: Any) -> None:
-    """Answer a LOG_REQUEST_LIST."""
-    pilot.send(dialect().MAVLink_log_entry_message(0, 0, 0, 0, 0), source[0])

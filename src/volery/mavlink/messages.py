@@ -10,6 +10,7 @@ from volery.mavlink import (
     commands,
     file_protocol,
     follow_target,
+    log_transfer,
     offboard,
     parameter_protocol,
     shell,
@@ -96,6 +97,9 @@ HANDLERS: dict[str, Callable[[Autopilot, Source, Any], None]] = {
     "MISSION_CLEAR_ALL": transfers.clear,
     "MISSION_SET_CURRENT": transfers.set_current,
     "FILE_TRANSFER_PROTOCOL": file_protocol.answer_file_request,
-    "LOG_REQUEST_LIST": file_protocol.list_logs,
+    "LOG_REQUEST_LIST": log_transfer.list_logs,
+    "LOG_REQUEST_DATA": log_transfer.send_data,
+    "LOG_REQUEST_END": log_transfer.end,
+    "LOG_ERASE": log_transfer.erase,
     "SERIAL_CONTROL": shell.take,
 }

@@ -31,7 +31,7 @@ def us(pilot: Autopilot) -> int:
     return pilot.memory.now_ns // 1_000
 
 
-def _local(pilot: Autopilot) -> tuple[Vector, Vector]:
+def local_motion(pilot: Autopilot) -> tuple[Vector, Vector]:
     """Place from the local origin and velocity, NED."""
     state, origin = pilot.state, pilot.memory.origin
     x, y, z = (here - there for here, there in zip(state.position, origin, strict=True))
@@ -101,13 +101,13 @@ def attitude_quaternion(pilot: Autopilot) -> Any:
 
 def local_position(pilot: Autopilot) -> Any:
     """LOCAL_POSITION_NED, from where the vehicle stood at the start."""
-    place, velocity = _local(pilot)
+    place, velocity = local_motion(pilot)
     return dialect().MAVLink_local_position_ned_message(ms(pilot), *place, *velocity)
 
 
 def odometry(pilot: Autopilot) -> Any:
     """ODOMETRY in the local frame, velocities too, as PX4 sends it; covariances are not known."""
-    place, velocity = _local(pilot)
+    place, velocity = local_motion(pilot)
     x, y, z, w = q_ned_frd_of_enu_flu(pilot.state.attitude)
     unknown = [math.nan] + [0.0] * 20
     return dialect().MAVLink_odometry_message(
@@ -143,7 +143,7 @@ def highres_imu(pilot: Autopilot) -> Any:
     """Specific force and rates as the controllers feel them, pressure of the standard air."""
     state = pilot.state
     altitude = state.position[2] + pilot.build.origin[2]
-    force = _specific_force(state)
+    force = specific_force(state)
     mbar = float(pressure(altitude)) / 100.0
     return dialect().MAVLink_highres_imu_message(
         us(pilot),
@@ -158,7 +158,7 @@ def highres_imu(pilot: Autopilot) -> Any:
     )
 
 
-def _specific_force(state: FlightState) -> Vector:
+def specific_force(state: FlightState) -> Vector:
     """m/s^2, body: what an accelerometer without errors feels."""
     x, y, z, w = state.attitude
     ax, ay, az = state.acceleration
@@ -204,8 +204,11 @@ def altitude(pilot: Autopilot) -> Any:
     )
 
 
-def position_target(pilot: Autopilot) -> Any:
-    """POSITION_TARGET_LOCAL_NED; None where nothing is aimed at."""
+def target_motion(pilot: Autopilot) -> list[float] | None:
+    """Position from the local origin, velocity and acceleration (NED), yaw and yaw rate aimed at.
+
+    nan where something is left open; None where no motion is aimed at.
+    """
     target = pilot.memory.target
     if target is None or target.attitude is not None or target.rates is not None:
         return None
@@ -213,7 +216,14 @@ def position_target(pilot: Autopilot) -> Any:
     x, y, z = (part - start for part, start in zip(target.position, origin, strict=True))
     vectors = (ned_of_enu((x, y, z)), ned_of_enu(target.velocity), ned_of_enu(target.acceleration))
     parts = [part for vector in vectors for part in vector]
-    parts += [0.5 * math.pi - target.yaw, -target.yaw_rate]
+    return [*parts, 0.5 * math.pi - target.yaw, -target.yaw_rate]
+
+
+def position_target(pilot: Autopilot) -> Any:
+    """POSITION_TARGET_LOCAL_NED; None where nothing is aimed at."""
+    parts = target_motion(pilot)
+    if parts is None:
+        return None
     bits = (1, 2, 4, 8, 16, 32, 64, 128, 256, 1024, 2048)
     mask = sum(bit for bit, part in zip(bits, parts, strict=True) if not math.isfinite(part))
     return dialect().MAVLink_position_target_local_ned_message(ms(pilot), 1, mask, *parts)

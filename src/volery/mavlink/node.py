@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -21,11 +22,14 @@ from volery.graph.messages import FluidPressure, NavSatFix, Temperature, message
 from volery.graph.node import Node
 from volery.mavlink import autopilot, streams
 from volery.mavlink.graph_vehicle import GraphVehicle, build_of, state_of
+from volery.mavlink.log_transfer import TransferPace
 from volery.mavlink.mavros import Mavros
 from volery.mavlink.memory import Memory
 
 PACKETS = "volery_interfaces/msg/MavlinkPackets"
 _STATE = "volery_interfaces/msg/FlightState"
+_PACES: WeakKeyDictionary[Any, TransferPace] = WeakKeyDictionary()
+"""Of the vehicles of each graph, which share it."""
 MOST_SYSTEMS = 250
 """Ids above are ground stations' by custom."""
 
@@ -47,6 +51,7 @@ class Autopilot(Node):
         self.declare_parameter("mavlink_id", self.system_id)
         build = build_of(self)
         self.core = autopilot.Autopilot(self.system_id, GraphVehicle(self), build, given)
+        self.core.log.transfers.pace = _PACES.setdefault(self._context.graph, TransferPace())
         self._packets = message_type(PACKETS)
         self._out = self.create_publisher(self._packets, "mavlink/out", 1000)
         self._mavros = [Mavros(self, self.core, "mavros")]
@@ -66,9 +71,15 @@ class Autopilot(Node):
         """Go on from a kept state, with the links of now."""
         links = self.core.memory.links
         self.core.memory = state
+        self.core.log.end()
         state.links = links
         for link in links.values():
             streams.begin(link, state.now_ns)
+
+    def destroy_node(self) -> None:
+        """As of nodes; the flight logs go, too."""
+        super().destroy_node()
+        self.core.log.close()
 
     def _take(self, message: Any) -> None:
         if message.closed:

@@ -76,6 +76,7 @@ def set_one(pilot: Autopilot, source: Source, message: Any) -> None:
         _tell(pilot, source[0], name)
         return
     pilot.memory.parameters[name] = value
+    pilot.log.note_parameter(pilot, name)
     for number in pilot.memory.links:
         _tell(pilot, number, name)
 

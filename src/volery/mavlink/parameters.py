@@ -80,6 +80,9 @@ DEFAULTS: dict[str, Parameter] = {
     "RTL_LAND_DELAY": Parameter(0.0, -1.0, 300.0, "s that a return waits there; -1: for ever"),
     "RTL_MIN_DIST": Parameter(10.0, 0.5, 100.0, "m from home: nearer returns do not climb"),
     "RTL_RETURN_ALT": Parameter(60.0, 0.0, 150.0, "m above home: height of a return"),
+    "SDLOG_MODE": Parameter(
+        0, -1, 2, "flight log: -1 none, 0 armed, 1 from the start to the first disarming, 2 always"
+    ),
     "SYS_AUTOSTART": Parameter(4001, 0, 9999999, "PX4's number of a generic quadrotor", fixed=True),
     "SYS_FAILURE_EN": Parameter(0, 0, 1, "1: failures may be injected"),
 }

@@ -23,8 +23,14 @@ def flight_version() -> int:
 
 
 @cache
+def own_version() -> str:
+    """Volery's version."""
+    return version("volery")
+
+
+@cache
 def custom_version() -> tuple[int, ...]:
     """Eight bytes: this package's patch, minor and major, then what is a commit's in PX4: 0."""
-    numbers = [int(part) for part in re.findall(r"\d+", version("volery"))[:3]]
+    numbers = [int(part) for part in re.findall(r"\d+", own_version())[:3]]
     major, minor, patch = [*numbers, 0, 0, 0][:3]
     return patch, minor, major, 0, 0, 0, 0, 0

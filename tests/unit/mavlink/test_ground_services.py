@@ -1,4 +1,4 @@
-"""What stations ask of a vehicle beside flying: gripper, calibration, shell, failures, logs."""
+"""What stations ask of a vehicle beside flying: gripper, calibration, shell, failures."""
 
 import numpy as np
 import pytest
@@ -99,12 +99,6 @@ def test_the_shell_keeps_no_endless_lines(flight):
         shell(station, "x" * 70)
         assert all(len(line) <= 200 for line in autopilot.core.memory.shells.values())
     assert "param show" in shell(station, "\nhelp\n") + shell(station, "help\n")
-
-
-def test_there_are_no_log_files(flight):
-    _, station = flight
-    station.send("log_request_list", 1, 1, 0, 0xFFFF)
-    assert station.last("LOG_ENTRY").num_logs == 0
 
 
 def test_failures_take_the_parameter(flight):
