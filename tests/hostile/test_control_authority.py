@@ -57,6 +57,7 @@ def call(service, args=None):
         call("/delete_entity", ["uav1"]),
         call("/set_entity_state", {"entity": b"uav1"}),
         call("/volery/inject_fault", {"fault": '{"kind": "radio", "uav": "uav1"}'}),
+        call("/volery/end_fault", {"fault": '{"kind": "radio", "uav": "uav1"}'}),
         call("/volery/inject_fault", {"fault": '{"kind": "radio", "uav": " uav1 "}'}),
         call("/volery/inject_fault", {"fault": '\n {"kind": "radio", "\\u0075av": "\\u0075av1"}'}),
         call("/volery/inject_fault", ['{"kind": "radio", "uav": "uav1"}']),

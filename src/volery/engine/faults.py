@@ -77,25 +77,25 @@ class FaultPlan:
         out to be impossible when its time comes changes nothing and is logged; another one ends
         the run.
         """
-        begin: Callable[[], Any]
-        end: Callable[[], Any] | None = None
-        if isinstance(fault, GustFault):
-            begin = self._gust(fault)
-        elif isinstance(fault, DisplacementFault):
-            begin = self._displacement(fault)
-        elif isinstance(fault, MotorFault):
-            begin, end = self._motor(fault)
-        elif isinstance(fault, SensorFault):
-            begin, end = self._sensor(fault)
-        elif isinstance(fault, RadioFault):
-            begin, end = self._radio(fault)
-        else:
-            begin = self._gnss(fault)
+        begin, end = self._actions(fault)
         uav = getattr(fault, "uav", None)
         until_s = getattr(fault, "until_s", None)
         self._at(fault.at_s, begin, uav, f"fault: {fault.kind}", client)
         if until_s is not None:
-            self._at(until_s, end or _nothing, uav, f"fault over: {fault.kind}", client)
+            ends_by_itself = isinstance(fault, GnssFault)
+            action = end if end is not None and not ends_by_itself else _nothing
+            self._at(until_s, action, uav, f"fault over: {fault.kind}", client)
+
+    def end(self, fault: Fault, *, client: str = "") -> None:
+        """End a fault that has begun, at the next tick; without such a fault nothing changes.
+
+        Its times do not count. Raises `CommandError` as `add`, and for a gust or a displacement.
+        """
+        _, end = self._actions(fault)
+        if end is None:
+            raise CommandError(f"fault: a {fault.kind} cannot be ended: it passes by itself")
+        uav = getattr(fault, "uav", None)
+        self._at(0.0, end, uav, f"fault over: {fault.kind}", client)
 
     def mend(self, uav: str) -> None:
         """Forget what weakens the rotors of a UAV that begins anew, and what silences its radio."""
@@ -133,6 +133,20 @@ class FaultPlan:
                 self._engine.note(self._row(uav), EventKind.FAULT, told)
 
         self._engine.at(ns_from_s(time_s), act)
+
+    def _actions(self, fault: Fault) -> tuple[Callable[[], Any], Callable[[], Any] | None]:
+        """What begins a fault and what ends it; `CommandError` for one that cannot be."""
+        if isinstance(fault, GustFault):
+            return self._gust(fault), None
+        if isinstance(fault, DisplacementFault):
+            return self._displacement(fault), None
+        if isinstance(fault, MotorFault):
+            return self._motor(fault)
+        if isinstance(fault, SensorFault):
+            return self._sensor(fault)
+        if isinstance(fault, RadioFault):
+            return self._radio(fault)
+        return self._gnss(fault)
 
     def _motor(self, fault: MotorFault) -> tuple[Callable[[], Any], Callable[[], Any]]:
         i = self._row(fault.uav)
@@ -185,7 +199,7 @@ class FaultPlan:
         radios.check(fault.uav)
         return lambda: radios.silence(fault.uav, 1), lambda: radios.silence(fault.uav, -1)
 
-    def _gnss(self, fault: GnssFault) -> Callable[[], Any]:
+    def _gnss(self, fault: GnssFault) -> tuple[Callable[[], Any], Callable[[], Any]]:
         if not self._receivers(self._row(fault.uav)):
             raise CommandError(f"{fault.uav} has no GNSS receiver to lose its fix")
         since = ns_from_s(fault.at_s)
@@ -196,7 +210,12 @@ class FaultPlan:
             for receiver in self._receivers(row):
                 receiver.deny(row, max(since, self._engine.time_ns), **until)
 
-        return deny
+        def allow() -> None:
+            row = self._row(fault.uav)
+            for receiver in self._receivers(row):
+                receiver.allow(row, self._engine.time_ns)
+
+        return deny, allow
 
     def _receivers(self, row: int) -> list[GnssBank]:
         inner = [b.bank for b in self._engine.banks if isinstance(b, FaultableBank)]

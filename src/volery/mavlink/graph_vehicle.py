@@ -24,6 +24,7 @@ _GO_TO = "volery_interfaces/srv/GoTo"
 _SET_TARGET = "volery_interfaces/srv/SetPositionTarget"
 _SET_ATTITUDE = "volery_interfaces/srv/SetAttitudeTarget"
 _INJECT = "volery_interfaces/srv/InjectFault"
+_END_FAULT = "volery_interfaces/srv/EndFault"
 _TARGET = "mavros_msgs/msg/PositionTarget"
 _ATTITUDE = "mavros_msgs/msg/AttitudeTarget"
 _NO_PLACE, _NO_VELOCITY, _NO_PUSH = 7, 7 << 3, 7 << 6
@@ -44,6 +45,7 @@ class GraphVehicle:
         self._take_off = node.create_client(_TAKE_OFF_TO, "take_off_to")
         self._sink = node.create_client(_LANDING_SPEED, "set_landing_speed")
         self._inject = node.create_client(_INJECT, "/volery/inject_fault")
+        self._end_fault = node.create_client(_END_FAULT, "/volery/end_fault")
         self._uav = node.get_namespace().strip("/")
         self._go_to = node.create_client(_GO_TO, "go_to")
 
@@ -116,6 +118,12 @@ class GraphVehicle:
         request = zero_message(f"{_INJECT}_Request")
         request.fault = json.dumps({**fault, "uav": self._uav})
         return _ask(self._inject, request)
+
+    def end_fault(self, fault: dict[str, Any]) -> str:
+        """As `Vehicle`."""
+        request = zero_message(f"{_END_FAULT}_Request")
+        request.fault = json.dumps({**fault, "uav": self._uav})
+        return _ask(self._end_fault, request)
 
     def _steer(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from volery.mavlink.modes import Mode
 from volery.mavlink.parameters import Value, defaults
@@ -197,6 +197,8 @@ class Memory:
     fix_lost: bool = False
     fix_denied: bool = False
     """Whether a UAV without a receiver has no fix: an injected failure."""
+    failures: dict[tuple[int, int], dict[str, Any]] = field(default_factory=dict)
+    """Injected faults of the simulation, by FAILURE_UNIT and instance."""
     orbit: Orbit | None = None
     followed: Target | None = None
     calibration: Calibration | None = None

@@ -97,5 +97,8 @@ class Vehicle(Protocol):
     def fail(self, fault: dict[str, Any]) -> str:
         """Injects a fault of the simulation, without its `uav`."""
 
+    def end_fault(self, fault: dict[str, Any]) -> str:
+        """Ends a fault that was injected."""
+
     def spin(self, rates: Vector, thrust: float) -> None:
         """Hold body rates, with a share of the full thrust."""

@@ -394,6 +394,16 @@ class Simulation:
         self._check_open()
         self._faults.add(parse_fault(fault), client=self.graph.acting_client)
 
+    def end_fault(self, fault: Fault | Mapping[str, Any]) -> None:
+        """Ends a fault that has begun; it is described as in `inject`, its times do not count.
+
+        `simulation.end_fault({"kind": "motor", "uav": "uav1", "rotor": 0})`. Nothing changes
+        without such a fault. Raises `CommandError` for one that cannot be, and for a gust or a
+        displacement.
+        """
+        self._check_open()
+        self._faults.end(parse_fault(fault), client=self.graph.acting_client)
+
     def add_partner(
         self,
         name: str,

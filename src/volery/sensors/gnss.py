@@ -136,6 +136,12 @@ class GnssBank(NoisyBank):
         self._denied_from_ns[rows] = since_ns
         self._denied_until_ns[rows] = until_ns
 
+    def allow(self, uav: int, time_ns: int) -> None:
+        """Give a UAV (a row of the fleet) its signals back; a denial that begins later stays."""
+        rows = rows_of(self._rows, np.array([uav]))
+        begun = rows[self._denied_from_ns[rows] <= time_ns]
+        self._denied_until_ns[begun] = np.minimum(self._denied_until_ns[begun], time_ns)
+
     def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:  # noqa: ARG002
         """With fresh drift and a fix at once."""
         self._drift[rows] = (self._wander.sigma * self._noise.start())[rows]

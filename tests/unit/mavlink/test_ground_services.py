@@ -7,8 +7,16 @@ from flying_bench import NAN, fly
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 GRIPPER, CALIBRATE, INJECT = 211, 241, 420
 RELEASE, GRAB = 0.0, 1.0
-GPS, MOTOR, AIRSPEED = 4.0, 101.0, 8.0
-OK, OFF, STUCK = 0.0, 1.0, 2.0
+GYRO, ACCELEROMETER, BAROMETER, GPS, AIRSPEED, BATTERY, MOTOR = (
+    0.0,
+    1.0,
+    3.0,
+    4.0,
+    8.0,
+    100.0,
+    101.0,
+)
+OK, OFF, STUCK, GARBAGE, WRONG = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @pytest.fixture
@@ -103,9 +111,17 @@ def test_the_shell_keeps_no_endless_lines(flight):
 
 def test_failures_take_the_parameter(flight):
     _, station = flight
-    assert station.command(INJECT, GPS, OFF, 0.0) == DENIED
+    for kind in (OFF, OK):
+        assert station.command(INJECT, GPS, kind, 0.0) == DENIED
     assert station.set("SYS_FAILURE_EN", 1) == 1
-    assert station.command(INJECT, AIRSPEED, OFF, 0.0) == UNSUPPORTED
+    for unit, kind in (
+        (AIRSPEED, OFF),
+        (AIRSPEED, OK),
+        (BATTERY, OFF),
+        (GPS, WRONG),
+        (MOTOR, STUCK),
+    ):
+        assert station.command(INJECT, unit, kind, 0.0) == UNSUPPORTED
     assert station.command(INJECT, MOTOR, OFF, 5.0) == UNSUPPORTED
     assert station.command(INJECT, NAN, INJECT, NAN) == UNSUPPORTED
     assert station.command(INJECT, 3.0, STUCK, 0.0) == FAILED
@@ -150,3 +166,77 @@ def test_a_motor_fails_of_the_own_uav_alone():
         station.seconds(0.1)
         health = simulation._engine.fleet.state.rotor_health[:, :4]
         assert np.array_equal(health, [[1.0, 0.0, 1.0, 1.0], [1.0, 1.0, 1.0, 1.0]])
+
+
+def health(simulation):
+    return simulation._engine.fleet.state.rotor_health[0, :4].tolist()
+
+
+def test_motors_work_again():
+    planned = {"kind": "motor", "uav": "uav1", "rotor": 3, "thrust_factor": 0.7}
+    simulation, station = fly(faults=[planned])
+    with simulation:
+        station.seconds(0.1)
+        station.set("SYS_FAILURE_EN", 1)
+        for _ in range(2):  # which does not count twice
+            assert station.command(INJECT, MOTOR, OFF, 0.0) == ACCEPTED
+        station.seconds(0.1)
+        assert health(simulation) == [0.0] * 4
+        assert station.command(INJECT, MOTOR, OK, 2.0) == ACCEPTED
+        station.seconds(0.1)
+        assert health(simulation) == [0.0, 1.0, 0.0, 0.0]
+        assert station.command(INJECT, MOTOR, OK, 0.0) == ACCEPTED
+        station.seconds(0.1)
+        assert health(simulation) == [1.0, 1.0, 1.0, 0.7]  # the scenario's fault stays
+        assert station.command(INJECT, MOTOR, OK, 0.0) == ACCEPTED
+        station.seconds(0.1)
+        assert health(simulation) == [1.0, 1.0, 1.0, 0.7]
+
+
+def test_sensors_work_again():
+    simulation, station = fly(sensors=[{"kind": "imu"}, {"kind": "barometer"}])
+    heard = []
+    for topic in ("imu", "pressure"):
+        simulation.graph.subscribe(f"/uav1/{topic}", lambda m, topic=topic: heard.append(topic))
+    with simulation:
+        station.seconds(0.5)
+        station.set("SYS_FAILURE_EN", 1)
+
+        def told():
+            heard.clear()
+            station.seconds(0.5)
+            return set(heard)
+
+        for unit in (GYRO, ACCELEROMETER, BAROMETER):
+            assert station.command(INJECT, unit, OFF, 0.0) == ACCEPTED
+        station.seconds(0.1)
+        assert told() == set()
+        assert station.command(INJECT, BAROMETER, OK, 1.0) == ACCEPTED
+        assert station.command(INJECT, GYRO, OK, 0.0) == ACCEPTED
+        assert told() == {"pressure"}  # the accelerometer, of the same sensor, fails on
+        assert station.command(INJECT, ACCELEROMETER, OK, 0.0) == ACCEPTED
+        assert told() == {"imu", "pressure"}
+
+
+def test_a_receiver_that_is_stuck_or_lost_has_its_fix_again():
+    simulation, station = fly(sensors=[{"kind": "gnss"}])
+    fixes = []
+    simulation.graph.subscribe("/uav1/fix", lambda m: fixes.append(m.message))
+    with simulation:
+        station.seconds(1.0)
+        station.set("SYS_FAILURE_EN", 1)
+
+        def told():
+            station.seconds(2.0)
+            fixes.clear()
+            station.seconds(6.0)
+            return len({fix.latitude for fix in fixes if fix.status.status >= 0})
+
+        assert told() > 10
+        assert station.command(INJECT, GPS, STUCK, 0.0) == ACCEPTED
+        assert told() == 1
+        assert station.command(INJECT, GPS, OFF, 0.0) == ACCEPTED  # in place of the other
+        assert told() == 0
+        assert station.command(INJECT, GPS, OK, 0.0) == ACCEPTED
+        assert told() > 10
+        assert fix_of(station) == 3

@@ -45,11 +45,18 @@ def test_faults(simulate, flat_data):
     assert ask(simulation, "/volery/inject_fault", fault=json.dumps(fault)).success
     simulation.run(0.01)
     assert simulation.events[-1].kind.name == "FAULT"
+    assert ask(simulation, "/volery/end_fault", fault=json.dumps(fault)).success
+    simulation.run(0.01)
+    assert simulation.events[-1].detail == "fault over: motor"
+    assert simulation._engine.fleet.state.rotor_health[0, 1] == 1.0
+    gust = {"kind": "gust", "velocity_m_s": [1.0, 0.0, 0.0]}
+    refused(ask(simulation, "/volery/end_fault", fault=json.dumps(gust)), "cannot be ended")
     refused(ask(simulation, "/volery/inject_fault", fault="{"), "JSON")
     refused(ask(simulation, "/volery/inject_fault", fault="[1]"), "table")
     refused(ask(simulation, "/volery/inject_fault", fault='{"kind": "flood"}'), "kind")
     fault["uav"] = "uav9"
-    refused(ask(simulation, "/volery/inject_fault", fault=json.dumps(fault)), "uav9")
+    for service in ("inject_fault", "end_fault"):
+        refused(ask(simulation, f"/volery/{service}", fault=json.dumps(fault)), "uav9")
 
 
 def test_speed(simulate, flat_data):

@@ -2133,6 +2133,15 @@ export interface volery_interfaces_ByName_Response {
   message: string;
 }
 
+export interface volery_interfaces_EndFault_Request {
+  fault: string;
+}
+
+export interface volery_interfaces_EndFault_Response {
+  success: boolean;
+  message: string;
+}
+
 export type volery_interfaces_GetBuild_Request = Record<string, never>;
 
 export interface volery_interfaces_GetBuild_Response {
@@ -2677,6 +2686,7 @@ export interface Services {
   "std_srvs/srv/Trigger": { request: std_srvs_Trigger_Request; response: std_srvs_Trigger_Response };
   "tf2_msgs/srv/FrameGraph": { request: tf2_msgs_FrameGraph_Request; response: tf2_msgs_FrameGraph_Response };
   "volery_interfaces/srv/ByName": { request: volery_interfaces_ByName_Request; response: volery_interfaces_ByName_Response };
+  "volery_interfaces/srv/EndFault": { request: volery_interfaces_EndFault_Request; response: volery_interfaces_EndFault_Response };
   "volery_interfaces/srv/GetBuild": { request: volery_interfaces_GetBuild_Request; response: volery_interfaces_GetBuild_Response };
   "volery_interfaces/srv/GetChoices": { request: volery_interfaces_GetChoices_Request; response: volery_interfaces_GetChoices_Response };
   "volery_interfaces/srv/GetGridMap": { request: volery_interfaces_GetGridMap_Request; response: volery_interfaces_GetGridMap_Response };

@@ -17,7 +17,7 @@ _OURS = "volery_interfaces/srv"
 
 
 def offer_air_and_faults(simulation: Simulation) -> None:
-    """Offer set_weather, get_weather, gust and inject_fault."""
+    """Offer set_weather, get_weather, gust, inject_fault and end_fault."""
 
     def set_weather(request: Any) -> None:
         simulation.set_weather(changed(simulation.weather, request, request.only))
@@ -35,14 +35,21 @@ def offer_air_and_faults(simulation: Simulation) -> None:
         simulation.gust_now(amplitude, request.rise, lasts_s)
 
     def inject_fault(request: Any) -> None:
-        try:
-            fault = json.loads(request.fault)
-        except (ValueError, RecursionError) as error:
-            raise CommandError(f"fault is not JSON: {error}") from None
-        simulation.inject(fault)
+        simulation.inject(_fault_of(request))
+
+    def end_fault(request: Any) -> None:
+        simulation.end_fault(_fault_of(request))
 
     graph = simulation.graph
     offer_command(graph, "/volery/set_weather", f"{_OURS}/SetWeather", set_weather)
     offer_command(graph, "/volery/get_weather", f"{_OURS}/GetWeather", get_weather)
     offer_command(graph, "/volery/gust", f"{_OURS}/Gust", gust)
     offer_command(graph, "/volery/inject_fault", f"{_OURS}/InjectFault", inject_fault)
+    offer_command(graph, "/volery/end_fault", f"{_OURS}/EndFault", end_fault)
+
+
+def _fault_of(request: Any) -> Any:
+    try:
+        return json.loads(request.fault)
+    except (ValueError, RecursionError) as error:
+        raise CommandError(f"fault is not JSON: {error}") from None
