@@ -18,6 +18,8 @@ _FRAMES_PER_S_AND_VEHICLE = 20.0
 """At least: setpoints for all vehicles of a large swarm over one connection."""
 _BURST_FRAMES = 500.0
 """At once: a mission of many waypoints, all parameters."""
+_SHORTEST_PAUSE_S = 0.05
+"""Of one client that has overdrawn, so that few long turns read it, not a turn for each frame."""
 _BYTES_PER_NOISE = 24
 """Bytes of no frame that cost as much as a frame: each is a possible start of one."""
 
@@ -71,7 +73,9 @@ class IntakeAccount:
         cost = num_frames + max(0, noise_bytes) / _BYTES_PER_NOISE
         self._at_s, self._frames = now_s, min(_BURST_FRAMES, filled) - cost
         self._limits.note(self, is_overdrawn=self._frames < 0.0)
-        return max(0.0, -self._frames / self._limits.rate)
+        if self._frames >= 0.0:
+            return 0.0
+        return max(_SHORTEST_PAUSE_S, -self._frames / self._limits.rate)
 
     def close(self) -> None:
         """The client has left."""

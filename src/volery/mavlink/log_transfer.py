@@ -20,9 +20,11 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot import Autopilot
     from volery.mavlink.memory import Source
 
-FRAMES_PER_STATE = 20
-"""That go out with each state of the vehicles, a hundred times a simulated second: 180 kB/s
+FRAMES_PER_STATE = 10
+"""That go out with each state of the vehicles, a hundred times a simulated second: 90 kB/s
 (modelling choice)."""
+_FRAMES_PER_TURN = 5
+"""Of a link, then the next one has its turn."""
 _DATA_BYTES = 90
 """Of a LOG_DATA; one with fewer is the last one."""
 _LOG_DATA = 120
@@ -97,11 +99,14 @@ class LogTransfers:
 
     def send_some(self, pilot: Autopilot) -> None:
         """Goes on with the answers, the links in turn."""
-        for _ in range(self.pace.share(pilot.memory.now_ns) if self._waiting else 0):
-            if not self._waiting:
-                return
+        num_frames = self.pace.share(pilot.memory.now_ns) if self._waiting else 0
+        while num_frames > 0 and self._waiting:
             link = self._waiting.popleft()
-            if _send_next(pilot, link, self._requests[link]):
+            request, turn = self._requests[link], min(num_frames, _FRAMES_PER_TURN)
+            send = _send_entries if request.log is None else _send_data
+            num_sent, is_done = send(pilot, link, request, turn)
+            num_frames -= num_sent
+            if not is_done:
                 self._waiting.append(link)
 
     def _set(self, link: int, request: _Request) -> None:
@@ -110,33 +115,34 @@ class LogTransfers:
             self._waiting.append(link)
 
 
-def _send_next(pilot: Autopilot, link: int, request: _Request) -> bool:
-    """Sends a frame; whether more are to follow."""
-    if request.log is None:
-        number = request.entries[0]
-        request.entries = request.entries[1:]
-        _send_entry(pilot, link, request.listed, number)
-        return bool(request.entries)
-    wanted = min(request.remaining, _DATA_BYTES)
+def _send_entries(pilot: Autopilot, link: int, request: _Request, turn: int) -> tuple[int, bool]:
+    """Sends the next LOG_ENTRY messages; how many, and whether they were the last ones."""
+    entry, listed = dialect().MAVLink_log_entry_message, request.listed
+    chosen, request.entries = request.entries[:turn], request.entries[turn:]
+    for number in chosen:
+        if not listed:  # the one that says so
+            pilot.send(entry(0, 0, 0, 0, 0), link)
+            continue
+        log = listed[number]
+        pilot.send(entry(number, len(listed), len(listed) - 1, log.time_s, log.size), link)
+    return len(chosen), not request.entries
+
+
+def _send_data(pilot: Autopilot, link: int, request: _Request, turn: int) -> tuple[int, bool]:
+    """Sends the next LOG_DATA messages; how many, and whether they were the last ones."""
+    assert request.log is not None
+    wanted = min(request.remaining, turn * _DATA_BYTES)
     try:
         data = pilot.log.storage.read(request.log, request.offset, wanted)
     except OSError:
         data = b""
-    head = _HEAD.pack(request.offset & 0xFFFFFFFF, request.number, len(data))
-    pilot.send_payload(_LOG_DATA, head + data.ljust(_DATA_BYTES, b"\0"), link)
-    request.offset += len(data)
-    request.remaining -= len(data)
-    return len(data) == _DATA_BYTES and request.remaining > 0
-
-
-def _send_entry(pilot: Autopilot, link: int, listed: tuple[StoredLog, ...], number: int) -> None:
-    """LOG_ENTRY; without logs the one that says so."""
-    entry = dialect().MAVLink_log_entry_message
-    if not listed:
-        pilot.send(entry(0, 0, 0, 0, 0), link)
-        return
-    log = listed[number]
-    pilot.send(entry(number, len(listed), len(listed) - 1, log.time_s, log.size), link)
+    pieces = [data[k : k + _DATA_BYTES] for k in range(0, len(data), _DATA_BYTES)] or [b""]
+    for piece in pieces:
+        head = _HEAD.pack(request.offset & 0xFFFFFFFF, request.number, len(piece))
+        pilot.send_payload(_LOG_DATA, head + piece.ljust(_DATA_BYTES, b"\0"), link)
+        request.offset += len(piece)
+        request.remaining -= len(piece)
+    return len(pieces), len(data) < wanted or request.remaining <= 0
 
 
 def list_logs(pilot: Autopilot, source: Source, message: Any) -> None:

@@ -45,13 +45,16 @@ class Party:
         Returns for how many seconds nothing more must be read.
         """
         frames, cost = self._framer.feed(data), 0
+        parts: dict[int, list[bytes]] = {}
         for frame in filter(self._signing.accepts, frames):
             self.has_spoken = True
             target = getattr(self._parser.decode(frame.data), "target_system", 0)
             chosen = self._systems if target == 0 else self._systems & {target}
             cost += max(0, len(chosen) - 1)
-            for system in sorted(chosen):
-                self._fleet.send(system, self.number, self._profile, frame.data)
+            for system in chosen:
+                parts.setdefault(system, []).append(frame.data)
+        for system in sorted(parts):
+            self._fleet.send(system, self.number, self._profile, b"".join(parts[system]))
         if self._account is None:
             return 0.0
         noise_bytes = len(data) - sum(len(frame.data) for frame in frames)

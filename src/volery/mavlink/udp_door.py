@@ -164,33 +164,37 @@ class _UdpLink:
         self._fleet.close_link(self._system, self.number)
 
     def _read(self) -> None:
+        """Brings the datagrams of a turn to the vehicle, all in one message."""
+        frames, pause_s = [], 0.0
         for _ in range(_DATAGRAMS_A_TURN):
             try:
                 data, peer = self._socket.recvfrom(65535)
             except (BlockingIOError, InterruptedError):
-                return
+                break
             except OSError:  # what was sent found nobody
                 continue
-            pause_s = self._take(data, peer)
+            taken, pause_s = self._take(data, peer)
+            frames.append(taken)
             if pause_s > 0.0:
                 self._loop.remove_reader(self._socket)
                 self._read_after(pause_s)
-                return
+                break
+        joined = b"".join(frames)
+        if joined:
+            self._fleet.send(self._system, self.number, self._profile, joined)
 
-    def _take(self, data: bytes, peer: tuple[str, int]) -> float:
-        """Brings a datagram to its vehicle; for how many seconds none must be read after it."""
+    def _take(self, data: bytes, peer: tuple[str, int]) -> tuple[bytes, float]:
+        """Returns the frames of a datagram, and for how many seconds none must be read after it."""
         heard = self._framer.datagram(data)
         frames = b"".join(frame.data for frame in heard if self._signing.accepts(frame))
         noise_bytes = len(data) - sum(len(frame.data) for frame in heard)
         cost_s = self._account.charge(max(1, len(heard)), noise_bytes)
         pause_s = max(cost_s, self._fleet.pause_s)
         if self._signing.has_key and not frames:  # a stranger
-            return pause_s
+            return b"", pause_s
         if peer not in self._peers:  # the place agreed upon, and who spoke last
             self._peers = [self._peers[0], peer[:2]]
-        if frames:
-            self._fleet.send(self._system, self.number, self._profile, frames)
-        return pause_s
+        return frames, pause_s
 
     def _read_after(self, pause_s: float) -> None:
         self._pause = self._loop.call_later(pause_s, self._read_again)

@@ -36,3 +36,12 @@ def test_a_run_is_attacked_and_measured(monkeypatch):
     assert figures["publisher_10_khz_sent"] > 0
     assert figures["none_rtf"] > 0.0
     assert set(BENCHES["hostile"].bounds) <= set(figures)
+
+
+@pytest.mark.slow
+def test_a_run_is_flooded_by_mavlink(monkeypatch):
+    attack = {"mavlink_flood": measuring.ATTACKS["mavlink_flood"]}
+    monkeypatch.setattr(measuring, "ATTACKS", attack)
+    figures = measuring.measure(quick=True).figures
+    assert figures["mavlink_flood_sent"] > 0
+    assert figures["mavlink_flood_rtf"] > 0.0

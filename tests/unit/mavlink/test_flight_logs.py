@@ -40,7 +40,7 @@ def entries(station, first=0, last=0xFFFF):
     return station.of("LOG_ENTRY")[before:]
 
 
-def pieces(station, number, offset, count, seconds=0.5):
+def pieces(station, number, offset, count, seconds=0.6):
     """Answers to one request for data."""
     before = len(station.of("LOG_DATA"))
     station.send("log_request_data", station.target, 1, number, offset, count)
@@ -214,7 +214,7 @@ def test_a_flood_of_requests_is_answered_at_the_rate_of_one(flight):
         for _ in range(20):
             station.send("log_request_data", station.target, 1, 0, 0, 0xFFFFFFFF)
         station.seconds(0.01)
-    assert 0 < len(station.of("LOG_DATA")) - before <= 51 * 20
+    assert 0 < len(station.of("LOG_DATA")) - before <= 51 * 10
     station.send("log_request_end", station.target, 1)
     before = len(station.of("LOG_DATA"))
     station.seconds(0.2)
@@ -233,8 +233,8 @@ def test_links_share_the_rate(flight):
         one.send("log_request_data", 1, 1, 0, 0, 0xFFFFFFFF)
     station.seconds(0.11)
     told = [len(one.of("LOG_DATA")) for one in (station, *others)]
-    assert sum(told) <= 20 * 12
-    assert max(told) - min(told) <= 1
+    assert sum(told) <= 10 * 12
+    assert max(told) - min(told) <= 5
 
 
 def test_a_closed_link_leaves_nothing(flight):

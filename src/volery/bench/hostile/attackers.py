@@ -1,6 +1,7 @@
 """Clients that ask for too much of a server on loopback, run as a process of their own.
 
     python -m volery.bench.hostile.attackers ATTACK ROSBRIDGE_PORT ROS_TCP_PORT SECONDS
+    python -m volery.bench.hostile.attackers mavlink_flood TCP_PORT UDP_PORT SECONDS
 
 It ends by itself after SECONDS and prints how much it has sent as a JSON object. An attacker that
 is disconnected connects again.
@@ -18,6 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
+from volery.bench.hostile import mavlink_flood
 from volery.bench.hostile.websocket import (
     BINARY,
     TEXT,
@@ -173,7 +175,11 @@ ATTACKS: dict[str, Callable[[int, int, float], int]] = {
     "connection_storm": storm,
     "service_loop": services,
     "service_pattern": pattern,
+    "mavlink_flood": mavlink_flood.flood,
 }
+"""By name; an attack takes two ports and the time at which it ends."""
+MAVLINK_ATTACKS = frozenset({"mavlink_flood"})
+"""Those whose ports are MAVLink's by TCP and UDP."""
 
 
 def _large(port: int, payload: bytes, kind: int, ends: float, first: bytes = b"") -> int:
@@ -226,10 +232,10 @@ def _ros_tcp_frame(destination: bytes, payload: bytes) -> bytes:
 
 def main() -> None:
     """Do what the command line says."""
-    attack, rosbridge, ros_tcp, seconds = sys.argv[1:]
+    attack, first_port, second_port, seconds = sys.argv[1:]
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     ends = time.monotonic() + float(seconds)
-    sent = ATTACKS[attack](int(rosbridge), int(ros_tcp), ends)
+    sent = ATTACKS[attack](int(first_port), int(second_port), ends)
     sys.stdout.write(json.dumps({"sent": sent}))
 
 

@@ -14,16 +14,18 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from volery.bench.hostile.attackers import ATTACKS
+from volery.bench.hostile.attackers import ATTACKS, MAVLINK_ATTACKS
 from volery.bench.hostile.witness import PERIOD_S
 from volery.bench.registry import Measured
 from volery.core.errors import VoleryError
+from volery.mavlink import ports
+from volery.mavlink.codec import dialect
 
 _log = logging.getLogger(__name__)
 
@@ -39,14 +41,15 @@ _NOT_ANSWERED_S = 10.0
 
 
 def measure(*, quick: bool = False) -> Measured:
-    """Figures of the bench `hostile`."""
+    """Figures of the bench `hostile`. `BridgeError` where pymavlink is missing."""
+    dialect()
     figures: dict[str, float] = {}
     seconds = _QUICK_ATTACK_S if quick else ATTACK_S
     for name in ("none", *ATTACKS):
         _log.info("hostile: %s", name)
-        with _victim() as (pid, rosbridge, ros_tcp):
+        with _victim(with_mavlink=name in MAVLINK_ATTACKS) as (pid, rosbridge, attacked):
             _result(_start("witness", rosbridge, _LEAD_S), _LEAD_S)  # what happens only once
-            figures |= _attack(name, pid, rosbridge, ros_tcp, seconds)
+            figures |= _attack(name, pid, rosbridge, attacked, seconds)
     return Measured(figures | worst_figures(figures))
 
 
@@ -77,12 +80,14 @@ def call_figures(answers: list[tuple[float, float, float]], asked: int) -> dict[
     }
 
 
-def _attack(name: str, pid: int, rosbridge: int, ros_tcp: int, seconds: float) -> dict[str, float]:
+def _attack(
+    name: str, pid: int, rosbridge: int, attacked: tuple[int, int], seconds: float
+) -> dict[str, float]:
     """Figures of one attack, named after it; `none` is none."""
     before = _resident_mb(pid)
     attacker = None
     if name in ATTACKS:
-        attacker = _start("attackers", name, rosbridge, ros_tcp, seconds + 2 * _LEAD_S)
+        attacker = _start("attackers", name, *attacked, seconds + 2 * _LEAD_S)
         time.sleep(_LEAD_S)
     witness = _start("witness", rosbridge, seconds)
     found = call_figures(_result(witness, seconds), round(seconds / PERIOD_S))
@@ -111,16 +116,22 @@ def _result(process: subprocess.Popen[str], seconds: float) -> Any:
 
 
 @contextmanager
-def _victim() -> Iterator[tuple[int, int, int]]:
-    """Process id, rosbridge port and ROS-TCP port of a run in real time."""
+def _victim(*, with_mavlink: bool) -> Iterator[tuple[int, int, tuple[int, int]]]:
+    """Process id, rosbridge port and attacked ports of a run in real time.
+
+    Those are rosbridge's and ROS-TCP's, or those of MAVLink by TCP and UDP.
+    """
     rosbridge, ros_tcp = _free_port(), _free_port()
+    attacked = (_free_port(), _free_mavlink_port()) if with_mavlink else (rosbridge, ros_tcp)
     command = [sys.executable, "-P", "-m", "volery.cli.app", "run", "hover", "--speed", "1"]
     command += ["--seconds", "100000"]
     command += ["--door", f"rosbridge={rosbridge}", "--door", f"ros-tcp={ros_tcp}"]
+    if with_mavlink:
+        command += ["--door", f"mavlink-tcp={attacked[0]}", "--door", f"mavlink={attacked[1]}"]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         _wait_until_open(process, rosbridge)
-        yield process.pid, rosbridge, ros_tcp
+        yield process.pid, rosbridge, attacked
     finally:
         process.terminate()
         try:
@@ -146,6 +157,18 @@ def _free_port() -> int:
     with socket.socket() as sock:
         sock.bind(("127.0.0.1", 0))
         return int(sock.getsockname()[1])
+
+
+def _free_mavlink_port() -> int:
+    """A PORT for the door `mavlink=PORT`: both ports of its first vehicle are free."""
+    for port in range(ports.ONBOARD_TO + 5000, ports.ONBOARD_TO + 40_000, 97):
+        with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as onboard:
+            shift = port - ports.ONBOARD_TO
+            onboard.bind(("127.0.0.1", ports.ONBOARD_FROM + shift))
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
+                ground.bind(("127.0.0.1", ports.GROUND_FROM + shift))
+                return port
+    raise VoleryError("hostile: no free UDP ports for MAVLink")
 
 
 def _resident_mb(pid: int) -> float:
