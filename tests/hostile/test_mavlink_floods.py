@@ -10,7 +10,9 @@ from live_graph import LiveGraph
 from volery.bridges.doors import Doors
 from volery.mavlink.codec import dialect
 from volery.mavlink.intake import FRAMES_PER_S, IntakeLimits
+from volery.mavlink.party import Party
 from volery.mavlink.tcp_door import MavlinkTcp
+from volery.mavlink.udp_door import _UdpLink
 
 PATIENCE_S = 30.0
 
@@ -71,6 +73,43 @@ def test_the_rate_grows_with_the_vehicles():
     assert limits.rate == FRAMES_PER_S
     limits.fit(50)
     assert limits.rate == 50 * 20.0
+
+
+def test_who_floods_is_read_in_few_long_turns():
+    account = IntakeLimits(clock=Clock()).account()
+    assert account.charge(500) == 0.0
+    assert account.charge(1) >= 0.05
+
+
+class Vehicles:
+    """Notes what a connection brings to the vehicles 1 to 3."""
+
+    pause_s = 0.0
+
+    def __init__(self):
+        self.taken = []
+
+    def send(self, system, link, profile, data):
+        self.taken.append((system, data))
+
+    def close_link(self, system, link):
+        pass
+
+
+def test_frames_that_come_together_reach_a_vehicle_as_one_message():
+    vehicles = Vehicles()
+    party = Party(vehicles, 7, 0)
+    for system in (1, 2, 3):
+        party.greet(system)
+    vehicles.taken.clear()
+    codec = dialect().MAVLink(None, 245, 190)
+    to_second = dialect().MAVLink_param_request_list_message(2, 1).pack(codec)
+    party.take((heartbeat() + to_second) * 30)
+    assert vehicles.taken == [
+        (1, heartbeat() * 30),
+        (2, (heartbeat() + to_second) * 30),
+        (3, heartbeat() * 30),
+    ]
 
 
 def test_who_floods_no_more_is_read_again():
@@ -156,3 +195,80 @@ def test_idle_clients_give_way_and_those_that_speak_stay(door):
         late.sendall(heartbeat())
         until(lambda: sum(one.party.has_spoken for one in door._clients.values()) == 2)
         assert len(door._clients) <= 40
+
+
+@pytest.fixture
+def udp_link():
+    """Frames that a vehicle's UDP port has taken, its port, and the port of its agreed peer."""
+    live = LiveGraph()
+    vehicles = Vehicles()
+    with Doors(live.gateway) as doors, contextlib.ExitStack() as stack:
+        agreed = stack.enter_context(bound())
+        own, peer = free_port(), agreed.getsockname()
+
+        async def opened():
+            limits = IntakeLimits(frames_per_s=1e-3)
+            return _UdpLink(vehicles, 1, 1, own, peer, None, limits, for_peer=True)
+
+        async def closed():
+            link.close()
+
+        link = doors.call(opened())
+        vehicles.taken.clear()
+        yield vehicles.taken, own, agreed, link
+        doors.call(closed())
+    live.close()
+
+
+def taken_bytes(taken):
+    return b"".join(data for _, data in taken)
+
+
+def bound():
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.bind(("127.0.0.1", 0))
+    return sock
+
+
+def free_port():
+    with bound() as sock:
+        return sock.getsockname()[1]
+
+
+def test_a_flood_of_a_udp_port_does_not_crowd_out_its_agreed_peer(udp_link):
+    taken, own, agreed, link = udp_link
+    target = ("127.0.0.1", own)
+    with bound() as flooding:
+        for _ in range(5000):
+            flooding.sendto(heartbeat(), target)
+        until(lambda: link._inlets[0]._pause is not None)  # it is read no more
+        before = len(taken_bytes(taken))
+        for _ in range(20):
+            agreed.sendto(heartbeat(), target)
+        wanted = before + 20 * len(heartbeat())
+        until(lambda: len(taken_bytes(taken)) >= wanted)
+        assert len(taken_bytes(taken)) == wanted
+
+
+def test_the_port_of_a_udp_link_stays_taken(udp_link):
+    _, own, _, link = udp_link
+    assert len(link._inlets) == 2
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        with pytest.raises(OSError, match="in use"):
+            other.bind(("127.0.0.1", own))
+
+
+def test_an_agreed_peer_that_left_may_come_again(udp_link):
+    taken, own, agreed, link = udp_link
+    target, peer = ("127.0.0.1", own), agreed.getsockname()
+    agreed.sendto(heartbeat(), target)
+    until(lambda: taken)
+    agreed.close()
+    for _ in range(20):
+        link.send(heartbeat())  # which finds no receiver
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
+        again.bind(peer)
+        before = len(taken)
+        again.sendto(heartbeat(), target)
+        until(lambda: len(taken) > before)

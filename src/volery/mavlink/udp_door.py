@@ -20,9 +20,10 @@ from volery.mavlink.intake import IntakeAccount, IntakeLimits
 from volery.mavlink.party import why_not
 from volery.mavlink.signing import Signing
 from volery.mavlink.streams import GROUND, ONBOARD
+from volery.mavlink.udp_inlet import UdpInlet, connected_beside
 
-_DATAGRAMS_A_TURN = 32
-"""After so many others have their turn."""
+_MOST_WITH_PEERS = 64
+"""Vehicles whose agreed peers have sockets of their own; those of further vehicles share one."""
 _MOST_DATAGRAM = 1400
 """Bytes: below the MTU of Ethernet."""
 
@@ -90,10 +91,16 @@ class MavlinkUdp:
         opened: list[_UdpLink] = []
         try:
             for own, to, profile in links:
-                account = self._intake.account()
                 opened.append(
                     _UdpLink(
-                        self._fleet, system, profile, own, (self._host, to), self._key, account
+                        self._fleet,
+                        system,
+                        profile,
+                        own,
+                        (self._host, to),
+                        self._key,
+                        self._intake,
+                        for_peer=len(self._links) < _MOST_WITH_PEERS,
                     )
                 )
         except BridgeError as error:
@@ -115,7 +122,10 @@ class MavlinkUdp:
 
 
 class _UdpLink:
-    """One socket of one vehicle; its own port is the link's number."""
+    """One port of one vehicle, which is the link's number.
+
+    for_peer: whether the peer at `to` has a socket of its own there.
+    """
 
     def __init__(
         self,
@@ -125,11 +135,12 @@ class _UdpLink:
         own: int,
         to: tuple[str, int],
         key: bytes | None,
-        account: IntakeAccount,
+        intake: IntakeLimits,
+        *,
+        for_peer: bool,
     ) -> None:
         self.number = own
-        self._account = account
-        self._pause: asyncio.TimerHandle | None = None
+        self._intake = intake
         self._fleet, self._system, self._profile = fleet, system, profile
         self._peers = [to]
         self._framer = Framer()
@@ -142,8 +153,8 @@ class _UdpLink:
         except (OSError, OverflowError) as error:
             self._socket.close()
             raise BridgeError(f"cannot listen on UDP port {own}: {why_not(error)}") from None
-        self._loop = asyncio.get_running_loop()
-        self._loop.add_reader(self._socket, self._read)
+        beside = connected_beside(self._socket, to) if for_peer else None
+        self._inlets = [self._read_from(sock) for sock in (self._socket, beside) if sock]
         fleet.send(system, own, profile, b"")
 
     def send(self, data: bytes) -> None:
@@ -156,55 +167,31 @@ class _UdpLink:
 
     def close(self) -> None:
         """Give the port back."""
-        self._account.close()
-        if self._pause is not None:
-            self._pause.cancel()
-        self._loop.remove_reader(self._socket)
-        self._socket.close()
+        for inlet in self._inlets:
+            inlet.close()
         self._fleet.close_link(self._system, self.number)
 
-    def _read(self) -> None:
-        """Brings the datagrams of a turn to the vehicle, all in one message."""
-        frames, pause_s = [], 0.0
-        for _ in range(_DATAGRAMS_A_TURN):
-            try:
-                data, peer = self._socket.recvfrom(65535)
-            except (BlockingIOError, InterruptedError):
-                break
-            except OSError:  # what was sent found nobody
-                continue
-            taken, pause_s = self._take(data, peer)
-            frames.append(taken)
-            if pause_s > 0.0:
-                self._loop.remove_reader(self._socket)
-                self._read_after(pause_s)
-                break
-        joined = b"".join(frames)
-        if joined:
-            self._fleet.send(self._system, self.number, self._profile, joined)
+    def _read_from(self, sock: socket.socket) -> UdpInlet:
+        def deliver(frames: bytes) -> None:
+            self._fleet.send(self._system, self.number, self._profile, frames)
 
-    def _take(self, data: bytes, peer: tuple[str, int]) -> tuple[bytes, float]:
+        account = self._intake.account()
+        return UdpInlet(sock, account, self._take, deliver, lambda: self._fleet.pause_s)
+
+    def _take(
+        self, data: bytes, peer: tuple[str, int], account: IntakeAccount
+    ) -> tuple[bytes, float]:
         """Returns the frames of a datagram, and for how many seconds none must be read after it."""
         heard = self._framer.datagram(data)
         frames = b"".join(frame.data for frame in heard if self._signing.accepts(frame))
         noise_bytes = len(data) - sum(len(frame.data) for frame in heard)
-        cost_s = self._account.charge(max(1, len(heard)), noise_bytes)
+        cost_s = account.charge(max(1, len(heard)), noise_bytes)
         pause_s = max(cost_s, self._fleet.pause_s)
         if self._signing.has_key and not frames:  # a stranger
             return b"", pause_s
         if peer not in self._peers:  # the place agreed upon, and who spoke last
             self._peers = [self._peers[0], peer[:2]]
         return frames, pause_s
-
-    def _read_after(self, pause_s: float) -> None:
-        self._pause = self._loop.call_later(pause_s, self._read_again)
-
-    def _read_again(self) -> None:
-        pause_s = max(self._account.charge(), self._fleet.pause_s)
-        if pause_s > 0.0:
-            self._read_after(pause_s)
-        else:
-            self._loop.add_reader(self._socket, self._read)
 
 
 def _pieces(data: bytes) -> list[bytes]:
