@@ -15,6 +15,8 @@ from volery.core.listener import Listener
 
 HEAD_TIMEOUT_S = 10.0
 """For the head of a request, and for the rest of a body after its answer (modelling choice)."""
+READ_BYTES = 64 << 10
+"""At once, and so what is kept of requests that a client sends before the answer to another."""
 
 
 def http_protocol(listener: Listener) -> type[H11Protocol]:
@@ -37,6 +39,7 @@ class _DeadlineProtocol(H11Protocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """As of asyncio."""
+        transport.max_size = READ_BYTES  # type: ignore[attr-defined]
         super().connection_made(transport)
         self._watch()
 

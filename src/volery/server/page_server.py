@@ -32,13 +32,14 @@ from volery.server.http_protocol import HEAD_TIMEOUT_S, http_protocol
 from volery.server.rights import check_rights
 from volery.server.settings import PageSettings
 from volery.server.site import Site, Situation, State, World
+from volery.server.websocket_protocol import PageWebSocket
 
 _KEEPALIVE_S = 20.0
 """Between two pings, and how long an answer may take."""
 _LONGEST_CALL_S = 30.0
 """Of the server's own work on a busy machine; nothing in it waits for a client longer."""
 
-_REPEATS = RepeatFilter()
+_REPEATS = RepeatFilter(bare=("Invalid UTF-8",))
 """Clients can cause uvicorn's warnings without end."""
 
 
@@ -93,7 +94,7 @@ class PageServer:
             uvicorn.Config(
                 app,
                 http=http_protocol(self._socket),
-                ws="websockets-sansio",
+                ws=PageWebSocket,
                 ws_max_size=MAX_MESSAGE_BYTES,
                 ws_ping_interval=_KEEPALIVE_S,
                 ws_ping_timeout=_KEEPALIVE_S,

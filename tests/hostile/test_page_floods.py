@@ -1,0 +1,225 @@
+"""The page's server under floods: frames that are no messages, and requests without an end.
+
+A flood ends where the server reads no more of it, which is seen by a socket that takes no more.
+"""
+
+from __future__ import annotations
+
+import base64
+import os
+import select
+import socket
+import struct
+import sys
+from contextlib import ExitStack, closing, suppress
+from pathlib import Path
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.frames import Opcode
+from websockets.sync.client import connect
+
+from volery.core.listener import MAX_UNPROVEN
+from volery.runtime.lobby import Lobby
+from volery.server import websocket_protocol
+from volery.server.http_protocol import READ_BYTES
+from volery.server.websocket_protocol import (
+    FRAMES_PER_S,
+    MAX_FRAGMENTS,
+    MAX_FRAMES_AHEAD,
+    HeldTransport,
+    PageWebSocket,
+)
+
+sys.path.append(str(Path(__file__).parents[1] / "unit" / "server"))
+from page_bench import ask, serving
+
+STALL_S = 1.0
+"""A socket that takes nothing for so long takes no more."""
+FLOOD_BYTES = 32 << 20
+BUFFERS_BYTES = 16 << 20
+"""What the system may take of a flood that is not read, with much room."""
+KEY = base64.b64encode(bytes(16)).decode()
+UPGRADE = (
+    "GET /rosbridge HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\n"
+    f"Connection: Upgrade\r\nSec-WebSocket-Key: {KEY}\r\nSec-WebSocket-Version: 13\r\n\r\n"
+)
+
+
+@pytest.fixture(scope="module")
+def server():
+    with serving(Lobby(lambda _: None)) as server:
+        yield server
+
+
+def frame(opcode, payload=b"", *, fin=True):
+    """A frame of a client with a mask of zeros."""
+    head = bytes([(0x80 if fin else 0) | opcode])
+    size = len(payload)
+    length = bytes([0x80 | size]) if size < 126 else b"\xfe" + struct.pack(">H", size)
+    return head + length + bytes(4) + payload
+
+
+def plain(server):
+    return socket.create_connection(("127.0.0.1", server.port), 20.0)
+
+
+def upgraded(server):
+    """A WebSocket connection of which nothing is read by itself."""
+    stranger = plain(server)
+    stranger.sendall(UPGRADE.format(port=server.port).encode())
+    answer = b""
+    while b"\r\n\r\n" not in answer:
+        answer += stranger.recv(4096)
+    assert answer.startswith(b"HTTP/1.1 101")
+    return stranger
+
+
+def flood(stranger, piece, *, reads):
+    """Bytes that the server, and the system, take of a flood; FLOOD_BYTES if all of them."""
+    stranger.setblocking(False)
+    data, sent = piece * (1 + (1 << 16) // len(piece)), 0
+    while sent < FLOOD_BYTES:
+        readable, writable, _ = select.select([stranger] if reads else [], [stranger], [], STALL_S)
+        if readable:
+            stranger.recv(1 << 20)
+        elif not writable:
+            break
+        if writable:
+            try:
+                sent += stranger.send(data)
+            except ConnectionError:  # the server has ended the connection
+                break
+    return sent
+
+
+FLOODS = {
+    "pings": frame(Opcode.PING, bytes(125)),
+    "pongs": frame(Opcode.PONG, bytes(125)),
+    "fragments": frame(Opcode.CONT, b"", fin=False),
+}
+
+
+@pytest.mark.parametrize("reads", [True, False])
+@pytest.mark.parametrize("kind", FLOODS)
+def test_floods_of_frames_are_not_read(server, monkeypatch, kind, reads):
+    monkeypatch.setattr(websocket_protocol, "FRAMES_PER_S", 10.0)  # a hold takes seconds
+    with upgraded(server) as stranger:
+        stranger.sendall(frame(Opcode.TEXT, fin=False))
+        assert flood(stranger, FLOODS[kind], reads=reads) < BUFFERS_BYTES
+        assert ask(server, "/api/status").status == 200
+    assert ask(server, "/api/status").status == 200
+
+
+def test_a_message_of_too_many_fragments_ends_the_connection(server):
+    with connect(f"ws://127.0.0.1:{server.port}/rosbridge") as stranger:
+        with suppress(ConnectionClosed):
+            stranger.send("x" for _ in range(MAX_FRAGMENTS + 2))
+        with pytest.raises(ConnectionClosed, match="fragments"):
+            stranger.recv(20.0)
+
+
+def test_honest_clients_ping_and_send_fragments(server):
+    with connect(f"ws://127.0.0.1:{server.port}/rosbridge") as client:
+        for answered in [client.ping() for _ in range(200)]:
+            assert answered.wait(20.0)
+        text = '{"op": "call_service", "service": "/nobody", "id": "1"}'
+        client.send(iter(text))
+        assert "nobody" in client.recv(20.0)
+
+
+def test_frames_are_counted_over_time():
+    """At the rate that clients may keep up, and a little above it, on a clock of the test's own."""
+
+    class Loop:
+        now_s = 0.0
+
+        def time(self):
+            return self.now_s
+
+        def call_later(self, wait_s, call, *arguments):
+            self.due = (self.now_s + wait_s, call, arguments)
+            return closing_handle
+
+    class Transport:
+        reads = True
+
+        def pause_reading(self):
+            self.reads = False
+
+        def resume_reading(self):
+            self.reads = True
+
+    class Handle:
+        def cancel(self):
+            pass
+
+    closing_handle, loop, transport = Handle(), Loop(), Transport()
+    protocol = PageWebSocket.__new__(PageWebSocket)
+    protocol.loop, protocol._held = loop, HeldTransport(transport)
+    for _ in range(5 * MAX_FRAMES_AHEAD):
+        loop.now_s += 1.0 / FRAMES_PER_S
+        protocol._count_frame()
+        assert transport.reads
+    for _ in range(MAX_FRAMES_AHEAD + 10):
+        protocol._count_frame()
+    assert not transport.reads
+    protocol._held.pause_reading()
+    due_s, call, arguments = loop.due
+    assert due_s - loop.now_s == pytest.approx(11.0 / FRAMES_PER_S, rel=0.2)
+    call(*arguments)
+    assert not transport.reads  # the server has not taken the last message
+    protocol._held.resume_reading()
+    assert transport.reads
+
+
+@pytest.mark.parametrize(
+    "request_bytes",
+    [
+        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: " + b"x" * (1 << 20),
+        b"GET /" + b"x" * (1 << 20) + b" HTTP/1.1\r\n\r\n",
+        b"GET / HTTP/1.1\r\n" + b"".join(b"X%d: x\r\n" % k for k in range(50_000)) + b"\r\n",
+        b"x" * (1 << 20),
+    ],
+)
+def test_heads_of_requests_are_bounded(server, request_bytes):
+    with plain(server) as stranger:
+        try:
+            stranger.sendall(request_bytes)
+            answer = stranger.recv(64)
+        except (ConnectionResetError, BrokenPipeError):
+            answer = b""
+        assert not answer or answer.split()[1].startswith(b"4")
+    assert ask(server, "/api/status").status == 200
+
+
+def test_requests_behind_another_are_kept_in_small_numbers(server):
+    """The answers are not read, so the requests behind them have to wait in the system."""
+    request = f"GET /api/status HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n".encode()
+    with plain(server) as stranger:
+        assert flood(stranger, request, reads=False) < BUFFERS_BYTES
+        assert ask(server, "/api/status").status == 200
+    assert READ_BYTES < 1 << 17
+
+
+def test_silent_and_halting_requests_keep_nobody_out(server):
+    heads = (b"", b"G", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n", b"POST /api/upload HTTP/1.1\r\n")
+    with ExitStack() as strangers:
+        for number in range(4 * MAX_UNPROVEN):
+            stranger = strangers.enter_context(closing(plain(server)))
+            stranger.sendall(heads[number % len(heads)])
+        assert ask(server, "/api/status").status == 200
+
+
+def test_a_huge_frame_is_refused_by_its_length(server):
+    with upgraded(server) as stranger:
+        stranger.sendall(b"\x82\xff" + struct.pack(">Q", 1 << 40) + bytes(4))
+        assert b"\x03\xf1" in stranger.recv(4096)  # 1009
+
+
+def test_text_that_is_no_utf_8_ends_the_connection_quietly(server, caplog):
+    for _ in range(3):
+        with upgraded(server) as stranger:
+            stranger.sendall(frame(Opcode.TEXT, b"\xff\xfe" + os.urandom(8)))
+            assert stranger.recv(4096)
+    assert "Traceback" not in caplog.text
