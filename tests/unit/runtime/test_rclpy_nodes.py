@@ -1,10 +1,13 @@
 """Node files written for rclpy run in a scenario as they are."""
 
+import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import pytest
 
+from volery.bridges.ros1.environment import rospy_is_installed
 from volery.core.errors import NodeError, ScenarioError
 from volery.graph.messages import Log, String
 from volery.graph.nodes.imports import withdraw_ros_imports
@@ -119,25 +122,6 @@ def test_a_message_may_be_used_again_after_its_publication(simulate, flat_data):
     assert heard == ["a", "b"]
 
 
-def test_an_installed_package_comes_before_a_stand_in(tmp_path, monkeypatch, simulate, flat_data):
-    (tmp_path / "std_msgs" / "msg").mkdir(parents=True)
-    (tmp_path / "std_msgs" / "__init__.py").write_text("")
-    (tmp_path / "std_msgs" / "msg" / "__init__.py").write_text("String = 'real'")
-    (tmp_path / "sees_real.py").write_text(
-        "from std_msgs.msg import String\n"
-        "from rclpy.node import Node\n"
-        "class Sees(Node):\n"
-        "    def __init__(self):\n"
-        "        super().__init__('sees')\n"
-        "        self.seen = String\n"
-    )
-    monkeypatch.syspath_prepend(tmp_path)
-    flat_data["types"]["f450"]["nodes"] = [{"node": "sees_real:Sees"}]
-    assert simulate(flat_data).nodes[0].seen == "real"
-    for name in ("std_msgs", "std_msgs.msg"):
-        sys.modules.pop(name, None)
-
-
 def test_unknown_types_and_modules_are_import_errors(tmp_path, monkeypatch, simulate, flat_data):
     monkeypatch.chdir(tmp_path)
     for k, line in enumerate(("from std_msgs.msg import Strin", "import rclpy.nothing")):
@@ -162,3 +146,45 @@ def test_spinning_says_that_volery_does_it(simulate, flat_data, tmp_path, monkey
     flat_data["types"]["f450"]["nodes"] = [{"node": "spins:Spins"}]
     with pytest.raises(NodeError, match=r"add_done_callback.*\(spins.py:8\)"):
         simulate(flat_data).run(0.2)
+
+
+@pytest.mark.skipif(not rospy_is_installed(), reason="rospy is not installed")
+def test_node_files_find_volerys_messages_beside_rospy():
+    """In a process of its own: rospy imports ROS 1's packages of the same names."""
+    program = """
+        from volery.bridges.ros1.environment import load_rospy
+        from volery.graph.nodes.imports import provide_ros_imports
+
+        rospy = load_rospy()
+        provide_ros_imports()
+        from std_msgs.msg import Header, String
+        from rosgraph_msgs.msg import Clock
+
+        assert String.__msgtype__ == "std_msgs/msg/String"
+        assert Clock.__msgtype__ == "rosgraph_msgs/msg/Clock"
+        assert rospy.Header is not Header
+        assert rospy.Header._md5sum
+    """
+    subprocess.run([sys.executable, "-c", textwrap.dedent(program)], check=True, timeout=60)
+
+
+def test_node_files_find_volerys_messages_before_other_packages(tmp_path):
+    """In a process of its own, where ROS 1's packages are on the path, unless ROS 2's are."""
+    for name in ("std_msgs", "rclpy"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text("")
+    (tmp_path / "std_msgs" / "msg.py").write_text("class String: pass\n")
+    program = """
+        import sys
+        sys.path.append({!r})
+        from volery.graph.nodes.imports import provide_ros_imports
+        provide_ros_imports()
+        from std_msgs.msg import String
+        assert hasattr(String, "__msgtype__") is {}
+    """
+    for has_ros2 in (True, False):
+        text = textwrap.dedent(program).format(str(tmp_path), not has_ros2)
+        subprocess.run([sys.executable, "-c", text], check=True, timeout=60)
+        if has_ros2:
+            (tmp_path / "rclpy" / "__init__.py").unlink()
+            (tmp_path / "rclpy").rmdir()

@@ -14,7 +14,7 @@ from typing import Any
 
 from volery.bridges.ros1.local_addresses import provide_local_addresses
 from volery.core.errors import BridgeError
-from volery.graph.nodes.imports import withdraw_ros_imports
+from volery.graph.nodes.imports import forget_message_packages, withdraw_ros_imports
 
 _DEBIAN = Path("/usr/lib/python3/dist-packages")
 _PACKAGES = "python3-rospy python3-rosmaster ros-std-msgs"
@@ -45,7 +45,7 @@ def _load() -> Any:
     added = [] if importlib.util.find_spec("rospy") else _folders()
     # At the end, and only for now: whatever this environment has itself must win, numpy above all.
     sys.path.extend(added)
-    logger_class = logging.getLoggerClass()
+    logger_class, before = logging.getLoggerClass(), set(sys.modules)
     try:
         rospy = importlib.import_module("rospy")
         provide_local_addresses()
@@ -60,6 +60,8 @@ def _load() -> Any:
         logging.setLoggerClass(logger_class)  # rospy's own is meant for its nodes alone
         for folder in added:
             sys.path.remove(folder)
+        # rospy keeps what it has imported; files of nodes shall find Volery's messages
+        forget_message_packages(set(sys.modules) - before)
 
 
 def _folders() -> list[str]:

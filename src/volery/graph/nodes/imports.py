@@ -1,18 +1,19 @@
 """Stand-ins for ROS's Python packages, so that a node file of ROS 2 runs where no ROS is sourced.
 
 `from geometry_msgs.msg import Twist`, `from std_srvs.srv import Trigger` and `from rclpy.node
-import Node` work once `provide_ros_imports` was called, which loading a node does. The finder comes
-after all others: what is installed, a sourced ROS above all, comes first. Code that loads a real
-ROS later calls `withdraw_ros_imports` before that.
+import Node` work once `provide_ros_imports` was called, which loading a node does. A sourced ROS 2
+comes first; without one the stand-ins do, also where ROS 1 is installed: its packages have the same
+names, and no node can publish its messages. Code that loads a real ROS later calls
+`withdraw_ros_imports` before that.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from importlib.abc import Loader, MetaPathFinder
-from importlib.machinery import ModuleSpec
+from importlib.machinery import ModuleSpec, PathFinder
 from types import ModuleType
 from typing import Any
 
@@ -68,9 +69,10 @@ _FINDER = _Finder()
 
 
 def provide_ros_imports() -> None:
-    """Let imports find the stand-ins from now on, after everything that is installed."""
+    """Lets imports find the stand-ins from now on: after a sourced ROS 2, before all else."""
     if _FINDER not in sys.meta_path:
-        sys.meta_path.append(_FINDER)
+        has_ros2 = PathFinder.find_spec("rclpy") is not None
+        sys.meta_path.insert(len(sys.meta_path) if has_ros2 else 0, _FINDER)
 
 
 def withdraw_ros_imports() -> None:
@@ -80,6 +82,17 @@ def withdraw_ros_imports() -> None:
     for name, module in list(sys.modules.items()):
         if isinstance(getattr(getattr(module, "__spec__", None), "loader", None), _Loader):
             del sys.modules[name]
+
+
+def forget_message_packages(names: Iterable[str]) -> None:
+    """Has the next import of those of these modules that hold ROS messages look for them anew.
+
+    For packages of ROS 1, once what needs them has imported them.
+    """
+    packages = {name.partition("/")[0] for name in typestore().names()}
+    for name in names:
+        if name.partition(".")[0] in packages:
+            sys.modules.pop(name, None)
 
 
 def _filler(package: str, rest: str) -> Callable[[ModuleType], None] | None:
