@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import contextlib
 import json
+import shutil
 import struct
 from functools import cache
 
 import numpy as np
 from file_place import path_of
+from rosbags.rosbag1 import Writer as BagWriter
+from rosbags.rosbag2 import Writer as Ros2Writer
 
 from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.bag_writer import bag_writer
 from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.logs.flights import ORIGIN_TOPIC, read_flight
 from volery.bridges.logs.playback import Playback
@@ -24,8 +28,10 @@ from volery.bridges.logs.recover import recover
 from volery.core.errors import GraphError, RecordingError
 from volery.graph import command_records, definition_store
 from volery.graph.graph import Graph
-from volery.graph.messages import Published, String
+from volery.graph.messages import Published, String, typestore
+from volery.graph.ros1 import ros1_codec
 from volery.graph.zero import zero_message
+from volery.runtime.slam_run.sources import open_source
 
 definition_store.MAX_FOREIGN = 60  # damaged definitions would be learned for ever
 
@@ -71,6 +77,67 @@ def _logs(suffix):
                 log.flush()
         log.close()
         found.append(path.read_bytes())
+    return [*found, _bzipped(path_of("bzipped.bag"))] if suffix == ".bag" else found
+
+
+def _bzipped(path):
+    """A bag as ROS 1 packs it with bz2."""
+    path.unlink(missing_ok=True)
+    writer = bag_writer(path, compressed=False)
+    writer.set_compression(BagWriter.CompressionFormat.BZ2)
+    codec, connections = ros1_codec(), {}
+    with writer:
+        for number, published in enumerate(_messages()):
+            topic, msgtype = published.topic, published.msgtype
+            if topic not in connections:
+                texts = {"msgdef": codec.definition_text(msgtype), "md5sum": codec.md5(msgtype)}
+                connections[topic] = writer.add_connection(topic, msgtype, **texts)
+            data = codec.encode(published.message, msgtype, number)
+            writer.write(connections[topic], published.time_ns, data)
+            if number % 80 == 79:
+                writer.write_chunk(writer.chunks[-1])
+    return path.read_bytes()
+
+
+@cache
+def _sqlite_bags():
+    """The SQLite files of ROS 2 bags, of both versions."""
+    found = []
+    for version in (8, 9):
+        folder = path_of(f"bag_{version}")
+        shutil.rmtree(folder, ignore_errors=True)
+        connections = {}
+        with Ros2Writer(folder, version=version) as writer:
+            for published in _messages():
+                topic, msgtype = published.topic, published.msgtype
+                if topic not in connections:
+                    connections[topic] = writer.add_connection(
+                        topic, msgtype, typestore=typestore()
+                    )
+                writer.write(connections[topic], published.time_ns, published.cdr)
+        (file,) = folder.glob("*.db3")
+        found.append(file.read_bytes())
+    return found
+
+
+def damaged_db3(mutator):
+    """SQLite files of ROS 2 bags, damaged, as `volery slam` reads them."""
+    path = path_of("damaged.db3")
+    path.write_bytes(_damaged(mutator, _sqlite_bags(), _page_cells))
+    with contextlib.suppress(RecordingError):
+        source = open_source(path)
+        for heard in source.messages({*source.topics}):
+            assert heard.topic in source.topics
+    return 1
+
+
+def _page_cells(data):
+    """The counts and offsets in the heads of SQLite's pages, and the file's page size."""
+    found, size = [(16, ">H"), (28, ">I")], 4096
+    for page in range(len(data) // size):
+        begin = page * size + (100 if page == 0 else 0)
+        found += [(begin + 1, ">H"), (begin + 3, ">H"), (begin + 5, ">H"), (begin + 8, ">I")]
+        found += [(begin + 12, ">H")] * (begin + 14 <= len(data))
     return found
 
 
@@ -80,7 +147,7 @@ def damaged_mcap(mutator):
 
 
 def damaged_bag(mutator):
-    """ROS 1 bags of a flight, damaged."""
+    """ROS 1 bags of a flight, packed by lz4, bz2 or not at all, damaged."""
     return _check(_damaged(mutator, _logs(".bag"), _bag_lengths), "damaged.bag")
 
 

@@ -50,6 +50,7 @@ TARGETS = {
     "bag": log_targets.bag,
     "damaged_mcap": damaged_log_targets.damaged_mcap,
     "damaged_bag": damaged_log_targets.damaged_bag,
+    "damaged_db3": damaged_log_targets.damaged_db3,
     "grid_map_matrix": grid_map_targets.matrix,
     "grid_map_moving_ai": grid_map_targets.moving_ai,
     "grid_map_picture": grid_map_targets.picture,
