@@ -274,9 +274,7 @@ def test_smoke_rises_from_a_crash(page, served):
 def test_a_crashed_uav_is_repaired(page, served):
     served.call("/uav3/stop", "std_srvs/srv/Trigger")
     vehicle(served, "uav3", lambda uav: uav["crashed"])
-    page.get_by_role("option", name="uav3").click()
-    page.get_by_role("navigation").get_by_role("button", name="Inspector").click()
-    repair = page.get_by_role("button", name="Repair: back to its start")
+    repair = inspect(page, "uav3").get_by_role("button", name="Repair: back to its start")
     repair.click()
     vehicle(served, "uav3", lambda uav: not uav["crashed"])
     repair.wait_for(state="detached")

@@ -46,7 +46,7 @@ const FRAME_MS = 1000 / 60;
 const offset = new ClockOffset();
 const ages: number[] = [];
 const intervals: number[] = [];
-let frameMs = NaN;
+let drawnMs = NaN;
 let droppedBefore = NaN;
 
 export function followHealth(): void {
@@ -60,11 +60,15 @@ export function followHealth(): void {
   setInterval(tell, TELL_MS);
 }
 
-function frame(): void {
+/** After the scene was drawn. */
+export function noteDrawn(): void {
   const now = nowMs();
-  if (!Number.isNaN(frameMs)) keep(intervals, now - frameMs);
-  frameMs = now;
-  const age = now - shownMs();
+  if (!Number.isNaN(drawnMs)) keep(intervals, now - drawnMs);
+  drawnMs = now;
+}
+
+function frame(): void {
+  const age = nowMs() - shownMs();
   if (useSimulation.getState().status?.state !== PLAYING) ages.length = 0;
   else if (!Number.isNaN(age)) keep(ages, age);
   requestAnimationFrame(frame);

@@ -2,6 +2,7 @@ import type { PerspectiveCamera, Scene, WebGLRenderer } from "three";
 import { link } from "../../link/link.ts";
 import { nowMs } from "../../lib/time.ts";
 import { POSE } from "../../link/protocol.ts";
+import { noteDrawn } from "../../state/health.ts";
 import { useView } from "../../state/view.ts";
 import { Air } from "../air/air.ts";
 import { makeFog } from "../air/fog.ts";
@@ -10,6 +11,8 @@ import { prepareMaterials } from "../world/materials.ts";
 import { standing } from "../world/standing.ts";
 import { debugging, noteFrame, onScreen } from "./debugging.ts";
 import type { Moment } from "./part.ts";
+import { Fence } from "./Fence.ts";
+import { DrawingPace } from "./pace.ts";
 import { makeParts, type Parts } from "./parts.ts";
 import { isSoftware, levelNamed, LEVELS, QualityGovernor } from "./quality.ts";
 import { shown } from "./shown.ts";
@@ -17,7 +20,6 @@ import { shown } from "./shown.ts";
 const LONGEST_STEP_S = 0.1;
 const MEDIUM = 2;
 const LOW = 1;
-const SHORTEST_FRAME_MS = 28;
 
 /** The picture's parts, brought up to date and drawn once a frame. */
 export class Stage {
@@ -26,6 +28,9 @@ export class Stage {
   private readonly governor: QualityGovernor;
   private readonly moment: Moment;
   private readonly fog = makeFog();
+  /** Null: a graphics card draws, as often as the browser asks. */
+  private readonly pace = isSoftware() ? new DrawingPace() : null;
+  private readonly fence: Fence;
   private worldVersion = 0;
   private lastMs = 0;
 
@@ -39,6 +44,7 @@ export class Stage {
     this.governor = new QualityGovernor(isSoftware() ? LOW : MEDIUM);
     scene.fog = this.fog;
     renderer.info.autoReset = true;
+    this.fence = new Fence(renderer.getContext() as WebGL2RenderingContext);
     this.parts = makeParts(scene, camera, renderer, this.air);
     const quality = LEVELS[this.governor.level]!;
     this.moment = { nowMs: 0, stepS: 0, camera, width: 1, height: 1, renderer, quality };
@@ -51,9 +57,8 @@ export class Stage {
   /** One frame: the whole of the page's work for it. */
   frame(width: number, height: number): void {
     const begun = performance.now();
-    // A processor that draws has other work too: the simulation's, more often than not.
-    if (isSoftware() && begun - this.lastMs < SHORTEST_FRAME_MS) return;
-    const { moment } = this;
+    const { moment, pace } = this;
+    if (pace?.mayBegin(begun, () => this.fence.isPassed()) === false) return;
     debugging.frameMs = begun - this.lastMs;
     this.lastMs = begun;
     moment.nowMs = nowMs();
@@ -70,6 +75,11 @@ export class Stage {
     debugging.updateMs = performance.now() - begun;
     moment.renderer.render(this.scene, moment.camera);
     debugging.scriptMs = performance.now() - begun;
+    if (pace !== null) {
+      pace.begin(begun);
+      this.fence.set();
+    }
+    noteDrawn();
     noteFrame(moment.renderer, moment.camera);
     if (debugging.firstPictureMs === 0 && this.parts.world.ready)
       debugging.firstPictureMs = performance.now();
@@ -77,6 +87,7 @@ export class Stage {
 
   dispose(): void {
     this.air.dispose();
+    this.fence.dispose();
     for (const [, part] of this.parts.all) {
       this.scene.remove(part.object);
       part.dispose();
@@ -102,7 +113,7 @@ export class Stage {
 
   private govern(): void {
     const wish = useView.getState().quality;
-    if (wish === "auto") this.governor.take(debugging.frameMs);
+    if (wish === "auto") this.governor.take(this.pace?.costMs ?? debugging.frameMs);
     else this.governor.level = levelNamed(wish);
     const quality = LEVELS[this.governor.level]!;
     if (quality !== this.moment.quality) this.take(quality);
