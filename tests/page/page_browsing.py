@@ -7,6 +7,8 @@ from pathlib import Path
 
 PICTURES = Path(__file__).parents[2] / "runs" / "page"
 """Screenshots of the tests, to be looked at."""
+HANG_S = 180.0
+"""No measure of anything: a machine with other work may take so long over a click."""
 SMALL = {"width": 640, "height": 360}
 COARSE = "Object.defineProperty(window, 'devicePixelRatio', { get: () => 0.25 })"
 """The scene gets one pixel for sixteen of the page: software draws slowly."""
@@ -33,7 +35,7 @@ class Browsing:
         Whoever names no quality looks at no picture: it is drawn as cheaply as can be.
         """
         opened = self._chromium.new_context(viewport=viewport or SMALL, **context)
-        opened.set_default_timeout(60_000)
+        opened.set_default_timeout(1000 * HANG_S)
         self._contexts.append(opened)
         if "quality=" not in url:
             url = with_fragment(url, "quality=minimal")

@@ -10,7 +10,7 @@ import roslibpy
 
 from volery.bench.page.serving import PageProcess
 
-ANSWER_S = 60.0
+ANSWER_S = 180.0
 
 
 class Served(PageProcess):

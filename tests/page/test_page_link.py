@@ -29,7 +29,7 @@ def clock_s(page):
     return 60 * int(minutes) + float(seconds)
 
 
-def wait_for_clock(page, fits, timeout_s=60.0):
+def wait_for_clock(page, fits, timeout_s=180.0):
     ends = time.monotonic() + timeout_s
     while not fits(clock_s(page)):
         assert time.monotonic() < ends, f"the page's clock shows {clock_s(page)} s"
@@ -42,7 +42,7 @@ def test_silence_is_told_at_once_and_ends_by_itself(browsing, served):
     os.kill(served.pid, signal.SIGSTOP)
     try:
         banner = page.get_by_role("alert").filter(has_text="Nothing comes from the simulation")
-        banner.wait_for(timeout=10_000)
+        banner.wait_for()
         keep_picture(page, "silent")
         assert "Since" in banner.inner_text()
     finally:
@@ -71,7 +71,7 @@ def test_the_page_comes_back_with_the_server(browsing, served):
     wait_for_clock(page, lambda s: s != before)
     # what was subscribed comes again
     rate = row.locator("[data-kind=rate]")
-    ends = time.monotonic() + 60
+    ends = time.monotonic() + 180
     while not re.match(r"[1-9]", rate.inner_text()):
         assert time.monotonic() < ends
         time.sleep(0.2)
@@ -154,7 +154,7 @@ def test_256_uavs(browsing, tmp_path):
     path.write_text(crowd(256))
     with Served(str(path)) as server:
         page = browsing.open(server.url, viewport=WIDE)
-        wait_for_clock(page, lambda s: s > 1, 120)
+        wait_for_clock(page, lambda s: s > 1)
         page.get_by_role("navigation").get_by_role("button", name="Topics", exact=True).click()
         page.get_by_label("Filter topics").fill("uav256/odom")
         row = page.get_by_role("listitem", name="/uav256/odom", exact=True)
