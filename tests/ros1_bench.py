@@ -49,7 +49,7 @@ def free_port():
         return probe.getsockname()[1]
 
 
-def wait_until(condition, seconds=10.0):
+def wait_until(condition, seconds=60.0):
     """Whether a condition comes true in time."""
     end = time.monotonic() + seconds
     while not condition():
@@ -160,7 +160,7 @@ class Program:
                     self._lines.put(json.loads(line))
         self._lines.put(EOFError())
 
-    def next(self, seconds=10.0):
+    def next(self, seconds=60.0):
         """The next value."""
         value = self._lines.get(timeout=seconds)
         if isinstance(value, EOFError):

@@ -71,7 +71,7 @@ class Other:
         with contextlib.closing(caller):
             until(lambda: caller.ready)
             caller.call(encode_cdr(request, f"{srvtype}_Request"), come.put, lambda: come.put(None))
-            data = come.get(timeout=10.0)
+            data = come.get(timeout=60.0)
         return None if data is None else decode_cdr(data, f"{srvtype}_Response")
 
     def close(self):

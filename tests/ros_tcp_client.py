@@ -13,7 +13,7 @@ import time
 from live_graph import LiveGraph
 
 
-def until(what, timeout_s=10.0):
+def until(what, timeout_s=60.0):
     """Wait for `what()` to be true, and return that."""
     end = time.monotonic() + timeout_s
     while time.monotonic() < end:
@@ -71,7 +71,7 @@ class Client:
     def command(self, name, ending=b"", **fields):
         self.send(f"__{name}", json.dumps(fields).encode() + ending)
 
-    def next(self, timeout_s=10.0):
+    def next(self, timeout_s=60.0):
         """The next frame; JSON is parsed."""
         destination, payload = self.frames.get(timeout=timeout_s)
         if destination.startswith("__"):

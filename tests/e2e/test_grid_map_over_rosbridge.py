@@ -33,7 +33,7 @@ MESSAGE = {
 }
 
 
-def until(condition, seconds=20.0):
+def until(condition, seconds=60.0):
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "waited too long"
@@ -64,7 +64,7 @@ def running(simulate):
 def test_a_web_client_builds_the_world(running):
     simulation, port = running
     ros = roslibpy.Ros("127.0.0.1", port)
-    ros.run(timeout=10)
+    ros.run(timeout=60.0)
     try:
         maps, scans = [], []
         roslibpy.Topic(ros, "/map", "nav_msgs/OccupancyGrid").subscribe(maps.append)

@@ -215,7 +215,7 @@ def test_who_does_not_answer_is_left_behind(gone):
         simulation.run(0.5)
         waited_s = time.monotonic() - before
         assert simulation.time_s == pytest.approx(0.5)
-        assert waited_s < 5.0
+        assert waited_s < 60.0
         if gone == "is silent":
             assert waited_s >= 0.3
         simulation.add_partner("lost", period_s=1.0)  # the name is free again

@@ -48,7 +48,7 @@ def test_a_log_is_played_to_a_client(flight):
         odom = client.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=lambda: None)
         for second in (1.5, 0.25, 1.0):
             assert seek(client, second).success
-            until = time.monotonic() + 20.0
+            until = time.monotonic() + 60.0
             stamps = []
             while not any(second - 0.021 < stamp <= second for stamp in stamps):
                 assert time.monotonic() < until
@@ -58,7 +58,7 @@ def test_a_log_is_played_to_a_client(flight):
         assert (info.file, info.state, info.position) == ("flight.mcap", 2, 1.0)
         client.close()
         process.send_signal(signal.SIGINT)
-        _, told = process.communicate(timeout=20.0)
+        _, told = process.communicate(timeout=60.0)
         assert "Stopped with Ctrl-C at 1.000 s" in told
     finally:
         process.kill()

@@ -53,7 +53,7 @@ class Run:
 
     def close(self):
         self.process.terminate()
-        self.process.wait(20)
+        self.process.wait(60.0)
         self._reader.join()
         self.process.stderr.close()
 
@@ -141,7 +141,7 @@ def test_a_door_can_be_opened_on_several_ports():
         for address in (f"127.0.0.1:{first}", f"127.0.0.1:{second}/rosbridge"):
             with connect(f"ws://{address}") as client:
                 client.send('{"op": "call_service", "service": "/get_entities"}')
-                assert json.loads(client.recv(20))["values"]["entities"] == ["uav1"]
+                assert json.loads(client.recv(60.0))["values"]["entities"] == ["uav1"]
     finally:
         run.close()
 
@@ -211,7 +211,7 @@ def test_a_node_runs_beside(run, tmp_path, way):
         assert "data: hello" in volery(run, "topic", "echo", f"/{name}", "--once")
     finally:
         node.terminate()
-        node.wait(20)
+        node.wait(60.0)
         node.stderr.close()
 
 
@@ -396,7 +396,7 @@ def test_a_client_unloads_the_world_and_loads_one_again():
         assert answer(client, "/set_simulation_state", state=quit_it).result.result == 103
         quit_it.state = QUITTING
         assert answer(client, "/set_simulation_state", state=quit_it).result.result == 1
-        assert run.process.wait(20.0) == 0
+        assert run.process.wait(60.0) == 0
     finally:
         client.close()
         run.close()

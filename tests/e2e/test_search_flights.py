@@ -183,7 +183,7 @@ def test_each_node_in_a_process_of_its_own(open_door, tmp_path, simulate):
         finally:
             for node in nodes:
                 node.terminate()
-                node.wait(20.0)
+                node.wait(60.0)
     watch.check()
 
 

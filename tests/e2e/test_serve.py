@@ -115,7 +115,7 @@ class Ros:
         answer = self.call("/load_world", "simulation_interfaces/LoadWorld", **source)
         return answer["result"]
 
-    def first(self, topic, msgtype, good=lambda message: True, seconds=20.0):
+    def first(self, topic, msgtype, good=lambda message: True, seconds=60.0):
         """The first message that is good."""
         found, there = [], threading.Event()
 

@@ -14,7 +14,7 @@ from volery.mavlink.party import Party
 from volery.mavlink.tcp_door import MavlinkTcp
 from volery.mavlink.udp_door import _UdpLink
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 class Clock:

@@ -296,7 +296,7 @@ def test_a_header_given_twice_is_a_bad_request(simulate, flat_data, caplog, head
             "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
             f"{header}: a\r\n{header}: b\r\n\r\n"
         )
-        with socket.create_connection(("127.0.0.1", server.port), timeout=10.0) as client:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=60.0) as client:
             client.sendall(request.encode())
             answer = client.recv(4096)
     assert answer.startswith(b"HTTP/1.1 400 ")

@@ -31,7 +31,7 @@ from volery.mavlink.codec import dialect
 from volery.mavlink.px4_door import Px4Door
 from volery.mavlink.tcp_door import MavlinkTcp
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "CONNECT", "OPTIONS", "TRACE", "PATCH")
 HELLO_OF_TLS = b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03"
 

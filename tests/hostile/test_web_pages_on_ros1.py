@@ -45,7 +45,7 @@ def test_programs_are_answered_and_pages_refused():
         with ServerProxy(f"http://{host}:{port}") as program:
             assert program.say("from a program") == "from a program"
         for headers in ({"Content-Type": "text/plain"}, {"Origin": "https://stranger.example"}):
-            page = http.client.HTTPConnection(host, port, timeout=20)
+            page = http.client.HTTPConnection(host, port, timeout=60.0)
             page.request("POST", "/RPC2", dumps(("from a page",), "say"), headers)
             assert page.getresponse().status == 403
             page.close()

@@ -26,7 +26,7 @@ def call(link, service, request=None):
         told.set()
 
     link.call(service, request, Reply(keep, keep))
-    assert told.wait(10.0)
+    assert told.wait(60.0)
     return results[0]
 
 
@@ -34,7 +34,7 @@ def main():
     link = Ros1Client(node_name="program")
     woken = threading.Event()
     mailbox = link.subscribe("/latched", wake=woken.set)
-    assert woken.wait(10.0)
+    assert woken.wait(60.0)
     say([mailbox.take()[0].message.data, link.info.mailboxes[0].received])
     link.unsubscribe(mailbox)
     link.advertise("/from_program", STRING, latched=True)

@@ -11,7 +11,7 @@ def main():
     link = Ros1Client(node_name="localhost_program")
     woken = threading.Event()
     mailbox = link.subscribe("/to_localhost", wake=woken.set)
-    woken.wait(10.0)
+    woken.wait(60.0)
     sys.stdout.write(json.dumps(mailbox.take()[0].message.data) + "\n")
     sys.stdout.flush()
     link.close()

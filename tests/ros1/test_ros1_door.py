@@ -345,7 +345,7 @@ def test_services_of_ros1_for_the_graph(live, door):
         reply = Reply(got.append, got.append)
         reply.when_done(come.set)
         live.do(lambda: live.graph.call_async("/remote", None, reply))
-        assert come.wait(10.0)
+        assert come.wait(60.0)
         wait_until(lambda: got)
         return got[0]
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
 from door_bench import Refused
 
@@ -31,7 +29,7 @@ def test_a_service_of_the_client(bench, client):
     client.offer(bench.remote_service)
     bench.ours.wait_for_service(bench.remote_service)
     for _ in range(2):
-        answer = bench.ours.call(bench.remote_service).get(timeout=10.0)
+        answer = bench.ours.call(bench.remote_service).get(timeout=60.0)
         assert answer.message == client.their_answer
 
 
@@ -43,6 +41,6 @@ def test_a_service_whose_client_left_fails_at_once(bench, client, how):
     bench.ours.wait_for_service(bench.remote_service)
     come = bench.ours.call(bench.remote_service)
     getattr(client, how)()
-    began = time.monotonic()
-    assert isinstance(come.get(timeout=10.0), GraphError)
-    assert time.monotonic() - began < 9.0  # not the ten seconds of the wait
+    failed = come.get(timeout=60.0)
+    assert isinstance(failed, GraphError)
+    assert "did not answer" not in str(failed)

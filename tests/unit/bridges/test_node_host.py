@@ -65,7 +65,7 @@ class Parrot(Node):
         return response
 
 
-def spin_until(host, condition, timeout_s=5.0):
+def spin_until(host, condition, timeout_s=60.0):
     end = time.monotonic() + timeout_s
     host.spin(lambda: condition() or time.monotonic() > end)
     assert condition()

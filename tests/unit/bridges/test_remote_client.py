@@ -76,7 +76,7 @@ def test_its_own_thread_cannot_wait_for_an_answer(loop, client):
     client.subscribe("/out", STRING, wake=wake)
     until(lambda: "/out" in topics(loop))
     loop.publish(loop.graph.advertise("/out", STRING), String("come"))
-    assert "give a type: the client's own thread cannot wait" in said.get(timeout=10.0)
+    assert "give a type: the client's own thread cannot wait" in said.get(timeout=60.0)
 
 
 def test_who_closes_it_in_its_own_thread_does_not_wait_for_itself(loop, client, way):
@@ -89,7 +89,7 @@ def test_who_closes_it_in_its_own_thread_does_not_wait_for_itself(loop, client, 
     client.subscribe("/out", STRING, wake=wake)
     until(lambda: "/out" in topics(loop))
     loop.publish(loop.graph.advertise("/out", STRING), String("go"))
-    assert left.wait(10.0)
+    assert left.wait(60.0)
     until(lambda: f"planner-{way}" not in [thread.name for thread in threading.enumerate()])
     with pytest.raises(GraphError, match="planner has left"):
         client.advertise("/in", STRING)
@@ -115,8 +115,8 @@ def test_calls_that_are_open_when_it_leaves_fail(loop, client):
     asked, outcome = threading.Event(), queue.Queue()
     loop.graph.offer_async("/waits", TRIGGER, lambda _request, _reply: asked.set())
     client.call("/waits", Request(), Reply(outcome.put, outcome.put))
-    assert asked.wait(10.0)
+    assert asked.wait(60.0)
     client.close()
-    assert isinstance(outcome.get(timeout=10.0), GraphError)
+    assert isinstance(outcome.get(timeout=60.0), GraphError)
     with pytest.raises(GraphError, match="planner has left"):
         client.call("/waits", Request(), Reply(outcome.put, outcome.put))

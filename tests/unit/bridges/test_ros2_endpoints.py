@@ -47,9 +47,9 @@ def test_what_is_due_and_fails_does_not_end_hearing(two, caplog):
     heard = here.hear("/in", STRING)
     here.participant._ear._now_and_then = fail
     for _ in range(2):
-        failed.get(timeout=10.0)
+        failed.get(timeout=60.0)
     assert "no such luck" in caplog.text
     writer, publish = there.speak("/in", STRING)
     until(lambda: writer.matched)
     publish(String("still there"))
-    assert heard.get(timeout=10.0).data == "still there"
+    assert heard.get(timeout=60.0).data == "still there"

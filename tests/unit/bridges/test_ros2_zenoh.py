@@ -165,7 +165,7 @@ def test_messages_go_both_ways(world, other):
     heard = other.hear("/chatter", STRING)
     until(lambda: {t.name: t for t in world.graph.topics()}["/chatter"].subscribers)
     world.do(lambda: chatter.publish(String("out")))
-    assert heard.get(timeout=5.0).data == "out"
+    assert heard.get(timeout=60.0).data == "out"
     _, publish = other.speak("/in", STRING)
 
     def arrives():
@@ -181,7 +181,7 @@ def test_what_is_latched_awaits_late_subscribers(world, other):
     latched = world.graph.advertise("/map", STRING, latched=True)
     world.do(lambda: latched.publish(String("kept")))
     until(lambda: any(p.topic == "/map" for p in other.participant.publishers()))
-    assert other.hear("/map", STRING, Profile(latched=True)).get(timeout=5.0).data == "kept"
+    assert other.hear("/map", STRING, Profile(latched=True)).get(timeout=60.0).data == "kept"
 
 
 def test_services_go_both_ways(world, other):
@@ -190,13 +190,13 @@ def test_services_go_both_ways(world, other):
     spec = ServiceSpec(other.node, "/theirs", TRIGGER)
     answer = b"\0\1\0\0\1\0\0\0" + struct.pack("<I7s", 7, b"theirs\0")
     server = other.participant.server(spec, lambda _data, reply: reply(answer))
-    assert call(world, "/theirs").get(timeout=10.0).message == "theirs"
+    assert call(world, "/theirs").get(timeout=60.0).message == "theirs"
     server.close()
     silent = other.participant.server(spec, lambda _data, _reply: None)
     asked = call(world, "/theirs")
     time.sleep(0.3)
     silent.close()
-    assert isinstance(asked.get(timeout=5.0), GraphError)
+    assert isinstance(asked.get(timeout=60.0), GraphError)
 
 
 def call(world, service):

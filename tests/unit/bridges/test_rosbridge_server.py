@@ -69,7 +69,7 @@ class Plain:
     def send(self, op, **fields):
         self.socket.send(json.dumps({"op": op, **fields}))
 
-    def read(self, timeout=10):
+    def read(self, timeout=60.0):
         frame = self.socket.recv(timeout)
         return cbor2.loads(frame) if isinstance(frame, bytes) else json.loads(frame)
 
@@ -80,7 +80,7 @@ class Plain:
             pass
 
 
-def until(condition, timeout_s=10.0):
+def until(condition, timeout_s=60.0):
     end = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < end, "it did not happen"
@@ -174,11 +174,13 @@ def test_a_client_that_does_not_read_disturbs_nobody(simulation, server):
         reader.synchronize()
         publisher = simulation.graph.advertise("/image", IMAGE)
         message = image(1_000_000)
-        for _ in range(60):
+        for _ in range(500):  # the sleeper's sockets hold some tens of megabytes
             simulation.do(lambda: publisher.publish(message))
             assert reader.read()["op"] == "publish"
-        infos = {s.name: s.mailboxes for s in simulation.gateway.sessions() if s.mailboxes}
-        dropped = sorted(mailboxes[0].dropped for mailboxes in infos.values())
+            infos = {s.name: s.mailboxes for s in simulation.gateway.sessions() if s.mailboxes}
+            dropped = sorted(mailboxes[0].dropped for mailboxes in infos.values())
+            if dropped[1] > 20:
+                break
         assert dropped[0] == 0
         assert dropped[1] > 20
 
@@ -188,12 +190,12 @@ def test_throttled_streams(simulation, server):
         client.send("subscribe", topic="/out", type=STRING, throttle_rate=200)
         client.synchronize()
         publisher = simulation.graph.advertise("/out", STRING)
+        began = time.monotonic()
         simulation.do(lambda: publisher.publish(m.String("first")))
         assert client.read()["msg"]["data"] == "first"
-        began = time.monotonic()
         simulation.do(lambda: [publisher.publish(m.String(str(k))) for k in range(50)])
         assert client.read()["msg"]["data"] == "49"
-        assert 0.1 < time.monotonic() - began < 5.0
+        assert time.monotonic() - began > 0.19
         with pytest.raises(TimeoutError):
             client.read(0.3)
 
@@ -260,16 +262,16 @@ def test_the_token(doors):
     doors.open(server)
     with connect(f"{url_of(server)}/?token=secret") as socket:
         socket.send('{"op": "bogus"}')
-        assert "unknown operation" in socket.recv(10)
+        assert "unknown operation" in socket.recv(60.0)
     bearer = {"Authorization": "Bearer secret"}
     with connect(url_of(server), additional_headers=bearer) as socket:
         socket.send('{"op": "bogus"}')
-        assert "unknown operation" in socket.recv(10)
+        assert "unknown operation" in socket.recv(60.0)
     with connect(url_of(server)) as socket:
         socket.send('{"op": "bogus"}')
-        assert "not authorized" in socket.recv(10)
+        assert "not authorized" in socket.recv(60.0)
         with pytest.raises(ConnectionClosed):
-            socket.recv(10)
+            socket.recv(60.0)
     with pytest.raises(InvalidStatus, match="401"), connect(f"{url_of(server)}/?token=no"):
         pass
 
@@ -332,7 +334,7 @@ def test_a_program_joins(simulation, client):
     mailbox = client.subscribe("/in", wake=woken.set)
     until(lambda: simulation.graph.topics()[0].subscribers == 2)
     client.publish("/in", scan)
-    assert woken.wait(10)
+    assert woken.wait(60.0)
     (published,) = mailbox.take()
     assert published.time_ns == 5
     assert published.message.ranges.tobytes() == ranges.tobytes()
@@ -350,7 +352,7 @@ def ask(client, service, request=None):
         done.set()
 
     client.call(service, request, Reply(take, take))
-    assert done.wait(10)
+    assert done.wait(60.0)
     return answers[0]
 
 
@@ -435,7 +437,7 @@ def test_roslibpy(simulation, server):
     seen, got = [], []
     simulation.graph.subscribe("/in", seen.append, STRING)
     ros = roslibpy.Ros("127.0.0.1", server.port)
-    ros.run(timeout=10)
+    ros.run(timeout=60.0)
     try:
         talker = roslibpy.Topic(ros, "/in", "std_msgs/String")
         talker.publish(roslibpy.Message({"data": "from roslibpy"}))
@@ -448,7 +450,7 @@ def test_roslibpy(simulation, server):
         assert got[0]["data"] == "to roslibpy"
         service = roslibpy.Service(ros, "/arm", "std_srvs/SetBool")
         request = roslibpy.ServiceRequest({"data": True})
-        assert service.call(request, timeout=10)["message"] == "armed"
+        assert service.call(request, timeout=60.0)["message"] == "armed"
         mine = roslibpy.Service(ros, "/mine", "std_srvs/Trigger")
 
         def answer(_request, reply):
@@ -495,7 +497,7 @@ def test_roslibpy_as_a_ros1_client(simulation, doors):
     doors.open(server)
     simulation.publish("/stamp", m.header(3_000_000_004, "map"), latched=True)
     ros = roslibpy.Ros("127.0.0.1", server.port)
-    ros.run(timeout=10)
+    ros.run(timeout=60.0)
     try:
         assert ros.get_time()["secs"] == 5
         assert ros.get_topic_type("/stamp") == "std_msgs/Header"
@@ -571,7 +573,7 @@ def test_the_tf_client_of_roslibpy(simulation, server):
     simulation.publish("/tf_static", m.TFMessage(fixed), latched=True)
     moving = simulation.graph.advertise("/tf", "tf2_msgs/msg/TFMessage")
     ros = roslibpy.Ros("127.0.0.1", server.port)
-    ros.run(timeout=10)
+    ros.run(timeout=60.0)
     seen, done = [], threading.Event()
 
     def fly():

@@ -77,7 +77,7 @@ class Aboard:
 
 
 def until(true: Callable[[], bool], *spinning: Aboard) -> None:
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + 60.0
     while not true():
         assert time.monotonic() < end
         for each in spinning:

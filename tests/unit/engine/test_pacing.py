@@ -1,9 +1,9 @@
 """Pacing alone: what it allows, how long it waits, what other threads may change."""
 
 import threading
-from types import SimpleNamespace
 
 import pytest
+from fake_wall_clock import FakeWallClock
 
 from volery.core.errors import CommandError
 from volery.engine import pacing
@@ -12,19 +12,10 @@ from volery.engine.pacing import Pacer
 MS = 1_000_000
 
 
-class Clock:
-    """Wall time that moves only by waiting."""
-
-    now_s = 100.0
-
-    def wait(self, timeout_s):
-        self.now_s += timeout_s
-
-
 @pytest.fixture
 def clock(monkeypatch):
-    made = Clock()
-    monkeypatch.setattr(pacing, "time", SimpleNamespace(perf_counter=lambda: made.now_s))
+    made = FakeWallClock()
+    monkeypatch.setattr(pacing, "time", made.time)
     return made
 
 

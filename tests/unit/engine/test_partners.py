@@ -20,7 +20,7 @@ def pilot(partner, uav, times, pause_s=0.0):
     """Fly by a law of time alone, from another thread."""
 
     def work():
-        while (time_ns := partner.wait(20.0)) is not None:
+        while (time_ns := partner.wait(60.0)) is not None:
             time.sleep(pause_s)
             times.append(time_ns)
             speed = 1.0 if (time_ns // (200 * MS)) % 2 else -1.0
@@ -46,7 +46,7 @@ def test_engine_waits_and_obeys_in_time(simulate, flat_data):
             simulation.run(seconds)
         digests.add(simulation.digest())
         simulation.close()
-        thread.join(10.0)
+        thread.join(60.0)
         assert not thread.is_alive()
         assert times == [50 * MS * k for k in range(1, 21)]
     assert len(digests) == 1
@@ -59,8 +59,8 @@ def test_partners_work_side_by_side_and_speak_in_order(simulate, flat_data):
     partners = [simulation.add_partner(n, period_s=0.01, timeout_s=20.0) for n in ("a", "b")]
 
     def work(partner):
-        while partner.wait(20.0) is not None:
-            both.wait(10.0)  # breaks unless both are waited for at once
+        while partner.wait(60.0) is not None:
+            both.wait(60.0)  # breaks unless both are waited for at once
             partner.reply(lambda: said.append(partner.name))
 
     for partner in partners:
@@ -89,12 +89,12 @@ def test_leaving_lets_the_run_go_on(simulate, flat_data):
     partner = simulation.add_partner("guest", period_s=0.01, timeout_s=20.0)
 
     def work():
-        partner.wait(20.0)
+        partner.wait(60.0)
         partner.leave()
 
     thread = in_thread(work)
     simulation.run(0.1)
-    thread.join(10.0)
+    thread.join(60.0)
     assert simulation.time_ns == 100 * MS
     simulation.snapshot()
 

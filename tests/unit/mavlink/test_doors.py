@@ -61,17 +61,17 @@ def client(running):
 
 def ack_of(client, command, *params):
     client.mav.command_long_send(1, 1, command, 0, *params, *(0,) * (7 - len(params)))
-    ack = client.recv_match(type="COMMAND_ACK", blocking=True, timeout=20)
+    ack = client.recv_match(type="COMMAND_ACK", blocking=True, timeout=60.0)
     assert ack.command == command
     return ack.result
 
 
 def test_a_client_is_found_and_answered(client):
-    assert client.wait_heartbeat(timeout=20).autopilot == 12
+    assert client.wait_heartbeat(timeout=60.0).autopilot == 12
     assert client.target_system == 1
     assert ack_of(client, 512, 242) == 0
     client.mav.param_request_read_send(1, 1, b"MIS_TAKEOFF_ALT", -1)
-    value = client.recv_match(type="PARAM_VALUE", blocking=True, timeout=20)
+    value = client.recv_match(type="PARAM_VALUE", blocking=True, timeout=60.0)
     assert value.param_value == 2.5
 
 
@@ -79,9 +79,9 @@ def test_every_vehicle_has_a_port_and_the_ground_station_hears_all(running):
     second = mavutil.mavlink_connection(f"udpin:127.0.0.1:{BASE + 1}")
     ground = mavutil.mavlink_connection(f"udpin:127.0.0.1:{BASE + 10}")
     try:
-        assert second.wait_heartbeat(timeout=20).get_srcSystem() == 2
+        assert second.wait_heartbeat(timeout=60.0).get_srcSystem() == 2
         heard = set()
-        end = time.monotonic() + 20
+        end = time.monotonic() + 60.0
         while heard != {1, 2} and time.monotonic() < end:
             message = ground.recv_match(type="HEARTBEAT", blocking=True, timeout=1)
             heard |= {message.get_srcSystem()} if message else set()
@@ -92,12 +92,12 @@ def test_every_vehicle_has_a_port_and_the_ground_station_hears_all(running):
 
 
 def test_heartbeats_go_on_while_the_simulation_stands_still(running, client):
-    assert client.wait_heartbeat(timeout=20)
+    assert client.wait_heartbeat(timeout=60.0)
     running.simulation.pause()
     time.sleep(0.3)
     while client.recv_msg():
         pass
-    beats = [client.recv_match(type="HEARTBEAT", blocking=True, timeout=20) for _ in range(2)]
+    beats = [client.recv_match(type="HEARTBEAT", blocking=True, timeout=60.0) for _ in range(2)]
     running.simulation.resume()
     assert all(beats)
 
@@ -126,13 +126,13 @@ def test_tcp_carries_all_vehicles_on_each_connection(running):
     )
     try:
         systems = set()
-        end = time.monotonic() + 20
+        end = time.monotonic() + 60.0
         while systems != {1, 2} and time.monotonic() < end:
             message = first.recv_match(type="HEARTBEAT", blocking=True, timeout=1)
             systems |= {message.get_srcSystem()} if message else set()
         assert systems == {1, 2}
         second.mav.command_long_send(2, 1, 512, 0, 242, 0, 0, 0, 0, 0, 0)
-        ack = second.recv_match(type="COMMAND_ACK", blocking=True, timeout=20)
+        ack = second.recv_match(type="COMMAND_ACK", blocking=True, timeout=60.0)
         assert (ack.get_srcSystem(), ack.target_system, ack.result) == (2, 251, 0)
     finally:
         first.close()
@@ -146,7 +146,7 @@ def test_a_serial_line_carries_them_too(running):
     station = mavutil.mavlink.MAVLink(None, 249, 190)
     station.robust_parsing = True
     heard, asked = set(), False
-    end = time.monotonic() + 20
+    end = time.monotonic() + 60.0
     while "COMMAND_ACK" not in heard and time.monotonic() < end:
         for message in station.parse_buffer(os.read(ours, 4096)) or ():
             heard.add(message.get_type())
@@ -160,7 +160,7 @@ def test_a_serial_line_carries_them_too(running):
 
 
 def test_noise_on_the_socket_disturbs_nobody(running, client):
-    assert client.wait_heartbeat(timeout=20)
+    assert client.wait_heartbeat(timeout=60.0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
         for data in (b"", b"\xfd", bytes(300), b"\xfd" * 5000, os.urandom(1000)):
             noise.sendto(data, ("127.0.0.1", BASE + 40))

@@ -84,7 +84,7 @@ def test_one_that_lost_its_simulation_begins_anew(tmp_path, simulator):
 def test_one_that_ends_by_itself_is_told(tmp_path):
     make_px4(tmp_path, FAILS)
     with Px4Instances(find_px4(tmp_path), 1, first=NUMBER) as instances:
-        assert instances.wait(20.0)
+        assert instances.wait(60.0)
     assert instances.failure == (
         "PX4 187 ended with code 3; it said:\n  PX4 server already running for instance 187"
     )

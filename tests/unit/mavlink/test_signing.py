@@ -159,7 +159,7 @@ def ack(port, key):
     try:
         if key is not None:
             link.setup_signing(key, allow_unsigned_callback=lambda *_: False)
-        assert link.wait_heartbeat(timeout=20)
+        assert link.wait_heartbeat(timeout=60.0)
         link.mav.command_long_send(1, 1, 512, 0, 242, 0, 0, 0, 0, 0, 0)
         return link.recv_match(
             type="COMMAND_ACK", blocking=True, timeout=20.0 if key is not None else 1.0

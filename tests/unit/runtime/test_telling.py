@@ -3,7 +3,6 @@
 import math
 import time
 
-import numpy as np
 import pytest
 from asking import ask
 from test_pause import InThread, wait_for
@@ -262,22 +261,26 @@ def test_slow_motion_is_shown_in_between(simulate, three):
 # ----------------------------------------------------------------------------------------- status
 
 
+def still(status):
+    """Whether nothing has been computed in the last seconds."""
+    return status.real_time_factor == 0.0 and not status.load.any()
+
+
 def test_the_status_comes_in_wall_time_also_while_paused(paused):
+    begun_s, told = time.time(), []
     watcher = Watcher(paused, STATUS)
-    time.sleep(1.5)
-    told = watcher.take(STATUS)
-    assert 1 <= len(told) <= 9  # a busy machine shows less
+    wait_for(lambda: told.extend(watcher.take(STATUS)) or (len(told) >= 3 and still(told[-1])))
+    ended_s = time.time()
+    assert len(told) <= 5.0 * (ended_s - begun_s) + 2
     last = told[-1]
     assert (last.scenario, last.state, last.speed, last.duration) == ("flat", 2, 1.0, 60.0)
     assert (last.stamp.sec, last.stamp.nanosec) == (3, 0)
-    assert abs(last.wall.sec + 1e-9 * last.wall.nanosec - time.time()) < 1.0
-    assert last.real_time_factor == 0.0
-    assert not last.load.any()
+    assert begun_s <= last.wall.sec + 1e-9 * last.wall.nanosec <= ended_s
     assert last.clients == 1
     assert 50.0 < last.memory < 10_000.0
     assert not last.replaying
-    gaps = np.diff([m.wall.sec + 1e-9 * m.wall.nanosec for m in told])
-    assert gaps.min() > 0.15
+    stamps = [m.wall.sec + 1e-9 * m.wall.nanosec for m in told]
+    assert stamps == sorted(stamps)
     paused.resume()
     time.sleep(1.4)
     last = watcher.last(STATUS)

@@ -97,14 +97,14 @@ class Client:
     def send(self, op, **fields):
         self.socket.send(json.dumps({"op": op, **fields}))
 
-    def read(self, timeout=20):
+    def read(self, timeout=60.0):
         return json.loads(self.socket.recv(timeout))
 
     def to_the_end(self):
         """The code with which the connection is closed."""
         try:
             while True:
-                self.socket.recv(20)
+                self.socket.recv(60.0)
         except ConnectionClosed as closed:
             return None if closed.rcvd is None else closed.rcvd.code
 
@@ -123,7 +123,7 @@ class Client:
         return found["values"], found["result"]
 
 
-def eventually(question, seconds=20.0):
+def eventually(question, seconds=60.0):
     """Wait until something is true."""
     end = time.monotonic() + seconds
     while not (found := question()):

@@ -155,7 +155,7 @@ def test_no_path_leaves_its_folder(server, path):
 
 
 def test_what_is_no_http_is_no_trouble(server):
-    with socket.create_connection(("127.0.0.1", server.port), timeout=20) as plug:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=60.0) as plug:
         plug.sendall(b"\x16\x03\x01 hello\r\n\r\n")
         plug.recv(100)
     assert ask(server, "/api/status").status == 200

@@ -192,7 +192,7 @@ def test_who_stops_reading_loses_messages_of_its_own():
             publisher = world.graph.advertise("/image", "sensor_msgs/msg/Image")
             for number in range(120):
                 world.do(lambda: publisher.publish(image))
-                assert len(reader.socket.recv(20)) > 1_000_000
+                assert len(reader.socket.recv(60.0)) > 1_000_000
                 if number == 60:  # what lies in buffers, also of the client, lies there
                     before = resident_mb()
             assert resident_mb() - before < 15.0
@@ -228,7 +228,7 @@ def test_a_world_is_left_though_a_client_reads_no_more():
                 for _ in range(9):
                     world.do(lambda: publisher.publish(image))
                 began = time.monotonic()
-            assert time.monotonic() - began < 15.0
+            assert time.monotonic() - began < 60.0
             assert not boxes(world)
     finally:
         world.close()

@@ -76,4 +76,4 @@ def test_the_page_and_all_it_asks_for_are_found(server):
     url = f"ws://127.0.0.1:{server.port}{PREFIX}/rosbridge"
     with connect(url, additional_headers={"Cookie": cookie}) as client:
         client.send('{"op": "subscribe", "topic": "/uav1/odom"}')
-        assert '"op":"publish"' in client.recv(20)
+        assert '"op":"publish"' in client.recv(60.0)

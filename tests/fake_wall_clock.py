@@ -1,0 +1,16 @@
+"""Wall time that only waiting moves: what paces a run is tested without a machine's load in it."""
+
+from types import SimpleNamespace
+
+
+class FakeWallClock:
+    """Seconds that pass while something waits, and no others."""
+
+    def __init__(self):
+        self.now_s = 100.0
+        self.time = SimpleNamespace(perf_counter=lambda: self.now_s)
+        """In the place of the module `time`."""
+
+    def wait(self, timeout_s):
+        """In the place of a condition's or an event's `wait`: nothing ends it early."""
+        self.now_s += timeout_s
