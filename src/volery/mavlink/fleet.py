@@ -22,7 +22,7 @@ PACKETS = "volery_interfaces/msg/MavlinkPackets"
 _IN, _OUT = "/mavlink/in", "/mavlink/out"
 _DEPTH = 1000
 _MOST_WAITING = 2000
-"""Frames that the simulation has not taken yet, above which clients wait."""
+"""Messages with frames that the simulation has not taken yet, above which clients wait."""
 _PAUSE_S = 0.02
 _LOOK_S = 0.2
 """Between two looks who has come and gone."""
