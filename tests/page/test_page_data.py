@@ -104,7 +104,7 @@ def test_a_service_is_called_by_a_form_of_its_own(page, served):
     form = panel.get_by_role("form", name="Call /uav1/take_off_to")
     form.get_by_label("altitude").fill("3")
     form.get_by_role("button", name="Call", exact=True).click()
-    answer = form.get_by_role("region", name="Answer")
+    answer = form.get_by_role("region", name="Response")
     answer.locator("[data-path=message]").wait_for()
     keep_picture(page, "services")
     assert answer.locator("[data-path=success]").inner_text() in ("true", "false")
@@ -154,7 +154,7 @@ def test_a_flight_is_recorded_listed_fetched_and_brought_again(page, recordings,
     assert content == (recordings / name).read_bytes()
     keep_picture(page, "recordings")
     with page.expect_file_chooser() as chosen:
-        panel.get_by_role("button", name="Bring a log").click()
+        panel.get_by_role("button", name="Upload a log").click()
     chosen.value.set_files({"name": f"brought_{name}", "mimeType": "", "buffer": content})
     panel.get_by_role("button", name=f"Play brought_{name}").wait_for()
     assert (recordings / f"brought_{name}").read_bytes() == content

@@ -62,7 +62,7 @@ def test_flight_by_gamepad(browsing, served, homes):
     wait_for_picture(page)
     page.get_by_role("option", name="uav1").click()
     page.keyboard.press("c")
-    hands = page.get_by_role("group", name="Flight by hand")
+    hands = page.get_by_role("group", name="Manual control")
     hands.get_by_text("gamepad").wait_for()
     page.evaluate("window.pad.axes = [0, 0, 0, -1]")  # the right stick ahead
     vehicle(served, "uav1", lambda uav: uav["velocity"]["x"] > 1.5 and uav["mode"] == "VELOCITY")

@@ -58,7 +58,7 @@ def fly(page, served):
     set_slider(page, "Thrust left", "ArrowLeft", 2)
     fault.get_by_role("button", name="Inject").click()
     page.get_by_text("Rotor fault injected").wait_for()
-    page.get_by_role("button", name="Fly by hand").click()
+    page.get_by_role("button", name="Manual control").click()
     page.keyboard.down("KeyA")
     vehicle(served, "uav1", lambda uav: uav["mode"] == "VELOCITY" and uav["velocity"]["y"] > 0.7)
     vehicle(served, "uav1", lambda uav: uav["position"]["y"] > 0.0)

@@ -66,12 +66,12 @@ def test_a_viewer_sees_all_and_every_control_is_off(browsing, served):
     wait_for_picture(page)
     assert json.loads(served.ask("status", f"?token={VIEWERS}"))["role"] == "viewer"
     panel = inspect(page, "uav1")
-    orders = panel.get_by_role("group", name="Orders")
+    orders = panel.get_by_role("group", name="Commands")
     for name in ("Take off", "Land", "Hold", "Return", "Arm", "Kill"):
         assert orders.get_by_role("button", name=name, exact=True).is_disabled()
     for name in ("Go", "Go to a place that is clicked", "Take control", "Remove uav1"):
         assert panel.get_by_role("button", name=name, exact=True).is_disabled()
-    for name in ("Pause", "Reset", "Fly by hand"):
+    for name in ("Pause", "Reset", "Manual control"):
         assert page.get_by_role("button", name=name, exact=True).is_disabled()
     open_panel(page, "Environment").get_by_text(WHY_NOT).wait_for()
     assert page.get_by_role("button", name="Blow a gust").is_disabled()
@@ -91,7 +91,7 @@ def test_a_viewers_keys_command_nothing(browsing, served):
     page.keyboard.press("l")
     page.get_by_role("alert").filter(has_text=WHY_NOT).first.wait_for()
     page.keyboard.press("c")
-    assert page.get_by_role("group", name="Flight by hand").count() == 0
+    assert page.get_by_role("group", name="Manual control").count() == 0
     assert vehicle(served, "uav1")["mode"] != "LAND"
 
 
@@ -129,7 +129,7 @@ def test_two_pilots_and_a_hand_over(browsing, served):
     ben.get_by_role("alert").filter(has_text="held by Anna").first.wait_for()
     assert vehicle(served, "uav1")["mode"] != "LAND"
     ben.keyboard.press("c")
-    ben.get_by_role("group", name="Flight by hand").get_by_text("Anna has the control").wait_for()
+    ben.get_by_role("group", name="Manual control").get_by_text("Anna has the control").wait_for()
     ben.keyboard.down("KeyW")
     ben.wait_for_timeout(1000)
     ben.keyboard.up("KeyW")

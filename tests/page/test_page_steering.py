@@ -121,8 +121,8 @@ def test_a_kill_is_asked_twice(page, served):
 def test_flight_by_keyboard(page, served):
     page.get_by_role("option", name="uav2").click()
     flying = vehicle(served, "uav2", lambda uav: uav["mode"] == "HOLD")
-    page.get_by_role("button", name="Fly by hand").click()
-    page.get_by_role("group", name="Flight by hand").wait_for()
+    page.get_by_role("button", name="Manual control").click()
+    page.get_by_role("group", name="Manual control").wait_for()
     page.keyboard.down("KeyW")
     ahead = vehicle(
         served, "uav2", lambda uav: uav["velocity"]["x"] > 1.0 and uav["mode"] == "VELOCITY"
@@ -130,7 +130,7 @@ def test_flight_by_keyboard(page, served):
     page.keyboard.up("KeyW")
     vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["x"]) < 0.2)
     page.keyboard.press("Escape")
-    page.get_by_role("group", name="Flight by hand").wait_for(state="hidden")
+    page.get_by_role("group", name="Manual control").wait_for(state="hidden")
     assert ahead["position"]["x"] > flying["position"]["x"]
 
 
@@ -147,7 +147,7 @@ def test_flight_goes_on_while_frames_are_slow_and_ends_when_the_page_hangs(page,
     page.get_by_role("option", name="uav2").click()
     vehicle(served, "uav2", lambda uav: uav["airborne"])
     page.keyboard.press("c")
-    page.get_by_role("group", name="Flight by hand").wait_for()
+    page.get_by_role("group", name="Manual control").wait_for()
     page.evaluate(SLOW_FRAMES)
     page.keyboard.down("KeyS")
     vehicle(served, "uav2", lambda uav: uav["velocity"]["x"] < -2.0)
@@ -170,13 +170,13 @@ def test_a_uav_is_chosen_and_flown_without_a_mouse(page, served):
     page.keyboard.press("ArrowDown")
     page.get_by_role("option", name="uav2", selected=True).wait_for()
     page.keyboard.press("c")
-    page.get_by_role("group", name="Flight by hand").wait_for()
+    page.get_by_role("group", name="Manual control").wait_for()
     page.keyboard.down("KeyR")
     vehicle(served, "uav2", lambda uav: uav["position"]["z"] > before[2] + 1.0)
     page.keyboard.up("KeyR")
     vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["z"]) < 0.2)
     page.keyboard.press("Escape")
-    page.get_by_role("group", name="Flight by hand").wait_for(state="hidden")
+    page.get_by_role("group", name="Manual control").wait_for(state="hidden")
 
 
 def test_uavs_come_and_go(page, served):

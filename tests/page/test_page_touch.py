@@ -37,7 +37,7 @@ class Thumbs:
 def page(browsing, served):
     vehicle(served, "uav1", lambda uav: uav["mode"] == "HOLD")  # after its own take-off
     page = browsing.open(served.url + "#uav=uav1", viewport=PHONE, **TOUCH)
-    page.get_by_role("button", name="Fly by hand").tap()
+    page.get_by_role("button", name="Manual control").tap()
     return page
 
 
@@ -48,9 +48,9 @@ def middle(element):
 
 
 def test_two_thumbs_fly_a_uav(page, served):
-    hands = page.get_by_role("group", name="Flight by hand")
+    hands = page.get_by_role("group", name="Manual control")
     left = page.get_by_role("application", name="Climb and turn")
-    right = page.get_by_role("application", name="Ahead and aside")
+    right = page.get_by_role("application", name="Forward / lateral")
     left.wait_for()
     panel = hands.bounding_box()
     (lx, ly), (rx, ry) = middle(left), middle(right)

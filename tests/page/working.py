@@ -15,6 +15,19 @@ def open_panel(page, name):
     return panel
 
 
+def panel_button(page, name):
+    """The button of the rail that opens a panel."""
+    return page.get_by_role("navigation").get_by_role("button", name=name, exact=True)
+
+
+def choose_field(page, name, option):
+    """Search a long list and choose from it."""
+    field = page.get_by_role("combobox", name=name, exact=True)
+    field.click()
+    field.fill(option)
+    page.get_by_role("option", name=option, exact=True).click()
+
+
 def inspect(page, uav):
     """The inspector with this UAV selected."""
     page.get_by_role("option", name=uav).click()

@@ -28,7 +28,7 @@ class _Set:
 # Places are those of the shipped scenarios on an F450: a level scanner on top, the others below.
 _SETS: dict[SensorSet, _Set] = {
     "lidar": _Set(
-        "a level and a nodding UTM-30LX scanner",
+        "a horizontal and a nodding UTM-30LX LIDAR",
         (
             {"kind": "lidar", "name": "horizontal", "position_m": [0.0, 0.0, 0.18]},
             {

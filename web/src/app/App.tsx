@@ -3,7 +3,7 @@ import { Scene } from "../scene/Scene.tsx";
 import { PlayerBar } from "./PlayerBar.tsx";
 import { useLayout } from "../state/layout.ts";
 import { useWindows } from "../state/windows.ts";
-import { DockArea } from "./DockArea.tsx";
+import { BottomArea, DockArea } from "./DockArea.tsx";
 import { DropZone } from "./DropZone.tsx";
 import { HandControls } from "./hands/HandControls.tsx";
 import { Picking } from "./Picking.tsx";
@@ -36,7 +36,7 @@ export function App() {
         <Situation />
       </main>
       <DockArea dock="right" />
-      <DockArea dock="bottom" />
+      <BottomArea />
       <Windows />
       <DropZone />
     </div>

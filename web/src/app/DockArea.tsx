@@ -1,35 +1,85 @@
-import { ActionIcon, Group, Loader, Title } from "@mantine/core";
-import { X } from "lucide-react";
-import { Suspense } from "react";
-import { PANELS } from "../panels/registry.ts";
-import { closePanel, useLayout, type Dock } from "../state/layout.ts";
+import { ActionIcon, Group, Loader, Title, Tooltip } from "@mantine/core";
+import { Columns2, X } from "lucide-react";
+import { Suspense, useEffect, useState, type CSSProperties, type ReactNode } from "react";
+import { PANELS, type PanelEntry } from "../panels/registry.ts";
+import {
+  closePanel,
+  isNarrow,
+  putPanel,
+  useLayout,
+  type Dock,
+  type Slot,
+} from "../state/layout.ts";
 import { DockEdge } from "./DockEdge.tsx";
+import { PanelChoice } from "./PanelChoice.tsx";
 import { SheetHandle } from "./SheetHandle.tsx";
+import { SplitEdge } from "./SplitEdge.tsx";
 
 /** One side of the page, with the panel that is open there. */
-export function DockArea({ dock }: { dock: Dock }) {
-  const open = useLayout((layout) => layout[dock]);
+export function DockArea({ dock }: { dock: Exclude<Dock, "bottom"> }) {
+  const panel = usePanel(dock);
+  if (panel === undefined) return null;
+  return (
+    <PanelFrame slot={dock} dock={dock} panel={panel}>
+      <PanelTitle panel={panel} />
+    </PanelFrame>
+  );
+}
+
+/** The foot of the page: one panel, or two side by side; a phone shows the left one only. */
+export function BottomArea() {
+  const [left, right] = [usePanel("bottom"), usePanel("second")];
+  const split = useLayout((layout) => layout.split);
+  const narrow = useNarrow();
+  if (left === undefined) return null;
+  if (right === undefined || narrow) {
+    return (
+      <PanelFrame slot="bottom" dock="bottom" panel={left}>
+        <PanelChoice slot="bottom" panel={left} />
+        {!narrow && <SplitButton panel={left} />}
+      </PanelFrame>
+    );
+  }
+  return (
+    <div className="halves" style={{ "--split": split } as CSSProperties}>
+      <PanelFrame slot="bottom" dock="bottom" panel={left}>
+        <PanelChoice slot="bottom" panel={left} />
+      </PanelFrame>
+      <PanelFrame slot="second" dock="bottom" panel={right}>
+        <SplitEdge left={left.title} right={right.title} />
+        <PanelChoice slot="second" panel={right} />
+      </PanelFrame>
+    </div>
+  );
+}
+
+interface PanelFrameProps {
+  slot: Slot;
+  dock: Dock;
+  panel: PanelEntry;
+  /** What its head shows beside the button that closes it. */
+  children: ReactNode;
+}
+
+function PanelFrame({ slot, dock, panel, children }: PanelFrameProps) {
   const size = useLayout((layout) => layout.sizes[dock]);
   const sheet = useLayout((layout) => layout.sheet);
-  const panel = PANELS.find(({ id }) => id === open);
-  if (panel === undefined) return null;
   return (
     <aside
       className={`dock dock-${dock}`}
       aria-label={panel.title}
-      style={{ "--dock-size": `${size}px`, "--sheet-size": `${sheet}px` } as React.CSSProperties}
+      style={{ "--dock-size": `${size}px`, "--sheet-size": `${sheet}px` } as CSSProperties}
     >
       <DockEdge dock={dock} title={panel.title} />
-      <SheetHandle dock={dock} title={panel.title} />
-      <Group justify="space-between" px="sm" py={4} wrap="nowrap">
-        <Title order={6} component="h2">
-          {panel.title}
-        </Title>
+      <SheetHandle slot={slot} title={panel.title} />
+      <Group px="sm" py={4} gap={4} wrap="nowrap">
+        {children}
         <ActionIcon
           variant="subtle"
           color="gray"
+          ml="auto"
           aria-label={`Close ${panel.title}`}
-          onClick={() => closePanel(dock)}
+          onClick={() => closePanel(slot)}
         >
           <X size={16} />
         </ActionIcon>
@@ -41,4 +91,46 @@ export function DockArea({ dock }: { dock: Dock }) {
       </div>
     </aside>
   );
+}
+
+function PanelTitle({ panel }: { panel: PanelEntry }) {
+  return (
+    <Title order={6} component="h2">
+      {panel.title}
+    </Title>
+  );
+}
+
+/** Opens the right half with a panel that goes well with the left one. */
+function SplitButton({ panel }: { panel: PanelEntry }) {
+  return (
+    <Tooltip label="Show a second panel beside it">
+      <ActionIcon
+        variant="subtle"
+        color="gray"
+        ml="auto"
+        mr={-4}
+        aria-label={`Show a second panel beside ${panel.title}`}
+        onClick={() => putPanel("second", panel.id === "plots" ? "topics" : "plots")}
+      >
+        <Columns2 size={16} />
+      </ActionIcon>
+    </Tooltip>
+  );
+}
+
+function usePanel(slot: Slot): PanelEntry | undefined {
+  const open = useLayout((layout) => layout[slot]);
+  return PANELS.find(({ id }) => id === open);
+}
+
+/** Whether the window is as narrow as a phone's. */
+function useNarrow(): boolean {
+  const [narrow, setNarrow] = useState(isNarrow);
+  useEffect(() => {
+    const look = () => setNarrow(isNarrow());
+    window.addEventListener("resize", look);
+    return () => window.removeEventListener("resize", look);
+  }, []);
+  return narrow;
 }

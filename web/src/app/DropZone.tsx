@@ -1,10 +1,11 @@
 import { Text } from "@mantine/core";
 import { Upload } from "lucide-react";
 import { useEffect, useState } from "react";
+import { UPLOAD_HINT } from "../lib/fileKinds.ts";
 import { useConnection } from "../state/connection.ts";
 import { offerFile } from "../state/windows.ts";
 
-/** A file that is dropped anywhere on the page is offered as a map. */
+/** A file that is dropped anywhere on the page is offered for an upload. */
 export function DropZone() {
   const volery = useConnection((connection) => connection.volery);
   const [over, setOver] = useState(false);
@@ -40,11 +41,9 @@ export function DropZone() {
     <div className="drop-zone">
       <Upload size={48} />
       <Text size="lg" fw={600}>
-        Drop a map or a scenario to fly it
+        Drop a map or a scenario to fly it, or a log to play it
       </Text>
-      <Text c="dimmed">
-        Grid (CSV, PNG, MovingAI), GeoJSON, glTF, OBJ, STL, forest inventory, scenario (TOML)
-      </Text>
+      <Text c="dimmed">{UPLOAD_HINT}</Text>
     </div>
   );
 }

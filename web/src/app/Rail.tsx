@@ -2,7 +2,7 @@ import { ActionIcon, Stack, Tooltip } from "@mantine/core";
 import { Gamepad2, Move3d } from "lucide-react";
 import { PANELS } from "../panels/registry.ts";
 import { toggleControls, useFlying } from "../state/flying.ts";
-import { togglePanel, useLayout } from "../state/layout.ts";
+import { slotOf, togglePanel, useLayout } from "../state/layout.ts";
 import { useWhyNot } from "../state/rights.ts";
 import { setMoving, useTool } from "../state/tool.ts";
 import { useVehicles } from "../state/vehicles.ts";
@@ -16,9 +16,9 @@ export function Rail() {
         <Tooltip key={id} label={title} position="right">
           <ActionIcon
             size="lg"
-            variant={layout[dock] === id ? "filled" : "subtle"}
+            variant={slotOf(dock, id, layout) !== null ? "filled" : "subtle"}
             aria-label={title}
-            aria-pressed={layout[dock] === id}
+            aria-pressed={slotOf(dock, id, layout) !== null}
             onClick={() => togglePanel(dock, id)}
           >
             <Icon size={19} />
@@ -38,12 +38,12 @@ function Tools() {
   const whyNot = useWhyNot() ?? (uav === "" ? "No UAV is selected" : null);
   return (
     <>
-      <Tooltip label={whyNot ?? `Fly ${uav} by hand (C)`} position="right">
+      <Tooltip label={whyNot ?? `Manual control of ${uav} (C)`} position="right">
         <ActionIcon
           size="lg"
           variant={flying ? "filled" : "subtle"}
           color={flying ? "orange" : "cyan"}
-          aria-label="Fly by hand"
+          aria-label="Manual control"
           aria-pressed={flying}
           disabled={whyNot !== null}
           onClick={toggleControls}

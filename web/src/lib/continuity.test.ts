@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { continues, type Instant } from "./continuity.ts";
+import { continues, isSameRun, type Instant } from "./continuity.ts";
 
 const flight: Instant = { scenario: "a", timeS: 10, playback: false };
 const log: Instant = { ...flight, playback: true };
@@ -20,4 +20,12 @@ test("a log whose position is moved begins anew", () => {
   expect(continues(log, { ...log, timeS: 12 })).toBe(true);
   expect(continues(log, { ...log, timeS: 60 })).toBe(false);
   expect(continues(log, { ...log, timeS: 9 })).toBe(false);
+});
+
+test("a reset and a moved position are the same run, another world and another log are not", () => {
+  expect(isSameRun(flight, { ...flight, timeS: 0 })).toBe(true);
+  expect(isSameRun({ ...log, log: [0, 20] }, { ...log, timeS: 3, log: [0, 20] })).toBe(true);
+  expect(isSameRun({ ...log, log: [0, 20] }, { ...log, log: [0, 35] })).toBe(false);
+  expect(isSameRun(flight, log)).toBe(false);
+  expect(isSameRun(flight, { ...flight, scenario: "b" })).toBe(false);
 });

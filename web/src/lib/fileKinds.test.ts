@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { kindOf } from "./fileKinds.ts";
+import { ENDINGS, kindOf, UPLOAD_HINT } from "./fileKinds.ts";
 
 it("files are told apart by their endings, tables by their first line", () => {
   expect(kindOf("town.GeoJSON", "")).toBe("city");
@@ -8,5 +8,13 @@ it("files are told apart by their endings, tables by their first line", () => {
   expect(kindOf("plot.csv", "\n0,1,0\n1,0,0")).toBe("grid_map");
   expect(kindOf("plot.csv", "x_m,y_m,dbh_cm,species\n1,2,30,oak")).toBe("forest");
   expect(kindOf("flight.toml", "name = 'flight'")).toBe("scenario");
+  expect(kindOf("flight.MCAP", "")).toBe("log");
+  expect(kindOf("flight.bag", "")).toBe("log");
   expect(kindOf("notes.docx", "")).toBeNull();
+});
+
+it("whatever can be uploaded may be chosen, and is named", () => {
+  for (const ending of [".csv", ".geojson", ".glb", ".toml", ".mcap", ".bag"])
+    expect(ENDINGS.split(",")).toContain(ending);
+  for (const word of ["map", "scenario", "log"]) expect(UPLOAD_HINT).toContain(word);
 });

@@ -1,6 +1,9 @@
 import type { UploadKind } from "../link/commands/scenarios.ts";
 
-const BY_ENDING: Readonly<Record<string, UploadKind>> = {
+/** What can be uploaded: what scenarios are made of, and logs. */
+export type FileKind = UploadKind | "log";
+
+const BY_ENDING: Readonly<Record<string, FileKind>> = {
   png: "grid_map",
   map: "grid_map",
   txt: "grid_map",
@@ -11,12 +14,18 @@ const BY_ENDING: Readonly<Record<string, UploadKind>> = {
   obj: "mesh",
   stl: "mesh",
   toml: "scenario",
+  mcap: "log",
+  bag: "log",
 };
 
 export const ENDINGS = [...Object.keys(BY_ENDING), "csv"].map((ending) => `.${ending}`).join(",");
 
+/** What to choose, for a first visit. */
+export const UPLOAD_HINT =
+  "A map (grid, GeoJSON, glTF, OBJ, STL, inventory of trees), a scenario (TOML) or a log (MCAP, bag)";
+
 /** What a file most likely is; a table with words in its first line lists trees. Null: unknown. */
-export function kindOf(name: string, beginning: string): UploadKind | null {
+export function kindOf(name: string, beginning: string): FileKind | null {
   const ending = name.split(".").at(-1)?.toLowerCase() ?? "";
   if (ending !== "csv") return BY_ENDING[ending] ?? null;
   const first = beginning.split(/\r?\n/).find((line) => line.trim() !== "") ?? "";

@@ -24,23 +24,23 @@ export const HOTKEYS: readonly HotkeyGroup[] = [
     keys: [
       { keys: ["[", "]"], text: "Select the one before, the next" },
       { keys: ["T"], text: "Take off" },
-      { keys: ["H"], text: "Hold its place" },
+      { keys: ["H"], text: "Hold its position" },
       { keys: ["L"], text: "Land" },
       { keys: ["B"], text: "Return home" },
-      { keys: ["G"], text: "Go to a place: click on it" },
+      { keys: ["G"], text: "Go to a position: click on it" },
       { keys: ["V"], text: "Move by dragging, on and off" },
     ],
   },
   {
-    title: "Flight by hand",
+    title: "Manual control",
     keys: [
       { keys: ["C"], text: "Take the controls, give them back" },
-      { keys: ["W", "S"], text: "Ahead, back" },
+      { keys: ["W", "S"], text: "Forward, back" },
       { keys: ["A", "D"], text: "Left, right" },
       { keys: ["R", "F"], text: "Up, down (also page up, page down)" },
       { keys: ["Q", "E"], text: "Turn left, right (also arrows)" },
       { keys: ["Shift"], text: "Twice as fast" },
-      { keys: ["Gamepad"], text: "Left stick: climb, turn; right stick: ahead, aside" },
+      { keys: ["Gamepad"], text: "Left stick: climb, turn; right stick: forward, lateral" },
     ],
   },
   {
@@ -54,7 +54,7 @@ export const HOTKEYS: readonly HotkeyGroup[] = [
     title: "Page",
     keys: [
       { keys: ["M"], text: "Map" },
-      { keys: ["P"], text: "Pictures" },
+      { keys: ["P"], text: "Cameras" },
       { keys: ["?"], text: "These keys" },
       { keys: ["Esc"], text: "Give the controls back, cancel, close" },
     ],

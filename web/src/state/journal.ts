@@ -27,7 +27,8 @@ interface EventJson {
   detail: string;
 }
 
-interface Command {
+/** A record of `/volery/log`. */
+export interface Command {
   stamp: { sec: number; nanosec: number };
   client: string;
   kind: string;
@@ -35,6 +36,8 @@ interface Command {
   content: string;
 }
 
+/** How many records wait for a slow page: many things can happen at once. */
+export const COMMAND_DEPTH = 1000;
 const MOST = 5000;
 const SHOW_MS = 200;
 const TROUBLES = new Set(["impact", "collision", "fault", "battery"]);
@@ -47,7 +50,6 @@ let next = 0;
 let timer: ReturnType<typeof setTimeout> | null = null;
 
 export function followJournal(): void {
-  const depth = 1000; // many things can happen at once
   link.subscribe(
     "/events",
     "std_msgs/msg/String",
@@ -55,13 +57,13 @@ export function followJournal(): void {
       const entry = entryOfEvent(message.data);
       if (entry !== null) write(entry);
     },
-    { depth },
+    { depth: COMMAND_DEPTH },
   );
   link.subscribe(
     "/volery/log",
     "volery_interfaces/msg/CommandRecord",
     ({ message }: { message: unknown }) => write(entryOfCommand(message as Command)),
-    { depth },
+    { depth: COMMAND_DEPTH },
   );
 }
 

@@ -4,6 +4,9 @@ import { sheetOf } from "../lib/sheet.ts";
 
 export type Dock = "left" | "right" | "bottom";
 
+/** What holds one panel: a side of the page, or the right half of its bottom. */
+export type Slot = Dock | "second";
+
 /** What lies over the scene. */
 export type Overlay = "map" | "pictures";
 
@@ -14,10 +17,12 @@ export interface Tile {
   width: number;
 }
 
-/** Which panel each side of the page shows (empty: none), sizes, and what lies over the scene. */
-interface Layout extends Record<Dock, string> {
+/** Which panel each slot shows (empty: none), sizes, and what lies over the scene. */
+interface Layout extends Record<Slot, string> {
   /** Width, of the bottom one height, in pixels. */
   sizes: Record<Dock, number>;
+  /** Width of the left half of the bottom, as a fraction. */
+  split: number;
   /** Height of a phone's sheet, in pixels. */
   sheet: number;
   shown: Record<Overlay, boolean>;
@@ -31,23 +36,29 @@ const KEY = "volery.layout";
 /** As in `page.css`: up to this width a panel is a sheet below the scene. */
 export const NARROW_PX = 700;
 export const LEAST_SIZE: Record<Dock, number> = { left: 200, right: 260, bottom: 140 };
+/** Width that each half of the bottom keeps. */
+const MIN_HALF_PX = 300;
 
 const USUAL: Layout = {
   left: "vehicles",
   right: "",
   bottom: "",
+  second: "",
   sizes: { left: 270, right: 330, bottom: 280 },
+  split: 0.5,
   sheet: 360,
   shown: { map: true, pictures: false },
   tiles: {},
   pictures: [],
 };
 
+const NO_PANELS: Record<Slot, string> = { left: "", right: "", bottom: "", second: "" };
+
 export const useLayout = create<Layout>(() => {
   const layout = readKept(KEY, USUAL);
   // On a phone a panel takes half of the page: it begins without one.
   if (!isNarrow()) return layout;
-  return { ...layout, left: "", right: "", bottom: "", shown: { map: false, pictures: false } };
+  return { ...layout, ...NO_PANELS, shown: { map: false, pictures: false } };
 });
 
 useLayout.subscribe((layout) => keep(KEY, layout));
@@ -58,17 +69,48 @@ export function isNarrow(): boolean {
 
 /** Show a panel on its side, or close it where it is shown. */
 export function togglePanel(dock: Dock, id: string): void {
-  if (useLayout.getState()[dock] === id) closePanel(dock);
-  else openPanel(dock, id);
+  const slot = slotOf(dock, id);
+  if (slot === null) openPanel(dock, id);
+  else closePanel(slot);
 }
 
+/** Where a panel of a side is shown; null: nowhere. */
+export function slotOf(dock: Dock, id: string, layout = useLayout.getState()): Slot | null {
+  if (layout[dock] === id) return dock;
+  return dock === "bottom" && layout.second === id ? "second" : null;
+}
+
+/** Show a panel; where it is shown already it stays. On a phone it is the only one. */
 export function openPanel(dock: Dock, id: string): void {
-  const others = isNarrow() ? { left: "", right: "", bottom: "" } : {};
-  useLayout.setState({ ...others, [dock]: id });
+  if (isNarrow()) useLayout.setState({ ...NO_PANELS, [dock]: id });
+  else if (slotOf(dock, id) === null) useLayout.setState({ [dock]: id });
 }
 
-export function closePanel(dock: Dock): void {
-  useLayout.setState({ [dock]: "" });
+/** Show a panel of the bottom in one of its halves; one that the other half shows changes places. */
+export function putPanel(slot: "bottom" | "second", id: string): void {
+  const layout = useLayout.getState();
+  const other = slot === "bottom" ? "second" : "bottom";
+  useLayout.setState({ [slot]: id, ...(layout[other] === id && { [other]: layout[slot] }) });
+}
+
+/** Show a bottom panel beside the one that asks for it, where there is room for two. */
+export function openBeside(asking: string, id: string): void {
+  if (isNarrow()) openPanel("bottom", id);
+  else if (slotOf("bottom", id) === null)
+    putPanel(slotOf("bottom", asking) === "second" ? "bottom" : "second", id);
+}
+
+/** Close a panel. What the right half shows takes the room of the left one. */
+export function closePanel(slot: Slot): void {
+  const { second } = useLayout.getState();
+  if (slot === "bottom") useLayout.setState({ bottom: second, second: "" });
+  else useLayout.setState({ [slot]: "" });
+}
+
+/** Move the border of the two halves of the bottom, which is `width` pixels wide. */
+export function splitBottom(fraction: number, width: number): void {
+  const min = Math.min(0.5, MIN_HALF_PX / width);
+  useLayout.setState({ split: Math.max(min, Math.min(fraction, 1 - min)) });
 }
 
 export function resizeDock(dock: Dock, size: number): void {
@@ -78,9 +120,9 @@ export function resizeDock(dock: Dock, size: number): void {
 }
 
 /** Let a phone's sheet be so high, px; one that is dragged to the foot of the page closes. */
-export function resizeSheet(dock: Dock, height: number): void {
+export function resizeSheet(slot: Slot, height: number): void {
   const { sheet, closes } = sheetOf(height, window.innerHeight);
-  if (closes) closePanel(dock);
+  if (closes) closePanel(slot);
   else useLayout.setState({ sheet });
 }
 

@@ -7,6 +7,7 @@ import { eulerOf } from "../lib/pose.ts";
 import { useConnection } from "./connection.ts";
 import { useEpoch } from "./epoch.ts";
 import { attempt, succeeds } from "./notices.ts";
+import { useRestart } from "./restarts.ts";
 import { pickPlace } from "./tool.ts";
 import { baseFrame } from "./vehicles.ts";
 import { heightAt } from "./worldPlan.ts";
@@ -14,9 +15,13 @@ import { heightAt } from "./worldPlan.ts";
 /** Places that UAVs were last sent to from this page. */
 export const useGoals = create<Record<string, Place>>(() => ({}));
 
-/** Forget the goals of a flight that is over. */
+/** Forget the goals of a flight that is over, and of a UAV that is put back to its start. */
 export function followGoals(): void {
   useEpoch.subscribe(() => useGoals.setState({}, true));
+  useRestart.subscribe(({ uav }) => {
+    const { [uav]: _over, ...others } = useGoals.getState();
+    useGoals.setState(others, true);
+  });
 }
 
 /** No UAV is sent nearer to the ground than this. */

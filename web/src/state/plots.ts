@@ -1,18 +1,27 @@
 import { create } from "zustand";
 import { keep, readKept } from "../lib/kept.ts";
+import { isLength, shortOf } from "../lib/units.ts";
+import type { Curve, Line } from "../lib/usualCurves.ts";
 
-/** A number of a topic's messages. */
-export interface Line {
-  topic: string;
-  type: string;
-  /** As `pose.pose.position.z`. */
-  path: string;
-}
+export type { Curve, Line };
 
-export interface Plot {
+/** Lines over simulated time. */
+export interface TimePlot {
   id: number;
+  kind?: "time";
   lines: Line[];
 }
+
+/** Curves of numbers over numbers. */
+export interface XYPlot {
+  id: number;
+  kind: "xy";
+  curves: Curve[];
+  /** Whether both axes have the same scale; null: where both show lengths. */
+  equal: boolean | null;
+}
+
+export type Plot = TimePlot | XYPlot;
 
 interface Plots {
   plots: Plot[];
@@ -31,35 +40,90 @@ export function nameOf({ topic, path }: Line): string {
   return `${topic}.${path}`;
 }
 
-/** Draw a line in a plot, or in the last one. */
+/** Which numbers a curve shows, x before y, for a legend: `/uav1/odom position.x, y`. */
+export function curveName({ x, y }: Curve): string {
+  if (x.topic !== y.topic) return `${x.topic} ${shortOf(x.path)}, ${y.topic} ${shortOf(y.path)}`;
+  const [parent, last] = splitPath(y.path);
+  const beside = splitPath(x.path)[0] === parent ? last : shortOf(y.path);
+  return `${y.topic} ${shortOf(x.path)}, ${beside}`;
+}
+
+/** `pose.position.x` as `pose.position` and `x`. */
+function splitPath(path: string): [string, string] {
+  const at = path.lastIndexOf(".");
+  return [path.slice(0, Math.max(0, at)), path.slice(at + 1)];
+}
+
+/** Everything that a plot shows, each number once. */
+export function linesOf(plot: Plot): Line[] {
+  if (plot.kind !== "xy") return plot.lines;
+  const lines = plot.curves.flatMap(({ x, y }) => [x, y]);
+  return [...new Map(lines.map((line) => [nameOf(line), line])).values()];
+}
+
+/** Whether both axes of a plot have the same scale. */
+export function hasEqualScales({ equal, curves }: XYPlot): boolean {
+  const lengths = curves.every(({ x, y }) => isLength(x.path, x.type) && isLength(y.path, y.type));
+  return equal ?? (curves.length > 0 && lengths);
+}
+
+/** Draw a line in a plot, or in the last one that is over time. */
 export function drawLine(line: Line, plot?: number): void {
-  usePlots.setState(({ plots }) => {
-    const id = plot ?? plots.at(-1)?.id ?? 1;
-    const known = plots.length > 0 ? plots : [{ id, lines: [] }];
+  const isOverTime = (one: Plot) => one.kind !== "xy";
+  if (plot === undefined && !usePlots.getState().plots.some(isOverTime)) addPlot();
+  const id = plot ?? usePlots.getState().plots.findLast(isOverTime)!.id;
+  change(id, (one) =>
+    one.kind === "xy" || one.lines.some((other) => nameOf(other) === nameOf(line))
+      ? one
+      : { ...one, lines: [...one.lines, line] },
+  );
+}
+
+export function removeLine(plot: number, line: Line): void {
+  change(plot, (one) =>
+    one.kind === "xy"
+      ? one
+      : { ...one, lines: one.lines.filter((other) => nameOf(other) !== nameOf(line)) },
+  );
+}
+
+/** Draw curves in an x-y plot; those that it has stay as they are. */
+export function drawCurves(plot: number, curves: readonly Curve[]): void {
+  change(plot, (one) => {
+    if (one.kind !== "xy") return one;
+    const known = new Set(one.curves.map(curveKey));
     return {
-      plots: known.map((one) =>
-        one.id === id && !one.lines.some((other) => nameOf(other) === nameOf(line))
-          ? { ...one, lines: [...one.lines, line] }
-          : one,
-      ),
+      ...one,
+      curves: [...one.curves, ...curves.filter((curve) => !known.has(curveKey(curve)))],
     };
   });
 }
 
-export function removeLine(plot: number, line: Line): void {
-  usePlots.setState(({ plots }) => ({
-    plots: plots.map((one) =>
-      one.id === plot
-        ? { ...one, lines: one.lines.filter((other) => nameOf(other) !== nameOf(line)) }
-        : one,
-    ),
-  }));
+export function removeCurve(plot: number, curve: Curve): void {
+  change(plot, (one) =>
+    one.kind === "xy"
+      ? { ...one, curves: one.curves.filter((other) => curveKey(other) !== curveKey(curve)) }
+      : one,
+  );
+}
+
+/** What tells a curve from all others. */
+export function curveKey({ x, y }: Curve): string {
+  return `${nameOf(x)} ${nameOf(y)}`;
+}
+
+export function setEqualScales(plot: number, equal: boolean): void {
+  change(plot, (one) => (one.kind === "xy" ? { ...one, equal } : one));
 }
 
 export function addPlot(): void {
-  usePlots.setState(({ plots }) => ({
-    plots: [...plots, { id: Math.max(0, ...plots.map(({ id }) => id)) + 1, lines: [] }],
-  }));
+  add((id) => ({ id, lines: [] }));
+}
+
+/** A plot of numbers over numbers, with these curves to begin with; it takes an empty one's place. */
+export function addXYPlot(curves: Curve[]): void {
+  usePlots.setState(({ plots }) => ({ plots: plots.filter((one) => linesOf(one).length > 0) }));
+  add((id) => ({ id, kind: "xy", curves, equal: null }));
 }
 
 export function removePlot(id: number): void {
@@ -68,4 +132,16 @@ export function removePlot(id: number): void {
 
 export function setWindow(windowS: number): void {
   usePlots.setState({ windowS });
+}
+
+function add(made: (id: number) => Plot): void {
+  usePlots.setState(({ plots }) => ({
+    plots: [...plots, made(Math.max(0, ...plots.map(({ id }) => id)) + 1)],
+  }));
+}
+
+function change(id: number, changed: (plot: Plot) => Plot): void {
+  usePlots.setState(({ plots }) => ({
+    plots: plots.map((one) => (one.id === id ? changed(one) : one)),
+  }));
 }

@@ -50,7 +50,7 @@ const TITLES: Record<Layer, string> = {
   paths: "Paths and goals",
   lidar: "LIDAR returns",
   frusta: "What cameras see",
-  pictures: "Pictures in the scene",
+  pictures: "Camera images in the scene",
   voxels: "OctoMap voxels",
   maps: "Occupancy maps",
   markers: "Markers",
@@ -115,8 +115,8 @@ function LayersMenu() {
   return (
     <Menu closeOnItemClick={false} position="bottom-start" withinPortal>
       <Menu.Target>
-        <Tooltip label="What is shown">
-          <ActionIcon variant="subtle" color="gray" aria-label="What is shown">
+        <Tooltip label="Layers">
+          <ActionIcon variant="subtle" color="gray" aria-label="Layers">
             <Layers size={16} />
           </ActionIcon>
         </Tooltip>

@@ -30,7 +30,7 @@ function Controls({ uav }: { uav: string }) {
         withBorder
         p="xs"
         role="group"
-        aria-label="Flight by hand"
+        aria-label="Manual control"
       >
         <Group gap="xs" justify="space-between" wrap="nowrap">
           <Group gap={6} wrap="nowrap">
@@ -49,7 +49,7 @@ function Controls({ uav }: { uav: string }) {
       {touch && (
         <div className="sticks">
           <Stick label="Climb and turn" onMove={(x, y) => (sticks.current.left = [x, y])} />
-          <Stick label="Ahead and aside" onMove={(x, y) => (sticks.current.right = [x, y])} />
+          <Stick label="Forward / lateral" onMove={(x, y) => (sticks.current.right = [x, y])} />
         </div>
       )}
     </>

@@ -26,7 +26,7 @@ export function TopBar() {
         <Health />
         <LinkBadge />
         <OverlayButton overlay="map" label="Map (M)" icon={<MapIcon size={18} />} />
-        <OverlayButton overlay="pictures" label="Pictures (P)" icon={<Images size={18} />} />
+        <OverlayButton overlay="pictures" label="Cameras (P)" icon={<Images size={18} />} />
         <Layouts />
         <ColourScheme />
         <Tooltip label="Keys (?)">

@@ -118,7 +118,7 @@ function Air({ weather, change, disabled }: AirProps) {
           </Button>
         </Group>
       </Section>
-      <Section title="In the air">
+      <Section title="Weather">
         <Dial
           name="Rain"
           min={0}

@@ -54,7 +54,7 @@ export default function Faults() {
           {PASSING.includes(form.kind) && (
             <NumberInput
               size="xs"
-              label="Lasts (0: it stays)"
+              label="Duration (0: permanent)"
               suffix=" s"
               min={0}
               value={form.lastsS}
@@ -75,7 +75,7 @@ export default function Faults() {
             Inject
           </Button>
           <Text size="xs" c="dimmed">
-            {whyNot ?? "It begins at once, is told in the log, and ends with a reset."}
+            {whyNot ?? "The fault begins at once, appears in the log, and ends with a reset."}
           </Text>
         </Group>
       </Stack>

@@ -43,7 +43,7 @@ export function Orders({ uav }: { uav: string }) {
     if (order === "arm" && said) tellSuccess(said);
   };
   return (
-    <SimpleGrid cols={2} spacing={6} role="group" aria-label="Orders">
+    <SimpleGrid cols={2} spacing={6} role="group" aria-label="Commands">
       {BUTTONS.map(({ order, label, hint, icon }) => (
         <Tooltip key={order} label={whyNot ?? hint}>
           <Button

@@ -16,9 +16,9 @@ export function Pilots({ uav }: { uav: string }) {
   if (!volery) return null;
   return (
     <Section title="Control">
-      <Text size="sm" aria-label="Holder" c={stranger === "" ? "bright" : "orange"}>
+      <Text size="sm" aria-label="Operator" c={stranger === "" ? "bright" : "orange"}>
         {holder === ""
-          ? "Nobody has taken it: every pilot may command it."
+          ? "No operator has taken it: every pilot may command it."
           : stranger === ""
             ? `You have it, as ${holder}.`
             : `${holder} has it: your commands are refused.`}

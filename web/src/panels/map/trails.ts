@@ -1,5 +1,6 @@
 import { useEffect, useRef } from "react";
 import { useEpoch } from "../../state/epoch.ts";
+import { isRestarting } from "../../state/restarts.ts";
 import { useVehicles } from "../../state/vehicles.ts";
 
 const MOST_POINTS = 600;
@@ -30,8 +31,8 @@ export function useTrails(): ReadonlyMap<string, Trail> {
       useVehicles.subscribe(({ list }) => {
         const known = trails.current;
         for (const { name, position } of list) {
-          if (!known.has(name)) known.set(name, new Trail());
-          known.get(name)!.add(position.x, position.y);
+          if (!known.has(name) || isRestarting(name)) known.set(name, new Trail());
+          else known.get(name)!.add(position.x, position.y);
         }
         for (const name of known.keys()) {
           if (!list.some((vehicle) => vehicle.name === name)) known.delete(name);

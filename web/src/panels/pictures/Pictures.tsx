@@ -49,7 +49,7 @@ function Chooser({ cameras, chosen }: { cameras: CameraTopic[]; chosen: string[]
         </Tooltip>
       </Menu.Target>
       <Menu.Dropdown>
-        <Menu.Label>Pictures</Menu.Label>
+        <Menu.Label>Cameras</Menu.Label>
         {cameras.length === 0 ? (
           <Paper p="xs">
             <Text size="sm" c="dimmed">

@@ -1,13 +1,10 @@
 import { Group, Select } from "@mantine/core";
-import { useCallback, useState } from "react";
-import { fieldsOf, numericPaths } from "../../lib/typeDefinitions.ts";
-import { messageDefinitions } from "../../link/commands.ts";
+import { useState } from "react";
 import { drawLine } from "../../state/plots.ts";
 import { useTopics } from "../../state/topics.ts";
 import { Reason } from "../shared/Reason.tsx";
-import { useAsked } from "../shared/useAsked.ts";
+import { usePaths } from "./usePaths.ts";
 
-const NO_PATHS: string[] = [];
 const MOST_SHOWN = 200;
 
 /** Choose a topic, then one of its numbers. */
@@ -15,12 +12,7 @@ export function AddLine({ plot }: { plot: number }) {
   const all = useTopics(({ list }) => list);
   const [topic, setTopic] = useState<string | null>(null);
   const type = all.find(({ name }) => name === topic)?.type ?? "";
-  const describe = useCallback(
-    async () =>
-      type === "" ? NO_PATHS : [...new Set(numericPaths(fieldsOf(await messageDefinitions(type))))],
-    [type],
-  );
-  const { value: paths, reason } = useAsked(describe, NO_PATHS);
+  const { paths, reason } = usePaths(type);
   return (
     <Group gap={6} wrap="nowrap">
       <Select

@@ -2,13 +2,17 @@ import "uplot/dist/uPlot.min.css";
 import { Button, Group, Select } from "@mantine/core";
 import { Pause, Play, Plus } from "lucide-react";
 import { useState } from "react";
-import { addPlot, setWindow, usePlots } from "../../state/plots.ts";
-import { PlotView } from "./PlotView.tsx";
+import { positionCurve } from "../../lib/usualCurves.ts";
+import { addPlot, addXYPlot, setWindow, usePlots } from "../../state/plots.ts";
+import { useTopics } from "../../state/topics.ts";
+import { useVehicles } from "../../state/vehicles.ts";
 import classes from "./Plots.module.css";
+import { TimePlotView } from "./TimePlotView.tsx";
+import { XYPlotView } from "./XYPlotView.tsx";
 
-const WINDOWS_S = [5, 10, 20, 60, 300];
+const WINDOWS_S = [5, 10, 20, 60, 300, 1800];
 
-/** Numbers of messages as lines over simulated time. */
+/** Numbers of messages over simulated time, or over each other. */
 export default function Plots() {
   const { plots, windowS } = usePlots();
   const [paused, setPaused] = useState(false);
@@ -41,14 +45,31 @@ export default function Plots() {
           leftSection={<Plus size={13} />}
           onClick={addPlot}
         >
-          Plot
+          Time plot
+        </Button>
+        <Button
+          size="compact-xs"
+          variant="default"
+          leftSection={<Plus size={13} />}
+          title="One field over another one; begins with the path of the selected UAV from above"
+          onClick={beginXYPlot}
+        >
+          x-y plot
         </Button>
       </Group>
       <div className={classes.plots}>
-        {plots.map((plot) => (
-          <PlotView key={plot.id} plot={plot} paused={paused} />
-        ))}
+        {plots.map((plot) =>
+          plot.kind === "xy" ? (
+            <XYPlotView key={plot.id} plot={plot} paused={paused} />
+          ) : (
+            <TimePlotView key={plot.id} plot={plot} paused={paused} />
+          ),
+        )}
       </div>
     </div>
   );
+}
+
+function beginXYPlot(): void {
+  addXYPlot(positionCurve(useTopics.getState().list, useVehicles.getState().selected));
 }

@@ -5,7 +5,8 @@ import { numberOf, stepsOf, valueAt } from "../../lib/fieldPath.ts";
 import { Series } from "../../lib/series.ts";
 import { nowMs, secondsOf } from "../../lib/time.ts";
 import { link } from "../../link/link.ts";
-import { nameOf, usePlots, type Line } from "../../state/plots.ts";
+import { useEpoch } from "../../state/epoch.ts";
+import { linesOf, nameOf, usePlots, type Line } from "../../state/plots.ts";
 
 interface Recorded {
   series: Series;
@@ -52,10 +53,16 @@ export function presentS(): number {
 
 /** Lines that no plot has any more are let go. */
 usePlots.subscribe(({ plots }) => {
-  const wanted = new Set(plots.flatMap(({ lines }) => lines.map(nameOf)));
+  const wanted = new Set(plots.flatMap((plot) => linesOf(plot).map(nameOf)));
   for (const [name, { end }] of recorded) {
     if (wanted.has(name)) continue;
     end();
     recorded.delete(name);
   }
+});
+
+/** Another world and another log have nothing in common with what was plotted. */
+useEpoch.subscribe(({ run }, before) => {
+  if (run === before.run) return;
+  for (const { series } of recorded.values()) series.clear();
 });

@@ -41,10 +41,10 @@ export default function Recordings() {
   const open = async (name: string) => {
     await attempt("The recording cannot be played", playRecording(name));
   };
-  const bring = async (file: File | null) => {
+  const send = async (file: File | null) => {
     if (file === null) return;
     const name = await attempt("The recording was not taken", uploadRecording(file));
-    if (name !== null) tellSuccess(`${name} is here`);
+    if (name !== null) tellSuccess(`${name} is among the recordings`);
     again();
   };
 
@@ -52,7 +52,7 @@ export default function Recordings() {
     <ScrollArea h="100%" type="auto">
       <Group gap="xs" px="sm" pb={6}>
         <Recorder onChange={again} whyNot={whyNot} />
-        <FileButton accept=".mcap,.bag" onChange={(file) => void bring(file)}>
+        <FileButton accept=".mcap,.bag" onChange={(file) => void send(file)}>
           {(props) => (
             <Button
               {...props}
@@ -61,7 +61,7 @@ export default function Recordings() {
               leftSection={<Upload size={14} />}
               disabled={whyNotOpen !== null}
             >
-              Bring a log
+              Upload a log
             </Button>
           )}
         </FileButton>

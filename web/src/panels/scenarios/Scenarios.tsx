@@ -8,10 +8,11 @@ import {
   Stack,
   Text,
   TextInput,
+  Tooltip,
 } from "@mantine/core";
 import { Search, Upload } from "lucide-react";
 import { useEffect, useState } from "react";
-import { ENDINGS } from "../../lib/fileKinds.ts";
+import { ENDINGS, UPLOAD_HINT } from "../../lib/fileKinds.ts";
 import { scenarios, type ScenarioCard } from "../../link/commands.ts";
 import { reasonOf } from "../../state/notices.ts";
 import { useSimulation } from "../../state/simulation.ts";
@@ -75,9 +76,11 @@ function Gallery({ cards, choose }: { cards: ScenarioCard[]; choose: (name: stri
         />
         <FileButton accept={ENDINGS} onChange={(file) => file !== null && offerFile(file)}>
           {(props) => (
-            <Button variant="default" leftSection={<Upload size={16} />} {...props}>
-              Upload a map
-            </Button>
+            <Tooltip label={UPLOAD_HINT} multiline w={280}>
+              <Button variant="default" leftSection={<Upload size={16} />} {...props}>
+                Upload a file
+              </Button>
+            </Tooltip>
           )}
         </FileButton>
       </Group>

@@ -65,7 +65,7 @@ export function Start({ card, back }: { card: ScenarioCard; back: () => void }) 
           />
           <NumberInput
             label="Seed"
-            placeholder="as written"
+            placeholder="from the scenario"
             min={0}
             max={Number.MAX_SAFE_INTEGER}
             allowDecimal={false}
@@ -75,7 +75,7 @@ export function Start({ card, back }: { card: ScenarioCard; back: () => void }) 
           {card.world === "forest" && (
             <NumberInput
               label="Trees per hectare"
-              placeholder="as written"
+              placeholder="from the scenario"
               min={0}
               max={10_000}
               value={changes.tree_density_per_ha ?? ""}

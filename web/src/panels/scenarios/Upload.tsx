@@ -1,12 +1,13 @@
 import { Alert, Button, FileButton, Group, Modal, Radio, Stack, Text } from "@mantine/core";
 import { useEffect, useState } from "react";
-import { ENDINGS, kindOf } from "../../lib/fileKinds.ts";
-import { upload, type UploadKind } from "../../link/commands.ts";
-import { reasonOf } from "../../state/notices.ts";
+import { ENDINGS, kindOf, type FileKind } from "../../lib/fileKinds.ts";
+import { upload, uploadRecording } from "../../link/commands.ts";
+import { openPanel } from "../../state/layout.ts";
+import { reasonOf, tellSuccess } from "../../state/notices.ts";
 import { useWhyNotOpen } from "../../state/rights.ts";
 import { closeWindow, offerFile, offerScenario, useWindows } from "../../state/windows.ts";
 
-const KINDS: { kind: UploadKind; label: string; description: string }[] = [
+const KINDS: { kind: FileKind; label: string; description: string }[] = [
   {
     kind: "grid_map",
     label: "Grid map",
@@ -20,13 +21,14 @@ const KINDS: { kind: UploadKind; label: string; description: string }[] = [
     label: "Scenario",
     description: "A whole scenario: TOML, with models and nodes that ship with Volery",
   },
+  { kind: "log", label: "Log", description: "A recorded flight to play: MCAP, or bag of ROS 1" },
 ];
 const PEEK_BYTES = 4096;
 
-/** A map or a scenario of the user's own joins the scenarios. */
+/** A map or a scenario of the user's own joins the scenarios, a log the recordings. */
 export default function Upload() {
   const file = useWindows((windows) => windows.file);
-  const [kind, setKind] = useState<UploadKind | null>(null);
+  const [kind, setKind] = useState<FileKind | null>(null);
   const [trouble, setTrouble] = useState("");
   const [busy, setBusy] = useState(false);
   const whyNot = useWhyNotOpen();
@@ -42,14 +44,15 @@ export default function Upload() {
     if (file === null || kind === null) return;
     setBusy(true);
     try {
-      offerScenario(await upload(file, kind));
+      if (kind === "log") await sendLog(file);
+      else offerScenario(await upload(file, kind));
     } catch (error) {
       setTrouble(reasonOf(error));
     }
     setBusy(false);
   };
   return (
-    <Modal opened onClose={closeWindow} title="Upload a map or a scenario" size="md">
+    <Modal opened onClose={closeWindow} title="Upload a map, a scenario or a log" size="md">
       <Stack gap="sm">
         <Group justify="space-between" wrap="nowrap">
           <Text truncate fw={600}>
@@ -66,7 +69,7 @@ export default function Upload() {
         <Radio.Group
           label="What is it?"
           value={kind ?? ""}
-          onChange={(value) => setKind(value as UploadKind)}
+          onChange={(value) => setKind(value as FileKind)}
         >
           <Stack gap={8} mt={6}>
             {KINDS.map(({ kind: value, label, description }) => (
@@ -75,7 +78,11 @@ export default function Upload() {
           </Stack>
         </Radio.Group>
         {trouble !== "" && (
-          <Alert color="red" role="alert" title="The file cannot be flown">
+          <Alert
+            color="red"
+            role="alert"
+            title={kind === "log" ? "The log cannot be played" : "The file cannot be flown"}
+          >
             <span className="reason">{trouble}</span>
           </Alert>
         )}
@@ -96,6 +103,12 @@ export default function Upload() {
       </Stack>
     </Modal>
   );
+}
+
+async function sendLog(file: File): Promise<void> {
+  tellSuccess(`${await uploadRecording(file)} is among the recordings`);
+  closeWindow();
+  openPanel("bottom", "recordings");
 }
 
 function sizeText(bytes: number): string {

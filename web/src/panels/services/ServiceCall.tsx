@@ -79,7 +79,7 @@ export function ServiceCall({ service }: { service: string }) {
           </Button>
         </div>
         {answered !== null && (
-          <div aria-label="Answer" role="region">
+          <div aria-label="Response" role="region">
             <Group gap={6}>
               <Text size="xs" c="dimmed">
                 Answered in {answered.tookMs.toFixed(0)} ms

@@ -19,7 +19,7 @@ export default function Services() {
   const words = sought.toLowerCase().split(/\s+/);
   const fitting = all.filter((name) => words.every((word) => name.toLowerCase().includes(word)));
   return (
-    <div className={classes.panel}>
+    <div className={classes.panel} data-chosen={chosen !== "" || undefined}>
       <div className={classes.names}>
         <TextInput
           size="xs"

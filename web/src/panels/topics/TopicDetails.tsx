@@ -2,7 +2,7 @@ import { Button, Group, Text } from "@mantine/core";
 import { Pause, Play, Send } from "lucide-react";
 import { useState } from "react";
 import { useConnection } from "../../state/connection.ts";
-import { openPanel } from "../../state/layout.ts";
+import { openBeside } from "../../state/layout.ts";
 import { drawLine } from "../../state/plots.ts";
 import type { Followed } from "../shared/useTopic.ts";
 import { ValueTree } from "../shared/ValueTree.tsx";
@@ -23,7 +23,7 @@ export function TopicDetails({ topic, type, followed }: TopicDetailsProps) {
   const shown = held ?? followed.message;
   const plot = (path: string) => {
     drawLine({ topic, type, path });
-    openPanel("bottom", "plots");
+    openBeside("topics", "plots");
   };
   return (
     <div className={classes.details}>

@@ -121,6 +121,12 @@ export class SegmentLines {
     this.buffer.needsUpdate = true;
   }
 
+  /** Draw segments `from` up to `to` no more. */
+  blank(from: number, to: number): void {
+    (this.buffer.array as Float32Array).fill(0, from * STRIDE, to * STRIDE);
+    this.send(from, to);
+  }
+
   /** Forget all segments. */
   clear(): void {
     (this.buffer.array as Float32Array).fill(0);

@@ -39,6 +39,8 @@ export interface Debugging {
   };
   /** UAVs on the screen. */
   uavs: () => OnScreen[];
+  /** Segments of a UAV's trail. */
+  trailLength: (uav: string) => number;
   /** Height of the ground, map, m. */
   groundAt: (x: number, y: number) => number;
 }
@@ -62,6 +64,7 @@ export const debugging: Debugging = {
   quality: "",
   camera: { position: [0, 0, 0], quaternion: [0, 0, 0, 1], fov: 0 },
   uavs: () => [],
+  trailLength: () => 0,
   groundAt: () => 0,
 };
 

@@ -6,6 +6,8 @@ import type {
   nav_msgs_Path,
   trajectory_msgs_MultiDOFJointTrajectory,
 } from "../../messages/generated.ts";
+import { useEpoch } from "../../state/epoch.ts";
+import { useRestart } from "../../state/restarts.ts";
 import { useView } from "../../state/view.ts";
 import { SegmentLines } from "../lines/SegmentLines.ts";
 import { inMap } from "../stage/frames.ts";
@@ -34,6 +36,7 @@ export class Paths implements Part {
   private readonly paths = new Map<string, Shown>();
   private changed = false;
   private readonly follower: Follower;
+  private readonly ends: readonly (() => void)[];
 
   constructor() {
     this.object.add(this.lines.object);
@@ -54,6 +57,10 @@ export class Paths implements Part {
         this.changed = true;
       },
     );
+    this.ends = [
+      useEpoch.subscribe(() => this.forget("/")),
+      useRestart.subscribe(({ uav }) => this.forget(`/${uav}/`)),
+    ];
   }
 
   update(moment: Moment): void {
@@ -70,8 +77,16 @@ export class Paths implements Part {
   }
 
   dispose(): void {
+    for (const end of this.ends) end();
     this.follower.end();
     this.lines.dispose();
+  }
+
+  /** Drop the goals and trajectories of topics below `prefix`: they were of another flight. */
+  private forget(prefix: string): void {
+    for (const [topic, { untilMs }] of this.paths)
+      if (Number.isFinite(untilMs) && topic.startsWith(prefix)) this.paths.delete(topic);
+    this.changed = true;
   }
 
   private take(topic: string, type: string, message: unknown): void {

@@ -1,8 +1,10 @@
 import { Group } from "three";
 import { POSE } from "../../link/protocol.ts";
 import { useEpoch } from "../../state/epoch.ts";
+import { isRestarting } from "../../state/restarts.ts";
 import { useView } from "../../state/view.ts";
 import { SegmentLines } from "../lines/SegmentLines.ts";
+import { debugging } from "../stage/debugging.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { shown } from "../stage/shown.ts";
 import { fleet } from "./fleet.ts";
@@ -30,6 +32,7 @@ export class Trails implements Part {
 
   constructor() {
     this.object.add(this.lines.object);
+    debugging.trailLength = (uav) => this.lengthOf(uav);
   }
 
   update(moment: Moment): void {
@@ -40,6 +43,12 @@ export class Trails implements Part {
     const { uavs } = fleet;
     for (let i = 0; i < uavs.length; i++) this.grow(i, nowS);
     this.lines.update(moment, nowS);
+  }
+
+  /** How many segments the trail of a UAV has. */
+  lengthOf(uav: string): number {
+    const i = fleet.uavs.findIndex(({ name }) => name === uav);
+    return Math.min(this.each, this.counts[i] ?? 0);
   }
 
   dispose(): void {
@@ -57,11 +66,23 @@ export class Trails implements Part {
     this.lines.clear();
   }
 
+  /** Drop the trail of one UAV; it begins anew with its next place. */
+  private forget(i: number): void {
+    const [from, to] = [i * this.each, i * this.each + Math.min(this.counts[i]!, this.each)];
+    this.lines.blank(from, to);
+    this.ends.fill(NaN, 3 * i, 3 * i + 3);
+    this.counts[i] = 0;
+  }
+
   private grow(i: number, nowS: number): void {
     const uav = fleet.uavs[i]!;
     const at = uav.row * POSE;
     if (at < 0) return;
     const { ends, each, counts, lines } = this;
+    if (isRestarting(uav.name)) {
+      this.forget(i);
+      return;
+    }
     const [x, y, z] = [shown.poses[at]!, shown.poses[at + 1]!, shown.poses[at + 2]!];
     const [ax, ay, az] = [ends[3 * i]!, ends[3 * i + 1]!, ends[3 * i + 2]!];
     const step = Math.hypot(x - ax, y - ay, z - az);

@@ -1,6 +1,8 @@
 import uPlot from "uplot";
 import { widened } from "../../lib/plotRange.ts";
 import { columnsOf, type Series } from "../../lib/series.ts";
+import { axisOf, MIN_PX, uprightAxis, type Look } from "./axes.ts";
+import type { Surface } from "./useDrawing.ts";
 
 export interface Drawn {
   name: string;
@@ -10,20 +12,8 @@ export interface Drawn {
   minSpan: number;
 }
 
-export interface Look {
-  text: string;
-  grid: string;
-}
-
-const DIGIT_PX = 7.5;
-
-/** Room for the longest mark of an axis, px. */
-function widthOf(marks: readonly string[] | null): number {
-  return 20 + DIGIT_PX * Math.max(4, ...(marks ?? []).map((mark) => mark.length));
-}
-
-/** One plot on its canvas. However many points come, it is drawn from a few per pixel. */
-export class Drawing {
+/** Lines over time on a canvas. However many points come, it is drawn from a few per pixel. */
+export class TimeDrawing implements Surface {
   private readonly plot: uPlot;
   /** What was zoomed to, s; null: the newest. */
   zoomed: [number, number] | null = null;
@@ -36,27 +26,22 @@ export class Drawing {
     const { width, height } = place.getBoundingClientRect();
     const spans = lines.map(({ minSpan }) => minSpan).filter((span) => !Number.isNaN(span));
     const minSpan = spans.length === 0 ? NaN : Math.max(...spans);
-    const axis = {
-      stroke: look.text,
-      grid: { stroke: look.grid, width: 1 },
-      ticks: { show: false },
-    };
     this.plot = new uPlot(
       {
-        width: Math.max(60, width),
-        height: Math.max(60, height),
+        width: Math.max(MIN_PX, width),
+        height: Math.max(MIN_PX, height),
         legend: { show: false },
         scales: {
           x: { time: false, auto: false, range: (_plot, from, to) => [from, to] },
           y: { range: (_plot, min, max) => rangeOf(min, max, minSpan) },
         },
         axes: [
-          { ...axis, size: 26, values: (_plot, marks) => marks.map((mark) => `${round(mark)} s`) },
           {
-            ...axis,
-            size: (_plot, marks) => widthOf(marks),
-            values: (_plot, marks, _axis, _space, step) => marks.map((mark) => fixed(mark, step)),
+            ...axisOf(look),
+            size: 26,
+            values: (_plot, marks) => marks.map((mark) => `${round(mark)} s`),
           },
+          uprightAxis(look),
         ],
         cursor: { drag: { x: true, y: false, setScale: false }, points: { size: 5 } },
         hooks: { setSelect: [(plot) => this.zoom(plot)] },
@@ -82,7 +67,7 @@ export class Drawing {
   };
 
   resize(width: number, height: number): void {
-    this.plot.setSize({ width: Math.max(60, width), height: Math.max(60, height) });
+    this.plot.setSize({ width: Math.max(MIN_PX, width), height: Math.max(MIN_PX, height) });
   }
 
   /** Draw what lies between two times, or what was zoomed to. */
@@ -117,11 +102,6 @@ export class Drawing {
 function rangeOf(min: number | null, max: number | null, minSpan: number): uPlot.Range.MinMax {
   if (min === null || max === null) return [0, 1];
   return uPlot.rangeNum(...widened(min, max, minSpan), 0.1, true);
-}
-
-/** A mark with the digits that tell it from the next one. */
-function fixed(mark: number, step: number): string {
-  return mark.toFixed(Math.min(12, Math.max(0, -Math.floor(Math.log10(step)))));
 }
 
 function round(time: number): string {
