@@ -2,6 +2,7 @@ import { useComputedColorScheme } from "@mantine/core";
 import { useEffect, useMemo, useRef, useState, type RefObject } from "react";
 import { AutoFit, pixelOf, type MapView, type Point, type Size } from "../../lib/mapProjection.ts";
 import { link } from "../../link/link.ts";
+import { isNarrow } from "../../state/layout.ts";
 import { useGoals } from "../../state/orders.ts";
 import { baseFrame, useVehicles } from "../../state/vehicles.ts";
 import { useWorldPlan, type WorldPlan } from "../../state/worldPlan.ts";
@@ -15,6 +16,9 @@ import { useTrails } from "./trails.ts";
 import { usePlannedPath } from "./usePlannedPath.ts";
 
 const FRAME_MS = 66;
+const BESIDE_TOOLBAR = { x: 1, y: 0, width: 300 };
+/** On a phone the views' buttons take the upper edge of the scene. */
+const BELOW_TOOLBAR = { ...BESIDE_TOOLBAR, y: 0.3 };
 
 const LIGHT: PlanColours = {
   ground: [214, 222, 205],
@@ -54,7 +58,8 @@ export default function MiniMap() {
     <FloatingTile
       name="map"
       title="Map"
-      usual={{ x: 1, y: 0, width: 300 }}
+      usual={isNarrow() ? BELOW_TOOLBAR : BESIDE_TOOLBAR}
+      mostShare={isNarrow() ? 0.65 : 1}
       aspect={1.25}
       actions={
         <MapButtons

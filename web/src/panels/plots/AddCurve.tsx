@@ -27,7 +27,7 @@ export function AddCurve({ plot }: { plot: number }) {
           Curve
         </Button>
       </Popover.Target>
-      <Popover.Dropdown w={340} maw="calc(100vw - 24px)" aria-label="New curve">
+      <Popover.Dropdown w={340} maw="calc(100vw - 24px)">
         <Form plot={plot} done={() => setOpened(false)} />
       </Popover.Dropdown>
     </Popover>
@@ -47,6 +47,7 @@ function Form({ plot, done }: { plot: number; done: () => void }) {
   };
   return (
     <form
+      aria-label="New curve"
       onSubmit={(event) => {
         event.preventDefault();
         if (curve === null) return;

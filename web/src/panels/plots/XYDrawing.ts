@@ -89,25 +89,31 @@ export class XYDrawing implements Surface {
 
   draw(from: number, to: number): void {
     this.curves = this.lines.map(({ x, y }) => curveOf(x, y, from, to));
-    const [across, up] = this.zoomed ?? this.ranges();
+    const [across, up] = this.fitted(this.zoomed ?? this.ranges());
     this.plot.batch(() => {
       this.plot.setData([across, [null, null]], false);
       this.plot.setScale("x", { min: across[0], max: across[1] });
       this.plot.setScale("y", { min: up[0], max: up[1] });
     });
-    this.plot.redraw(false);
   }
 
   destroy(): void {
     this.plot.destroy();
   }
 
+  /** All that is drawn. */
   private ranges(): [Range, Range] {
-    const { xMinSpan, yMinSpan, equal } = this.axes;
-    const across = around(extentOf(this.curves.map(({ x }) => x)), xMinSpan);
-    const up = around(extentOf(this.curves.map(({ y }) => y)), yMinSpan);
+    return [
+      around(extentOf(this.curves.map(({ x }) => x)), this.axes.xMinSpan),
+      around(extentOf(this.curves.map(({ y }) => y)), this.axes.yMinSpan),
+    ];
+  }
+
+  /** Ranges with the same scale, where that is wanted. */
+  private fitted(ranges: [Range, Range]): [Range, Range] {
     const { width, height } = this.plot.bbox;
-    return equal && width > 0 && height > 0 ? equalScales(across, up, width, height) : [across, up];
+    const fits = this.axes.equal && width > 0 && height > 0;
+    return fits ? equalScales(...ranges, width, height) : ranges;
   }
 
   private paint(plot: uPlot): void {
@@ -128,10 +134,10 @@ export class XYDrawing implements Surface {
   private zoom(plot: uPlot): void {
     const { left, top, width, height } = plot.select;
     if (width < 4 || height < 4) return;
-    const across: Range = [plot.posToVal(left, "x"), plot.posToVal(left + width, "x")];
-    const up: Range = [plot.posToVal(top + height, "y"), plot.posToVal(top, "y")];
-    const { bbox } = plot;
-    this.zoomed = this.axes.equal ? equalScales(across, up, bbox.width, bbox.height) : [across, up];
+    this.zoomed = [
+      [plot.posToVal(left, "x"), plot.posToVal(left + width, "x")],
+      [plot.posToVal(top + height, "y"), plot.posToVal(top, "y")],
+    ];
     plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
   }
 }
