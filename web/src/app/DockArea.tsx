@@ -1,15 +1,9 @@
 import { ActionIcon, Group, Loader, Title, Tooltip } from "@mantine/core";
 import { Columns2, X } from "lucide-react";
-import { Suspense, useEffect, useState, type CSSProperties, type ReactNode } from "react";
+import { Suspense, type CSSProperties, type ReactNode } from "react";
 import { PANELS, type PanelEntry } from "../panels/registry.ts";
-import {
-  closePanel,
-  isNarrow,
-  putPanel,
-  useLayout,
-  type Dock,
-  type Slot,
-} from "../state/layout.ts";
+import { closePanel, putPanel, useLayout, type Dock, type Slot } from "../state/layout.ts";
+import { useNarrow } from "../state/useNarrow.ts";
 import { DockEdge } from "./DockEdge.tsx";
 import { PanelChoice } from "./PanelChoice.tsx";
 import { SheetHandle } from "./SheetHandle.tsx";
@@ -34,9 +28,13 @@ export function BottomArea() {
   if (left === undefined) return null;
   if (right === undefined || narrow) {
     return (
-      <PanelFrame slot="bottom" dock="bottom" panel={left}>
+      <PanelFrame
+        slot="bottom"
+        dock="bottom"
+        panel={left}
+        actions={!narrow && <SplitButton panel={left} />}
+      >
         <PanelChoice slot="bottom" panel={left} />
-        {!narrow && <SplitButton panel={left} />}
       </PanelFrame>
     );
   }
@@ -57,11 +55,13 @@ interface PanelFrameProps {
   slot: Slot;
   dock: Dock;
   panel: PanelEntry;
-  /** What its head shows beside the button that closes it. */
+  /** The title in its head. */
   children: ReactNode;
+  /** Buttons beside the one that closes it. */
+  actions?: ReactNode;
 }
 
-function PanelFrame({ slot, dock, panel, children }: PanelFrameProps) {
+function PanelFrame({ slot, dock, panel, children, actions }: PanelFrameProps) {
   const size = useLayout((layout) => layout.sizes[dock]);
   const sheet = useLayout((layout) => layout.sheet);
   return (
@@ -74,15 +74,17 @@ function PanelFrame({ slot, dock, panel, children }: PanelFrameProps) {
       <SheetHandle slot={slot} title={panel.title} />
       <Group px="sm" py={4} gap={4} wrap="nowrap">
         {children}
-        <ActionIcon
-          variant="subtle"
-          color="gray"
-          ml="auto"
-          aria-label={`Close ${panel.title}`}
-          onClick={() => closePanel(slot)}
-        >
-          <X size={16} />
-        </ActionIcon>
+        <Group gap={0} ml="auto" wrap="nowrap">
+          {actions}
+          <ActionIcon
+            variant="subtle"
+            color="gray"
+            aria-label={`Close ${panel.title}`}
+            onClick={() => closePanel(slot)}
+          >
+            <X size={16} />
+          </ActionIcon>
+        </Group>
       </Group>
       <div className="dock-content">
         <Suspense fallback={<Loader size="sm" m="md" />}>
@@ -108,8 +110,6 @@ function SplitButton({ panel }: { panel: PanelEntry }) {
       <ActionIcon
         variant="subtle"
         color="gray"
-        ml="auto"
-        mr={-4}
         aria-label={`Show a second panel beside ${panel.title}`}
         onClick={() => putPanel("second", panel.id === "plots" ? "topics" : "plots")}
       >
@@ -122,15 +122,4 @@ function SplitButton({ panel }: { panel: PanelEntry }) {
 function usePanel(slot: Slot): PanelEntry | undefined {
   const open = useLayout((layout) => layout[slot]);
   return PANELS.find(({ id }) => id === open);
-}
-
-/** Whether the window is as narrow as a phone's. */
-function useNarrow(): boolean {
-  const [narrow, setNarrow] = useState(isNarrow);
-  useEffect(() => {
-    const look = () => setNarrow(isNarrow());
-    window.addEventListener("resize", look);
-    return () => window.removeEventListener("resize", look);
-  }, []);
-  return narrow;
 }

@@ -2,9 +2,9 @@ import { useComputedColorScheme } from "@mantine/core";
 import { useEffect, useMemo, useRef, useState, type RefObject } from "react";
 import { AutoFit, pixelOf, type MapView, type Point, type Size } from "../../lib/mapProjection.ts";
 import { link } from "../../link/link.ts";
-import { isNarrow } from "../../state/layout.ts";
 import { useGoals } from "../../state/orders.ts";
 import { baseFrame, useVehicles } from "../../state/vehicles.ts";
+import { useNarrow } from "../../state/useNarrow.ts";
 import { useWorldPlan, type WorldPlan } from "../../state/worldPlan.ts";
 import { FloatingTile } from "../FloatingTile.tsx";
 import { drawPlan, type PlanColours } from "./drawPlan.ts";
@@ -40,6 +40,7 @@ export default function MiniMap() {
   const [view, setView] = useState<MapView | null>(null);
   const [follows, setFollows] = useState(false);
   const [clickSends, setClickSends] = useState(false);
+  const narrow = useNarrow();
   const canvas = useRef<HTMLCanvasElement>(null);
   const shown = useRef<MapView | null>(null);
   const auto = useRef(new AutoFit());
@@ -58,8 +59,8 @@ export default function MiniMap() {
     <FloatingTile
       name="map"
       title="Map"
-      usual={isNarrow() ? BELOW_TOOLBAR : BESIDE_TOOLBAR}
-      mostShare={isNarrow() ? 0.65 : 1}
+      usual={narrow ? BELOW_TOOLBAR : BESIDE_TOOLBAR}
+      mostShare={narrow ? 0.65 : 1}
       aspect={1.25}
       actions={
         <MapButtons
