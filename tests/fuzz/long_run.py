@@ -17,6 +17,7 @@ import faulthandler
 import gc
 import random
 import resource
+import signal
 import sys
 import time
 import traceback
@@ -28,7 +29,7 @@ from mutation import Mutator  # noqa: E402
 from targets import BUILT, LOADED, TARGETS  # noqa: E402
 
 _HUNG_S = 120.0
-"""For a hundred checks; for each of those that fly, as for them in all, a hang is"""
+"""CPU time of a hundred checks (others may have the processor); of one check that flies:"""
 _FLIGHT_HUNG_S = 20.0
 _SLOW_S = 2.0
 _MOST_GROWTH_MB = 40.0
@@ -53,7 +54,7 @@ def run(name, seconds, checks, seed):
         if settled is None and (number > 0.1 * checks if checks else now > begin + 0.1 * seconds):
             settled = _resident_mb()
         if flies or number % 100 == 0:
-            faulthandler.dump_traceback_later(_FLIGHT_HUNG_S if flies else _HUNG_S, exit=True)
+            signal.setitimer(signal.ITIMER_PROF, _FLIGHT_HUNG_S if flies else _HUNG_S)
         began_s = time.process_time()  # others may have the processor meanwhile
         try:
             frames += check(Mutator(random_of(seed, name, number)))
@@ -62,7 +63,7 @@ def run(name, seconds, checks, seed):
             return f"{name}: check {number} of seed {seed} FAILED", False
         slowest_s = max(slowest_s, time.process_time() - began_s)
         number += 1
-    faulthandler.cancel_dump_traceback_later()
+    signal.setitimer(signal.ITIMER_PROF, 0.0)
     grown, taken_s = _resident_mb() - (settled or 0.0), time.monotonic() - begin
     well = slowest_s < (_FLIGHT_HUNG_S if flies else _SLOW_S) and grown < _MOST_GROWTH_MB
     return (
@@ -101,6 +102,7 @@ def main():
     parser.add_argument("--only", type=int, help="this check alone")
     options = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY_BYTES, _MOST_MEMORY_BYTES))
+    faulthandler.register(signal.SIGPROF, chain=True)  # where it hangs; then the process ends
     well = True
     names = [each for name in options.targets for each in _named(name)]
     for name in names:
