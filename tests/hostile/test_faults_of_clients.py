@@ -12,6 +12,7 @@ from whole_world import Client, leaves, nasty_values, offer_rosapi, put, whole_d
 
 from volery.core.errors import NodeError, ScenarioError
 from volery.graph.messages import String, message_type
+from volery.graph.node import Context, Node
 from volery.graph.zero import zero_message
 from volery.scenario.load import parse_scenario
 
@@ -127,6 +128,21 @@ def test_a_node_that_breaks_by_itself_still_ends_the_run(client):
     publisher.publish(String("x"))
     with pytest.raises((ZeroDivisionError, NodeError)):
         client.simulation.step(1)
+
+
+def test_a_node_that_breaks_later_on_a_clients_value_names_the_client(client):
+    """The run ends, as with every mistake of a node, and it is clear what brought it about."""
+    simulation = client.simulation
+    context = Context(simulation.graph, simulation._engine, lambda: simulation.time_ns)
+    node = Node("trusting", context=context)
+    kept = []
+    node.create_subscription(String, "/number", lambda message: kept.append(message.data))
+    node.create_timer(0.01, lambda: [int(text) for text in kept])
+    client.publish("/number", String("12"))
+    simulation.step(20)
+    client.publish("/number", String("nan"))
+    with pytest.raises(NodeError, match=r"trusting.*timer.*'nan'.*from stranger on /number"):
+        simulation.step(20)
 
 
 def test_a_service_that_breaks_names_itself_not_pythons_error(client, caplog):

@@ -83,6 +83,8 @@ class Node(ParameterMethods):
         self.__timers: list[Timer] = []
         self.__destroyed = False
         self.__busy_s = 0.0
+        self.__last_client = ""
+        """External client whose message was taken last, and its topic."""
         self.__thinker = (
             Thinker(node_name, context.latency_ns, context.timers, context.now_ns)
             if context.latency_ns
@@ -181,6 +183,9 @@ class Node(ParameterMethods):
         occasion = f"message on {name}{_name_of(callback)}"
 
         def receive(published: Published) -> None:
+            client = self._context.graph.acting_client
+            if client:
+                self.__last_client = f"{client} on {name}"
             self.__run(partial(callback, published.message), occasion)
 
         subscription: Subscription = self._context.graph.subscribe(
@@ -380,9 +385,10 @@ class Node(ParameterMethods):
     def __failure(self, error: Exception, occasion: str) -> NodeError:
         now_ns = self.__now_ns()
         what = str(error) if isinstance(error, VoleryError) else f"{type(error).__name__}: {error}"
+        client = f"; its last message of a client came from {self.__last_client}"
         failure = NodeError(
             f"node {self.full_name} failed at {now_ns / 1e9:.3f} s in its {occasion}: "
-            f"{what}{place_of(error)}",
+            f"{what}{place_of(error)}{client if self.__last_client else ''}",
             node=self.full_name,
             time_ns=now_ns,
         )
