@@ -12,6 +12,7 @@ from ros_tcp_client import frame
 
 from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.wire import FrameParser
+from volery.bridges.rosbridge.bulk_turns import BulkTurns
 from volery.bridges.rosbridge.conversation import Bell, converse, post_to
 from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
 from volery.core.errors import GraphError
@@ -142,7 +143,7 @@ def test_rosbridge_reads_on_when_the_simulation_has_taken_enough(monkeypatch):
         loop = asyncio.get_running_loop()
         bell, session = Bell(loop), graph.gateway.open("flood")
         peer = RosbridgePeer(session, Shared(), wake=bell.ring, post=post_to(loop))
-        talk = asyncio.create_task(converse(flood, bell, peer))
+        talk = asyncio.create_task(converse(flood, bell, peer, BulkTurns()))
         while flood.read <= MAX_WAITING - 2:
             await asyncio.sleep(0.001)
         for _ in range(50):
@@ -167,7 +168,7 @@ def test_rosbridge_reads_no_more_of_a_client_over_its_share(monkeypatch):
         peer = RosbridgePeer(
             graph.gateway.open("flood"), Shared(), wake=bell.ring, post=post_to(loop)
         )
-        talk = asyncio.create_task(converse(flood, bell, peer))
+        talk = asyncio.create_task(converse(flood, bell, peer, BulkTurns()))
         for _ in range(50):
             await asyncio.sleep(0.001)
         talk.cancel()

@@ -100,7 +100,7 @@ async def _serve(
         authorized=True,
         gate=gate,
     )
-    conversation = asyncio.create_task(converse(channel, bell, peer))
+    conversation = asyncio.create_task(converse(channel, bell, peer, world.bulk))
     client = Client(channel, conversation)
     site.clients.add(client)
     try:

@@ -12,6 +12,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Protocol
 
+from volery.bridges.rosbridge.bulk_turns import BulkTurns
 from volery.bridges.rosbridge.conversation import SERVICE_RESTART, Channel
 from volery.bridges.rosbridge.forms import Forms
 from volery.bridges.rosbridge.protocol import Shared
@@ -76,6 +77,7 @@ class JoinedWorld:
         self.scenario: Scenario | None = getattr(world, "scenario", None)
         self.pilots: Pilots | None = getattr(world, "pilots", None)
         self.shared = Shared(Forms("ros2"), graph.now_ns)
+        self.bulk = BulkTurns()
         self._world = world
         self._rosapi = RosApi(world.gateway, "ros2", graph.now_ns)
         self._rosapi.start()

@@ -1,6 +1,6 @@
 """One client's WebSocket, whoever serves it: its frames to its peer, what that says back to it.
 
-await converse(channel, bell, peer)
+await converse(channel, bell, peer, bulk)
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from contextlib import suppress
 from typing import Any, Protocol
 
 from volery.bridges.doors import wake_of
+from volery.bridges.rosbridge.bulk_turns import TURN_S, BulkTurns, Writer
 from volery.bridges.rosbridge.checkpoint import Checkpoint
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.wire import Frame
@@ -23,8 +24,6 @@ SERVICE_RESTART = 1012
 
 _LONGEST_SILENCE_S = 10.0
 """Time a client has to show its token."""
-_TURN_S = 0.3e-3
-"""CPU time of frames read or sent before other clients get their turn, though there are more."""
 
 
 class Channel(Protocol):
@@ -38,20 +37,6 @@ class Channel(Protocol):
 
     async def close(self, code: int = ..., reason: str = ...) -> None:
         """Take leave."""
-
-
-class Turns:
-    """Lets other clients have their turn in the loop after each `_TURN_S` that this one takes."""
-
-    def __init__(self) -> None:
-        self._spent_s = 0.0
-
-    async def spend(self, cost_s: float) -> None:
-        """Adds what a frame has cost."""
-        self._spent_s += cost_s
-        if self._spent_s >= _TURN_S:
-            self._spent_s = 0.0
-            await asyncio.sleep(0)
 
 
 class Bell:
@@ -84,22 +69,29 @@ def post_to(loop: asyncio.AbstractEventLoop) -> Callable[[Callable[[], Any]], No
 
 
 async def converse(
-    channel: Channel, bell: Bell, peer: RosbridgePeer, checkpoint: Checkpoint | None = None
+    channel: Channel,
+    bell: Bell,
+    peer: RosbridgePeer,
+    bulk: BulkTurns,
+    checkpoint: Checkpoint | None = None,
 ) -> Exception | None:
     """Serve a client until it leaves or must go, then close its peer.
 
-    bell: what the peer's `wake` rings. checkpoint: of a client that must show a token. Returns what
-    ended the service unless that was its own end: mostly that the connection was closed.
+    bell: what the peer's `wake` rings. bulk: turns of all clients of this loop. checkpoint: of a
+    client that must show a token. Returns what ended the service unless that was its own end:
+    mostly that the connection was closed.
     """
     read = asyncio.Event()
+    writer = Writer(bulk)
     tasks = [
         asyncio.create_task(_read(channel, peer, read, checkpoint)),
-        asyncio.create_task(_write(channel, peer, bell, read)),
+        asyncio.create_task(_write(channel, peer, bell, writer, read)),
     ]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
         peer.close()
+        writer.close()
         for task in tasks:
             task.cancel()
         outcomes = await asyncio.gather(*tasks, return_exceptions=True)
@@ -110,7 +102,7 @@ async def _read(
     channel: Channel, peer: RosbridgePeer, read: asyncio.Event, checkpoint: Checkpoint | None
 ) -> None:
     """Hand the client's frames to its peer until it leaves or must go."""
-    turns = Turns()
+    spent_s = 0.0
     while peer.refused is None:
         silence_s = None if peer.authorized else _LONGEST_SILENCE_S
         try:
@@ -125,8 +117,10 @@ async def _read(
         else:
             await checkpoint.receive(peer, frame)
             peer.reading.begin()  # the checkpoint lets others have their turn
-        cost_s = peer.reading.end(1, len(frame))
-        await turns.spend(cost_s)  # `recv` does not wait where a frame is there
+        spent_s += peer.reading.end(1, len(frame))
+        if spent_s >= TURN_S:  # `recv` does not wait where a frame is there
+            spent_s = 0.0
+            await asyncio.sleep(0)
         while (pause_s := peer.reading.pause_s()) and peer.refused is None:
             await asyncio.sleep(pause_s)
         while peer.congested:  # it asks for more than it reads
@@ -137,11 +131,13 @@ async def _read(
     await channel.close(POLICY_VIOLATION, peer.refused[:100])
 
 
-async def _write(channel: Channel, peer: RosbridgePeer, bell: Bell, read: asyncio.Event) -> None:
+async def _write(
+    channel: Channel, peer: RosbridgePeer, bell: Bell, turns: Writer, read: asyncio.Event
+) -> None:
     """Send what the peer has to say, as fast as the client reads."""
-    turns = Turns()
     while True:
         bell.silence()
+        await turns.begin()
         frames = peer.frames(time.monotonic())
         while True:
             frame, cost_s = _next(peer, frames)

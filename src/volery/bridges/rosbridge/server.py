@@ -16,6 +16,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from volery.bridges.origins import Origins
+from volery.bridges.rosbridge.bulk_turns import BulkTurns
 from volery.bridges.rosbridge.checkpoint import Checkpoint
 from volery.bridges.rosbridge.conversation import Bell, converse, post_to
 from volery.bridges.rosbridge.first_message import GuardedConnection, guarded
@@ -118,6 +119,7 @@ class RosbridgeServer:
         """Clients whose request for a connection carried the token."""
         self._gateway: Gateway | None = None
         self._shared = Shared()
+        self._bulk = BulkTurns()
 
     @property
     def name(self) -> str:
@@ -257,7 +259,7 @@ class RosbridgeServer:
         if peer.authorized:
             prove()
         try:
-            trouble = await converse(connection, bell, peer, checkpoint)
+            trouble = await converse(connection, bell, peer, self._bulk, checkpoint)
         finally:
             self._clients.discard(connection)
         if trouble is not None and not isinstance(trouble, ConnectionClosed):

@@ -1,0 +1,87 @@
+"""Turns of the clients that are sent much, so that one that is sent little hardly waits.
+
+A loop of asyncio runs whatever is ready, in order: an answer to one client waits, several times on
+its way, until each of fifty others has been sent the messages that it subscribed to. Clients that
+cost more than their share write in turn here, a few in each round of the loop, which never idles
+for it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable
+
+TURN_S = 0.3e-3
+"""CPU time of frames read or sent before other clients get their turn, though there are more."""
+TURNS_A_ROUND = 6
+"""Clients sent much that write in one round of the loop."""
+FRACTION = 0.5
+"""Of the loop's time that all clients share equally; a client that costs more is sent much."""
+CREDIT_S = 0.5e-3
+"""What it may cost in advance."""
+_MOST_OWED_S = 0.01
+
+
+class BulkTurns:
+    """A line of the clients of one loop."""
+
+    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
+        self.now_s = now_s
+        self.num_clients = 0
+        self._waiting: deque[asyncio.Future[None]] = deque()
+        self._is_granting = False
+
+    async def turn(self) -> None:
+        """Waits for this client's turn."""
+        loop = asyncio.get_running_loop()
+        mine = loop.create_future()
+        self._waiting.append(mine)
+        if not self._is_granting:
+            self._is_granting = True
+            loop.call_soon(self._grant, loop)
+        await mine
+
+    def _grant(self, loop: asyncio.AbstractEventLoop) -> None:
+        for _ in range(min(TURNS_A_ROUND, len(self._waiting))):
+            next_one = self._waiting.popleft()
+            if not next_one.done():  # it has not been cancelled
+                next_one.set_result(None)
+        self._is_granting = bool(self._waiting)
+        if self._is_granting:
+            loop.call_soon(self._grant, loop)
+
+
+class Writer:
+    """Turns of one client that is written to."""
+
+    def __init__(self, bulk: BulkTurns) -> None:
+        self._bulk = bulk
+        self._spent_s = 0.0
+        self._owed_s = 0.0
+        self._last_s = bulk.now_s()
+        bulk.num_clients += 1
+
+    def close(self) -> None:
+        """The client is written to no more."""
+        self._bulk.num_clients -= 1
+
+    async def begin(self) -> None:
+        """Waits until the client may be written to."""
+        if self._is_sent_much():
+            await self._bulk.turn()
+
+    async def spend(self, cost_s: float) -> None:
+        """Notes what a frame has cost; waits where it is the turn of others."""
+        self._owed_s = min(self._owed_s + cost_s, _MOST_OWED_S)
+        self._spent_s += cost_s
+        if self._spent_s >= TURN_S:
+            self._spent_s = 0.0
+            await (self._bulk.turn() if self._is_sent_much() else asyncio.sleep(0))
+
+    def _is_sent_much(self) -> bool:
+        now_s = self._bulk.now_s()
+        paid_s = (now_s - self._last_s) * FRACTION / self._bulk.num_clients
+        self._owed_s, self._last_s = max(0.0, self._owed_s - paid_s), now_s
+        return self._owed_s > CREDIT_S
