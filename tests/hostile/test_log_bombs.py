@@ -262,6 +262,17 @@ def test_a_ros2_bag_of_views_is_refused(tmp_path):
         open_source(path)
 
 
+def test_a_ros2_bag_whose_tables_have_no_readable_names_is_refused(tmp_path):
+    path = tmp_path / "damaged.db3"
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY)")
+        base.commit()
+    data = path.read_bytes().replace(b"messagesmessages", b"mes\xe4agesmessages")
+    path.write_bytes(data.replace(b"CREATE TABLE", b"CREATE TABEL"))
+    with pytest.raises(RecordingError, match="no bag of ROS 2"):
+        open_source(path)
+
+
 @pytest.mark.parametrize("line", ["compression_mode: FILE", "storage_identifier: mcap"])
 def test_a_ros2_bag_that_others_would_unpack_is_refused(tmp_path, line):
     (tmp_path / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  {line}\n")

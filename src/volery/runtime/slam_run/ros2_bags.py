@@ -119,5 +119,9 @@ def _check_files(path: Path) -> None:
                 ).fetchone()
         except sqlite3.Error:
             continue  # the reader says why
+        except UnicodeDecodeError:  # in the text of SQLite's own error
+            raise RecordingError(
+                f"{file}: the tables are damaged; this is no bag of ROS 2"
+            ) from None
         if odd:
             raise RecordingError(f"{file}: '{odd[0]}' is no plain table; this is no bag of ROS 2")
