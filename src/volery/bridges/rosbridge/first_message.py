@@ -1,4 +1,4 @@
-"""Connections that take little until their client has shown the token.
+"""Connections that take little until their client has shown the token, and few frames at any time.
 
 The first message may be short only: a longer one is refused by the length that it announces. Behind
 it nothing is read before the server has looked at it, whatever it holds. So a client may send large
@@ -8,16 +8,19 @@ messages right behind its token, and one without a token fills no memory.
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+from typing import Any, cast
 
 from websockets.asyncio.server import ServerConnection
+from websockets.exceptions import ProtocolError
 from websockets.frames import Frame, Opcode
 
+from volery.bridges.frame_limits import MAX_FRAGMENTS, FrameLimits, HeldTransport
 from volery.bridges.rosbridge.message_budget import MAX_UNAUTHORIZED_BYTES
 
 _READ_BYTES = 32 << 10
 """At once: all frames in it are cut before anybody else has a turn. Of asyncio's 256 KiB, full of
 small frames, others would have to wait for a tenth of a second."""
+_CONTROL = (Opcode.PING, Opcode.PONG)
 _MESSAGES = (Opcode.TEXT, Opcode.BINARY, Opcode.CONT)
 
 
@@ -31,7 +34,8 @@ class GuardedConnection(ServerConnection):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        self._recv_frame = self.protocol.recv_frame
+        self._recv_unbounded = self.protocol.recv_frame
+        self.protocol.recv_frame = self._recv_frame  # type: ignore[method-assign]
         if self.has_token:
             self.protocol.max_message_size = MAX_UNAUTHORIZED_BYTES
             self.protocol.recv_frame = self._recv_first  # type: ignore[method-assign]
@@ -39,12 +43,37 @@ class GuardedConnection(ServerConnection):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Read in small pieces; as of asyncio."""
         transport.max_size = _READ_BYTES  # type: ignore[attr-defined]
-        super().connection_made(transport)
+        self._held = HeldTransport(cast("asyncio.Transport", transport))
+        self._limits = FrameLimits(self._held, self.loop)
+        super().connection_made(cast("asyncio.BaseTransport", self._held))
+
+    def resume_writing(self) -> None:
+        """As of asyncio: the client has read."""
+        super().resume_writing()
+        self._limits.answers_read()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """As of asyncio."""
+        self._held.end()
+        super().connection_lost(exc)
 
     def allow(self) -> None:
         """Take messages of any size that the server takes: the client has shown the token."""
         self._unguard()
         self.transport.resume_reading()
+
+    def _recv_frame(self, frame: Frame) -> None:
+        """Raises `ProtocolError`, and so ends the connection, beyond a number of fragments."""
+        if frame.opcode is Opcode.CONT:
+            if not self._limits.fragment():
+                raise ProtocolError(f"more than {MAX_FRAGMENTS} fragments")
+        elif frame.opcode in _CONTROL:
+            self._limits.control_frame()
+            if frame.opcode is Opcode.PING and self.paused:
+                self._limits.unread_answer()
+        else:
+            self._limits.message()
+        self._recv_unbounded(frame)
 
     def _recv_first(self, frame: Frame) -> None:
         self._recv_frame(frame)

@@ -1,4 +1,4 @@
-"""The page's server under floods: frames that are no messages, and requests without an end.
+"""Servers of the web under floods: frames that are no messages, and requests without an end.
 
 A flood ends where the server reads no more of it, which is seen by a socket that takes no more.
 """
@@ -19,19 +19,22 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import Opcode
 from websockets.sync.client import connect
 
-from volery.core.listener import MAX_UNPROVEN
-from volery.runtime.lobby import Lobby
-from volery.server import websocket_protocol
-from volery.server.http_protocol import READ_BYTES
-from volery.server.websocket_protocol import (
+from volery.bridges import frame_limits
+from volery.bridges.doors import Doors
+from volery.bridges.frame_limits import (
     FRAMES_PER_S,
     MAX_FRAGMENTS,
     MAX_FRAMES_AHEAD,
+    FrameLimits,
     HeldTransport,
-    PageWebSocket,
 )
+from volery.bridges.rosbridge.server import RosbridgeServer
+from volery.core.listener import MAX_UNPROVEN
+from volery.runtime.lobby import Lobby
+from volery.server.http_protocol import READ_BYTES
 
 sys.path.append(str(Path(__file__).parents[1] / "unit" / "server"))
+from live_graph import LiveGraph
 from page_bench import ask, serving
 
 STALL_S = 1.0
@@ -50,6 +53,29 @@ UPGRADE = (
 def server():
     with serving(Lobby(lambda _: None)) as server:
         yield server
+
+
+@pytest.fixture(scope="module")
+def rosbridge():
+    live = LiveGraph()
+    with Doors(live.gateway) as doors:
+        server = RosbridgeServer(port=0)
+        doors.open(server)
+        yield server
+    live.close()
+
+
+@pytest.fixture(params=["page", "rosbridge"])
+def either(request, server, rosbridge):
+    """A server of WebSockets."""
+    return {"page": server, "rosbridge": rosbridge}[request.param]
+
+
+def serves(server):
+    """Whether another client is answered."""
+    with connect(f"ws://127.0.0.1:{server.port}/rosbridge") as client:
+        client.send('{"op": "call_service", "service": "/nobody", "id": "1"}')
+        return "nobody" in client.recv(20.0)
 
 
 def frame(opcode, payload=b"", *, fin=True):
@@ -102,25 +128,25 @@ FLOODS = {
 
 @pytest.mark.parametrize("reads", [True, False])
 @pytest.mark.parametrize("kind", FLOODS)
-def test_floods_of_frames_are_not_read(server, monkeypatch, kind, reads):
-    monkeypatch.setattr(websocket_protocol, "FRAMES_PER_S", 10.0)  # a hold takes seconds
-    with upgraded(server) as stranger:
+def test_floods_of_frames_are_not_read(either, monkeypatch, kind, reads):
+    monkeypatch.setattr(frame_limits, "FRAMES_PER_S", 10.0)  # a hold takes seconds
+    with upgraded(either) as stranger:
         stranger.sendall(frame(Opcode.TEXT, fin=False))
         assert flood(stranger, FLOODS[kind], reads=reads) < BUFFERS_BYTES
-        assert ask(server, "/api/status").status == 200
-    assert ask(server, "/api/status").status == 200
+        assert serves(either)
+    assert serves(either)
 
 
-def test_a_message_of_too_many_fragments_ends_the_connection(server):
-    with connect(f"ws://127.0.0.1:{server.port}/rosbridge") as stranger:
+def test_a_message_of_too_many_fragments_ends_the_connection(either):
+    with connect(f"ws://127.0.0.1:{either.port}/rosbridge") as stranger:
         with suppress(ConnectionClosed):
             stranger.send("x" for _ in range(MAX_FRAGMENTS + 2))
         with pytest.raises(ConnectionClosed, match="fragments"):
             stranger.recv(20.0)
 
 
-def test_honest_clients_ping_and_send_fragments(server):
-    with connect(f"ws://127.0.0.1:{server.port}/rosbridge") as client:
+def test_honest_clients_ping_and_send_fragments(either):
+    with connect(f"ws://127.0.0.1:{either.port}/rosbridge") as client:
         for answered in [client.ping() for _ in range(200)]:
             assert answered.wait(20.0)
         text = '{"op": "call_service", "service": "/nobody", "id": "1"}'
@@ -155,21 +181,21 @@ def test_frames_are_counted_over_time():
             pass
 
     closing_handle, loop, transport = Handle(), Loop(), Transport()
-    protocol = PageWebSocket.__new__(PageWebSocket)
-    protocol.loop, protocol._held = loop, HeldTransport(transport)
+    held = HeldTransport(transport)
+    limits = FrameLimits(held, loop)
     for _ in range(5 * MAX_FRAMES_AHEAD):
         loop.now_s += 1.0 / FRAMES_PER_S
-        protocol._count_frame()
+        limits.control_frame()
         assert transport.reads
     for _ in range(MAX_FRAMES_AHEAD + 10):
-        protocol._count_frame()
+        limits.control_frame()
     assert not transport.reads
-    protocol._held.pause_reading()
+    held.pause_reading()
     due_s, call, arguments = loop.due
     assert due_s - loop.now_s == pytest.approx(11.0 / FRAMES_PER_S, rel=0.2)
     call(*arguments)
     assert not transport.reads  # the server has not taken the last message
-    protocol._held.resume_reading()
+    held.resume_reading()
     assert transport.reads
 
 
