@@ -1,5 +1,6 @@
 """Wall time that only waiting moves: what paces a run is tested without a machine's load in it."""
 
+import time
 from types import SimpleNamespace
 
 
@@ -8,7 +9,7 @@ class FakeWallClock:
 
     def __init__(self):
         self.now_s = 100.0
-        self.time = SimpleNamespace(perf_counter=lambda: self.now_s)
+        self.time = SimpleNamespace(perf_counter=lambda: self.now_s, thread_time=time.thread_time)
         """In the place of the module `time`."""
 
     def wait(self, timeout_s):
