@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import signal
 import socket
 import subprocess
 import sys
@@ -96,7 +94,7 @@ def fly_with_node_outside():
             return digests(run.communicate(timeout=HANG_S)[0])
         finally:
             run.kill()
-            os.kill(node.pid, signal.SIGINT)
+            node.terminate()
             node.wait(HANG_S)
 
 
