@@ -11,8 +11,8 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-_THRESHOLDS = (700, 10, 30)
-"""Those of Python, but for full collections, which come a third as often."""
+_THRESHOLDS = (700, 10, 100)
+"""Those of Python, but for full collections, which come a tenth as often."""
 
 
 @contextmanager

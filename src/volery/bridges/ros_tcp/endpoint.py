@@ -28,6 +28,7 @@ from volery.core.preamble import Preamble
 from volery.core.waiting_room import look_at_binary
 from volery.graph.mailbox import Wake
 from volery.graph.qos import DEFAULT_DEPTH
+from volery.graph.ros1 import ros1_codec
 from volery.graph.session import Gateway
 
 SILENCE_S = 15.0
@@ -91,6 +92,8 @@ class RosTcpEndpoint:
     async def start(self, gateway: Gateway) -> None:
         """Listen. `BridgeError` where the port is in use or the host is not ours."""
         loop = asyncio.get_running_loop()
+        if self._generation == "ros1":
+            ros1_codec()  # which takes a while to load: not when the first client comes
         greeting = ros_tcp.handshake(self._generation, FEATURES)
         self._listener = _listen(self._host, self.port, greeting)
         self.port = self._listener.getsockname()[1]
