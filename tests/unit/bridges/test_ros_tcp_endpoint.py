@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import socket
 import struct
 import threading
 import time
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -479,7 +481,25 @@ def test_the_half_open_are_noticed_by_their_silence(loop, serve, connect):
     assert silent.ended.is_set()
     assert not mute.ended.is_set()  # it never promised to send any
     assert not lively.ended.is_set()
-    assert len(loop.gateway.sessions()) == 1  # of the one that has spoken
+    until(lambda: len(loop.gateway.sessions()) == 1)  # of the one that has spoken
+
+
+def test_a_client_that_leaves_within_a_message_leaves_no_memory(serve, connect):
+    """At once: the garbage collector comes by rarely."""
+    head = struct.pack("<I", 6) + b"/large" + struct.pack("<I", 20_000_000)
+    port = serve().port
+    gc.disable()
+    tracemalloc.start()
+    try:
+        for _ in range(3):
+            client = connect(port)
+            client.sock.sendall(head + bytes(100_000))
+            until(lambda: tracemalloc.get_traced_memory()[0] > 20_000_000)
+            client.close()
+            until(lambda: tracemalloc.get_traced_memory()[0] < 10_000_000)
+    finally:
+        tracemalloc.stop()
+        gc.enable()
 
 
 def test_a_client_comes_back(loop, serve, connect):

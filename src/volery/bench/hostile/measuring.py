@@ -154,7 +154,7 @@ def _wait_until_open(process: subprocess.Popen[bytes], port: int) -> None:
 
 
 def _wait_until_answered(port: int) -> None:
-    """Until a witness gets its answers: kernels are compiled, and what happens once has happened."""
+    """Until a witness gets its answers: kernels are compiled, what happens once has happened."""
     ends = time.monotonic() + _START_S
     while time.monotonic() < ends:
         if len(_result(_start("witness", port, _LEAD_S), _LEAD_S)) * PERIOD_S > 0.9 * _LEAD_S:

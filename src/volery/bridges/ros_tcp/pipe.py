@@ -127,6 +127,7 @@ class Pipe:
         self._loop.remove_writer(self._sock)
         self._sock.close()
         self._unsent.clear()
+        self.parser.end()
         self._closed(reason)
 
     def _readable(self) -> None:

@@ -113,6 +113,10 @@ class FrameParser:
             frames += self.written(count)
         return frames
 
+    def end(self) -> None:
+        """Forgets a frame that is not whole: no more bytes come. Its memory is free at once."""
+        self._apart = None
+
     def _advance(self, frames: list[Frame]) -> bool:
         """Read the next part of a frame; False where bytes are missing."""
         if self._destination_bytes is None:
