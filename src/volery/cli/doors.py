@@ -173,12 +173,14 @@ def _px4_instances(simulation: Any, doors: list[Door], options: RunOptions) -> I
     if options.px4_dir is None:
         yield
         return
+    from volery.cli.px4 import parameters_for
     from volery.mavlink.px4_door import Px4Door
     from volery.mavlink.px4_processes import Px4Instances, find_px4
 
     build, count = find_px4(options.px4_dir), len(simulation.uav_names)
+    parameters = [parameters_for(uav.airframe) for uav in simulation.uavs.values()]
     door = next(door for door in doors if isinstance(door, Px4Door))
-    with Px4Instances(build, count, speed=options.speed) as instances:
+    with Px4Instances(build, count, speed=options.speed, parameters=parameters) as instances:
         typer.echo(f"started {build.binary}, instances 0 to {count - 1}", err=True)
         end_s = time.monotonic() + _LONGEST_START_S
         while len(door.connected) < count:

@@ -250,6 +250,10 @@ def px4(
     speed: Annotated[
         float | None, typer.Option(min=0.01, help="Factor of real time, for PX4's time-outs.")
     ] = None,
+    airframe: Annotated[
+        str | None,
+        typer.Option(help="Fit PX4 to this airframe, by name or .toml file, not to its own Iris."),
+    ] = None,
 ) -> None:
     """Run PX4s for a simulation with `--door px4`, until Ctrl-C.
 
@@ -258,7 +262,15 @@ def px4(
     """
     from volery.cli.px4 import run_px4
 
-    run_px4(px4_dir, count, first=first, host=host, folder=folder, speed=speed)
+    run_px4(
+        px4_dir,
+        count,
+        first=first,
+        host=host,
+        folder=folder,
+        speed=speed,
+        airframe=airframe,
+    )
 
 
 @guarded

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Mapping
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
 
 import typer
 
 from volery.cli.interrupt import StopSignals
 from volery.core.errors import BridgeError
+from volery.mavlink.px4_parameters import Px4Airframe, Px4Rotor, px4_parameters
 from volery.mavlink.px4_processes import Px4Instances, find_px4
+
+if TYPE_CHECKING:
+    from volery.vehicle.airframe import Airframe
 
 _LOOK_S = 0.5
 
@@ -23,8 +29,12 @@ def run_px4(
     host: str,
     folder: Path | None,
     speed: float | None,
+    airframe: str | None = None,
 ) -> None:
-    """Run instances until a signal ends them; `BridgeError` where one cannot start or ends."""
+    """Run instances until a signal ends them; `BridgeError` where one cannot start or ends.
+
+    airframe: name or file of the one that all of them fly; None: PX4's own Iris.
+    """
     ended = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:
@@ -33,9 +43,18 @@ def run_px4(
         ended.set()
 
     build = find_px4(px4_dir)
+    parameters = [] if airframe is None else [_parameters_of(airframe)] * count
     with (
         StopSignals(end),
-        Px4Instances(build, count, first=first, host=host, folder=folder, speed=speed) as instances,
+        Px4Instances(
+            build,
+            count,
+            first=first,
+            host=host,
+            folder=folder,
+            speed=speed,
+            parameters=parameters,
+        ) as instances,
     ):
         last = first + count - 1
         typer.echo(f"started {build.binary}, instances {first} to {last}; Ctrl-C ends them")
@@ -43,3 +62,27 @@ def run_px4(
             pass
         if instances.failure is not None:
             raise BridgeError(instances.failure)
+
+
+def parameters_for(airframe: Airframe) -> Mapping[str, float]:
+    """Returns PX4's parameters that fit an airframe; BridgeError where PX4 cannot fly it."""
+    import numpy as np
+
+    from volery.vehicle.airframe import hover_thrusts
+
+    rotors = airframe.rotors
+    speeds = np.sqrt(hover_thrusts(airframe) / rotors.thrust_n_s2)
+    return px4_parameters(
+        Px4Airframe(
+            [Px4Rotor(place.position_m, place.axis, place.direction) for place in rotors.places],
+            rotors.torque_m,
+            float(speeds.mean()) / rotors.max_speed_rad_s,
+            airframe.limits.tilt_deg,
+        )
+    )
+
+
+def _parameters_of(name: str) -> Mapping[str, float]:
+    from volery.vehicle.airframe import load_airframe
+
+    return parameters_for(load_airframe(name))

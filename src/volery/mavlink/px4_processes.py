@@ -17,7 +17,7 @@ import signal
 import subprocess
 import tempfile
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -78,6 +78,8 @@ class Px4Instances:
     Instance i has the system id i + 1 and connects to `host` at port 4560 + i.
     folder: where each has a folder of its own for parameters and logs, which stays; None: one that
     is removed in the end. speed: factor of real time that its time-outs of radio links allow for.
+    parameters: PX4's parameters of each instance; those that the environment sets as
+    `PX4_PARAM_NAME` come first.
     """
 
     def __init__(
@@ -89,6 +91,7 @@ class Px4Instances:
         host: str = "127.0.0.1",
         folder: Path | None = None,
         speed: float | None = None,
+        parameters: Sequence[Mapping[str, float]] = (),
     ) -> None:
         if count < 1 or first < 0 or first + count > MOST_INSTANCES:
             last = MOST_INSTANCES - 1
@@ -96,6 +99,7 @@ class Px4Instances:
         self._build = build
         self._numbers = range(first, first + count)
         self._environment = _environment(host, speed)
+        self._parameters = tuple(parameters) or ({},) * count
         self._kept = folder
         self._folder = Path()
         self._instances: list[_Instance] = []
@@ -108,8 +112,9 @@ class Px4Instances:
         """Start all of them. `BridgeError` where that is not possible."""
         self._folder = self._kept or Path(tempfile.mkdtemp(prefix="volery-px4-"))
         try:
-            for number in self._numbers:
-                instance = _Instance(self._build, number, self._folder, self._environment)
+            for number, own in zip(self._numbers, self._parameters, strict=True):
+                environment = {**_parameter_variables(own), **self._environment}
+                instance = _Instance(self._build, number, self._folder, environment)
                 self._instances.append(instance)
                 instance.start()
         except OSError as error:
@@ -248,6 +253,11 @@ def _environment(host: str, speed: float | None) -> dict[str, str]:
     if speed not in (None, 1.0):  # PX4's script needs the program bc for it
         kept["PX4_SIM_SPEED_FACTOR"] = f"{speed:g}"
     return kept
+
+
+def _parameter_variables(parameters: Mapping[str, float]) -> dict[str, str]:
+    """Variables by which PX4's start script sets parameters."""
+    return {f"PX4_PARAM_{name}": f"{value:g}" for name, value in parameters.items()}
 
 
 def established_ports() -> frozenset[int] | None:

@@ -120,10 +120,13 @@ def test_integral_stands_still_while_it_would_push_further():
 
 def test_own_limits_of_the_integral_follow_the_drag():
     data = F450.model_dump()
-    data["rotors"]["drag_n_s2_m"] = 0.0
-    slick = gains_of(Airframe.model_validate(data), 1e-3)["integral_limit"][0]
-    assert slick == pytest.approx(0.3 * GRAVITY)
-    assert gains_of(F450, 1e-3)["integral_limit"][0] > 6.0  # N/kg: 6 m/s of wind push with 7
+    found = []
+    for drag in (0.0, 1.75e-4, 4e-4, 1e-3):  # N s2/m, of each rotor
+        data["rotors"]["drag_n_s2_m"] = drag
+        found.append(gains_of(Airframe.model_validate(data), 1e-3)["integral_limit"][0])
+    wind = 4 * 4e-4 * 769.6 / F450.body.mass_kg * F450.limits.speed_m_s
+    wanted = [0.3 * GRAVITY, 0.3 * GRAVITY, wind, 0.8 * GRAVITY]
+    np.testing.assert_allclose(found, wanted, rtol=1e-4)
 
 
 @pytest.mark.parametrize("goal", [(0.3, 0, 0), (4, -3, 1), (60, 80, -30), (0, 0, 15), (-2, 0, 0)])

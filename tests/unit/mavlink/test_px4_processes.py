@@ -13,6 +13,7 @@ from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
 from volery.mavlink.px4_door import Px4Door
 from volery.mavlink.px4_processes import FIRST_PORT, Px4Instances, established_ports, find_px4
+from volery.vehicle.airframe import load_airframe
 
 NUMBER = 187
 """Of instances, so that their ports are nobody's."""
@@ -69,6 +70,30 @@ def test_an_instance_connects_and_ends(tmp_path, simulator):
     assert said == f"none_iris 127.0.0.1 ['-d', '{build / 'etc'}']\n"
 
 
+TELLS_PARAMETERS = """
+import os, time
+for name in sorted(os.environ):
+    if name.startswith("PX4_"):
+        print(name, os.environ[name], flush=True)
+"""
+
+
+def test_each_instance_gets_its_parameters_and_the_environments_come_first(tmp_path, monkeypatch):
+    make_px4(tmp_path, TELLS_PARAMETERS)
+    monkeypatch.setenv("PX4_PARAM_MPC_THR_HOVER", "0.6")
+    monkeypatch.setenv("PX4_HOME_LAT", "47.0")
+    own = [{"CA_ROTOR_COUNT": 4, "MPC_THR_HOVER": 0.7}, {"CA_ROTOR0_PX": -0.159}]
+    kept = tmp_path / "kept"
+    with Px4Instances(find_px4(tmp_path), 2, first=NUMBER, folder=kept, parameters=own) as all_of:
+        assert all_of.wait(20.0)
+    said = [(kept / f"instance_{NUMBER + k}/output.txt").read_text() for k in range(2)]
+    assert "PX4_PARAM_CA_ROTOR_COUNT 4\n" in said[0]
+    assert "PX4_PARAM_MPC_THR_HOVER 0.6\n" in said[0]
+    assert "ROTOR0" not in said[0]
+    assert "PX4_PARAM_CA_ROTOR0_PX -0.159\nPX4_PARAM_MPC_THR_HOVER 0.6\n" in said[1]
+    assert "HOME_LAT" not in said[0] + said[1]
+
+
 @pytest.mark.skipif(established_ports() is None, reason="this system does not tell connections")
 def test_one_that_lost_its_simulation_begins_anew(tmp_path, simulator):
     make_px4(tmp_path, CONNECTS)
@@ -123,7 +148,8 @@ time.sleep(1000)
 def test_one_that_never_connects_is_told_with_its_last_words(tmp_path, monkeypatch):
     make_px4(tmp_path, HANGS)
     monkeypatch.setattr("volery.cli.doors._LONGEST_START_S", 1.0)
-    simulation = SimpleNamespace(uav_names=["uav1"])
+    uav = SimpleNamespace(airframe=load_airframe("f450"))
+    simulation = SimpleNamespace(uav_names=["uav1"], uavs={"uav1": uav})
     options = RunOptions("hover", px4_dir=tmp_path)
     with (
         pytest.raises(BridgeError) as error,

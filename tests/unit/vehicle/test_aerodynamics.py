@@ -122,7 +122,7 @@ def fly_on_without(airframe, rotor, seconds=12.0):
 def test_a_hexarotor_flies_on_without_a_rotor_and_a_quadrotor_does_not():
     """Allocation stays nominal; the integrals of the rate loop find the new trim."""
     low, far = fly_on_without(ring(6), 1)
-    assert low > 99.0, (low, far)
-    assert far < 2.0, (low, far)
+    assert low > 98.5, (low, far)
+    assert far < 3.5, (low, far)
     low, _ = fly_on_without(F450, 1)
     assert low < 50.0

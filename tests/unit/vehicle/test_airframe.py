@@ -26,13 +26,13 @@ def write(tmp_path, edit):
     return path
 
 
-def test_f450_is_openuavs():
+def test_f450_is_openuavs_but_for_its_drag():
     f450 = load_airframe("f450")
     assert airframe_names()[0] == "f450" or "f450" in airframe_names()
     assert f450.body.mass_kg == pytest.approx(2.0 + 0.045 + 0.02)
     assert f450.body.inertia_kg_m2 == (0.0337, 0.0337, 0.0185)
     assert f450.rotors.thrust_n_s2 == 8.54858e-6
-    assert f450.rotors.drag_n_s2_m == 8.06428e-4
+    assert f450.rotors.drag_n_s2_m == 1.75e-4
     assert f450.rotors.max_speed_rad_s == 1100.0
     assert f450.max_rotor_thrust * 4 / f450.weight == pytest.approx(2.04, abs=0.01)
     assert np.sqrt(hover_thrusts(f450) / f450.rotors.thrust_n_s2) == pytest.approx(770, abs=1)
@@ -74,7 +74,7 @@ def test_own_file_beside_the_scenario(tmp_path):
         ("rated_v = 14.8", "rated_v = 14.8\nlow = 0.1", ["critical = 0.1 must be below low"]),
         ("rated_v = 14.8", "rated_v = 14.8\nvolts = 3", ["battery.volts"]),
         ("[0.159, 0.159, 0.11]", "[0.159, nan, 0.11]", ["rotors.places", "finite"]),
-        ("tilt_deg = 55.0", "tilt_deg = 95.0", ["limits.tilt_deg", "75"]),
+        ("tilt_deg = 45.0", "tilt_deg = 95.0", ["limits.tilt_deg", "75"]),
     ],
 )
 def test_impossible_files_are_refused(tmp_path, old, new, words):
