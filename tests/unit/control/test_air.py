@@ -54,7 +54,7 @@ def test_a_holding_f450_leans_into_the_wind_as_the_drag_formula_says(wind):
 
 def test_a_level_f450_drifts_as_the_drag_formula_says():
     """Pushed at first by (4 w c_d + rho A u / 2) u, u the wind; in the end it goes with the air."""
-    fleet = in_air(weather=Weather((3.0, 0.0, 0.0)))
+    fleet = in_air((0.0, 0.0, 1000.0), weather=Weather((3.0, 0.0, 0.0)))
     fleet.command_attitude(0, LEVEL, MASS * G)
     fleet.advance(1, FLAT.grid)
     force = (4 * np.sqrt(MASS * G / (4 * LIFT)) * LOSS + 0.5 * RHO * AREA[0] * 3.0) * 3.0

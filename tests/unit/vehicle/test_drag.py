@@ -64,5 +64,5 @@ def test_a_vehicle_that_holds_in_wind_leans_so_far(name, wind):
     tilt = math.acos(1.0 - 2.0 * (q[0] ** 2 + q[1] ** 2))
     assert tilt == pytest.approx(steady_tilt(airframe, wind), rel=0.12)
     bound = gains_of(airframe, 1e-3)["integral_limit"][0]
-    if drag_acceleration(airframe, wind) < bound:  # else it stands where the rest comes from
+    if 1.1 * drag_acceleration(airframe, wind) < bound:  # else it stands where the rest comes from
         np.testing.assert_allclose(fleet.state.position_map[0], [0, 0, 50], atol=0.05)
