@@ -21,6 +21,7 @@ from volery.vehicle.airframe import (
     allocation_matrix,
     hover_thrusts,
 )
+from volery.vehicle.drag import drag_acceleration, hover_rotor_drags
 
 _AIR_PERIOD_S = 0.008
 """Least time between two looks at the air; eddies and jets that matter to a vehicle last longer."""
@@ -28,8 +29,9 @@ _THRUST_RESERVE = 0.9
 """Share of the full thrust that guidance may ask for; the rest steers."""
 _LEAST_THRUST = 0.15
 """Share of the weight that guidance keeps, so that attitude stays in hand."""
-_LEAST_INTEGRAL, _MOST_INTEGRAL = 0.3, 0.8
-"""Bounds of what the integrals may ask for, in g; a vehicle with much drag needs more."""
+_LEAST_INTEGRAL, _MOST_INTEGRAL = 0.5, 0.8
+"""Bounds of what the integrals may ask for, in g. Flying 2 m below its like an F450 needs 0.4 g; a
+vehicle with much drag needs more in wind."""
 _IDLE_SPEED = 0.1
 """Idle speed of a rotor, share of its hover speed."""
 
@@ -162,11 +164,11 @@ def gains_of(  # noqa: PLR0915
     row["vertical"] = vertical
     row["vertical_integral"] = 0.25 * vertical**2
     # in-plane drag of the rotors in hover, 1/s: known from the airframe, so fed forward
-    drags = rotors.drag_n_s2_m * np.sqrt(trim / rotors.thrust_n_s2)
+    drags = hover_rotor_drags(airframe)
     row["drag"] = drags.sum() / airframe.body.mass_kg
     row["rate_drag"] = _rate_drag(airframe, drags) / inertia
     # a steady wind as fast as the vehicle flies must be answered
-    wind = float(row["drag"][0]) * limits.speed_m_s
+    wind = drag_acceleration(airframe, limits.speed_m_s)
     row["integral_limit"] = min(max(_LEAST_INTEGRAL * GRAVITY, wind), _MOST_INTEGRAL * GRAVITY)
     row["position"] = position
     level, height = level_gains(wish.horizontal, attitude), height_gains(wish.height, rate)

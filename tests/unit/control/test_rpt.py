@@ -12,6 +12,7 @@ from volery.control.rpt import tracking_gains
 from volery.control.setpoints import new_pilots
 from volery.vehicle.airframe import GRAVITY, Airframe
 from volery.vehicle.compiled import fused_kernel
+from volery.vehicle.drag import drag_acceleration
 from volery.vehicle.fleet import new_bodies
 from volery.world.weather import Weather
 
@@ -121,11 +122,13 @@ def test_integral_stands_still_while_it_would_push_further():
 def test_own_limits_of_the_integral_follow_the_drag():
     data = F450.model_dump()
     found = []
-    for drag in (0.0, 1.75e-4, 4e-4, 1e-3):  # N s2/m, of each rotor
+    for drag in (0.0, 1.75e-4, 3.5e-4, 1e-3):  # N s2/m, of each rotor
         data["rotors"]["drag_n_s2_m"] = drag
         found.append(gains_of(Airframe.model_validate(data), 1e-3)["integral_limit"][0])
-    wind = 4 * 4e-4 * 769.6 / F450.body.mass_kg * F450.limits.speed_m_s
-    wanted = [0.3 * GRAVITY, 0.3 * GRAVITY, wind, 0.8 * GRAVITY]
+    data["rotors"]["drag_n_s2_m"] = 3.5e-4
+    wind = drag_acceleration(Airframe.model_validate(data), F450.limits.speed_m_s)
+    assert 0.5 * GRAVITY < wind < 0.8 * GRAVITY
+    wanted = [0.5 * GRAVITY, 0.5 * GRAVITY, wind, 0.8 * GRAVITY]
     np.testing.assert_allclose(found, wanted, rtol=1e-4)
 
 
