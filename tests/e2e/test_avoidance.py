@@ -30,7 +30,7 @@ def past_a_block(tmp_path):
         node["node"] = WAYS[way]
         node["parameters"]["distance_m"] = COURSE_M
         if way == "region":
-            node["parameters"] |= {"threshold": 0.5, "region": [0.4, 0.4]}
+            node["parameters"] |= {"threshold": 0.6, "region": [0.5, 0.4]}
         data["duration_s"] = 120.0
         return data
 
