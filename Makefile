@@ -59,8 +59,8 @@ serve: $(VENV)/.installed page ## serve the page until Ctrl-C: http://127.0.0.1:
 	$(BIN)/volery serve
 
 lint: $(VENV)/.installed-tests ## style, types, layers
-	$(BIN)/ruff check src tests examples
-	$(BIN)/ruff format --check src tests examples
+	$(BIN)/ruff check src tests examples tools
+	$(BIN)/ruff format --check src tests examples tools
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	@if .ci/node_fits; then $(MAKE) --no-print-directory web/node_modules/.package-lock.json \
