@@ -20,7 +20,7 @@ def scenario_of(folder):
     field = folder / "field.csv"
     field.write_text(FIELD)
     planner = {
-        "node": "volery.autonomy.coverage.planner_node:CoveragePlanner",
+        "node": "coverage",
         "parameters": {"uavs": ["uav1", "uav2", "uav3"], "height_m": 2.5},
     }
     data = {

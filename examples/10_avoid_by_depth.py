@@ -7,8 +7,8 @@ from volery.scenario.schema import Scenario
 
 way = sys.argv[1] if len(sys.argv) > 1 else "whole"
 nodes = {
-    "whole": "volery.autonomy.depth_avoidance:DepthAvoidance",
-    "region": "volery.autonomy.avoidance_fsm:RegionAvoidance",
+    "whole": "depth_avoidance",
+    "region": "region_avoidance",
 }
 
 data = load_scenario("obstacle_field").model_dump()

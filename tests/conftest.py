@@ -50,7 +50,7 @@ WOOD = {
             "sensors": LIDARS + OTHERS,
             "nodes": [
                 {
-                    "node": "volery.autonomy.gap_following:GapFollowing",
+                    "node": "gap_following",
                     "parameters": {
                         "route": [[60.0, 0.0]],
                         "level_mount": [0.0, 0.0, 0.18],

@@ -59,7 +59,7 @@ def grid(message):
 def field_data(tmp_path, rows=FIELD, **parameters):
     (tmp_path / "field.csv").write_text("\n".join(",".join(row) for row in rows) + "\n")
     planner = {
-        "node": "volery.autonomy.coverage.planner_node:CoveragePlanner",
+        "node": "coverage",
         "parameters": {"uavs": ["uav1", "uav2", "uav3"], **parameters},
     }
     maps = [{"file": str(tmp_path / "field.csv")}]

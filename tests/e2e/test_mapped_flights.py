@@ -17,7 +17,7 @@ ODOM = {"odometry": "odom", "corrected": False}
 PLANNING = "volery.autonomy.planning."
 NODES = [
     {
-        "node": "volery.autonomy.mapping.mapping_node:Mapping",
+        "node": "mapping",
         "latency_s": 0.1,
         "parameters": {**ODOM, **MOUNTS, "voxels_period_s": 5.0},
     },

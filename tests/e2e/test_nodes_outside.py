@@ -38,7 +38,7 @@ def scenario(*, with_node):
         },
     ]
     sonar = {"kind": "sonar", "position_m": [0.0, 0.0, -0.05], "rpy_deg": [0.0, 90.0, 0.0]}
-    node = {"node": "volery.autonomy.gap_following:GapFollowing", "parameters": PARAMETERS}
+    node = {"node": "gap_following", "parameters": PARAMETERS}
     return parse_scenario(
         {
             "name": "outside",

@@ -18,7 +18,7 @@ from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.engine.events import EventKind
 
 OBJECT = np.array([17.5, 15.5])
-NODE = "volery.autonomy.cooperative_search:CooperativeSearch"
+NODE = "cooperative_search"
 CAMERA = {
     "kind": "camera",
     "name": "down",

@@ -30,7 +30,7 @@ def scenario_of(*, blind):
     kind = FOREST["types"]["surveyor"]
     sensors = [s for s in kind["sensors"] if s["kind"] != "odometry"]
     node = {
-        "node": "volery.autonomy.slam.slam_node:Slam",
+        "node": "slam",
         "latency_s": 0.02,
         "parameters": {**MOUNTS, "start": [60.0, 120.0, 0.0, 0.0]},
     }

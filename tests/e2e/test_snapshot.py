@@ -128,7 +128,7 @@ def test_node_that_keeps_no_state_is_named(simulate, flat_data):
 @pytest.mark.parametrize("latency_s", [0.0, 0.02])
 def test_reset_makes_a_node_without_state_anew(simulate, flat_data, latency_s):
     entry = {"node": f"{__name__}:Counting", "latency_s": latency_s}
-    keeping = {"node": "volery.autonomy.gap_following:GapFollowing"}
+    keeping = {"node": "gap_following"}
     twice = {**entry, "node": f"{__name__}:CountingTwice"}
     flat_data["types"]["f450"]["nodes"] = [keeping, entry, twice]
 

@@ -116,13 +116,13 @@ sensors = [
   {kind = "sonar", position_m = [0.0, 0.0, -0.05], rpy_deg = [0.0, 90.0, 0.0]},
 ]
 [[types.surveyor.nodes]]
-node = "volery.autonomy.gap_following:GapFollowing"
+node = "gap_following"
 parameters = {route = [[30.0, 0.0]], height_m = 3.0, level_mount = [0.0, 0.0, 0.18]}
 [[uavs]]
 type = "surveyor"
 position_m = [0.0, 0.0]
 [[nodes]]
-node = "volery.autonomy.coverage.planner_node:CoveragePlanner"
+node = "coverage"
 parameters = {uavs = ["uav1"], height_m = 2.5, over_m = 0.0, layer_m = 1.5, patience_s = 10.0}
 [[faults]]
 kind = "motor"
@@ -138,7 +138,7 @@ namespace = "/uav1"
 clock = "wall"
 remap = {"laser/horizontal/scan" = "/scan", "odom" = "/mavros/odom"}
 parameters = {height_m = 3.0, route = [[1.0, 2.0]]}
-launch = [{node = "volery.autonomy.gap_following:GapFollowing", parameters = {height_m = 3.0}}]
+launch = [{node = "gap_following", parameters = {height_m = 3.0}}]
 """
 _CHANGES = {
     "uavs": 3,

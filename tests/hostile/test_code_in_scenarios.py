@@ -221,7 +221,7 @@ def test_an_upload_starts_no_module(trap: Trap, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_shipped_nodes_of_a_log_start(trap: Trap) -> None:
-    trap.file.write_text(TOML.format(node="volery.autonomy.mapping.merging_node:MapMerging"))
+    trap.file.write_text(TOML.format(node="map_merging"))
     with Simulation(scenario_from_log(trap), threads=1) as simulation:
         simulation.run(0.01)
 

@@ -175,7 +175,7 @@ def test_every_command_that_stays_ends_by_a_signal(tmp_path, command, number):
         "serve": (["serve", "--port", "0", "--recordings", tmp_path], "flying"),
         "play": (["play", log, "--door", f"rosbridge={free_port()}"], "playing"),
         "comms": (["comms", "--port", "0"], "open "),
-        "node": (["node", "volery.autonomy.gap_following:GapFollowing", "--via", NOWHERE], ""),
+        "node": (["node", "gap_following", "--via", NOWHERE], ""),
     }[command]
     said = tmp_path / "said"
     with said.open("w") as file:

@@ -269,7 +269,7 @@ def test_nodes_of_a_log_write_below_the_working_folder_only(
 ) -> None:
     monkeypatch.chdir(own)
     (own / "linked").symlink_to(secret)
-    node = "volery.autonomy.mapping.mapping_node:Mapping"
+    node = "mapping"
     kind = {"sensors": [], "nodes": [{"node": node, "parameters": {"folder": folder}}]}
     told = content({}, types={"f450": kind})
     with pytest.raises(ScenarioError, match="below the working folder only"):
@@ -277,7 +277,7 @@ def test_nodes_of_a_log_write_below_the_working_folder_only(
 
 
 def test_clients_set_no_parameter_that_names_files() -> None:
-    node = "volery.autonomy.mapping.mapping_node:Mapping"
+    node = "mapping"
     told = content({}, types={"f450": {"sensors": [], "nodes": [{"node": node}]}})
     with Simulation(parse_scenario(told), threads=1) as simulation:
         parameters = simulation.graph.parameters

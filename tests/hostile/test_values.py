@@ -150,13 +150,13 @@ def test_worlds_of_absurd_size_are_refused(flat_data, world):
 @pytest.mark.parametrize(
     ("node", "key", "value"),
     [
-        ("volery.autonomy.gap_following:GapFollowing", "route", lambda x: [[10.0, x]]),
-        ("volery.autonomy.gap_following:GapFollowing", "height_m", lambda x: x),
-        ("volery.autonomy.gap_following:GapFollowing", "level_mount", lambda x: [x, 0.0, 0.0]),
-        ("volery.autonomy.coverage.planner_node:CoveragePlanner", "over_m", lambda x: x),
-        ("volery.autonomy.coverage.planner_node:CoveragePlanner", "height_m", lambda x: x),
-        ("volery.autonomy.avoidance_fsm:RegionAvoidance", "mount", lambda x: [0.0, x, 0.0]),
-        ("volery.autonomy.depth_avoidance:DepthAvoidance", "mount", lambda x: [0.0, x, 0.0]),
+        ("gap_following", "route", lambda x: [[10.0, x]]),
+        ("gap_following", "height_m", lambda x: x),
+        ("gap_following", "level_mount", lambda x: [x, 0.0, 0.0]),
+        ("coverage", "over_m", lambda x: x),
+        ("coverage", "height_m", lambda x: x),
+        ("region_avoidance", "mount", lambda x: [0.0, x, 0.0]),
+        ("depth_avoidance", "mount", lambda x: [0.0, x, 0.0]),
     ],
 )
 def test_parameters_of_nodes_are_finite(flat_data, node, key, value, number):
@@ -175,7 +175,7 @@ def test_parameters_of_nodes_are_finite(flat_data, node, key, value, number):
     ],
 )
 def test_coverage_has_heights_at_which_something_flies(flat_data, key, value, words):
-    node = "volery.autonomy.coverage.planner_node:CoveragePlanner"
+    node = "coverage"
     flat_data["nodes"] = [{"node": node, "parameters": {key: value}}]
     with pytest.raises(ScenarioError, match=words):
         Simulation(parse_scenario(flat_data), threads=1)
@@ -183,7 +183,7 @@ def test_coverage_has_heights_at_which_something_flies(flat_data, key, value, wo
 
 @pytest.mark.parametrize("route", [[[1.0]], [[1.0, 2.0, 3.0]], ["x"], [1.0, 2.0], [[True, 1.0]]])
 def test_a_route_is_of_points(flat_data, route):
-    entry = {"node": "volery.autonomy.gap_following:GapFollowing", "parameters": {"route": route}}
+    entry = {"node": "gap_following", "parameters": {"route": route}}
     flat_data["types"]["f450"]["nodes"] = [entry]
     with pytest.raises(ScenarioError, match=r"route is a list of \[x, y\]"):
         Simulation(parse_scenario(flat_data), threads=1)

@@ -6,9 +6,6 @@ subscribes to, sets its parameters to hard values, and the run goes on.
 
 from __future__ import annotations
 
-import importlib
-import inspect
-import pkgutil
 from functools import partial
 
 import pytest
@@ -16,8 +13,8 @@ from poison import plausible, poisoned
 from whole_world import Client
 
 from volery.core.errors import GraphError
-from volery.graph.node import Node
 from volery.graph.nodes.handles import NodeSubscription
+from volery.scenario.node_names import registered_nodes
 
 SENSORS = [
     {"kind": "lidar", "name": "horizontal"},
@@ -33,37 +30,37 @@ SENSORS = [
 ]
 AREA = [-20.0, -20.0, 20.0, 20.0]
 NODES = {
-    "volery.autonomy.avoidance_fsm:RegionAvoidance": {},
-    "volery.autonomy.cooperative_search:CooperativeSearch": {
+    "region_avoidance": {},
+    "cooperative_search": {
         "camera": "camera",
         "team": ["uav1", "uav2"],
         "area_m": AREA,
         "altitude_m": 3.0,
     },
-    "volery.autonomy.coverage.planner_node:CoveragePlanner": {
+    "coverage": {
         "uavs": ["uav1", "uav2"],
         "height_m": 2.5,
         "over_m": 10.0,
     },
-    "volery.autonomy.depth_avoidance:DepthAvoidance": {},
-    "volery.autonomy.gap_following:GapFollowing": {"route": [[15.0, 0.0]]},
-    "volery.autonomy.mapping.mapping_node:Mapping": {"voxels_period_s": 0.2, "grid_period_s": 0.2},
-    "volery.autonomy.mapping.merging_node:MapMerging": {"period_s": 0.2},
-    "volery.autonomy.planning.exploring_node:Exploring": {},
-    "volery.autonomy.planning.follower:TrajectoryFollower": {},
-    "volery.autonomy.planning.global_planner:GlobalPlanner": {"iterations": 50},
-    "volery.autonomy.planning.local_planner:LocalPlanner": {},
-    "volery.autonomy.slam.planar_node:PlanarSlam": {},
-    "volery.autonomy.slam.slam_node:Slam": {},
-    "volery.autonomy.target_detection:TargetDetection": {"camera": "camera"},
-    "volery.autonomy.task_manager:TaskManager": {"area_m": AREA, "sector_m": 20.0},
-    "volery.comms.radio_node:RadioNode": {"topics": ["odom nav_msgs/msg/Odometry"], "station": 1},
-    "volery.mavlink.node:Autopilot": {},
+    "depth_avoidance": {},
+    "gap_following": {"route": [[15.0, 0.0]]},
+    "mapping": {"voxels_period_s": 0.2, "grid_period_s": 0.2},
+    "map_merging": {"period_s": 0.2},
+    "exploration": {},
+    "trajectory_follower": {},
+    "global_planner": {"iterations": 50},
+    "local_planner": {},
+    "planar_slam": {},
+    "slam": {},
+    "target_detection": {"camera": "camera"},
+    "task_manager": {"area_m": AREA, "sector_m": 20.0},
+    "radio": {"topics": ["odom nav_msgs/msg/Odometry"], "station": 1},
+    "mavlink_autopilot": {},
 }
 """Nodes and their parameters."""
 OF_THE_WORLD = (
-    "volery.autonomy.coverage.planner_node:CoveragePlanner",
-    "volery.autonomy.mapping.merging_node:MapMerging",
+    "coverage",
+    "map_merging",
 )
 """Nodes of no UAV."""
 RATE_HZ = 250
@@ -75,20 +72,9 @@ HARD = (
 )
 
 
-def shipped_nodes():
-    """All classes of nodes in the package that can be named in a scenario."""
-    found = set()
-    for name in ("autonomy", "comms", "mavlink"):
-        folder = importlib.import_module(f"volery.{name}")
-        for module in pkgutil.walk_packages(folder.__path__, f"{folder.__name__}."):
-            for kind in vars(importlib.import_module(module.name)).values():
-                if inspect.isclass(kind) and issubclass(kind, Node) and kind is not Node:
-                    found.add(kind)
-    return {kind for kind in found if not any(issubclass(o, kind) and o is not kind for o in found)}
-
-
 def test_every_node_that_ships_is_in_the_table():
-    assert {f"{kind.__module__}:{kind.__name__}" for kind in shipped_nodes()} == {*NODES}
+    paths = registered_nodes()
+    assert {name for name, path in paths.items() if path.startswith("volery.")} == {*NODES}
 
 
 def flight(name):

@@ -21,12 +21,12 @@ SENSORS = [
     {"kind": "ground_truth"},
 ]
 GAP_FOLLOWING = {
-    "node": "volery.autonomy.gap_following:GapFollowing",
+    "node": "gap_following",
     "parameters": {"route": [[60.0, 0.0]]},
 }
-MAVLINK = {"node": "volery.mavlink.node:Autopilot"}
+MAVLINK = {"node": "mavlink_autopilot"}
 COVERAGE = {
-    "node": "volery.autonomy.coverage.planner_node:CoveragePlanner",
+    "node": "coverage",
     "parameters": {"uavs": ["uav1", "uav2"], "height_m": 2.5, "over_m": 10.0},
 }
 PLANNING = [

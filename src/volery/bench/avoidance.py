@@ -29,8 +29,8 @@ from volery.scenario.schema import Scenario
 
 SEEDS = 50
 WAYS = {
-    "region": "volery.autonomy.avoidance_fsm:RegionAvoidance",
-    "whole": "volery.autonomy.depth_avoidance:DepthAvoidance",
+    "region": "region_avoidance",
+    "whole": "depth_avoidance",
 }
 FIELDS = ("trees", "blocks")
 

@@ -77,11 +77,13 @@ def _remedy(name: str) -> str:
 def check_autopilots(scenario: Scenario, options: RunOptions) -> None:
     """`BridgeError` where a scenario brings autopilots for UAVs that doors bring others for."""
     from volery.mavlink.outfit import NODE
+    from volery.scenario.node_names import is_same_node
 
     outside = [name for name in _names(options) if name in _OUTSIDE]
     used = {group.type for group in scenario.uavs}
     for name, uav_type in scenario.types.items():
-        if outside and name in used and any(entry.node == NODE for entry in uav_type.nodes):
+        has_own = any(is_same_node(entry.node, NODE) for entry in uav_type.nodes)
+        if outside and name in used and has_own:
             raise BridgeError(
                 f"scenario '{scenario.name}', type '{name}': has an autopilot of its own "
                 f"({NODE}); --door {outside[0]} would bring a second one"

@@ -229,11 +229,18 @@ def play(
 
 
 @guarded
-def list_scenarios() -> None:
+def list_scenarios(
+    nodes: Annotated[
+        bool, typer.Option("--nodes", help="List the nodes that have a name instead.")
+    ] = False,
+) -> None:
     """List the scenarios that ship."""
-    from volery.cli.listing import show_scenarios
+    from volery.cli.listing import show_nodes, show_scenarios
 
-    show_scenarios()
+    if nodes:
+        show_nodes()
+    else:
+        show_scenarios()
 
 
 @guarded

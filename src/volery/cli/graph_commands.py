@@ -48,7 +48,7 @@ def _use(context: typer.Context, via: str) -> None:
 
 @guarded
 def node(
-    node: Annotated[str, typer.Argument(help="module:Class.")],
+    node: Annotated[str, typer.Argument(help="Name (volery list --nodes) or module:Class.")],
     via: Annotated[
         str | None,
         typer.Option(

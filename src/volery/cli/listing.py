@@ -1,4 +1,4 @@
-"""`volery list`: the scenarios that ship."""
+"""`volery list`: the scenarios that ship, and the nodes that installed packages register."""
 
 from __future__ import annotations
 
@@ -16,3 +16,10 @@ def show_scenarios() -> None:
         count = str(scenario.uav_count)
         rows.append((name, count, f"{scenario.duration_s:g} s", library.describe(name)))
     print_table(("scenario", "UAVs", "duration", "what it is"), rows, right=(1, 2))
+
+
+def show_nodes() -> None:
+    """Print the registered names of nodes and their classes."""
+    from volery.scenario.node_names import registered_nodes
+
+    print_table(("node", "class"), list(registered_nodes().items()))

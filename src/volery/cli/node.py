@@ -57,7 +57,9 @@ def run_node(options: NodeOptions) -> None:
     try:
         entry = NodeEntry(node=options.node, parameters=parameters)
     except ValidationError:
-        raise BridgeError(f"a node is named module:Class, not '{options.node}'") from None
+        raise BridgeError(
+            f"'{options.node}' is no node: give a name of `volery list --nodes`, or module:Class"
+        ) from None
     name = options.node.rpartition(":")[2]
     via = options.via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
     if options.lock_step_s is not None and via.partition("://")[0] in ROS2_WAYS:

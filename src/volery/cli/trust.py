@@ -21,6 +21,7 @@ from volery.cli.flight import RunOptions
 from volery.core.errors import ScenarioError
 from volery.scenario import library
 from volery.scenario.access import ScenarioAccess
+from volery.scenario.node_names import node_module
 
 
 def with_trust(options: RunOptions) -> RunOptions:
@@ -47,8 +48,8 @@ def may_run_local_nodes(file: Path, nodes: Iterable[str], access: ScenarioAccess
     """
     from volery.runtime.node_loading import is_local
 
-    named = dict.fromkeys(node.partition(":")[0] for node in nodes)
-    modules = [module for module in named if is_local(module, access)]
+    named = dict.fromkeys(node_module(node) for node in nodes)
+    modules = [module for module in named if module is not None and is_local(module, access)]
     if not modules:
         return False
     if not set(modules) <= _trusted(file):

@@ -3,7 +3,7 @@ r"""A UAV's radio as a node: its topics over a real communication server instead
 In flight, and wherever UAVs run in processes of their own, this takes the place of a scenario's
 `[radio]`; the other nodes stay as they are:
 
-    volery node volery.comms.radio_node:RadioNode --via ros1 --namespace /uav1 \
+    volery node radio --via ros1 --namespace /uav1 \
         --param 'topics=["team volery_interfaces/msg/TeamReport"]' --param server=10.0.0.1:10200
 """
 

@@ -1,7 +1,7 @@
 """The autopilot as a node of the simulation: in lock step with its UAV, so that flights repeat.
 
     [[types.iris.nodes]]
-    node = "volery.mavlink.node:Autopilot"
+    node = "mavlink_autopilot"
     parameters = { px4 = { MIS_TAKEOFF_ALT = 5.0 } }
 
 Frames come on `mavlink/in` and go out on `mavlink/out`; `udp_door`, `tcp_door` and `serial_door`

@@ -8,9 +8,10 @@ from typing import Any
 from volery.mavlink.codec import dialect
 from volery.mavlink.json_frames import STATE_HZ
 from volery.scenario.load import parse_scenario
+from volery.scenario.node_names import is_same_node
 from volery.scenario.schema import Scenario
 
-NODE = "volery.mavlink.node:Autopilot"
+NODE = "mavlink_autopilot"
 _CALIBRATED_IMU = "iim42653"
 
 
@@ -23,7 +24,7 @@ def with_autopilots(scenario: Scenario) -> Scenario:
     dialect()
     data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
     for name, uav_type in scenario.types.items():
-        if all(entry.node != NODE for entry in uav_type.nodes):
+        if not any(is_same_node(entry.node, NODE) for entry in uav_type.nodes):
             kept = [entry.model_dump(exclude_unset=True) for entry in uav_type.nodes]
             data["types"][name] = {**data["types"][name], "nodes": [*kept, {"node": NODE}]}
     return _parsed_like(scenario, data)

@@ -27,6 +27,7 @@ from volery.graph.nodes.failures import add_frames, place_of
 from volery.graph.nodes.imports import provide_ros_imports
 from volery.graph.nodes.launch import Launch, make_node
 from volery.scenario.access import ScenarioAccess
+from volery.scenario.node_names import node_module, node_path
 from volery.scenario.schema import NodeEntry, Scenario
 
 _SHIPPED = ("volery.autonomy.", "volery.comms.", "volery.mavlink.")
@@ -66,31 +67,36 @@ def _check_base(node: object, entry: NodeEntry, where: str) -> None:
 
 def find_node(entry: NodeEntry, where: str, access: ScenarioAccess) -> type[Any]:
     """Import a node's class. `ScenarioError` where it may not be imported, or is none."""
-    module = entry.node.partition(":")[0]
-    _check_allowed(entry.node, where, access)
+    try:
+        path = node_path(entry.node)
+    except ScenarioError as error:
+        raise ScenarioError(f"{where}: {error}") from None
+    _check_allowed(entry.node, path, where, access)
     if access.is_trusted:
         with _also_from(*_local_folders(access)):
-            return _find_class(entry.node, where)
+            return _find_class(path, where)
     with _installed_only(access):
-        if is_local(module, access):
+        if is_local(path.partition(":")[0], access):
             raise ScenarioError(
                 f"{where}: node '{entry.node}' is a module beside the scenario, which runs only if "
                 "you trust it: give --trust, or load_scenario(..., trust=True) in Python"
             )
-        return _find_class(entry.node, where)
+        return _find_class(path, where)
 
 
 def local_nodes(scenario: Scenario) -> tuple[str, ...]:
     """Return the scenario's nodes that lie beside it or in the working folder. Imports nothing."""
     access, names = scenario.access, [entry.node for entry in scenario.node_entries]
-    return tuple(n for n in dict.fromkeys(names) if is_local(n.partition(":")[0], access))
+    return tuple(n for n in dict.fromkeys(names) if is_local(node_module(n), access))
 
 
-def is_local(module: str, access: ScenarioAccess) -> bool:
-    """Whether a module is found only in the folder of a scenario or in the working folder.
+def is_local(module: str | None, access: ScenarioAccess) -> bool:
+    """Returns whether a module is found only in the scenario's folder or the working folder.
 
-    Imports nothing.
+    Imports nothing. False for None, the module of an unknown name.
     """
+    if module is None:
+        return False
     top = module.partition(".")[0]
     with _installed_only(access):
         if top in sys.modules or _is_found(top):
@@ -99,8 +105,8 @@ def is_local(module: str, access: ScenarioAccess) -> bool:
     return PathFinder.find_spec(top, folders) is not None
 
 
-def _check_allowed(node: str, where: str, access: ScenarioAccess) -> None:
-    if node.startswith(_SHIPPED) or node in access.own_nodes:
+def _check_allowed(node: str, path: str, where: str, access: ScenarioAccess) -> None:
+    if path.startswith(_SHIPPED) or node in access.own_nodes:
         return
     if access.is_confined:
         raise ScenarioError(
@@ -108,7 +114,7 @@ def _check_allowed(node: str, where: str, access: ScenarioAccess) -> None:
             "upload starts shipped nodes only; name your own file of the scenario to allow its "
             "nodes"
         )
-    if node.startswith("volery.") and not access.is_trusted:
+    if path.startswith("volery.") and not access.is_trusted:
         raise ScenarioError(f"{where}: '{node}' is no node that ships with Volery")
 
 

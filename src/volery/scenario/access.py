@@ -35,7 +35,7 @@ class ScenarioAccess:
     own_names: frozenset[str] = frozenset()
     """File names that a confined scenario shares with a file of the user's own: not confined."""
     own_nodes: frozenset[str] = frozenset()
-    """Nodes, `module:Class`, that a confined scenario shares with a file of the user's own."""
+    """Nodes, as files name them, that a confined scenario shares with a file of the user's own."""
 
     def find_file(self, name: str, shipped: Path | None = SHIPPED_DATA) -> Path:
         """Path of a file: beside the scenario, from the working folder, else among shipped data.

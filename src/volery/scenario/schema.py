@@ -28,6 +28,7 @@ from volery.scenario.city import City
 from volery.scenario.faults import Fault
 from volery.scenario.grid_map import GridMapWorld
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
+from volery.scenario.node_names import NODE_PATTERN
 from volery.scenario.radio import Radio
 from volery.scenario.things import Things, check_things
 from volery.scenario.user_mesh import UserMesh
@@ -264,8 +265,8 @@ class Flight(Data):
 class NodeEntry(Data):
     """A node that runs inside the simulation, in lock step: beside a UAV, or for all of them."""
 
-    node: Annotated[str, Field(pattern=r"^[\w.]+:\w+$")]
-    """`module:Class` with the node contract of `volery.graph.node`."""
+    node: Annotated[str, Field(pattern=NODE_PATTERN)]
+    """A registered name, such as `slam`, or the `module:Class` of a `volery.graph.node.Node`."""
     parameters: dict[str, Any] = Field(default_factory=dict)
     latency_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     """Simulated time from a callback's input to its output; above 0 the node runs on a worker."""

@@ -9,12 +9,12 @@ from volery.bridges.nodes.profile import load_profile
 from volery.scenario.load import load_scenario
 
 PROFILES = Path(__file__).parents[3] / "examples/profiles"
-RADIO = "volery.comms.radio_node:RadioNode"
+RADIO = "radio"
 DIFFERENT: dict[tuple[str, str], dict[str, Any]] = {
     # Where nobody knows the place of take-off it is measured.
-    (name, "Slam"): {"start": [24.0, 260.0, 144.2, 0.0]}
+    (name, "slam"): {"start": [24.0, 260.0, 144.2, 0.0]}
     for name in ("simulation", "ground_test", "flight_test")
-} | {("flight_test", "LocalPlanner"): {"speed_m_s": 1.5}}
+} | {("flight_test", "local_planner"): {"speed_m_s": 1.5}}
 """What a profile says otherwise on purpose, by profile and node."""
 
 
@@ -28,7 +28,7 @@ def test_profiles_fly_as_the_scenario_does(name: str) -> None:
     assert (radio is None) == (name == "simulation")  # there the radio is the run's
     for entry in kind.nodes:
         expected = dict(entry.parameters)
-        for key, value in DIFFERENT.get((name, entry.node.rpartition(":")[2]), {}).items():
+        for key, value in DIFFERENT.get((name, entry.node), {}).items():
             assert expected[key] != value
             expected[key] = value
         assert launched.pop(entry.node) == expected, entry.node

@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 from volery.cli import launching, node
 from volery.cli.app import app
 
-GAPS = "volery.autonomy.gap_following:GapFollowing"
+GAPS = "gap_following"
 
 
 @pytest.mark.parametrize(

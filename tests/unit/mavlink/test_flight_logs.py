@@ -159,9 +159,7 @@ def test_each_flight_has_a_log_and_each_vehicle_its_own():
 @pytest.mark.parametrize(("mode", "num_logs"), [(-1, 0), (0, 0), (1, 1), (2, 1)])
 def test_when_logs_begin_is_a_parameter(mode, num_logs):
     parameters = {"px4": {"SDLOG_MODE": mode}}
-    simulation, station = fly(
-        nodes=[{"node": "volery.mavlink.node:Autopilot", "parameters": parameters}]
-    )
+    simulation, station = fly(nodes=[{"node": "mavlink_autopilot", "parameters": parameters}])
     with simulation:
         station.seconds(0.1)
         assert entries(station)[0].num_logs == num_logs
@@ -254,9 +252,7 @@ def test_logging_changes_no_flight():
     digests = []
     for mode in (-1, 2):
         parameters = {"px4": {"SDLOG_MODE": mode}}
-        simulation, station = fly(
-            nodes=[{"node": "volery.mavlink.node:Autopilot", "parameters": parameters}]
-        )
+        simulation, station = fly(nodes=[{"node": "mavlink_autopilot", "parameters": parameters}])
         with simulation:
             simulation.enable_digest()
             station.seconds(0.1)

@@ -61,8 +61,8 @@ def test_missing_files_name_the_places_looked_at(simulate, flat_data):
         ("volery.autonomy.gap_following:Gap", {}, "has no class"),
         ("volery.no_such:Gap", {}, "cannot be imported"),
         ("volery.core.clock:Schedule", {}, "no subclass"),
-        ("volery.autonomy.gap_following:GapFollowing", {"rout": []}, "no parameter rout"),
-        ("volery.autonomy.gap_following:GapFollowing", {"speed_m_s": "x"}, "must be like"),
+        ("gap_following", {"rout": []}, "no parameter rout"),
+        ("gap_following", {"speed_m_s": "x"}, "must be like"),
     ],
 )
 def test_nodes_that_do_not_start(simulate, flat_data, node, parameters, words):

@@ -18,7 +18,7 @@ changes what the node does.
 One that names nodes launches all of them in one process (`volery launch`):
 
     [[launch]]
-    node = "volery.autonomy.task_manager:TaskManager"
+    node = "task_manager"
     parameters = { area_m = [0.0, 0.0, 100.0, 100.0] }
 """
 
@@ -30,6 +30,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from volery.scenario.data_files import load_data_file
+from volery.scenario.node_names import NODE_PATTERN
 
 Name = Annotated[str, Field(pattern=r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")]
 Namespace = Annotated[str, Field(pattern=r"^(/[A-Za-z_][A-Za-z0-9_]*)*$")]
@@ -40,8 +41,8 @@ class Launched(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    node: Annotated[str, Field(pattern=r"^[\w.]+:\w+$")]
-    """`module:Class`"""
+    node: Annotated[str, Field(pattern=NODE_PATTERN)]
+    """A registered name, such as `slam`, or `module:Class`."""
     parameters: dict[str, Any] = {}
 
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import pkgutil
 from collections.abc import Iterator
 from importlib import import_module
 
-import volery.autonomy
 from volery.core.errors import DataFileError, ScenarioError
 from volery.graph.node import Node
 from volery.runtime.node_loading import find_node
 from volery.runtime.warm_up import parts
 from volery.runtime.warm_up.tasks import Task
+from volery.scenario.node_names import registered_nodes
 from volery.scenario.schema import LidarSensor, NodeEntry, Scenario, UavType
 from volery.sensors.lidar_model import load_lidar
 from volery.sensors.scan_patterns import PlanarScan
@@ -48,12 +47,11 @@ def all_needs() -> list[Task]:
 
 
 def shipped_nodes() -> Iterator[type[Node]]:
-    """The classes of `volery.autonomy`."""
-    package = volery.autonomy
-    for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-        for found in vars(import_module(module.name)).values():
-            if isinstance(found, type) and issubclass(found, Node):
-                yield found
+    """Yields the classes of Volery's own nodes."""
+    for path in registered_nodes().values():
+        module, _, name = path.partition(":")
+        if module.startswith("volery."):
+            yield getattr(import_module(module), name)
 
 
 def _of_type(kind: UavType, scenario: Scenario) -> Iterator[Task]:

@@ -1,0 +1,56 @@
+"""Names of nodes: `slam`, which an installed package registers, or `my_package.planning:Planner`.
+
+Packages register their nodes as entry points of the group `volery.nodes`; Volery registers its own
+in `pyproject.toml`.
+"""
+
+from __future__ import annotations
+
+import difflib
+
+from volery.core.entry_points import EntryPoints
+from volery.core.errors import ScenarioError
+
+NODE_PATTERN = r"^(\w[\w-]*|[\w.]+:\w+)$"
+"""What scenarios, profiles and the command line take: a registered name or `module:Class`."""
+
+_REGISTERED = EntryPoints("volery.nodes")
+
+
+def registered_nodes() -> dict[str, str]:
+    """Returns the `module:Class` of each registered name, sorted by name."""
+    return {name: node_path(name) for name in _REGISTERED.names()}
+
+
+def node_path(node: str) -> str:
+    """Returns a node's `module:Class`. Imports nothing.
+
+    Raises `ScenarioError` for a name that no installed package registers.
+    """
+    if ":" in node:
+        return node
+    path = _REGISTERED.find(node)
+    if path is None:
+        known = _REGISTERED.names()
+        near = difflib.get_close_matches(node, known, n=1)
+        hint = f"; did you mean '{near[0]}'?" if near else "."
+        raise ScenarioError(
+            f"no node '{node}'{hint} It is neither module:Class nor one of: {', '.join(known)}"
+        )
+    return path
+
+
+def is_same_node(one: str, other: str) -> bool:
+    """Returns whether two names stand for one class; False for unknown names."""
+    try:
+        return node_path(one) == node_path(other)
+    except ScenarioError:
+        return False
+
+
+def node_module(node: str) -> str | None:
+    """Returns the module of a node, or None for a name that no installed package registers."""
+    try:
+        return node_path(node).partition(":")[0]
+    except ScenarioError:
+        return None
