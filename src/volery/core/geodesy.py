@@ -7,7 +7,10 @@ sea level are one and the same here.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,32 +41,39 @@ def ecef_from_geodetic(geodetic: ArrayLike) -> Array:
 
 
 def geodetic_from_ecef(ecef: ArrayLike) -> Array:
-    """Geodetic coordinates of earth-centred places more than 43 km from the earth's centre.
+    """Geodetic coordinates of earth-centred places more than 43 km from the earth's centre."""
+    return np.stack(_geodetic(np, *_components(ecef)), axis=-1)
+
+
+def geodetic_from_ecef_point(x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Returns the same for one point, without arrays, which take about ten times as long."""
+    latitude, longitude, height = _geodetic(math, x, y, z)
+    return latitude, longitude, height
+
+
+def _geodetic(library: ModuleType, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
+    """Latitude, longitude, height by the functions of a library, `math` or `numpy`.
 
     Closed form, without iterations: H. Vermeille, Direct transformation from geocentric coordinates
     to geodetic coordinates, Journal of Geodesy 76 (2002).
     """
-    x, y, z = _components(ecef)
     e2 = ECCENTRICITY_SQUARED
-    from_axis = np.hypot(x, y)
+    from_axis = library.hypot(x, y)
     p = (from_axis / SEMI_MAJOR_M) ** 2
     q = (1.0 - e2) * (z / SEMI_MAJOR_M) ** 2
     r = (p + q - e2 * e2) / 6.0
     s = e2 * e2 * p * q / (4.0 * r**3)
-    t = np.cbrt(1.0 + s + np.sqrt(s * (2.0 + s)))
+    t = library.cbrt(1.0 + s + library.sqrt(s * (2.0 + s)))
     u = r * (1.0 + t + 1.0 / t)
-    v = np.sqrt(u * u + e2 * e2 * q)
+    v = library.sqrt(u * u + e2 * e2 * q)
     w = e2 * (u + v - q) / (2.0 * v)
-    k = np.sqrt(u + v + w * w) - w
+    k = library.sqrt(u + v + w * w) - w
     d = k * from_axis / (k + e2)
-    to_surface = np.hypot(d, z)
-    return np.stack(
-        [
-            2.0 * np.arctan2(z, d + to_surface),
-            np.arctan2(y, x),
-            (k + e2 - 1.0) / k * to_surface,
-        ],
-        axis=-1,
+    to_surface = library.hypot(d, z)
+    return (
+        2.0 * library.atan2(z, d + to_surface),
+        library.atan2(y, x),
+        (k + e2 - 1.0) / k * to_surface,
     )
 
 
