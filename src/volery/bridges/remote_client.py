@@ -140,10 +140,7 @@ class RemoteClient(ABC):
         reliable: bool = False,
         wake: Wake,
     ) -> Mailbox:
-        """Begin to receive `topic`; without a type the server is asked for it.
-
-        `wake` is called from the client's thread when a message comes to an empty mailbox.
-        """
+        """As `Link.subscribe`; without a type the client asks the server for it."""
         self._check_open()
         if msgtype is None:
             msgtype = self._type_of(topic)

@@ -9,49 +9,70 @@ from typing import Any, Protocol, runtime_checkable
 from volery.core.errors import GraphError
 from volery.graph.mailbox import Mailbox, Wake
 from volery.graph.parameters import Parameters
+from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.reply import Reply
 from volery.graph.session import Handler
 
 
 class Link(Protocol):
-    """One client's part in a graph; see `graph.session.Session`, which is the nearest one.
+    """One client's connection to a graph; the nearest one is `graph.session.Session`.
 
-    All methods may be called by any thread; replies and wakes come from the link's own.
+    This is the contract of all of them; an implementation documents only what it adds. Any thread
+    may call any method; replies and wakes come from a thread of the link. `advertise`, `subscribe`
+    and `offer` raise `GraphError` for a wrong type, and once the link is closed.
     """
 
     name: str
 
     def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
-        """Announce that messages will be published on `topic`."""
+        """Announce that this client publishes on `topic`; a second call replaces the type."""
 
     def publish(self, topic: str, message: Any) -> None:
-        """Publish a message of the announced type."""
+        """Publish a message of the announced type. `GraphError` where none was announced."""
 
     def unadvertise(self, topic: str) -> None:
-        """Publish on `topic` no more."""
+        """Publish on `topic` no more. `GraphError` where it was not announced."""
 
     def subscribe(
         self,
         topic: str,
         msgtype: str | None = None,
         *,
-        depth: int = ...,
-        reliable: bool = ...,
+        depth: int = DEFAULT_DEPTH,
+        reliable: bool = False,
         wake: Wake,
     ) -> Mailbox:
-        """Begin to receive `topic`."""
+        """Receive the messages of `topic` in the mailbox that is returned.
+
+        Parameters
+        ----------
+        topic
+            Absolute name.
+        msgtype
+            None: the type that the topic has; `GraphError` where the topic does not exist.
+        depth, reliable
+            How many messages wait, and what happens to more: see `Mailbox`. The newest message of
+            each latched publisher is the first.
+        wake
+            Called from a thread of the link when a message comes to an empty mailbox. It must not
+            block.
+
+        """
 
     def unsubscribe(self, mailbox: Mailbox) -> None:
-        """Receive no more."""
+        """Receive no more; messages that wait can still be taken."""
 
     def call(self, service: str, request: Any | None, reply: Reply) -> None:
-        """Call a service of the graph."""
+        """Call a service; `reply` gets the response or a `GraphError`, in another thread.
+
+        Without a request the service gets an empty one.
+        """
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
-        """Offer a service to the graph."""
+        """Serve `service`: `handler(request, reply)` is called in a thread of the link."""
 
     def close(self) -> None:
-        """Take back everything."""
+        """End all publishers, subscriptions, calls and services of this client."""
 
 
 @runtime_checkable

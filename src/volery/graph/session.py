@@ -301,12 +301,7 @@ class Session:
         reliable: bool = False,
         wake: Wake,
     ) -> Mailbox:
-        """Begin to receive `topic`, which must exist or be given a type.
-
-        depth, reliable: see `Mailbox`. What latched publishers sent before waits in the mailbox
-        already. `wake` is called, from the simulation's thread, whenever a message comes to an
-        empty mailbox.
-        """
+        """As `graph.link.Link.subscribe`; `wake` is called from the simulation's thread."""
         check_depth(depth)
         mailbox = Mailbox(topic, depth, wake, reliable=reliable)
         with self._lock:

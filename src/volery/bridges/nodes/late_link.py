@@ -80,7 +80,7 @@ class LateLink:
         reliable: bool = False,
         wake: Wake,
     ) -> Mailbox:
-        """As of `Link`; the mailbox is empty until there is a graph."""
+        """As `Link.subscribe`; the mailbox is empty until there is a graph."""
         mailbox = _LateMailbox(topic, depth, wake, reliable=reliable)
 
         def fill(link: Link) -> None:

@@ -102,10 +102,7 @@ class Ros1Client:
         reliable: bool = False,
         wake: Wake,
     ) -> Mailbox:
-        """Begin to receive `topic`, which must be published somewhere or be given a type.
-
-        The time of a message is that of its arrival, by the computer's clock.
-        """
+        """As `Link.subscribe`; a message's time is that of its arrival, by the computer's clock."""
         check_depth(depth)
         found = msgtype or self._node.topic_type(topic)
         if found is None:

@@ -164,10 +164,9 @@ class Ros2Client:
         reliable: bool = False,
         wake: Wake,
     ) -> Mailbox:
-        """Begin to receive `topic`, which must be published somewhere or be given a type.
+        """As `Link.subscribe`; a message's time is that of its arrival, by the computer's clock.
 
-        The middleware delivers reliably what all publishers offer so, whatever `reliable` says of
-        the mailbox. The time of a message is that of its arrival, by the computer's clock.
+        The middleware delivers reliably where all publishers do; `reliable` is of the mailbox only.
         """
         check_depth(depth)
         check_name(topic)
