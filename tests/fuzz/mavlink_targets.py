@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from volery.mavlink.autopilot import Autopilot
+from volery.mavlink.autopilot.core import Autopilot
+from volery.mavlink.autopilot.vehicle import Build, FlightState
 from volery.mavlink.codec import Codec, Parser, dialect
 from volery.mavlink.framing import Framer
-from volery.mavlink.vehicle import Build, FlightState
 
 _BUILD = Build("iris", 4, 0.5, 12.0, 3.0, 1.5, 0.7, 4, 5.0, (47.4, 8.5, 488.0))
 _NAN = math.nan

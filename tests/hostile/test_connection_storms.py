@@ -33,7 +33,7 @@ SERVERS = """
     from volery.bridges.sensor_link.server import SensorLink
     from volery.comms.server import CommsServer
     from volery.core.connection_limits import SHARED
-    from volery.mavlink.tcp_door import MavlinkTcp
+    from volery.mavlink.links.tcp_door import MavlinkTcp
     from volery.server.page_server import PageServer
     from volery.server.settings import PageSettings
 

@@ -9,10 +9,10 @@ from live_graph import LiveGraph
 
 from volery.bridges.doors import Doors
 from volery.mavlink.codec import dialect
-from volery.mavlink.intake import FRAMES_PER_S, IntakeLimits
-from volery.mavlink.party import Party
-from volery.mavlink.tcp_door import MavlinkTcp
-from volery.mavlink.udp_door import _UdpLink
+from volery.mavlink.links.connection import Party
+from volery.mavlink.links.intake import FRAMES_PER_S, IntakeLimits
+from volery.mavlink.links.tcp_door import MavlinkTcp
+from volery.mavlink.links.udp_door import _UdpLink
 
 PATIENCE_S = 60.0
 

@@ -28,8 +28,8 @@ from volery.comms.server import CommsServer
 from volery.core.preamble import Preamble
 from volery.graph import messages as m
 from volery.mavlink.codec import dialect
-from volery.mavlink.px4_door import Px4Door
-from volery.mavlink.tcp_door import MavlinkTcp
+from volery.mavlink.hil.px4_door import Px4Door
+from volery.mavlink.links.tcp_door import MavlinkTcp
 
 PATIENCE_S = 60.0
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "CONNECT", "OPTIONS", "TRACE", "PATCH")

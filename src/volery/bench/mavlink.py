@@ -35,7 +35,7 @@ def measure() -> dict[str, float]:
 
 
 def _scenario(count: int, physics_hz: int = 1000) -> Any:
-    from volery.mavlink.outfit import with_autopilots
+    from volery.mavlink.scenario_setup import with_autopilots
     from volery.scenario.load import parse_scenario
 
     data = {
@@ -60,7 +60,7 @@ def _scenario(count: int, physics_hz: int = 1000) -> Any:
 def _fly_ten(*, streams: bool) -> tuple[float, list[float]]:
     """CPU seconds a second in real time, and milliseconds from commands to their answers."""
     from volery.bridges.doors import Doors
-    from volery.mavlink.udp_door import MavlinkUdp
+    from volery.mavlink.links.udp_door import MavlinkUdp
     from volery.runtime import Simulation
 
     plain, outfitted = _scenario(_VEHICLES)

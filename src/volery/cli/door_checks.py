@@ -76,7 +76,7 @@ def _remedy(name: str) -> str:
 
 def check_autopilots(scenario: Scenario, options: RunOptions) -> None:
     """`BridgeError` where a scenario brings autopilots for UAVs that doors bring others for."""
-    from volery.mavlink.outfit import NODE
+    from volery.mavlink.scenario_setup import NODE
     from volery.scenario.node_names import is_same_node
 
     outside = [name for name in _names(options) if name in _OUTSIDE]

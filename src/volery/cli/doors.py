@@ -16,9 +16,9 @@ from volery.core.errors import BridgeError
 if TYPE_CHECKING:
     from volery.bridges.door_names import Address, Terms
     from volery.bridges.doors import Door
-    from volery.mavlink.meetings import Patience
-    from volery.mavlink.px4_door import Px4Door
-    from volery.mavlink.px4_processes import Px4Instances
+    from volery.mavlink.hil.lock_step import Patience
+    from volery.mavlink.hil.px4_door import Px4Door
+    from volery.mavlink.hil.px4_processes import Px4Instances
     from volery.scenario.schema import Scenario
 
 _LONGEST_START_S = 60.0
@@ -29,21 +29,21 @@ _LOOK_S = 0.05
 def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
     """The scenario with what the doors of `options` need: autopilots, or sensors for real ones."""
     if options.px4_dir is not None:
-        from volery.mavlink.px4_processes import find_px4
+        from volery.mavlink.hil.px4_processes import find_px4
 
         find_px4(options.px4_dir)  # a wrong folder is told before anything is built
     check_autopilots(scenario, options)
     names = {text.partition("=")[0] for text in options.doors}
     if any(name.startswith("mavlink") for name in names):
-        from volery.mavlink.outfit import with_autopilots
+        from volery.mavlink.scenario_setup import with_autopilots
 
         scenario = with_autopilots(scenario)
     if names & {"px4", "px4-serial"}:
-        from volery.mavlink.outfit import with_px4
+        from volery.mavlink.scenario_setup import with_px4
 
         scenario = with_px4(scenario)
     if "ardupilot" in names:
-        from volery.mavlink.outfit import with_ardupilot
+        from volery.mavlink.scenario_setup import with_ardupilot
 
         scenario = with_ardupilot(scenario)
     return scenario
@@ -103,19 +103,19 @@ def _comms(address: Address, terms: Terms) -> Door:
 
 
 def _mavlink(address: Address, terms: Terms, key: bytes | None) -> Door:
-    from volery.mavlink.udp_door import MavlinkUdp
+    from volery.mavlink.links.udp_door import MavlinkUdp
 
     return MavlinkUdp(*address, anywhere=terms.anywhere, key=key)
 
 
 def _mavlink_tcp(address: Address, terms: Terms, key: bytes | None) -> Door:
-    from volery.mavlink.tcp_door import MavlinkTcp
+    from volery.mavlink.links.tcp_door import MavlinkTcp
 
     return MavlinkTcp(*address, anywhere=terms.anywhere, key=key)
 
 
 def _mavlink_serial(address: Address, key: bytes | None) -> Door:
-    from volery.mavlink.serial_door import MavlinkSerial
+    from volery.mavlink.links.serial_door import MavlinkSerial
 
     return MavlinkSerial(*address, key=key)
 
@@ -123,15 +123,15 @@ def _mavlink_serial(address: Address, key: bytes | None) -> Door:
 def _key_of(options: RunOptions) -> bytes | None:
     if options.mavlink_key is None:
         return None
-    from volery.mavlink.signing import key_of
+    from volery.mavlink.links.signing import key_of
 
     return key_of(options.mavlink_key)
 
 
 def _px4(address: Address, terms: Terms, patience: Patience, *, are_ours: bool) -> Door:
     """`are_ours`: the run starts the PX4s, and tells by itself of those that do not come."""
-    from volery.mavlink.absence import NOTICE_S
-    from volery.mavlink.px4_door import Px4Door
+    from volery.mavlink.hil.connection_notice import NOTICE_S
+    from volery.mavlink.hil.px4_door import Px4Door
 
     return Px4Door(
         *address,
@@ -142,14 +142,14 @@ def _px4(address: Address, terms: Terms, patience: Patience, *, are_ours: bool) 
 
 
 def _px4_serial(address: Address, patience: Patience) -> Door:
-    from volery.mavlink.px4_serial_door import Px4Serial
+    from volery.mavlink.hil.px4_serial_door import Px4Serial
 
     return Px4Serial(*address, patience=patience)
 
 
 def _ardupilot(address: Address, terms: Terms, patience: Patience, simulation: Any) -> Door:
-    from volery.mavlink.ardupilot_door import ArdupilotDoor
-    from volery.mavlink.json_frames import Rotor
+    from volery.mavlink.hil.ardupilot_door import ArdupilotDoor
+    from volery.mavlink.hil.ardupilot_json import Rotor
 
     rotors = {
         name: [
@@ -162,7 +162,7 @@ def _ardupilot(address: Address, terms: Terms, patience: Patience, simulation: A
 
 
 def _patience_of(options: RunOptions) -> Patience:
-    from volery.mavlink.meetings import Patience
+    from volery.mavlink.hil.lock_step import Patience
 
     return Patience(options.autopilot_timeout_s, options.drop_silent)
 
@@ -174,8 +174,8 @@ def _px4_instances(simulation: Any, doors: list[Door], options: RunOptions) -> I
         yield
         return
     from volery.cli.px4 import parameters_for
-    from volery.mavlink.px4_door import Px4Door
-    from volery.mavlink.px4_processes import Px4Instances, find_px4
+    from volery.mavlink.hil.px4_door import Px4Door
+    from volery.mavlink.hil.px4_processes import Px4Instances, find_px4
 
     build, count = find_px4(options.px4_dir), len(simulation.uav_names)
     parameters = [parameters_for(uav.airframe) for uav in simulation.uavs.values()]

@@ -12,8 +12,8 @@ import typer
 
 from volery.cli.interrupt import StopSignals
 from volery.core.errors import BridgeError
-from volery.mavlink.px4_parameters import Px4Airframe, Px4Rotor, px4_parameters
-from volery.mavlink.px4_processes import Px4Instances, find_px4
+from volery.mavlink.hil.px4_parameters import Px4Airframe, Px4Rotor, px4_parameters
+from volery.mavlink.hil.px4_processes import Px4Instances, find_px4
 
 if TYPE_CHECKING:
     from volery.vehicle.airframe import Airframe

@@ -32,15 +32,15 @@ from volery.graph.messages import (
     message_type,
 )
 from volery.graph.zero import zero_message
-from volery.mavlink import arming, commands, offboard, switching
-from volery.mavlink.modes import mode_named
-from volery.mavlink.setpoints import Setpoint
+from volery.mavlink.autopilot import arming, commands, mode_transitions, offboard
+from volery.mavlink.autopilot.modes import mode_named
+from volery.mavlink.autopilot.setpoints import Setpoint
 
 if TYPE_CHECKING:
     from volery.graph.node import Node
-    from volery.mavlink.autopilot import Autopilot
-    from volery.mavlink.memory import Source
-    from volery.mavlink.vehicle import Vector
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.state import Source
+    from volery.mavlink.autopilot.vehicle import Vector
 
 _STATE, _EXTENDED = "mavros_msgs/msg/State", "mavros_msgs/msg/ExtendedState"
 _TARGET, _ATTITUDE = "mavros_msgs/msg/PositionTarget", "mavros_msgs/msg/AttitudeTarget"
@@ -229,7 +229,9 @@ class Mavros:
 
     def _set_mode(self, request: Any, response: Any) -> Any:
         mode = mode_named(request.custom_mode)
-        why = "there is no such mode" if mode is None else switching.ask_for(self._pilot, mode)
+        why = (
+            "there is no such mode" if mode is None else mode_transitions.ask_for(self._pilot, mode)
+        )
         if why:
             self._refuse(f"mode '{request.custom_mode}': {why}")
         response.mode_sent = not why

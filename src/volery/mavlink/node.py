@@ -20,11 +20,11 @@ import numpy as np
 from volery.core.errors import NodeError
 from volery.graph.messages import FluidPressure, NavSatFix, Temperature, message_type
 from volery.graph.node import Node
-from volery.mavlink import autopilot, streams
-from volery.mavlink.graph_vehicle import GraphVehicle, build_of, state_of
-from volery.mavlink.log_transfer import TransferPace
+from volery.mavlink.autopilot import core, streams
+from volery.mavlink.autopilot.graph_vehicle import GraphVehicle, build_of, state_of
+from volery.mavlink.autopilot.log_transfer import TransferPace
+from volery.mavlink.autopilot.state import Memory
 from volery.mavlink.mavros import Mavros
-from volery.mavlink.memory import Memory
 
 PACKETS = "volery_interfaces/msg/MavlinkPackets"
 _STATE = "volery_interfaces/msg/FlightState"
@@ -50,7 +50,7 @@ class Autopilot(Node):
             raise NodeError(f"system_id {self.system_id}: 1 to {MOST_SYSTEMS} is allowed")
         self.declare_parameter("mavlink_id", self.system_id)
         build = build_of(self)
-        self.core = autopilot.Autopilot(self.system_id, GraphVehicle(self), build, given)
+        self.core = core.Autopilot(self.system_id, GraphVehicle(self), build, given)
         self.core.log.transfers.pace = _PACES.setdefault(self._context.graph, TransferPace())
         self._packets = message_type(PACKETS)
         self._out = self.create_publisher(self._packets, "mavlink/out", 1000)

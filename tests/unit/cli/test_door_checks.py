@@ -9,7 +9,7 @@ from volery.cli.app import app
 from volery.cli.door_checks import check_autopilots, check_doors, token_gaps
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
-from volery.mavlink.outfit import with_autopilots
+from volery.mavlink.scenario_setup import with_autopilots
 from volery.scenario.load import load_scenario
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 from volery.comms.server import CommsServer
 from volery.core.listening import write_while_open
-from volery.mavlink.tcp_door import _TcpClient
+from volery.mavlink.links.tcp_door import _TcpClient
 
 
 async def _write_after_reset(write):

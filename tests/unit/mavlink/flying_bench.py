@@ -9,7 +9,7 @@ import numpy as np
 from volery.graph.messages import message_type
 from volery.mavlink.codec import Parser, dialect
 from volery.mavlink.framing import Framer
-from volery.mavlink.outfit import with_autopilots
+from volery.mavlink.scenario_setup import with_autopilots
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
 

@@ -9,11 +9,11 @@ from px4_stand_in import Terminal, connect
 from test_ardupilot import X
 
 from volery.bridges.doors import Doors
-from volery.mavlink.absence import notice
-from volery.mavlink.ardupilot_door import ArdupilotDoor
-from volery.mavlink.outfit import with_ardupilot, with_px4
-from volery.mavlink.px4_door import Px4Door, how_to_start
-from volery.mavlink.px4_serial_door import Px4Serial
+from volery.mavlink.hil.ardupilot_door import ArdupilotDoor
+from volery.mavlink.hil.connection_notice import notice
+from volery.mavlink.hil.px4_door import Px4Door, how_to_start
+from volery.mavlink.hil.px4_serial_door import Px4Serial
+from volery.mavlink.scenario_setup import with_ardupilot, with_px4
 from volery.runtime import Simulation
 
 SOON_S = 0.3

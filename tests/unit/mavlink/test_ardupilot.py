@@ -14,8 +14,8 @@ from autopilot_bench import free_port, irises
 
 from volery.bridges.doors import Doors
 from volery.core.errors import BridgeError, PartnerError
-from volery.mavlink.ardupilot_door import ArdupilotDoor
-from volery.mavlink.json_frames import (
+from volery.mavlink.hil.ardupilot_door import ArdupilotDoor
+from volery.mavlink.hil.ardupilot_json import (
     STATE_HZ,
     Rotor,
     State,
@@ -24,8 +24,8 @@ from volery.mavlink.json_frames import (
     shares,
     state_line,
 )
-from volery.mavlink.meetings import PATIENCE, Patience
-from volery.mavlink.outfit import with_ardupilot
+from volery.mavlink.hil.lock_step import PATIENCE, Patience
+from volery.mavlink.scenario_setup import with_ardupilot
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
 

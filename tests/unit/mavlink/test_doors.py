@@ -13,9 +13,9 @@ from volery.bridges.doors import Doors
 from volery.cli.doors import open_doors
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
-from volery.mavlink.serial_door import MavlinkSerial
-from volery.mavlink.tcp_door import MavlinkTcp
-from volery.mavlink.udp_door import MavlinkUdp
+from volery.mavlink.links.serial_door import MavlinkSerial
+from volery.mavlink.links.tcp_door import MavlinkTcp
+from volery.mavlink.links.udp_door import MavlinkUdp
 from volery.runtime import Simulation
 
 mavutil = pytest.importorskip("pymavlink.mavutil")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from volery.core.geodesy import LocalFrame
-from volery.mavlink.geography import Earth
+from volery.mavlink.autopilot.geo_reference import Earth
 
 ORIGINS = [
     (47.397742, 8.545594, 488.0),

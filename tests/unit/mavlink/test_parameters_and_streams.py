@@ -9,10 +9,10 @@ from collections import Counter
 import pytest
 from flying_bench import NAN, PACKETS, Station, fly
 
+from volery.mavlink.autopilot.parameters import DEFAULTS, NAMES
+from volery.mavlink.autopilot.streams import RATES_HZ
 from volery.mavlink.codec import Codec, dialect
 from volery.mavlink.framing import lengths_of
-from volery.mavlink.parameters import DEFAULTS, NAMES
-from volery.mavlink.streams import RATES_HZ
 
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 

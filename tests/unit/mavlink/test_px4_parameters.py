@@ -5,7 +5,7 @@ import pytest
 
 from volery.cli.px4 import parameters_for
 from volery.core.errors import BridgeError
-from volery.mavlink.px4_parameters import MAX_ROTORS, Px4Airframe, Px4Rotor, px4_parameters
+from volery.mavlink.hil.px4_parameters import MAX_ROTORS, Px4Airframe, Px4Rotor, px4_parameters
 from volery.vehicle.airframe import airframe_names, load_airframe, wrench_matrix
 
 

@@ -11,8 +11,8 @@ from autopilot_bench import free_port
 from volery.cli.doors import _px4_instances
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
-from volery.mavlink.px4_door import Px4Door
-from volery.mavlink.px4_processes import FIRST_PORT, Px4Instances, established_ports, find_px4
+from volery.mavlink.hil.px4_door import Px4Door
+from volery.mavlink.hil.px4_processes import FIRST_PORT, Px4Instances, established_ports, find_px4
 from volery.vehicle.airframe import load_airframe
 
 NUMBER = 187

@@ -5,7 +5,7 @@ from flying_bench import Station, fly, scenario
 
 from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.flights import read_flight
-from volery.mavlink.outfit import NODE, with_autopilots
+from volery.mavlink.scenario_setup import NODE, with_autopilots
 from volery.runtime import Simulation
 from volery.runtime.origin import scenario_of
 

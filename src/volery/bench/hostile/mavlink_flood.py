@@ -9,8 +9,8 @@ from contextlib import suppress
 from functools import cache
 from typing import Any
 
-from volery.mavlink import ports
 from volery.mavlink.codec import dialect
+from volery.mavlink.links import ports
 
 FRAMES_HZ = 10_000
 _BURSTS_HZ = 100

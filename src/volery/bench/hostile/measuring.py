@@ -24,8 +24,8 @@ from volery.bench.hostile.attackers import ATTACKS, MAVLINK_ATTACKS
 from volery.bench.hostile.witness import PERIOD_S
 from volery.bench.registry import Measured
 from volery.core.errors import VoleryError
-from volery.mavlink import ports
 from volery.mavlink.codec import dialect
+from volery.mavlink.links import ports
 
 _log = logging.getLogger(__name__)
 

@@ -1,0 +1,94 @@
+"""Arming: what must be well before the rotors may turn, and when they stop for good.
+
+The rotors of an armed UAV stand still until it takes off: its flight modes know no idling.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from volery.mavlink.autopilot import feasibility, home, mode_requirements
+from volery.mavlink.autopilot.modes import Mode
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+
+
+def troubles(pilot: Autopilot) -> list[str]:
+    """What keeps the UAV from being armed; nothing where all is well."""
+    memory = pilot.memory
+    state = memory.state
+    if state is None:
+        return ["nothing is known of the vehicle"]
+    found = []
+    if state.crashed:
+        found.append("the vehicle has crashed")
+    if memory.mode in (Mode.RETURN, Mode.LAND) and not memory.armed:
+        found.append("mode not suitable for arming")
+    if memory.fix_lost and not pilot.parameter("COM_ARM_WO_GPS"):
+        found.append("no satellite fix")
+    if math.isfinite(state.charge) and state.charge < float(pilot.parameter("BAT_LOW_THR")):
+        found.append("low battery")
+    tilt = 1.0 - 2.0 * (state.attitude[0] ** 2 + state.attitude[1] ** 2)
+    if not state.airborne and tilt < 0.7:  # PX4 refuses beyond about 45 deg
+        found.append("the vehicle lies on its side")
+    lacks = mode_requirements.missing(pilot, memory.mode)
+    found += [lacks] if lacks else []
+    if int(pilot.parameter("NAV_DLL_ACT")) and not mode_requirements.ground_is_there(pilot):
+        found.append("no connection to the ground control station")
+    return found
+
+
+def obstacle(pilot: Autopilot) -> str:
+    """The first trouble, or what is wrong with the mission that it would begin; empty: none."""
+    found = troubles(pilot)
+    if not found and pilot.memory.mode is Mode.MISSION:
+        return feasibility.trouble(pilot)
+    return found[0] if found else ""
+
+
+def arm(pilot: Autopilot) -> str:
+    """Arm; why not, empty where it is armed. Nobody can force it: PX4 checks for all outside."""
+    memory = pilot.memory
+    if memory.armed:
+        return ""
+    why = obstacle(pilot)
+    if why:
+        return why
+    memory.armed, memory.armed_ns = True, memory.now_ns
+    memory.airborne, memory.failsafe = False, False
+    memory.warned.clear()
+    home.set_on_arming(pilot)
+    pilot.say(6, "Armed by external command")
+    pilot.announce()
+    return ""
+
+
+def disarm(pilot: Autopilot, *, forced: bool) -> str:
+    """Disarm; in the air only by force, and then it falls. Why not, empty where it is done."""
+    state = pilot.state
+    landed = state.mode in ("LANDED", "CRASHED")
+    if not landed:
+        if not forced:
+            return "not landed"
+        why = pilot.vehicle.stop()
+        if why:
+            return why
+    finish(pilot, "Disarmed by external command")
+    pilot.memory.order = "" if landed else "stop"
+    pilot.memory.ordered_ns = pilot.memory.now_ns
+    return ""
+
+
+def finish(pilot: Autopilot, text: str) -> None:
+    """Be disarmed from now on."""
+    memory = pilot.memory
+    if not memory.armed:
+        return
+    memory.armed, memory.airborne, memory.failsafe = False, False, False
+    memory.leg = memory.way_home = memory.target = None
+    if memory.mode in (Mode.RETURN, Mode.LAND, Mode.TAKE_OFF, Mode.OFFBOARD):
+        memory.mode = Mode.HOLD
+    pilot.say(6, text)
+    pilot.announce()

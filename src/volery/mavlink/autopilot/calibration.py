@@ -1,0 +1,70 @@
+"""Calibration of sensors: announced and finished as by PX4; it changes nothing.
+
+The simulated sensors of a UAV at rest need none. STATUSTEXTs, by which ground stations follow it:
+`calibration_messages.h` of PX4 1.18. What has to be turned by hand (magnetometer, accelerometer on
+six sides) and sensors that are not there (radio, airspeed) are not offered.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from volery.mavlink.autopilot.acknowledgement import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
+from volery.mavlink.autopilot.state import Calibration
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.commands import Command
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.state import Source
+
+CALIBRATE = 241
+_OFFERED: dict[tuple[float, ...], str] = {
+    (1, 0, 0, 0, 0): "gyro",
+    (0, 0, 1, 0, 0): "baro",
+    (0, 0, 0, 0, 2): "level",
+    (0, 0, 0, 0, 4): "accel",
+}
+"""Sensor by the first five parameters."""
+_DURATION_NS = 2_000_000_000
+_STEP_PERCENT = 5
+"""Duration is a modelling choice, the step is PX4's."""
+
+
+def start(pilot: Autopilot, _source: Source, command: Command) -> int:
+    """Starts PREFLIGHT_CALIBRATION; without any sensor it cancels the present one."""
+    memory = pilot.memory
+    params = [0.0 if math.isnan(param) else param for param in command.params]
+    if not any(params):
+        if memory.calibration is not None:
+            memory.calibration = None
+            pilot.say(6, "[cal] calibration cancelled")
+        return ACCEPTED
+    if memory.armed or memory.calibration is not None or pilot.state.mode != "LANDED":
+        return TEMPORARILY_REJECTED
+    sensor = _OFFERED.get(tuple(params[:5])) if not any(params[5:]) else None
+    if sensor is None:
+        return UNSUPPORTED
+    memory.calibration = Calibration(sensor, memory.now_ns)
+    return ACCEPTED
+
+
+def update(pilot: Autopilot) -> None:
+    """Reports the progress of a calibration."""
+    memory, calibration = pilot.memory, pilot.memory.calibration
+    if calibration is None:
+        return
+    if calibration.percent < 0:
+        pilot.say(6, f"[cal] calibration started: 2 {calibration.sensor}")
+        calibration.percent = 0
+    if memory.armed or pilot.state.mode != "LANDED":
+        memory.calibration = None
+        pilot.say(2, f"[cal] calibration failed: {calibration.sensor}")
+        return
+    percent = min((memory.now_ns - calibration.start_ns) * 100 // _DURATION_NS, 100)
+    while calibration.percent + _STEP_PERCENT <= percent:
+        calibration.percent += _STEP_PERCENT
+        pilot.say(6, f"[cal] progress <{calibration.percent}>")
+    if calibration.percent == 100:
+        memory.calibration = None
+        pilot.say(6, f"[cal] calibration done: {calibration.sensor}")

@@ -1,0 +1,120 @@
+"""What happens by itself when something goes wrong, on simulated time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from volery.mavlink.autopilot import arming, mode_requirements, mode_transitions
+from volery.mavlink.autopilot.geofence import breach
+from volery.mavlink.autopilot.modes import Mode
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.vehicle import FlightState
+
+PERIOD_NS = 100_000_000
+"""Between two looks (modelling choice)."""
+_FIX_PATIENCE_NS = 5_000_000_000
+"""Without a fix the estimate counts for this long, PX4's EKF2_NOAID_TOUT."""
+
+
+def check(pilot: Autopilot, state: FlightState) -> None:
+    """Look whether anything is wrong; tell of it once, and act on it once."""
+    memory = pilot.memory
+    memory.fix_lost = memory.now_ns - memory.fix_ns > _FIX_PATIENCE_NS
+    flies = memory.armed and mode_transitions.flies(pilot)
+    for name, look in _LOOKS.items():
+        found = look(pilot, state) if flies or name.startswith("battery") else None
+        if found is None:
+            memory.warned.discard(name)
+        elif name not in memory.warned:
+            memory.warned.add(name)
+            text, mode = found
+            pilot.say(2 if mode else 4, text)
+            if flies:
+                act(pilot, mode)
+
+
+def act(pilot: Autopilot, mode: Mode | None) -> None:
+    """Enter the mode of a failsafe; a landing stays one, and who has no place lands at once."""
+    memory = pilot.memory
+    if mode is None:
+        return
+    if memory.fix_lost:
+        mode = Mode.LAND
+    if memory.mode is Mode.LAND or (memory.mode is Mode.RETURN and mode is Mode.HOLD):
+        return
+    memory.failsafe = True
+    if mode is not memory.mode or (mode is Mode.HOLD and _is_under_way(pilot)):
+        mode_transitions.enter(pilot, mode)
+
+
+def _is_under_way(pilot: Autopilot) -> bool:
+    """Whether a UAV in hold still flies somewhere, by a reposition or by another's orders."""
+    return pilot.memory.leg is not None or pilot.memory.order not in ("hold", "HOLD")
+
+
+def _position(pilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
+    if not pilot.memory.fix_lost or pilot.memory.mode is Mode.ALTITUDE:
+        return None
+    return "Failsafe: position lost, landing", Mode.LAND
+
+
+def _battery(level: str) -> Callable[[Autopilot, FlightState], tuple[str, Mode | None] | None]:
+    def look(pilot: Autopilot, state: FlightState) -> tuple[str, Mode | None] | None:
+        threshold = float(pilot.parameter(f"BAT_{level}_THR"))
+        if not (math.isfinite(state.charge) and state.charge < threshold):
+            return None
+        action = int(pilot.parameter("COM_LOW_BAT_ACT"))
+        mode = None
+        if level == "CRIT":
+            mode = {2: Mode.LAND, 3: Mode.RETURN}.get(action)
+        elif level == "EMERGEN":
+            mode = {2: Mode.LAND, 3: Mode.LAND}.get(action)
+        word = {"LOW": "Low", "CRIT": "Critical", "EMERGEN": "Emergency"}[level]
+        return f"{word} battery level", mode
+
+    return look
+
+
+def _fence(pilot: Autopilot, state: FlightState) -> tuple[str, Mode | None] | None:
+    action = int(pilot.parameter("GF_ACTION"))
+    broken = breach(pilot, state.position) if action else ""
+    if not broken:
+        return None
+    if action == 4:
+        arming.disarm(pilot, forced=True)
+    mode = {2: Mode.HOLD, 3: Mode.RETURN, 5: Mode.LAND}.get(action)
+    return f"Geofence violation: {broken}", mode
+
+
+def _link(pilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
+    """As in PX4 one that was never heard counts as lost, and who lands already goes on landing."""
+    action = int(pilot.parameter("NAV_DLL_ACT"))
+    if not action or mode_requirements.ground_is_there(pilot):
+        return None
+    if pilot.memory.mode is Mode.LAND and "link" not in pilot.memory.warned:
+        return None
+    mode = {1: Mode.HOLD, 2: Mode.RETURN, 3: Mode.LAND}[action]
+    return "Failsafe: connection to ground station lost", mode
+
+
+def _sticks(pilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
+    if not pilot.memory.mode.by_sticks or mode_requirements.sticks_are_there(pilot):
+        return None
+    mode = {1: Mode.HOLD, 3: Mode.LAND}.get(int(pilot.parameter("NAV_RCL_ACT")), Mode.RETURN)
+    return "Failsafe: manual control lost", mode
+
+
+_LOOKS: dict[str, Callable[[Autopilot, FlightState], tuple[str, Mode | None] | None]] = {
+    "position": _position,
+    "battery low": _battery("LOW"),
+    "battery critical": _battery("CRIT"),
+    "battery emergency": _battery("EMERGEN"),
+    "fence": _fence,
+    "link": _link,
+    "sticks": _sticks,
+}
+"""The first to be looked at, and the last one that finds something decides; landings stay."""

@@ -1,0 +1,90 @@
+"""INJECT_FAILURE: the faults of the simulation under MAVLink's numbers, for the own UAV alone.
+
+As in PX4 only where SYS_FAILURE_EN is 1; an instance of a unit has one failure at most, and
+FAILURE_TYPE_OK ends it (`FailureTable.cpp` of PX4 1.18). Faults that others have injected stay.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from volery.mavlink.autopilot.acknowledgement import ACCEPTED, DENIED, FAILED, UNSUPPORTED
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.commands import Command
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.state import Source
+
+INJECT_FAILURE = 420
+_GPS, _MOTOR = 4, 101
+_SENSORS = {0: "imu", 1: "imu", 2: "mag", 3: "pressure", _GPS: "fix", 7: "range"}
+"""Usual name of the sensor by FAILURE_UNIT; gyroscope and accelerometer are one."""
+_OK, _OFF, _STUCK = 0, 1, 2
+"""FAILURE_TYPE."""
+_EFFECTS = {_OFF: "dropped", _STUCK: "stuck"}
+
+
+def inject(pilot: Autopilot, _source: Source, command: Command) -> int:
+    """Lets a unit of the UAV fail, or ends its failure."""
+    unit, kind, instance = (
+        round(part) if math.isfinite(part) else 0 for part in command.params[:3]
+    )
+    if pilot.parameter("SYS_FAILURE_EN") != 1:
+        return DENIED
+    instances = _instances_of(pilot, unit, instance)
+    if not instances or not _is_supported(unit, kind):
+        return UNSUPPORTED
+    if unit == _GPS and kind in (_OK, _OFF) and not pilot.memory.has_receiver:
+        pilot.memory.fix_denied = kind == _OFF
+        return ACCEPTED
+    for number in instances:
+        why = _change(pilot, (unit, number), _fault_of(unit, kind, number))
+        if why:
+            pilot.say(4, why)
+            return FAILED
+    return ACCEPTED
+
+
+def _is_supported(unit: int, kind: int) -> bool:
+    """Whether a unit can fail so."""
+    return kind in ((_OK, _OFF) if unit == _MOTOR else (_OK, _OFF, _STUCK))
+
+
+def _instances_of(pilot: Autopilot, unit: int, instance: int) -> tuple[int, ...]:
+    """Instances of a unit, from 1, that a command is about (0: all); none of what is not there."""
+    if unit == _MOTOR:
+        all_of_them = tuple(range(1, pilot.build.rotors + 1))
+    else:
+        all_of_them = (1,) if unit in _SENSORS else ()
+    return tuple(number for number in all_of_them if instance in (0, number))
+
+
+def _fault_of(unit: int, kind: int, instance: int) -> dict[str, Any] | None:
+    """The fault of the simulation; None where all is to be well."""
+    if kind == _OK:
+        return None
+    if unit == _MOTOR:
+        return {"kind": "motor", "rotor": instance - 1}
+    if unit == _GPS and kind == _OFF:
+        return {"kind": "gnss_loss"}
+    return {"kind": "sensor", "sensor": _SENSORS[unit], "effect": _EFFECTS[kind]}
+
+
+def _change(pilot: Autopilot, key: tuple[int, int], fault: dict[str, Any] | None) -> str:
+    """Ends the failure of an instance and begins the next one; why not, empty where it is done."""
+    failures = pilot.memory.failures
+    before = failures.pop(key, None)
+    if before is not None:
+        why = pilot.vehicle.end_fault(before)
+        if why:
+            return why
+        for other in failures.values():  # of the same sensor: it fails on
+            if other.get("sensor", "") == before.get("sensor"):
+                pilot.vehicle.fail(other)
+    if fault is None:
+        return ""
+    why = pilot.vehicle.fail(fault)
+    if not why:
+        failures[key] = fault
+    return why

@@ -1,0 +1,41 @@
+"""Answers MAVLink FTP as a server without files, so that no client waits.
+
+Its header and answers: `mavlink_ftp.cpp` of PX4 1.18.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING, Any
+
+from volery.mavlink.codec import dialect
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.state import Source
+
+_HEADER = struct.Struct("<HBBBBBBI")
+"""Sequence, session, opcode, size, opcode that is answered, end of a burst, padding, offset."""
+_PAYLOAD = 251
+_MOST_DATA = _PAYLOAD - _HEADER.size
+_ACK, _NAK = 128, 129
+_FAIL, _INVALID_SIZE, _INVALID_SESSION, _UNKNOWN_COMMAND, _NOT_FOUND = 1, 3, 4, 7, 10
+_FAULTS = {
+    **dict.fromkeys((0, 2), 0),  # nothing, and the end of all sessions
+    **dict.fromkeys((1, 5, 7, 15), _INVALID_SESSION),  # end, read, write, burst
+    **dict.fromkeys((3, 4, 8, 10, 12, 13, 14, 16), _NOT_FOUND),  # of a path
+    **dict.fromkeys((6, 9, 11), _FAIL),  # what would make something
+}
+"""Error by opcode; 0 is none."""
+
+
+def answer_file_request(pilot: Autopilot, source: Source, message: Any) -> None:
+    """Answer a FILE_TRANSFER_PROTOCOL."""
+    payload = bytes(message.payload)
+    sequence, session, opcode, size, _, _, _, offset = _HEADER.unpack_from(payload)
+    fault = _INVALID_SIZE if size > _MOST_DATA else _FAULTS.get(opcode, _UNKNOWN_COMMAND)
+    kind, data = (_NAK, bytes((fault,))) if fault else (_ACK, b"")
+    head = _HEADER.pack(sequence + 1 & 0xFFFF, session, kind, len(data), opcode, 0, 0, offset)
+    link, system, component = source
+    answer = dialect().MAVLink_file_transfer_protocol_message
+    pilot.send(answer(0, system, component, (head + data).ljust(_PAYLOAD, b"\0")), link)

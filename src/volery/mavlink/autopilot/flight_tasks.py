@@ -1,0 +1,80 @@
+"""What each mode does at each state of the UAV."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from volery.mavlink.autopilot import (
+    follow_target,
+    landing,
+    manual_control,
+    mission_flight,
+    mode_transitions,
+    offboard,
+    orbit,
+    return_flight,
+)
+from volery.mavlink.autopilot.legs import fly_leg
+from volery.mavlink.autopilot.modes import Mode
+from volery.mavlink.autopilot.setpoints import Setpoint
+from volery.mavlink.autopilot.state import Leg
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.vehicle import FlightState
+
+
+def fly(pilot: Autopilot, state: FlightState) -> None:
+    """Go on with the present mode; nothing while it is disarmed or somebody else flies."""
+    memory = pilot.memory
+    if not memory.armed or state.crashed or memory.order.isupper():
+        return
+    _FLIGHTS[memory.mode](pilot, state)
+    if memory.order == "land" and state.mode == "LAND":
+        landing.follow(pilot, state)
+
+
+def _take_off(pilot: Autopilot, state: FlightState) -> None:
+    memory = pilot.memory
+    if state.mode == "LANDED":
+        if memory.order != "take_off":
+            mode_transitions.rise(pilot)
+        return
+    there = state.mode == "HOLD" if memory.leg is None else fly_leg(pilot, memory.leg)
+    if there:
+        wants_mission = pilot.parameter("COM_TAKEOFF_ACT") == 1
+        goes_on = wants_mission and not mode_transitions.obstacle_to(pilot, Mode.MISSION)
+        leg = memory.leg
+        if leg is None and memory.take_off_goal is not None:
+            leg = Leg(memory.take_off_goal, None, mode_transitions.cruise(pilot))
+        mode_transitions.enter(pilot, Mode.MISSION if goes_on else Mode.HOLD)
+        memory.leg = None if goes_on else leg
+
+
+def _hold(pilot: Autopilot, state: FlightState) -> None:
+    if pilot.memory.leg is not None and state.mode != "LANDED":
+        fly_leg(pilot, pilot.memory.leg)
+
+
+def _land(pilot: Autopilot, state: FlightState) -> None:
+    if state.mode not in ("LANDED", "LAND") and pilot.memory.order != "land":
+        mode_transitions.order(pilot, "land", pilot.vehicle.land())
+    if pilot.memory.target is None:
+        x, y, _ = state.position
+        pilot.memory.target = Setpoint(position=(x, y, math.nan))
+
+
+_FLIGHTS: dict[Mode, Callable[[Autopilot, FlightState], None]] = {
+    Mode.ALTITUDE: manual_control.fly_altitude,
+    Mode.POSITION: manual_control.fly_position,
+    Mode.ORBIT: orbit.fly,
+    Mode.TAKE_OFF: _take_off,
+    Mode.HOLD: _hold,
+    Mode.MISSION: mission_flight.fly,
+    Mode.RETURN: return_flight.fly,
+    Mode.LAND: _land,
+    Mode.FOLLOW_TARGET: follow_target.fly,
+    Mode.OFFBOARD: offboard.fly,
+}

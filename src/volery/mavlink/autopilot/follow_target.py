@@ -1,0 +1,133 @@
+"""Follow-me: beside a target whose position FOLLOW_TARGET brings, as PX4's AutoFollowTarget.
+
+Position and velocity of the target are filtered as by PX4's `TargetEstimator.cpp` (without its
+acceleration); the position beside it is by its course, height and angle by parameters.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from volery.core.frames import enu_of_ned
+from volery.mavlink.autopilot import mode_transitions
+from volery.mavlink.autopilot.legs import approach_speed
+from volery.mavlink.autopilot.modes import Mode
+from volery.mavlink.autopilot.setpoints import Setpoint
+from volery.mavlink.autopilot.state import Target
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.state import Source
+    from volery.mavlink.autopilot.vehicle import FlightState, Vector
+
+_STALE_NS = 3_000_000_000
+"""A target that is silent for so long stands still."""
+_MOVES_M_S = 0.1
+"""Speed from which a velocity is a course."""
+_HEIGHT_FIRST_M = 3.0
+"""Only nearer to its height the UAV moves along the ground."""
+_FARTHEST_M = 1e6
+_PERIOD_NS = 20_000_000
+_FACED_M = 1.0
+"""A target nearer than this along the ground is not faced."""
+
+
+def take(pilot: Autopilot, _source: Source, message: Any) -> None:
+    """Filters the position and the velocity of a FOLLOW_TARGET, in the mode that follows it."""
+    if pilot.memory.mode is not Mode.FOLLOW_TARGET:
+        return
+    latitude, longitude = message.lat * 1e-7, message.lon * 1e-7
+    numbers = (latitude, longitude, message.alt)
+    if not all(map(math.isfinite, numbers)) or abs(latitude) > 90.0 or abs(longitude) > 180.0:
+        return
+    x, y, _ = pilot.earth.place(latitude, longitude, 0.0)
+    measured = x, y, message.alt - pilot.build.origin[2]
+    if any(abs(part) > _FARTHEST_M for part in measured):
+        return
+    vx, vy, vz = message.vel
+    velocity = enu_of_ned((vx, vy, vz))
+    known = all(math.isfinite(part) and abs(part) < 1e3 for part in velocity)
+    memory, before = pilot.memory, pilot.memory.followed
+    if before is None:
+        start = velocity if known else (0.0, 0.0, 0.0)
+        memory.followed = Target(measured, start, memory.now_ns)
+    else:
+        _fuse(pilot, before, measured, velocity if known else None)
+    target = memory.followed
+    if target is not None and math.hypot(*target.velocity[:2]) > _MOVES_M_S:
+        target.course = math.atan2(target.velocity[1], target.velocity[0])
+
+
+def _fuse(pilot: Autopilot, target: Target, measured: Vector, velocity: Vector | None) -> None:
+    """Corrects an estimate by a measurement: PX4's filter by FLW_TGT_RS."""
+    share = min(max(float(pilot.parameter("FLW_TGT_RS")), 0.1), 1.0)
+    beta = share ** (1.0 / 3.0)
+    gain, rate_gain = 1.0 - share, 1.5 * (1.0 - beta) ** 2 * (1.0 + beta)
+    velocity_gain = 1.0 - (0.9 * beta) ** 2
+    elapsed_s = min(max((pilot.memory.now_ns - target.time_ns) * 1e-9, 1e-3), 20.0)
+    predicted = _position_now(pilot, target)
+    off = tuple(here - there for here, there in zip(measured, predicted, strict=True))
+    x, y, z = (p + gain * o for p, o in zip(predicted, off, strict=True))
+    vx, vy, vz = (v + rate_gain / elapsed_s * o for v, o in zip(target.velocity, off, strict=True))
+    if velocity is not None:
+        vx, vy, vz = (
+            v + velocity_gain * (told - v) for v, told in zip((vx, vy, vz), velocity, strict=True)
+        )
+    target.position, target.velocity = (x, y, z), (vx, vy, vz)
+    target.time_ns = pilot.memory.now_ns
+
+
+def fly(pilot: Autopilot, state: FlightState) -> None:
+    """Flies to the position beside the target, and with it; holds until there is a target."""
+    memory, target = pilot.memory, pilot.memory.followed
+    if target is None or state.mode == "LANDED":
+        return
+    if memory.now_ns - memory.ordered_ns < _PERIOD_NS and memory.order == "steer":
+        return
+    there = _position_now(pilot, target)
+    moves = memory.now_ns - target.time_ns < _STALE_NS
+    vx, vy, _ = target.velocity if moves else (0.0, 0.0, 0.0)
+    goal = _position_beside(pilot, target, there)
+    x, y, z = (wanted - here for wanted, here in zip(goal, state.position, strict=True))
+    away = math.hypot(x, y)
+    speed = min(
+        approach_speed(away, float(pilot.parameter("MPC_ACC_HOR"))),
+        float(pilot.parameter("FLW_TGT_MAX_VEL")),
+    )
+    share = speed / away if away > 1e-6 else 0.0
+    level = (vx + share * x, vy + share * y) if abs(z) < _HEIGHT_FIRST_M else (0.0, 0.0)
+    most = float(pilot.parameter("MPC_XY_VEL_MAX"))
+    reduced = min(1.0, most / max(math.hypot(*level), 1e-6))
+    limit = float(pilot.parameter(f"MPC_Z_V_AUTO_{'UP' if z > 0.0 else 'DN'}"))
+    brake = 0.5 * float(pilot.parameter("MPC_ACC_HOR"))
+    climb = math.copysign(min(limit, approach_speed(abs(z), brake)), z)
+    dx, dy = there[0] - state.position[0], there[1] - state.position[1]
+    yaw = math.atan2(dy, dx) if math.hypot(dx, dy) > _FACED_M else None
+    memory.target = Setpoint(position=goal, yaw=math.nan if yaw is None else yaw)
+    pilot.vehicle.steer((reduced * level[0], reduced * level[1], climb), yaw, 0.0)
+    mode_transitions.order(pilot, "steer")
+
+
+def _position_now(pilot: Autopilot, target: Target) -> Vector:
+    """Returns the position of the target, moved on by its velocity."""
+    since_s = min(pilot.memory.now_ns - target.time_ns, _STALE_NS) * 1e-9
+    x, y, z = (p + since_s * v for p, v in zip(target.position, target.velocity, strict=True))
+    return x, y, z
+
+
+def _position_beside(pilot: Autopilot, target: Target, there: Vector) -> Vector:
+    """Returns where the UAV wants to be; beside a target without a course: on its own side."""
+    if target.course is None:
+        here = pilot.state.position
+        angle = math.atan2(here[1] - there[1], here[0] - there[0])
+    else:
+        angle = target.course - math.radians(float(pilot.parameter("FLW_TGT_FA")))
+    distance, height = (float(pilot.parameter(f"FLW_TGT_{name}")) for name in ("DST", "HT"))
+    follows_height = pilot.parameter("FLW_TGT_ALT_M") == 2
+    base = there[2] if follows_height else (pilot.memory.home or pilot.memory.origin)[2]
+    return (
+        there[0] + distance * math.cos(angle),
+        there[1] + distance * math.sin(angle),
+        base + height,
+    )

@@ -1,0 +1,32 @@
+"""Places on the earth of one vehicle, without arrays: it is asked hundreds of times a second."""
+
+from __future__ import annotations
+
+import math
+
+from volery.core.geodesy import LocalFrame, ecef_from_geodetic, geodetic_from_ecef_point
+from volery.mavlink.autopilot.vehicle import Vector
+
+
+class Earth:
+    """The map on the earth: latitude and longitude in degrees, altitude in m."""
+
+    def __init__(self, latitude: float, longitude: float, altitude: float) -> None:
+        self._frame = LocalFrame.from_degrees(latitude, longitude, altitude)
+        self._columns = self._frame.enu_from_ecef_matrix.T.tolist()
+        self._centre = ecef_from_geodetic(self._frame.origin_geodetic).tolist()
+
+    def geodetic(self, place: Vector) -> Vector:
+        """Degrees, degrees, m of a place in the map."""
+        x, y, z = (
+            centre + row[0] * place[0] + row[1] * place[1] + row[2] * place[2]
+            for centre, row in zip(self._centre, self._columns, strict=True)
+        )
+        latitude, longitude, altitude = geodetic_from_ecef_point(x, y, z)
+        return math.degrees(latitude), math.degrees(longitude), altitude
+
+    def place(self, latitude: float, longitude: float, altitude: float) -> Vector:
+        """The place in the map of degrees, degrees, m."""
+        geodetic = [math.radians(latitude), math.radians(longitude), altitude]
+        x, y, z = self._frame.enu_from_geodetic(geodetic).tolist()
+        return x, y, z

@@ -1,0 +1,63 @@
+"""The geofence: a largest distance and height from home, polygons and circles to stay in or out."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from volery.mavlink.autopilot import plans
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.vehicle import Vector
+
+
+def breach(pilot: Autopilot, place: Vector) -> str:
+    """What a place in the map breaks; empty where it is allowed.
+
+    Where there are shapes to stay in, it is enough to be in one of them, as in PX4's polygons.
+    """
+    home = pilot.memory.home or pilot.memory.origin
+    farthest = float(pilot.parameter("GF_MAX_HOR_DIST"))
+    highest = float(pilot.parameter("GF_MAX_VER_DIST"))
+    if farthest > 0.0 and math.dist(place[:2], home[:2]) > farthest:
+        return "maximum distance from home"
+    if highest > 0.0 and place[2] - home[2] > highest:
+        return "maximum altitude above home"
+    inside: list[bool] = []
+    items = pilot.memory.plans[plans.FENCE]
+    k = 0
+    while k < len(items):
+        item = items[k]
+        corners = 1
+        if item.command in (plans.CIRCLE_IN, plans.CIRCLE_OUT):
+            held = math.dist(_point(pilot, item), place[:2]) < item.params[0]
+        elif item.command in (plans.POLYGON_IN, plans.POLYGON_OUT):
+            corners = int(item.params[0])
+            held = _contains([_point(pilot, one) for one in items[k : k + corners]], place)
+        else:
+            held = False
+        k += corners
+        if item.command in (plans.CIRCLE_IN, plans.POLYGON_IN):
+            inside.append(held)
+        elif held:
+            return "an area to stay out of"
+    return "" if not inside or any(inside) else "the area to stay in"
+
+
+def _point(pilot: Autopilot, item: plans.Item) -> tuple[float, float]:
+    x, y, _ = pilot.earth.place(item.latitude, item.longitude, pilot.build.origin[2])
+    return x, y
+
+
+def _contains(corners: list[tuple[float, float]], place: Vector) -> bool:
+    """Whether a polygon holds a place: a ray to the east crosses its sides an odd number of times.
+
+    (W. R. Franklin, "PNPOLY - Point Inclusion in Polygon Test".)
+    """
+    x, y, _ = place
+    odd = False
+    for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True):
+        if (ay > y) != (by > y) and x < (bx - ax) * (y - ay) / (by - ay) + ax:
+            odd = not odd
+    return odd

@@ -1,0 +1,201 @@
+"""A UAV of the graph as the autopilot's vehicle.
+
+Services carry everything: what is asked first is done first, and what is refused is told.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+from volery.core.errors import GraphError
+from volery.graph.messages import Point, Quaternion, Vector3
+from volery.graph.node import Node
+from volery.graph.zero import zero_message
+from volery.mavlink.autopilot.vehicle import Build, FlightState, Vector
+from volery.mavlink.autopilot.vehicle import Quaternion as Turn
+
+_TRIGGER = "std_srvs/srv/Trigger"
+_TAKE_OFF_TO = "volery_interfaces/srv/TakeOffTo"
+_GET_BUILD = "volery_interfaces/srv/GetBuild"
+_LANDING_SPEED = "volery_interfaces/srv/SetLandingSpeed"
+_GO_TO = "volery_interfaces/srv/GoTo"
+_SET_TARGET = "volery_interfaces/srv/SetPositionTarget"
+_SET_ATTITUDE = "volery_interfaces/srv/SetAttitudeTarget"
+_INJECT = "volery_interfaces/srv/InjectFault"
+_END_FAULT = "volery_interfaces/srv/EndFault"
+_TARGET = "mavros_msgs/msg/PositionTarget"
+_ATTITUDE = "mavros_msgs/msg/AttitudeTarget"
+_NO_PLACE, _NO_VELOCITY, _NO_PUSH = 7, 7 << 3, 7 << 6
+_NO_YAW, _NO_YAW_RATE = 1024, 2048
+_NO_RATES, _NO_ATTITUDE = 7, 128
+_NOTHING = (0.0, 0.0, 0.0)
+
+
+class GraphVehicle:
+    """Commands the UAV in whose namespace `node` lives."""
+
+    def __init__(self, node: Node) -> None:
+        self._target = node.create_client(_SET_TARGET, "set_position_target")
+        self._attitude = node.create_client(_SET_ATTITUDE, "set_attitude_target")
+        self._clients = {
+            name: node.create_client(_TRIGGER, name) for name in ("hold", "land", "stop")
+        }
+        self._take_off = node.create_client(_TAKE_OFF_TO, "take_off_to")
+        self._sink = node.create_client(_LANDING_SPEED, "set_landing_speed")
+        self._inject = node.create_client(_INJECT, "/volery/inject_fault")
+        self._end_fault = node.create_client(_END_FAULT, "/volery/end_fault")
+        self._uav = node.get_namespace().strip("/")
+        self._go_to = node.create_client(_GO_TO, "go_to")
+
+    def take_off(self, height_m: float) -> str:
+        """As `Vehicle`."""
+        request = zero_message(f"{_TAKE_OFF_TO}_Request")
+        request.altitude = height_m
+        return _ask(self._take_off, request)
+
+    def hold(self) -> str:
+        """As `Vehicle`."""
+        return _ask(self._clients["hold"])
+
+    def land(self) -> str:
+        """As `Vehicle`."""
+        return _ask(self._clients["land"])
+
+    def sink(self, speed: float) -> str:
+        """As `Vehicle`."""
+        request = zero_message(f"{_LANDING_SPEED}_Request")
+        request.speed = speed
+        return _ask(self._sink, request)
+
+    def stop(self) -> str:
+        """As `Vehicle`."""
+        return _ask(self._clients["stop"])
+
+    def go_to(self, position: Vector, yaw: float | None) -> str:
+        """As `Vehicle`."""
+        request = zero_message(f"{_GO_TO}_Request")
+        request.position = Point(*position)
+        request.yaw, request.keep_heading = yaw or 0.0, yaw is None
+        return _ask(self._go_to, request)
+
+    def steer(self, velocity: Vector, yaw: float | None, yaw_rate: float) -> None:
+        """As `Vehicle`."""
+        self._steer(_NO_PLACE | _NO_PUSH, _NOTHING, velocity, _NOTHING, yaw, yaw_rate)
+
+    def follow(
+        self,
+        position: Vector,
+        velocity: Vector,
+        acceleration: Vector,
+        yaw: float | None,
+        yaw_rate: float,
+    ) -> None:
+        """As `Vehicle`."""
+        self._steer(0, position, velocity, acceleration, yaw, yaw_rate)
+
+    def push(self, acceleration: Vector, yaw: float | None, yaw_rate: float) -> None:
+        """As `Vehicle`."""
+        self._steer(_NO_PLACE | _NO_VELOCITY, _NOTHING, _NOTHING, acceleration, yaw, yaw_rate)
+
+    def tilt(self, attitude: Turn, thrust: float) -> None:
+        """As `Vehicle`."""
+        message = zero_message(_ATTITUDE)
+        message.type_mask = _NO_RATES
+        message.orientation, message.thrust = Quaternion(*attitude), thrust
+        self._turn(message)
+
+    def spin(self, rates: Vector, thrust: float) -> None:
+        """As `Vehicle`."""
+        message = zero_message(_ATTITUDE)
+        message.type_mask = _NO_ATTITUDE
+        message.body_rate, message.thrust = Vector3(*rates), thrust
+        self._turn(message)
+
+    def fail(self, fault: dict[str, Any]) -> str:
+        """As `Vehicle`."""
+        request = zero_message(f"{_INJECT}_Request")
+        request.fault = json.dumps({**fault, "uav": self._uav})
+        return _ask(self._inject, request)
+
+    def end_fault(self, fault: dict[str, Any]) -> str:
+        """As `Vehicle`."""
+        request = zero_message(f"{_END_FAULT}_Request")
+        request.fault = json.dumps({**fault, "uav": self._uav})
+        return _ask(self._end_fault, request)
+
+    def _steer(
+        self,
+        mask: int,
+        position: Vector,
+        velocity: Vector,
+        acceleration: Vector,
+        yaw: float | None,
+        yaw_rate: float,
+    ) -> None:
+        message = zero_message(_TARGET)
+        message.coordinate_frame = 1
+        message.type_mask = mask | (_NO_YAW if yaw is None else _NO_YAW_RATE)
+        message.position, message.velocity = Point(*position), Vector3(*velocity)
+        message.acceleration_or_force = Vector3(*acceleration)
+        message.yaw, message.yaw_rate = yaw or 0.0, yaw_rate
+        request = zero_message(f"{_SET_TARGET}_Request")
+        request.target = message
+        _ask(self._target, request)
+
+    def _turn(self, message: Any) -> None:
+        request = zero_message(f"{_SET_ATTITUDE}_Request")
+        request.target = message
+        _ask(self._attitude, request)
+
+
+def _ask(client: Any, request: Any = None) -> str:
+    """Call a service that answers with success and a message; why not, empty where it does."""
+    try:
+        response = client.call(request)
+    except GraphError as error:
+        return str(error)
+    return "" if response.success else str(response.message) or "refused"
+
+
+def build_of(node: Node) -> Build:
+    """What of the UAV never changes. `GraphError` where the graph does not tell."""
+    told = node.create_client(_GET_BUILD, "get_build").call()
+    if not told.success:
+        raise GraphError(told.message)
+    return Build(
+        told.airframe,
+        told.rotors,
+        told.hover_thrust,
+        told.speed,
+        told.climb,
+        told.descent,
+        told.tilt,
+        told.battery_cells,
+        told.battery_capacity,
+        (told.latitude, told.longitude, told.altitude),
+    )
+
+
+def state_of(message: Any) -> FlightState:
+    """Of a FlightState message."""
+    stamp, pose = message.header.stamp, message.pose
+    place, turn = pose.position, pose.orientation
+    v, w, a = message.velocity, message.angular_velocity, message.acceleration
+    has_battery = math.isfinite(message.battery_charge)
+    return FlightState(
+        stamp.sec * 1_000_000_000 + stamp.nanosec,
+        message.mode,
+        message.airborne,
+        message.crashed,
+        (place.x, place.y, place.z),
+        (turn.x, turn.y, turn.z, turn.w),
+        (v.x, v.y, v.z),
+        (w.x, w.y, w.z),
+        (a.x, a.y, a.z),
+        float(message.battery_charge),
+        float(message.battery_voltage) if has_battery else math.nan,
+        float(message.battery_current) if has_battery else math.nan,
+        tuple(message.rotors.tolist()),
+    )

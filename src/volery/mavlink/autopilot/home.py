@@ -1,0 +1,44 @@
+"""Home: where heights count from, and where returns lead."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+
+_FARTHEST_M, _HIGHEST_M = 1e6, 1e5
+"""From the map's origin: beyond, a flat map says nothing (modelling choice; PX4 knows no limit)."""
+
+
+def set_here(pilot: Autopilot) -> None:
+    """Let home be where the UAV is."""
+    pilot.memory.home, pilot.memory.chosen_home = pilot.state.position, None
+    _tell(pilot)
+
+
+def set_on_arming(pilot: Autopilot) -> None:
+    """Let home be where the UAV is armed; a place that somebody chose stays, as in PX4."""
+    if pilot.memory.chosen_home is None:
+        set_here(pilot)
+
+
+def choose(pilot: Autopilot, latitude: float, longitude: float, z: float) -> str:
+    """Let home be a place in degrees and a height in the map, m; why not, empty where it is so."""
+    origin = pilot.build.origin
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
+        return "Home is not on the earth"
+    place = pilot.earth.place(latitude, longitude, origin[2])
+    if not (math.hypot(*place) <= _FARTHEST_M and abs(z) <= _HIGHEST_M):
+        return "Home is too far away"
+    pilot.memory.home = (place[0], place[1], z)
+    pilot.memory.chosen_home = (latitude, longitude, z + origin[2])
+    _tell(pilot)
+    return ""
+
+
+def _tell(pilot: Autopilot) -> None:
+    from volery.mavlink.autopilot.telemetry import BUILDERS, HOME_POSITION
+
+    pilot.send(BUILDERS[HOME_POSITION](pilot))

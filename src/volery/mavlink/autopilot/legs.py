@@ -1,0 +1,62 @@
+"""The way to a place, at a speed that parameters and missions may set.
+
+Far out the UAV is told velocities: along the ground the largest from which it can still brake, in
+the height likewise. Near the place it is told the place itself, which its own controllers keep.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from volery.mavlink.autopilot import mode_transitions
+from volery.mavlink.autopilot.setpoints import Setpoint
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.state import Leg
+
+_NEAR_M = 1.5
+"""Where the place itself is told."""
+_GAIN = 0.95
+"""1/s of the speed near the place, PX4's MPC_XY_P."""
+_ARRIVED_M, _ARRIVED_M_S = 0.3, 0.5
+
+
+def fly_leg(pilot: Autopilot, leg: Leg) -> bool:
+    """Fly on; whether the UAV is there and rests."""
+    state = pilot.state
+    x, y, z = (goal - here for goal, here in zip(leg.target, state.position, strict=True))
+    level, away = math.hypot(x, y), math.hypot(x, y, z)
+    pilot.memory.target = Setpoint(
+        position=leg.target, yaw=math.nan if leg.yaw is None else leg.yaw
+    )
+    if leg.locked:
+        return away < _ARRIVED_M and math.hypot(*state.velocity) < _ARRIVED_M_S
+    if away < _NEAR_M:
+        leg.locked = True
+        mode_transitions.order(pilot, "go_to", pilot.vehicle.go_to(leg.target, leg.yaw))
+        return False
+    speed = min(leg.speed, approach_speed(level, float(pilot.parameter("MPC_ACC_HOR"))))
+    way = "UP" if z > 0.0 else "DN"
+    limit = min(float(pilot.parameter(f"MPC_Z_{kind}_{way}")) for kind in ("V_AUTO", "VEL_MAX"))
+    climb = min(limit, approach_speed(abs(z), 0.5 * float(pilot.parameter("MPC_ACC_HOR"))))
+    share = speed / level if level > 1e-6 else 0.0
+    velocity = (share * x, share * y, math.copysign(climb, z))
+    pilot.vehicle.steer(velocity, leg.yaw, 0.0)
+    mode_transitions.order(pilot, "steer")
+    return False
+
+
+def bearing(pilot: Autopilot, target: tuple[float, float, float]) -> float | None:
+    """Rad in the map from the UAV to a place; None where that is right here."""
+    dx, dy = target[0] - pilot.state.position[0], target[1] - pilot.state.position[1]
+    return math.atan2(dy, dx) if math.hypot(dx, dy) > 1.0 else None
+
+
+def approach_speed(distance: float, brake: float) -> float:
+    """m/s from which `brake` m/s^2 stops in time; proportional near the place."""
+    linear = brake / _GAIN**2
+    if distance <= linear:
+        return _GAIN * distance
+    return math.sqrt(2.0 * brake * (distance - 0.5 * linear))

@@ -1,0 +1,219 @@
+"""What a flight log holds of a vehicle: PX4's topics with their names, units and usual rates.
+
+Fields are those of PX4 1.18 that are known here (NED, FRD, quaternions w x y z); rates are those of
+its default profile (`logged_topics.cpp`), as far as the state of the vehicle comes so often.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+from volery.core.frames import frd_of_flu, ned_of_enu, q_ned_frd_of_enu_flu
+from volery.mavlink.autopilot import motion
+from volery.mavlink.autopilot.modes import Mode
+from volery.mavlink.autopilot.ulog import Topic
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.geo_reference import Earth
+    from volery.mavlink.autopilot.vehicle import Vector
+
+Values = Sequence[float]
+_NAN = math.nan
+_NAV_STATES = {
+    Mode.ALTITUDE: 1,
+    Mode.POSITION: 2,
+    Mode.MISSION: 3,
+    Mode.HOLD: 4,
+    Mode.RETURN: 5,
+    Mode.OFFBOARD: 14,
+    Mode.TAKE_OFF: 17,
+    Mode.LAND: 18,
+    Mode.FOLLOW_TARGET: 19,
+    Mode.ORBIT: 21,
+}
+_DISARMED, _ARMED, _ROTARY_WING = 1, 2, 1
+_MOTORS = 12
+"""Of `actuator_motors`."""
+_WARNINGS = (("BAT_EMERGEN_THR", 3), ("BAT_CRIT_THR", 2), ("BAT_LOW_THR", 1))
+
+
+class LoggedTopic(NamedTuple):
+    """A topic, how often it is sampled, and what of the vehicle it holds.
+
+    values: None where there is nothing to log.
+    """
+
+    topic: Topic
+    period_ns: int
+    values: Callable[[Autopilot], Values | None]
+
+
+def _attitude(pilot: Autopilot) -> Values:
+    x, y, z, w = q_ned_frd_of_enu_flu(pilot.state.attitude)
+    time_us = motion.us(pilot)
+    return time_us, time_us, w, x, y, z
+
+
+def _angular_velocity(pilot: Autopilot) -> Values:
+    time_us = motion.us(pilot)
+    return time_us, time_us, *frd_of_flu(pilot.state.rates)
+
+
+def _acceleration(pilot: Autopilot) -> Values:
+    time_us = motion.us(pilot)
+    return time_us, time_us, *frd_of_flu(motion.specific_force(pilot.state))
+
+
+def _local_position(pilot: Autopilot) -> Values:
+    time_us, memory = motion.us(pilot), pilot.memory
+    place, velocity = motion.local_motion(pilot)
+    heading = math.remainder(0.5 * math.pi - pilot.yaw, 2.0 * math.pi)
+    has_fix = not memory.fix_lost
+    return (
+        *(time_us, time_us, has_fix, True, has_fix, True),
+        *place,
+        *velocity,
+        velocity[2],
+        *ned_of_enu(pilot.state.acceleration),
+        *(heading, True, has_fix, True, 0),
+        *_reference(pilot.earth, memory.origin),
+    )
+
+
+@lru_cache(maxsize=256)
+def _reference(earth: Earth, origin: Vector) -> Vector:
+    """Latitude and longitude in degrees and altitude where the local frame begins."""
+    return earth.geodetic(origin)
+
+
+def _global_position(pilot: Autopilot) -> Values:
+    time_us = motion.us(pilot)
+    return time_us, time_us, *pilot.geodetic(), not pilot.memory.fix_lost, True
+
+
+def _status(pilot: Autopilot) -> Values:
+    memory, nav_state = pilot.memory, _NAV_STATES[pilot.memory.mode]
+    return (
+        motion.us(pilot),
+        memory.armed_ns // 1000 if memory.armed else 0,
+        _ARMED if memory.armed else _DISARMED,
+        nav_state,
+        nav_state,
+        _ROTARY_WING,
+        memory.failsafe,
+        int(memory.parameters["MAV_TYPE"]),
+        pilot.system,
+        1,
+    )
+
+
+def _land_detected(pilot: Autopilot) -> Values:
+    return motion.us(pilot), not pilot.state.airborne
+
+
+def _battery(pilot: Autopilot) -> Values | None:
+    state = pilot.state
+    if not math.isfinite(state.charge):
+        return None
+    used_mah = (1.0 - state.charge) * pilot.build.battery_capacity_ah * 1e3
+    warning = next(
+        (level for name, level in _WARNINGS if state.charge < float(pilot.parameter(name))), 0
+    )
+    cells = pilot.build.battery_cells
+    return (
+        *(motion.us(pilot), 1, True, state.voltage, state.current, used_mah, state.charge),
+        *(warning, cells),
+    )
+
+
+def _motors(pilot: Autopilot) -> Values:
+    time_us = motion.us(pilot)
+    speeds = pilot.state.rotors[:_MOTORS] if pilot.memory.armed else ()
+    thrusts = [speed * speed for speed in speeds]
+    return time_us, time_us, 0, *thrusts, *(_NAN,) * (_MOTORS - len(thrusts))
+
+
+def _trajectory_setpoint(pilot: Autopilot) -> Values | None:
+    parts = motion.target_motion(pilot)
+    if parts is None:
+        return None
+    return motion.us(pilot), *parts[:9], *(_NAN,) * 3, *parts[9:]
+
+
+def _attitude_setpoint(pilot: Autopilot) -> Values | None:
+    target = pilot.memory.target
+    if target is None or target.attitude is None:
+        return None
+    x, y, z, w = q_ned_frd_of_enu_flu(target.attitude)
+    return motion.us(pilot), _NAN, w, x, y, z, 0.0, 0.0, -target.thrust
+
+
+def _rates_setpoint(pilot: Autopilot) -> Values | None:
+    target = pilot.memory.target
+    if target is None or target.rates is None:
+        return None
+    return motion.us(pilot), *frd_of_flu(target.rates), 0.0, 0.0, -target.thrust
+
+
+_TIMES = "uint64_t timestamp; uint64_t timestamp_sample"
+_LOCAL_POSITION = (
+    "bool xy_valid; bool z_valid; bool v_xy_valid; bool v_z_valid; float x; float y; float z;"
+    "float vx; float vy; float vz; float z_deriv; float ax; float ay; float az; float heading;"
+    "bool heading_good_for_control; bool xy_global; bool z_global; uint64_t ref_timestamp;"
+    "double ref_lat; double ref_lon; float ref_alt"
+)
+_STATUS = (
+    "uint64_t timestamp; uint64_t armed_time; uint8_t arming_state;"
+    "uint8_t nav_state_user_intention; uint8_t nav_state; uint8_t vehicle_type; bool failsafe;"
+    "uint8_t system_type; uint8_t system_id; uint8_t component_id"
+)
+_BATTERY = (
+    "uint64_t timestamp; uint8_t id; bool connected; float voltage_v; float current_a;"
+    "float discharged_mah; float remaining; uint8_t warning; uint8_t cell_count"
+)
+_TRAJECTORY = (
+    "uint64_t timestamp; float[3] position; float[3] velocity; float[3] acceleration;"
+    "float[3] jerk; float yaw; float yawspeed"
+)
+_DESCRIBED: tuple[tuple[str, str, int, Callable[[Autopilot], Values | None]], ...] = (
+    ("vehicle_attitude", f"{_TIMES}; float[4] q", 50, _attitude),
+    ("vehicle_angular_velocity", f"{_TIMES}; float[3] xyz", 20, _angular_velocity),
+    ("vehicle_acceleration", f"{_TIMES}; float[3] xyz", 50, _acceleration),
+    ("vehicle_local_position", f"{_TIMES}; {_LOCAL_POSITION}", 100, _local_position),
+    (
+        "vehicle_global_position",
+        f"{_TIMES}; double lat; double lon; float alt; bool lat_lon_valid; bool alt_valid",
+        200,
+        _global_position,
+    ),
+    ("vehicle_status", _STATUS, 200, _status),
+    ("vehicle_land_detected", "uint64_t timestamp; bool landed", 200, _land_detected),
+    ("battery_status", _BATTERY, 200, _battery),
+    (
+        "actuator_motors",
+        f"{_TIMES}; uint16_t reversible_flags; float[12] control",
+        100,
+        _motors,
+    ),
+    ("trajectory_setpoint", _TRAJECTORY, 100, _trajectory_setpoint),
+    (
+        "vehicle_attitude_setpoint",
+        "uint64_t timestamp; float yaw_sp_move_rate; float[4] q_d; float[3] thrust_body",
+        50,
+        _attitude_setpoint,
+    ),
+    (
+        "vehicle_rates_setpoint",
+        "uint64_t timestamp; float roll; float pitch; float yaw; float[3] thrust_body",
+        20,
+        _rates_setpoint,
+    ),
+)
+TOPICS = tuple(
+    LoggedTopic(Topic(number, name, fields), period_ms * 1_000_000, values)
+    for number, (name, fields, period_ms, values) in enumerate(_DESCRIBED)
+)

@@ -1,0 +1,167 @@
+"""MAVLink's log protocol: clients list the flight logs of a vehicle and read them.
+
+As in PX4 each link has one request at a time, which a new one replaces, and a log keeps the number
+of the link's last list. Answers go out at a bounded rate of simulated time, which the links share:
+so requests without end cost no more than one.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from volery.mavlink.autopilot.log_storage import StoredLog
+from volery.mavlink.codec import dialect
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.state import Source
+
+FRAMES_PER_STATE = 10
+"""That go out with each state of the vehicles, a hundred times a simulated second: 90 kB/s
+(modelling choice)."""
+_FRAMES_PER_TURN = 5
+"""Of a link, then the next one has its turn."""
+_DATA_BYTES = 90
+"""Of a LOG_DATA; one with fewer is the last one."""
+_LOG_DATA = 120
+_HEAD = struct.Struct("<IHB")
+
+
+@dataclass
+class _Request:
+    """What a link has asked for: entries of its list, or bytes of a log."""
+
+    listed: tuple[StoredLog, ...]
+    entries: range = field(default=range(0))
+    log: StoredLog | None = None
+    number: int = 0
+    offset: int = 0
+    remaining: int = 0
+
+
+class TransferPace:
+    """Shares the rate among the vehicles of a run that have something to send."""
+
+    def __init__(self) -> None:
+        self._now_ns = -1
+        self._num_sending = 0
+        self._share = FRAMES_PER_STATE
+
+    def share(self, now_ns: int) -> int:
+        """Returns how many frames a vehicle may send at a time at which it has some."""
+        if now_ns != self._now_ns:
+            self._now_ns = now_ns
+            self._share = max(1, FRAMES_PER_STATE // max(1, self._num_sending))
+            self._num_sending = 0
+        self._num_sending += 1
+        return self._share
+
+
+class LogTransfers:
+    """Answers under way, by link."""
+
+    def __init__(self, pace: TransferPace | None = None) -> None:
+        self.pace = pace or TransferPace()
+        self._requests: dict[int, _Request] = {}
+        self._waiting: deque[int] = deque()
+        """Links with something to send, the next one first."""
+
+    def list_logs(self, pilot: Autopilot, link: int, first: int, last: int) -> None:
+        """Begins to send the entries of the logs `first` to `last`."""
+        listed = tuple(pilot.log.storage.logs)
+        last = min(last, len(listed) - 1)
+        entries = range(min(first, last), last + 1) if listed else range(1)
+        self._set(link, _Request(listed, entries))
+
+    def send_data(self, pilot: Autopilot, link: int, number: int, offset: int, count: int) -> None:
+        """Begins to send `count` bytes of a log from `offset` on."""
+        before = self._requests.get(link)
+        listed = tuple(pilot.log.storage.logs) if before is None else before.listed
+        if number < len(listed):
+            log = listed[number]
+            count = max(0, min(count, log.size - offset))
+            self._set(link, _Request(listed, range(0), log, number, offset, count))
+
+    def forget(self, link: int) -> None:
+        """Ends what a link has asked for."""
+        self._requests.pop(link, None)
+        with suppress(ValueError):
+            self._waiting.remove(link)
+
+    def clear(self) -> None:
+        """Ends everything."""
+        self._requests.clear()
+        self._waiting.clear()
+
+    def send_some(self, pilot: Autopilot) -> None:
+        """Goes on with the answers, the links in turn."""
+        num_frames = self.pace.share(pilot.memory.now_ns) if self._waiting else 0
+        while num_frames > 0 and self._waiting:
+            link = self._waiting.popleft()
+            request, turn = self._requests[link], min(num_frames, _FRAMES_PER_TURN)
+            send = _send_entries if request.log is None else _send_data
+            num_sent, is_done = send(pilot, link, request, turn)
+            num_frames -= num_sent
+            if not is_done:
+                self._waiting.append(link)
+
+    def _set(self, link: int, request: _Request) -> None:
+        self._requests[link] = request
+        if link not in self._waiting:
+            self._waiting.append(link)
+
+
+def _send_entries(pilot: Autopilot, link: int, request: _Request, turn: int) -> tuple[int, bool]:
+    """Sends the next LOG_ENTRY messages; how many, and whether they were the last ones."""
+    entry, listed = dialect().MAVLink_log_entry_message, request.listed
+    chosen, request.entries = request.entries[:turn], request.entries[turn:]
+    for number in chosen:
+        if not listed:  # the one that says so
+            pilot.send(entry(0, 0, 0, 0, 0), link)
+            continue
+        log = listed[number]
+        pilot.send(entry(number, len(listed), len(listed) - 1, log.time_s, log.size), link)
+    return len(chosen), not request.entries
+
+
+def _send_data(pilot: Autopilot, link: int, request: _Request, turn: int) -> tuple[int, bool]:
+    """Sends the next LOG_DATA messages; how many, and whether they were the last ones."""
+    assert request.log is not None
+    wanted = min(request.remaining, turn * _DATA_BYTES)
+    try:
+        data = pilot.log.storage.read(request.log, request.offset, wanted)
+    except OSError:
+        data = b""
+    pieces = [data[k : k + _DATA_BYTES] for k in range(0, len(data), _DATA_BYTES)] or [b""]
+    for piece in pieces:
+        head = _HEAD.pack(request.offset & 0xFFFFFFFF, request.number, len(piece))
+        pilot.send_payload(_LOG_DATA, head + piece.ljust(_DATA_BYTES, b"\0"), link)
+        request.offset += len(piece)
+        request.remaining -= len(piece)
+    return len(pieces), len(data) < wanted or request.remaining <= 0
+
+
+def list_logs(pilot: Autopilot, source: Source, message: Any) -> None:
+    """Answers a LOG_REQUEST_LIST."""
+    pilot.log.transfers.list_logs(pilot, source[0], message.start, message.end)
+
+
+def send_data(pilot: Autopilot, source: Source, message: Any) -> None:
+    """Answers a LOG_REQUEST_DATA; of a log that is not there nothing is sent, as by PX4."""
+    parts = int(message.id), int(message.ofs), int(message.count)
+    pilot.log.transfers.send_data(pilot, source[0], *parts)
+
+
+def erase(pilot: Autopilot, _source: Source, _message: Any) -> None:
+    """Obeys a LOG_ERASE: erases all logs but that of the present flight."""
+    pilot.log.transfers.clear()
+    pilot.log.storage.erase(keeps_newest=pilot.log.is_recording)
+
+
+def end(pilot: Autopilot, source: Source, _message: Any) -> None:
+    """Obeys a LOG_REQUEST_END."""
+    pilot.log.transfers.forget(source[0])

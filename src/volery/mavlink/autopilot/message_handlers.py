@@ -1,0 +1,105 @@
+"""Which message does what."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from volery.mavlink.autopilot import (
+    commands,
+    file_protocol,
+    follow_target,
+    log_transfer,
+    manual_control,
+    mission_protocol,
+    offboard,
+    parameter_protocol,
+    shell,
+)
+from volery.mavlink.codec import dialect
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.state import Source
+
+_GROUND_STATION = 6
+"""MAV_TYPE_GCS."""
+
+
+def _heartbeat(pilot: Autopilot, _source: Source, message: Any) -> None:
+    if message.type == _GROUND_STATION:
+        pilot.memory.ground_heard_ns = pilot.memory.now_ns
+
+
+def _ping(pilot: Autopilot, source: Source, message: Any) -> None:
+    if message.target_system == 0 and message.target_component == 0:
+        link, system, component = source
+        answer = dialect().MAVLink_ping_message(message.time_usec, message.seq, system, component)
+        pilot.send(answer, link)
+
+
+def _time_sync(pilot: Autopilot, source: Source, message: Any) -> None:
+    """Answer with the simulated time since the start."""
+    if message.tc1 == 0:
+        answer = dialect().MAVLink_timesync_message(pilot.memory.now_ns, message.ts1)
+        pilot.send(answer, source[0])
+
+
+def _command_long(pilot: Autopilot, source: Source, message: Any) -> None:
+    params = tuple(float(getattr(message, f"param{k}")) for k in range(1, 8))
+    commands.take(pilot, source, commands.Command(message.command, params, None))
+
+
+def _command_int(pilot: Autopilot, source: Source, message: Any) -> None:
+    x, y = (
+        math.nan if part == 2**31 - 1 or part == -(2**31) else part * 1e-7
+        for part in (message.x, message.y)
+    )
+    params = (message.param1, message.param2, message.param3, message.param4, x, y, message.z)
+    commands.take(pilot, source, commands.Command(message.command, params, int(message.frame)))
+
+
+def _set_mode(pilot: Autopilot, source: Source, message: Any) -> None:
+    """The old message: PX4 makes a command of it, and answers that."""
+    custom = message.custom_mode
+    params = (float(message.base_mode), custom >> 16 & 255, custom >> 24 & 255, *(math.nan,) * 4)
+    commands.take(pilot, source, commands.Command(commands.DO_SET_MODE, params, None))
+
+
+def _data_stream(pilot: Autopilot, source: Source, message: Any) -> None:
+    """The old way to ask for streams: what MAVProxy asks for at its start; PX4 does not hear it."""
+
+
+HANDLERS: dict[str, Callable[[Autopilot, Source, Any], None]] = {
+    "HEARTBEAT": _heartbeat,
+    "PING": _ping,
+    "TIMESYNC": _time_sync,
+    "COMMAND_LONG": _command_long,
+    "COMMAND_INT": _command_int,
+    "SET_MODE": _set_mode,
+    "REQUEST_DATA_STREAM": _data_stream,
+    "PARAM_REQUEST_LIST": parameter_protocol.send_list,
+    "PARAM_REQUEST_READ": parameter_protocol.send_one,
+    "PARAM_SET": parameter_protocol.set_one,
+    "SET_POSITION_TARGET_LOCAL_NED": offboard.take_local,
+    "SET_POSITION_TARGET_GLOBAL_INT": offboard.take_global,
+    "SET_ATTITUDE_TARGET": offboard.take_attitude,
+    "FOLLOW_TARGET": follow_target.take,
+    "MANUAL_CONTROL": manual_control.take,
+    "MISSION_COUNT": mission_protocol.begin_upload,
+    "MISSION_ITEM_INT": mission_protocol.take_item,
+    "MISSION_ITEM": mission_protocol.take_item,
+    "MISSION_REQUEST_LIST": mission_protocol.begin_download,
+    "MISSION_REQUEST_INT": mission_protocol.send_item,
+    "MISSION_REQUEST": mission_protocol.send_item,
+    "MISSION_ACK": mission_protocol.take_ack,
+    "MISSION_CLEAR_ALL": mission_protocol.clear,
+    "MISSION_SET_CURRENT": mission_protocol.set_current,
+    "FILE_TRANSFER_PROTOCOL": file_protocol.answer_file_request,
+    "LOG_REQUEST_LIST": log_transfer.list_logs,
+    "LOG_REQUEST_DATA": log_transfer.send_data,
+    "LOG_REQUEST_END": log_transfer.end,
+    "LOG_ERASE": log_transfer.erase,
+    "SERIAL_CONTROL": shell.take,
+}

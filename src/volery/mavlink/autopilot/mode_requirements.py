@@ -1,0 +1,46 @@
+"""What a mode needs that others send: sticks, setpoints, a mission."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from volery.mavlink.autopilot import plans
+from volery.mavlink.autopilot.modes import Mode
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+
+_LEAST_OFFBOARD_HZ = 2.0
+"""PX4 enters offboard only where setpoints come more often than that."""
+
+
+def missing(pilot: Autopilot, mode: Mode) -> str:
+    """What of it is not there for a mode; empty where nothing is missing."""
+    if mode.by_sticks and not sticks_are_there(pilot):
+        return "no manual control input"
+    if mode is Mode.OFFBOARD and not offboard_is_fresh(pilot):
+        return "no offboard signal"
+    if mode is Mode.ORBIT and pilot.memory.orbit is None:
+        return "no orbit was asked for"
+    if mode is Mode.MISSION and not pilot.memory.plans[plans.MISSION]:
+        return "no valid mission"
+    return ""
+
+
+def sticks_are_there(pilot: Autopilot) -> bool:
+    """Whether MANUAL_CONTROL has come within COM_RC_LOSS_T."""
+    age_ns = pilot.memory.now_ns - pilot.memory.sticks.time_ns
+    return age_ns <= float(pilot.parameter("COM_RC_LOSS_T")) * 1e9
+
+
+def offboard_is_fresh(pilot: Autopilot) -> bool:
+    """Whether setpoints come often enough to fly by."""
+    offboard, now_ns = pilot.memory.offboard, pilot.memory.now_ns
+    return offboard.setpoint is not None and now_ns - offboard.time_ns < 1e9 / _LEAST_OFFBOARD_HZ
+
+
+def ground_is_there(pilot: Autopilot) -> bool:
+    """Whether a ground station's heartbeat has come within COM_DL_LOSS_T."""
+    heard_ns = pilot.memory.ground_heard_ns
+    limit_ns = int(pilot.parameter("COM_DL_LOSS_T")) * 1_000_000_000
+    return heard_ns >= 0 and pilot.memory.now_ns - heard_ns <= limit_ns

@@ -1,0 +1,185 @@
+"""Changes of mode: what a mode needs, what it begins with, and who else flies the UAV.
+
+Other clients of the graph may command the UAV beside the autopilot: it then tells the mode that
+comes nearest and keeps its hands off until it is asked for one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from volery.mavlink.autopilot import arming, feasibility, mode_requirements
+from volery.mavlink.autopilot.modes import Mode
+from volery.mavlink.autopilot.state import Leg
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.vehicle import FlightState, Vector
+
+_FOLLOWS = {
+    "take_off": {"TAKE_OFF", "HOLD", "LANDED"},
+    "hold": {"HOLD"},
+    "land": {"LAND", "LANDED"},
+    "go_to": {"GO_TO", "HOLD"},
+    "steer": {"VELOCITY", "HOLD"},
+    "follow": {"TRAJECTORY", "HOLD"},
+    "push": {"LOW_LEVEL"},
+    "tilt": {"LOW_LEVEL"},
+    "spin": {"LOW_LEVEL"},
+    "stop": {"LOW_LEVEL", "LANDED"},
+    "": {"LANDED"},
+}
+"""Modes of the UAV that an order leads to."""
+_OUTSIDE = {"TAKE_OFF": Mode.TAKE_OFF, "LAND": Mode.LAND, "RETURN": Mode.RETURN}
+"""What is told where somebody else flies it; else: hold."""
+_PATIENCE_NS = 50_000_000
+"""For this long an order may take to show."""
+
+
+def flies(pilot: Autopilot) -> bool:
+    """Whether the UAV is off the ground, by whomever."""
+    return pilot.state.mode not in ("LANDED", "CRASHED")
+
+
+def cruise(pilot: Autopilot) -> float:
+    """m/s of ways to places: of the mission, of a command, of MPC_XY_CRUISE."""
+    memory = pilot.memory
+    asked = (memory.mission.speed if memory.mode is Mode.MISSION else math.nan, memory.cruise)
+    speed = next((s for s in asked if math.isfinite(s)), float(pilot.parameter("MPC_XY_CRUISE")))
+    return min(speed, float(pilot.parameter("MPC_XY_VEL_MAX")))
+
+
+def go_to(pilot: Autopilot, place: Vector, yaw: float | None) -> None:
+    """Fly to a place at cruising speed."""
+    pilot.memory.leg = Leg(place, yaw, cruise(pilot))
+
+
+def obstacle_to(pilot: Autopilot, mode: Mode) -> str:
+    """Why a mode cannot be entered now; empty where it can."""
+    memory = pilot.memory
+    if pilot.state.crashed:
+        return "the vehicle has crashed"
+    if memory.fix_lost and mode not in (Mode.ALTITUDE, Mode.LAND):
+        return "no valid position"
+    if mode is Mode.MISSION:
+        return feasibility.obstacle(pilot)
+    return mode_requirements.missing(pilot, mode)
+
+
+def ask_for(pilot: Autopilot, mode: Mode) -> str:
+    """Enter a mode that somebody asks for; why not, empty where it is entered.
+
+    A disarmed UAV may be in any: what is missing keeps it from being armed, as in PX4.
+    """
+    why = obstacle_to(pilot, mode) if pilot.memory.armed else ""
+    if not why:
+        pilot.memory.failsafe = False
+        enter(pilot, mode)
+    return why
+
+
+def enter(pilot: Autopilot, mode: Mode) -> None:
+    """Fly in a mode from now on."""
+    memory = pilot.memory
+    changed = memory.mode is not mode
+    memory.mode = mode
+    memory.leg = memory.way_home = memory.target = None
+    memory.altitude_target = math.nan
+    if mode is not Mode.FOLLOW_TARGET:
+        memory.followed = None
+    if mode is not Mode.MISSION:
+        memory.mission.entered = False
+    if memory.armed and flies(pilot):
+        if mode is Mode.LAND:
+            order(pilot, "land", pilot.vehicle.land())
+        elif mode is Mode.TAKE_OFF:
+            rise(pilot)
+        elif mode is Mode.OFFBOARD:
+            # It continues its motion until the next setpoint; a take-off first reaches the height
+            # at which setpoints are flown.
+            order(pilot, "take_off" if pilot.state.mode == "TAKE_OFF" else "steer")
+        else:
+            order(pilot, "hold", pilot.vehicle.hold())
+    if changed:
+        pilot.announce()
+
+
+def rise(pilot: Autopilot) -> None:
+    """Take off from the ground, or climb as high in the air."""
+    height = pilot.memory.take_off_height
+    if not math.isfinite(height):
+        height = float(pilot.parameter("MIS_TAKEOFF_ALT"))
+    x, y, z = pilot.state.position
+    if not flies(pilot):
+        height = max(height, 0.1)
+        pilot.memory.take_off_height = math.nan
+        pilot.memory.take_off_goal = x, y, z + height
+        order(pilot, "take_off", pilot.vehicle.take_off(height))
+        return
+    ground = (pilot.memory.home or pilot.memory.origin)[2]
+    top = z + height if math.isfinite(pilot.memory.take_off_height) else max(z, ground + height)
+    pilot.memory.take_off_height = math.nan
+    go_to(pilot, (x, y, top), None)
+
+
+def order(pilot: Autopilot, what: str, why_not: str = "") -> None:
+    """Note what the UAV was told, and tell people where it did not take it."""
+    pilot.memory.order, pilot.memory.sinks = what, math.nan
+    pilot.memory.ordered_ns = pilot.memory.now_ns
+    if why_not:
+        pilot.memory.order = ""
+        pilot.say(4, why_not)
+
+
+def follow_vehicle(pilot: Autopilot, state: FlightState) -> None:
+    """Notice take-offs, landings, crashes, and others who fly the UAV."""
+    memory = pilot.memory
+    if state.crashed:
+        if memory.armed:
+            pilot.say(0, "Crash detected: motors stopped")
+            arming.finish(pilot, "Disarmed")
+        return
+    settled = memory.now_ns - memory.ordered_ns > _PATIENCE_NS
+    if settled and state.mode not in _FOLLOWS.get(memory.order, {memory.order}):
+        _step_back(pilot, state)
+    if state.airborne and not memory.airborne and memory.armed:
+        memory.airborne = True
+        pilot.say(6, "Takeoff detected")
+    if state.mode == "LANDED" and memory.airborne:
+        memory.airborne, memory.landed_ns = False, memory.now_ns
+        pilot.say(6, "Landing detected")
+        memory.order, memory.leg = "", None
+    if memory.armed and state.mode == "LANDED" and not _begins(pilot):
+        _disarm_in_time(pilot)
+
+
+def _step_back(pilot: Autopilot, state: FlightState) -> None:
+    """Somebody else flies it: tell so, and keep the hands off."""
+    memory = pilot.memory
+    memory.order = state.mode if state.mode != "LANDED" else ""
+    memory.leg = memory.way_home = None
+    if state.mode == "LANDED":
+        return
+    if not memory.armed:
+        memory.armed, memory.armed_ns = True, memory.now_ns
+        memory.home = memory.home or state.position
+    mode = _OUTSIDE.get(state.mode, Mode.HOLD)
+    if mode is not memory.mode:
+        memory.mode = mode
+    pilot.announce()
+
+
+def _begins(pilot: Autopilot) -> bool:
+    """Whether a take-off is under way that has not left the ground."""
+    return pilot.memory.order == "take_off" and pilot.memory.now_ns - pilot.memory.ordered_ns < 1e9
+
+
+def _disarm_in_time(pilot: Autopilot) -> None:
+    memory = pilot.memory
+    flown = memory.landed_ns > memory.armed_ns
+    name = "COM_DISARM_LAND" if flown else "COM_DISARM_PRFLT"
+    limit_s = float(pilot.parameter(name))
+    since_ns = memory.landed_ns if flown else memory.armed_ns
+    if limit_s > 0.0 and memory.now_ns - since_ns >= limit_s * 1e9:
+        arming.finish(pilot, f"Disarmed by {'landing' if flown else 'auto preflight disarming'}")

@@ -1,0 +1,251 @@
+"""What is told of a vehicle's motion: NED, FRD, and MAVLink's units (degE7, mm, cm/s, mbar).
+
+Unknown fields hold the values that the dialect gives for that.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from volery.core.atmosphere import pressure
+from volery.core.frames import frd_of_flu, ned_of_enu, q_ned_frd_of_enu_flu
+from volery.mavlink.codec import dialect
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.vehicle import FlightState, Quaternion, Vector
+
+_GRAVITY = 9.80665
+_LOCAL_NED, _BY_AUTOPILOT = 1, 8
+"""MAV_FRAME, MAV_ESTIMATOR_TYPE."""
+
+
+def ms(pilot: Autopilot) -> int:
+    """Milliseconds since the start."""
+    return pilot.memory.now_ns // 1_000_000 & 0xFFFFFFFF
+
+
+def us(pilot: Autopilot) -> int:
+    """Microseconds since the start."""
+    return pilot.memory.now_ns // 1_000
+
+
+def local_motion(pilot: Autopilot) -> tuple[Vector, Vector]:
+    """Place from the local origin and velocity, NED."""
+    state, origin = pilot.state, pilot.memory.origin
+    x, y, z = (here - there for here, there in zip(state.position, origin, strict=True))
+    return ned_of_enu((x, y, z)), ned_of_enu(state.velocity)
+
+
+def _roll_pitch_yaw(q: Quaternion) -> Vector:
+    x, y, z, w = q
+    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
+    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return roll, pitch, yaw
+
+
+def degrees_e7(geodetic: Vector) -> tuple[int, int, int]:
+    """degE7, degE7, mm."""
+    latitude, longitude, altitude = geodetic
+    return round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3)
+
+
+def clipped(value: float, bits: int) -> int:
+    """A whole number that fits a signed field."""
+    limit = (1 << bits - 1) - 1
+    return max(-limit, min(limit, round(value)))
+
+
+def _heading_cdeg(pilot: Autopilot) -> int:
+    degrees = 90.0 - math.degrees(pilot.yaw)
+    return round(degrees % 360.0 * 100.0) % 36000
+
+
+def gps_raw_int(pilot: Autopilot) -> Any:
+    """As the estimate has it; of a UAV that has lost its fix: none."""
+    place = degrees_e7(pilot.geodetic())
+    north, east, _ = ned_of_enu(pilot.state.velocity)
+    speed = math.hypot(north, east)
+    course = round(math.degrees(math.atan2(east, north)) % 360.0 * 100.0) % 36000
+    lost = pilot.memory.now_ns - pilot.memory.fix_ns > 1_000_000_000
+    fix, satellites = (1, 0) if lost else (3, 10)
+    return dialect().MAVLink_gps_raw_int_message(
+        us(pilot),
+        fix,
+        *place,
+        65535 if lost else 80,
+        65535 if lost else 120,
+        min(round(speed * 100.0), 65534),
+        course if speed > 0.3 else 65535,
+        satellites,
+        place[2],
+    )
+
+
+def attitude(pilot: Autopilot) -> Any:
+    """ATTITUDE."""
+    angles = _roll_pitch_yaw(q_ned_frd_of_enu_flu(pilot.state.attitude))
+    return dialect().MAVLink_attitude_message(ms(pilot), *angles, *frd_of_flu(pilot.state.rates))
+
+
+def attitude_quaternion(pilot: Autopilot) -> Any:
+    """ATTITUDE_QUATERNION."""
+    x, y, z, w = q_ned_frd_of_enu_flu(pilot.state.attitude)
+    sign = -1.0 if w < 0.0 else 1.0
+    turned = (sign * w, sign * x, sign * y, sign * z)
+    rates = frd_of_flu(pilot.state.rates)
+    return dialect().MAVLink_attitude_quaternion_message(ms(pilot), *turned, *rates)
+
+
+def local_position(pilot: Autopilot) -> Any:
+    """LOCAL_POSITION_NED, from where the vehicle stood at the start."""
+    place, velocity = local_motion(pilot)
+    return dialect().MAVLink_local_position_ned_message(ms(pilot), *place, *velocity)
+
+
+def odometry(pilot: Autopilot) -> Any:
+    """ODOMETRY in the local frame, velocities too, as PX4 sends it; covariances are not known."""
+    place, velocity = local_motion(pilot)
+    x, y, z, w = q_ned_frd_of_enu_flu(pilot.state.attitude)
+    unknown = [math.nan] + [0.0] * 20
+    return dialect().MAVLink_odometry_message(
+        us(pilot),
+        _LOCAL_NED,
+        _LOCAL_NED,
+        *place,
+        [w, x, y, z],
+        *velocity,
+        *frd_of_flu(pilot.state.rates),
+        unknown,
+        unknown,
+        0,
+        _BY_AUTOPILOT,
+    )
+
+
+def global_position(pilot: Autopilot) -> Any:
+    """GLOBAL_POSITION_INT."""
+    state = pilot.state
+    home = pilot.memory.home or pilot.memory.origin
+    velocity = (clipped(part * 100.0, 16) for part in ned_of_enu(state.velocity))
+    return dialect().MAVLink_global_position_int_message(
+        ms(pilot),
+        *degrees_e7(pilot.geodetic()),
+        round((state.position[2] - home[2]) * 1e3),
+        *velocity,
+        _heading_cdeg(pilot),
+    )
+
+
+def highres_imu(pilot: Autopilot) -> Any:
+    """Specific force and rates as the controllers feel them, pressure of the standard air."""
+    state = pilot.state
+    altitude = state.position[2] + pilot.build.origin[2]
+    force = specific_force(state)
+    mbar = float(pressure(altitude)) / 100.0
+    return dialect().MAVLink_highres_imu_message(
+        us(pilot),
+        *frd_of_flu(force),
+        *frd_of_flu(state.rates),
+        *(math.nan,) * 3,
+        mbar,
+        math.nan,
+        altitude,
+        math.nan,
+        0x3F | 0xA00,
+    )
+
+
+def specific_force(state: FlightState) -> Vector:
+    """m/s^2, body: what an accelerometer without errors feels."""
+    x, y, z, w = state.attitude
+    ax, ay, az = state.acceleration
+    az += _GRAVITY
+    tx, ty, tz = 2.0 * (z * ay - y * az), 2.0 * (x * az - z * ax), 2.0 * (y * ax - x * ay)
+    return (
+        ax + w * tx + z * ty - y * tz,
+        ay + w * ty + x * tz - z * tx,
+        az + w * tz + y * tx - x * ty,
+    )
+
+
+def scaled_pressure(pilot: Autopilot) -> Any:
+    """SCALED_PRESSURE of the barometer; None where there is none."""
+    memory = pilot.memory
+    if not math.isfinite(memory.pressure):
+        return None
+    warmth = memory.air_temperature if math.isfinite(memory.air_temperature) else 0.0
+    return dialect().MAVLink_scaled_pressure_message(
+        ms(pilot), memory.pressure / 100.0, 0.0, clipped(warmth * 100.0, 16)
+    )
+
+
+def vfr_hud(pilot: Autopilot) -> Any:
+    """VFR_HUD."""
+    state = pilot.state
+    speed = math.hypot(*state.velocity[:2])
+    throttle = round(100.0 * sum(state.rotors) / max(len(state.rotors), 1))
+    altitude = state.position[2] + pilot.build.origin[2]
+    return dialect().MAVLink_vfr_hud_message(
+        speed, speed, _heading_cdeg(pilot) // 100, throttle, altitude, state.velocity[2]
+    )
+
+
+def altitude(pilot: Autopilot) -> Any:
+    """ALTITUDE."""
+    z = pilot.state.position[2]
+    home = pilot.memory.home or pilot.memory.origin
+    amsl = z + pilot.build.origin[2]
+    local = z - pilot.memory.origin[2]
+    return dialect().MAVLink_altitude_message(
+        us(pilot), amsl, amsl, local, z - home[2], math.nan, math.nan
+    )
+
+
+def target_motion(pilot: Autopilot) -> list[float] | None:
+    """Position from the local origin, velocity and acceleration (NED), yaw and yaw rate aimed at.
+
+    nan where something is left open; None where no motion is aimed at.
+    """
+    target = pilot.memory.target
+    if target is None or target.attitude is not None or target.rates is not None:
+        return None
+    origin = pilot.memory.origin
+    x, y, z = (part - start for part, start in zip(target.position, origin, strict=True))
+    vectors = (ned_of_enu((x, y, z)), ned_of_enu(target.velocity), ned_of_enu(target.acceleration))
+    parts = [part for vector in vectors for part in vector]
+    return [*parts, 0.5 * math.pi - target.yaw, -target.yaw_rate]
+
+
+def position_target(pilot: Autopilot) -> Any:
+    """POSITION_TARGET_LOCAL_NED; None where nothing is aimed at."""
+    parts = target_motion(pilot)
+    if parts is None:
+        return None
+    bits = (1, 2, 4, 8, 16, 32, 64, 128, 256, 1024, 2048)
+    mask = sum(bit for bit, part in zip(bits, parts, strict=True) if not math.isfinite(part))
+    return dialect().MAVLink_position_target_local_ned_message(ms(pilot), 1, mask, *parts)
+
+
+def attitude_target(pilot: Autopilot) -> Any:
+    """ATTITUDE_TARGET; None where no attitude is wanted."""
+    target = pilot.memory.target
+    if target is None or (target.attitude is None and target.rates is None):
+        return None
+    x, y, z, w = q_ned_frd_of_enu_flu(target.attitude or (0.0, 0.0, 0.0, 1.0))
+    mask = 7 if target.attitude is not None else 128
+    rates = frd_of_flu(target.rates or (0.0, 0.0, 0.0))
+    return dialect().MAVLink_attitude_target_message(
+        ms(pilot), mask, [w, x, y, z], *rates, target.thrust
+    )
+
+
+def servo_output(pilot: Autopilot) -> Any:
+    """SERVO_OUTPUT_RAW: shares of full speed as pulses of 1000 to 2000 us."""
+    pulses = [round(1000.0 + 1000.0 * min(share, 1.0)) for share in pilot.state.rotors]
+    pulses = (pulses + [0] * 16)[:16]
+    return dialect().MAVLink_servo_output_raw_message(
+        us(pilot) & 0xFFFFFFFF, 0, *pulses[:8], *pulses[8:]
+    )

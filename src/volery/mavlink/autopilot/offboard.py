@@ -1,0 +1,213 @@
+"""Offboard: setpoints from outside, flown as they come; PX4's rules for beginning and losing them.
+
+Setpoints are heard in every mode, so that offboard can be entered while they come. One sender at a
+time is heard: another one's setpoints count when the first has been silent for COM_OF_LOSS_T.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from volery.mavlink.autopilot import mode_transitions
+from volery.mavlink.autopilot.modes import Mode
+from volery.mavlink.autopilot.setpoints import (
+    Setpoint,
+    attitude_setpoint,
+    global_setpoint,
+    local_setpoint,
+)
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.state import Source
+    from volery.mavlink.autopilot.vehicle import FlightState, Vector
+
+_GAIN = 0.95
+"""1/s: PX4's MPC_XY_P and, within a twentieth, MPC_Z_P."""
+_TRACKED_M = 2.0
+"""A moving place nearer than this is tracked; towards a farther one it is flown first."""
+_REFRESH_NS, _FEEDBACK_NS = 100_000_000, 20_000_000
+"""How often velocities are told again, and where they follow from the place."""
+_LIFTED_M = 0.3
+"""Height from which setpoints are flown after a start from the ground."""
+_ABOVE_HOME = (3, 6, 10, 11)
+
+
+def take_local(pilot: Autopilot, source: Source, message: Any) -> None:
+    """Hear a SET_POSITION_TARGET_LOCAL_NED."""
+    take(pilot, source, local_setpoint(message, pilot.memory.origin))
+
+
+def take_global(pilot: Autopilot, source: Source, message: Any) -> None:
+    """Hear a SET_POSITION_TARGET_GLOBAL_INT."""
+    x, y, _ = pilot.earth.place(message.lat_int * 1e-7, message.lon_int * 1e-7, 0.0)
+    above = message.coordinate_frame in _ABOVE_HOME
+    home = pilot.memory.home or pilot.memory.origin
+    z = message.alt + (home[2] if above else -pilot.build.origin[2])
+    take(pilot, source, global_setpoint(message, (x, y, z)))
+
+
+def take_attitude(pilot: Autopilot, source: Source, message: Any) -> None:
+    """Hear a SET_ATTITUDE_TARGET."""
+    take(pilot, source, attitude_setpoint(message))
+
+
+def take(pilot: Autopilot, source: Source, setpoint: Setpoint) -> None:
+    """Hear a setpoint; in offboard mode it is flown at once."""
+    memory = pilot.memory
+    offboard, now_ns = memory.offboard, memory.now_ns
+    if source != offboard.source:
+        if offboard.source is not None and not _is_lost(pilot):
+            if source not in offboard.refused:
+                offboard.refused.add(source)
+                pilot.say(4, f"Setpoints of {source[1]}/{source[2]} ignored: another one flies")
+            return
+        offboard.source = source
+        offboard.refused.clear()
+    offboard.setpoint, offboard.time_ns = setpoint, now_ns
+    if memory.mode is Mode.OFFBOARD and memory.armed and memory.state is not None:
+        _fly(pilot, memory.state, setpoint, fresh=True)
+
+
+def _is_lost(pilot: Autopilot) -> bool:
+    limit_ns = float(pilot.parameter("COM_OF_LOSS_T")) * 1e9
+    return pilot.memory.now_ns - pilot.memory.offboard.time_ns > limit_ns
+
+
+def fly(pilot: Autopilot, state: FlightState) -> None:
+    """Go on with the newest setpoint; act where none comes any more."""
+    from volery.mavlink.autopilot.failsafes import act
+
+    setpoint = pilot.memory.offboard.setpoint
+    if _is_lost(pilot) or setpoint is None:
+        action = int(pilot.parameter("COM_OBL_RC_ACT"))
+        pilot.say(2, "Failsafe: offboard control lost")
+        act(pilot, {3: Mode.RETURN, 4: Mode.LAND}.get(action, Mode.HOLD))
+        return
+    _fly(pilot, state, setpoint, fresh=False)
+
+
+def _fly(pilot: Autopilot, state: FlightState, setpoint: Setpoint, *, fresh: bool) -> None:
+    memory = pilot.memory
+    memory.target = setpoint
+    if setpoint.attitude is not None or setpoint.rates is not None:
+        _hold_attitude(pilot, setpoint, fresh=fresh)
+        return
+    if not _is_up(pilot, state, setpoint):
+        return
+    if _is_place(setpoint):
+        _go(pilot, setpoint, fresh=fresh)
+    elif _finite(setpoint.position) and _finite(setpoint.velocity):
+        _track(pilot, state, setpoint, fresh=fresh)
+    elif _finite(setpoint.acceleration) and not any(map(math.isfinite, setpoint.velocity)):
+        _push(pilot, setpoint, fresh=fresh)
+    else:
+        _steer(pilot, state, setpoint, fresh=fresh)
+
+
+def _hold_attitude(pilot: Autopilot, setpoint: Setpoint, *, fresh: bool) -> None:
+    if not fresh and pilot.memory.order in ("tilt", "spin"):
+        return
+    if setpoint.attitude is not None:
+        pilot.vehicle.tilt(setpoint.attitude, setpoint.thrust)
+        mode_transitions.order(pilot, "tilt")
+    elif setpoint.rates is not None:
+        pilot.vehicle.spin(setpoint.rates, setpoint.thrust)
+        mode_transitions.order(pilot, "spin")
+
+
+def _is_up(pilot: Autopilot, state: FlightState, setpoint: Setpoint) -> bool:
+    """Whether it is high enough to follow setpoints; from the ground it starts for those upwards.
+
+    Attitudes need no start: their thrust decides.
+    """
+    memory = pilot.memory
+    if state.mode == "LANDED":
+        upwards = (
+            setpoint.position[2] > state.position[2] + 0.2
+            or setpoint.velocity[2] > 0.1
+            or setpoint.acceleration[2] > 0.1
+        )
+        if upwards and memory.order != "take_off":
+            mode_transitions.order(pilot, "take_off", pilot.vehicle.take_off(2.0 * _LIFTED_M))
+        return False
+    if memory.order == "take_off":
+        ground = (memory.home or memory.origin)[2]
+        if state.mode == "TAKE_OFF" and state.position[2] < ground + _LIFTED_M:
+            return False
+        mode_transitions.order(pilot, "hold", pilot.vehicle.hold())
+    return True
+
+
+def _is_place(setpoint: Setpoint) -> bool:
+    moves = any(map(math.isfinite, (*setpoint.velocity, *setpoint.acceleration)))
+    return _finite(setpoint.position) and not moves and not math.isfinite(setpoint.yaw_rate)
+
+
+def _go(pilot: Autopilot, setpoint: Setpoint, *, fresh: bool) -> None:
+    leg = pilot.memory.leg
+    yaw = setpoint.yaw if math.isfinite(setpoint.yaw) else None
+    same = leg is not None and (leg.target, leg.yaw) == (setpoint.position, yaw)
+    if same and pilot.memory.order == "go_to":
+        return
+    if fresh or not same:
+        from volery.mavlink.autopilot.state import Leg
+
+        pilot.memory.leg = Leg(setpoint.position, yaw, 0.0, locked=True)
+        mode_transitions.order(pilot, "go_to", pilot.vehicle.go_to(setpoint.position, yaw))
+
+
+def _track(pilot: Autopilot, state: FlightState, setpoint: Setpoint, *, fresh: bool) -> None:
+    if math.dist(setpoint.position, state.position) > _TRACKED_M:
+        _steer(pilot, state, setpoint, fresh=fresh)
+    elif fresh:
+        push = setpoint.acceleration if _finite(setpoint.acceleration) else (0.0, 0.0, 0.0)
+        pilot.vehicle.follow(setpoint.position, setpoint.velocity, push, *_turn(setpoint))
+        mode_transitions.order(pilot, "follow")
+
+
+def _push(pilot: Autopilot, setpoint: Setpoint, *, fresh: bool) -> None:
+    if fresh or pilot.memory.order != "push":
+        push = (
+            _turned(pilot, setpoint.acceleration) if setpoint.in_heading else setpoint.acceleration
+        )
+        pilot.vehicle.push(push, *_turn(setpoint))
+        mode_transitions.order(pilot, "push")
+
+
+def _steer(pilot: Autopilot, state: FlightState, setpoint: Setpoint, *, fresh: bool) -> None:
+    """Fly velocities; axes that have a place are drawn to it."""
+    age_ns = pilot.memory.now_ns - pilot.memory.ordered_ns
+    placed = any(map(math.isfinite, setpoint.position)) or setpoint.in_heading
+    if not fresh and age_ns < (_FEEDBACK_NS if placed else _REFRESH_NS):
+        return
+    x, y, z = (v if math.isfinite(v) else 0.0 for v in setpoint.velocity)
+    if setpoint.in_heading:
+        x, y, z = _turned(pilot, (x, y, z))
+    x, y, z = (
+        v + (_GAIN * (goal - here) if math.isfinite(goal) else 0.0)
+        for v, goal, here in zip((x, y, z), setpoint.position, state.position, strict=True)
+    )
+    size, most = math.hypot(x, y), float(pilot.parameter("MPC_XY_VEL_MAX"))
+    if size > most:
+        x, y = x * most / size, y * most / size
+    up, down = (float(pilot.parameter(f"MPC_Z_VEL_MAX_{way}")) for way in ("UP", "DN"))
+    pilot.vehicle.steer((x, y, min(max(z, -down), up)), *_turn(setpoint))
+    mode_transitions.order(pilot, "steer")
+
+
+def _turn(setpoint: Setpoint) -> tuple[float | None, float]:
+    rate = setpoint.yaw_rate if math.isfinite(setpoint.yaw_rate) else 0.0
+    return (setpoint.yaw if math.isfinite(setpoint.yaw) else None), rate
+
+
+def _turned(pilot: Autopilot, vector: Vector) -> Vector:
+    """From the level heading frame to the map; what is nan counts as nothing."""
+    x, y, z = (part if math.isfinite(part) else 0.0 for part in vector)
+    c, s = math.cos(pilot.yaw), math.sin(pilot.yaw)
+    return c * x - s * y, s * x + c * y, z
+
+
+def _finite(vector: Vector) -> bool:
+    return all(map(math.isfinite, vector))

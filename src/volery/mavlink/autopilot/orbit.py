@@ -1,0 +1,147 @@
+"""DO_ORBIT: round a centre at a height, as PX4's `FlightTaskOrbit.cpp`.
+
+Parameters that are nan stay as they are; of a first orbit they are a radius and a speed of 1 m and
+m/s, round the position of the UAV. A positive radius turns clockwise.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from volery.mavlink.autopilot import mode_transitions
+from volery.mavlink.autopilot.acknowledgement import ACCEPTED, DENIED, TEMPORARILY_REJECTED
+from volery.mavlink.autopilot.legs import approach_speed, fly_leg
+from volery.mavlink.autopilot.modes import Mode
+from volery.mavlink.autopilot.motion import degrees_e7, us
+from volery.mavlink.autopilot.setpoints import Setpoint
+from volery.mavlink.autopilot.state import Leg, Orbit
+from volery.mavlink.codec import dialect
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.commands import Command
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.state import Source
+    from volery.mavlink.autopilot.vehicle import FlightState, Vector
+
+DO_ORBIT = 34
+_MIN_RADIUS_M, _MAX_RADIUS_M = 1.0, 1000.0
+_MAX_SPEED_M_S, _MAX_ACCELERATION = 10.0, 2.0
+"""PX4's limits; a speed that the acceleration does not allow is reduced."""
+_TO_CENTRE, _INITIAL_HEADING, _UNCONTROLLED, _TANGENT, _BY_STICKS, _UNCHANGED = range(6)
+"""ORBIT_YAW_BEHAVIOUR."""
+_GAIN = 1.0
+"""1/s of the way back to the circle, PX4's."""
+_ON_CIRCLE_M = 0.5
+_PERIOD_NS = 20_000_000
+
+
+def prepare(pilot: Autopilot, _source: Source, command: Command, height: float) -> int:
+    """Returns the result of DO_ORBIT, whose altitude is `height` in the map (nan: as it is)."""
+    if any(math.isinf(param) for param in command.params):
+        return DENIED
+    latitude, longitude = command.params[4:6]
+    placed = math.isfinite(latitude) and math.isfinite(longitude)
+    if placed and not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
+        return DENIED
+    if not (pilot.memory.armed and mode_transitions.flies(pilot)):
+        return TEMPORARILY_REJECTED
+    before = pilot.memory.orbit if pilot.memory.mode is Mode.ORBIT else None
+    x, y, z = before.center if before else pilot.state.position
+    if placed:
+        x, y, _ = pilot.earth.place(latitude, longitude, pilot.build.origin[2])
+    pilot.memory.orbit = _orbit(
+        command.params, before, (x, y, height if math.isfinite(height) else z), pilot.yaw
+    )
+    return ACCEPTED
+
+
+def _orbit(params: tuple[float, ...], before: Orbit | None, center: Vector, yaw: float) -> Orbit:
+    radius, speed, behaviour = params[:3]
+    if not math.isfinite(radius):
+        radius = before.radius if before else _MIN_RADIUS_M
+    if not math.isfinite(speed):
+        speed = before.speed if before else 1.0
+    clockwise = radius > 0.0
+    radius = min(max(abs(radius), _MIN_RADIUS_M), _MAX_RADIUS_M)
+    limit = min(_MAX_SPEED_M_S, math.sqrt(_MAX_ACCELERATION * radius))
+    speed = min(max(speed, -limit), limit)
+    facing = round(behaviour) if math.isfinite(behaviour) else _UNCHANGED
+    if facing == _UNCHANGED:
+        facing = before.facing if before else _TO_CENTRE
+    return Orbit(center, radius if clockwise else -radius, speed, facing, yaw)
+
+
+def fly(pilot: Autopilot, state: FlightState) -> None:
+    """Flies to the nearest point of the circle, then along it."""
+    memory, orbit = pilot.memory, pilot.memory.orbit
+    if orbit is None or state.mode == "LANDED":
+        return
+    x, y, z = (here - there for here, there in zip(state.position, orbit.center, strict=True))
+    away = math.hypot(x, y)
+    if away < 1e-3:
+        x, y, away = math.cos(pilot.yaw), math.sin(pilot.yaw), 1.0
+        outside = -abs(orbit.radius)
+    else:
+        outside = away - abs(orbit.radius)
+    outward = x / away, y / away
+    if orbit.approaches:
+        orbit.approaches = not _approach(pilot, orbit, outward, abs(outside) + abs(z))
+        return
+    if memory.now_ns - memory.ordered_ns < _PERIOD_NS and memory.order == "steer":
+        return
+    turning = math.copysign(1.0, orbit.radius) * orbit.speed
+    along = outward[1] * turning, -outward[0] * turning
+    back = _GAIN * outside
+    climb = math.copysign(_climb(pilot, z), -z)
+    yaw, rate = _facing(orbit, outward, turning)
+    velocity = along[0] - back * outward[0], along[1] - back * outward[1], climb
+    memory.target = Setpoint(velocity=velocity, yaw=math.nan if yaw is None else yaw)
+    pilot.vehicle.steer(velocity, yaw, rate)
+    mode_transitions.order(pilot, "steer")
+
+
+def status(pilot: Autopilot) -> Any:
+    """Returns ORBIT_EXECUTION_STATUS; None while it does not orbit."""
+    orbit = pilot.memory.orbit
+    if orbit is None or pilot.memory.mode is not Mode.ORBIT:
+        return None
+    latitude, longitude, _ = degrees_e7(pilot.earth.geodetic(orbit.center))
+    altitude = orbit.center[2] + pilot.build.origin[2]
+    built = dialect().MAVLink_orbit_execution_status_message
+    return built(us(pilot), orbit.radius, 0, latitude, longitude, altitude)
+
+
+def _approach(pilot: Autopilot, orbit: Orbit, outward: tuple[float, float], off_m: float) -> bool:
+    """Returns whether the circle is reached."""
+    if pilot.memory.leg is None:
+        x, y, z = orbit.center
+        size = abs(orbit.radius)
+        target = x + size * outward[0], y + size * outward[1], z
+        yaw, _ = _facing(orbit, outward, 0.0)
+        pilot.memory.leg = Leg(target, yaw, mode_transitions.cruise(pilot))
+    if off_m > _ON_CIRCLE_M and not fly_leg(pilot, pilot.memory.leg):
+        return False
+    pilot.memory.leg = None
+    return True
+
+
+def _facing(
+    orbit: Orbit, outward: tuple[float, float], turning: float
+) -> tuple[float | None, float]:
+    """Returns the yaw in the map, None: as it turns, and that rate."""
+    if orbit.facing == _INITIAL_HEADING:
+        return orbit.initial_yaw, 0.0
+    if orbit.facing in (_UNCONTROLLED, _BY_STICKS):
+        return None, 0.0
+    rate = -turning / abs(orbit.radius)
+    if orbit.facing == _TANGENT:
+        return math.atan2(-outward[0] * turning, outward[1] * turning), rate
+    return math.atan2(-outward[1], -outward[0]), rate
+
+
+def _climb(pilot: Autopilot, above: float) -> float:
+    """Returns the speed of the way back to the height, m/s."""
+    way = "DN" if above > 0.0 else "UP"
+    limit = float(pilot.parameter(f"MPC_Z_V_AUTO_{way}"))
+    return min(limit, approach_speed(abs(above), 0.5 * float(pilot.parameter("MPC_ACC_HOR"))))

@@ -1,0 +1,150 @@
+"""Missions, fences and rally points: their items and what must hold for each of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from volery.mavlink.autopilot import payload_items
+
+MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
+"""MAV_MISSION_TYPE."""
+MOST_ITEMS = {MISSION: 500, FENCE: 200, RALLY: 50}
+"""Modelling choice, of the size of PX4's on a flight controller."""
+
+WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LOITER_TO_ALTITUDE = 16, 17, 19, 31
+RETURN_TO_LAUNCH, LAND, TAKE_OFF = 20, 21, 22
+DELAY, CONDITION_DELAY, CONDITION_YAW = 93, 112, 115
+JUMP, CHANGE_SPEED, SET_HOME = 177, 178, 179
+"""MAV_CMD of missions."""
+RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT = 5000, 5001, 5002, 5003, 5004
+RALLY_POINT = 5100
+"""MAV_CMD of fences and rally points."""
+PLACED = {WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LOITER_TO_ALTITUDE, LAND, TAKE_OFF}
+"""Items of missions that lead to a place."""
+_KNOWN = {
+    MISSION: PLACED
+    | {RETURN_TO_LAUNCH, DELAY, CONDITION_DELAY, CONDITION_YAW, JUMP, CHANGE_SPEED, SET_HOME}
+    | payload_items.COMMANDS,
+    FENCE: {RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT},
+    RALLY: {RALLY_POINT},
+}
+NEED_NO_PLACE = {
+    DELAY,
+    CONDITION_DELAY,
+    CONDITION_YAW,
+    JUMP,
+    CHANGE_SPEED,
+    SET_HOME,
+} | payload_items.MARKERS
+"""What may stand before a take-off."""
+AMSL, MISSION_FRAME, ABOVE_HOME = (0, 5), (2,), (3, 6, 10, 11)
+"""MAV_FRAME: GLOBAL(_INT); MISSION; GLOBAL_RELATIVE_ALT(_INT), and TERRAIN_ALT(_INT), which counts
+from home: no terrain is known on board."""
+
+ACCEPTED, ERROR, BAD_FRAME, UNSUPPORTED, NO_SPACE, INVALID = 0, 1, 2, 3, 4, 5
+INVALID_PARAM1, INVALID_X, INVALID_Y, INVALID_Z, INVALID_SEQUENCE, DENIED = 6, 10, 11, 12, 13, 14
+CANCELLED = 15
+"""MAV_MISSION_RESULT."""
+
+
+class Item(NamedTuple):
+    """One item. latitude and longitude in degrees, nan where none was given; altitude m."""
+
+    command: int
+    frame: int
+    params: tuple[float, float, float, float]
+    latitude: float
+    longitude: float
+    altitude: float
+    goes_on: bool = True
+    """autocontinue"""
+
+    @property
+    def placed(self) -> bool:
+        """Whether it says where."""
+        here = self.latitude == 0.0 and self.longitude == 0.0
+        return math.isfinite(self.latitude) and math.isfinite(self.longitude) and not here
+
+
+def item_of(message: Any) -> Item:
+    """Of a MISSION_ITEM_INT or a MISSION_ITEM."""
+    frame = int(message.frame)
+    params = (message.param1, message.param2, message.param3, message.param4)
+    x, y = float(message.x), float(message.y)
+    if message.get_type() == "MISSION_ITEM_INT":
+        unset = message.x == -(2**31) or message.y == -(2**31)
+        x, y = (math.nan, math.nan) if unset else (x * 1e-7, y * 1e-7)
+    return Item(int(message.command), frame, params, x, y, message.z, bool(message.autocontinue))
+
+
+def fault_of(item: Item, kind: int, count: int) -> int:  # noqa: PLR0911
+    """MAV_MISSION_RESULT of an item of a plan of `count` items."""
+    if item.command not in _KNOWN[kind]:
+        return UNSUPPORTED
+    if any(math.isinf(param) or abs(param) > 1e9 for param in item.params):
+        return INVALID
+    if kind == MISSION and item.command in payload_items.COMMANDS:
+        fields = (*item.params, item.latitude, item.longitude, item.altitude)
+        return payload_items.fault_of(item.command, item.frame, fields)
+    if item.command == JUMP:
+        whole = item.params[0] == item.params[0] // 1 and item.params[1] == item.params[1] // 1
+        return ACCEPTED if whole and 0 <= item.params[0] < count else INVALID_PARAM1
+    if item.command in (DELAY, CONDITION_DELAY, LOITER_TIME) and not item.params[0] >= 0.0:
+        return INVALID_PARAM1
+    if item.command == CHANGE_SPEED:
+        return ACCEPTED if math.isfinite(item.params[1]) else INVALID_PARAM1 + 1
+    if item.command == CONDITION_YAW:
+        return ACCEPTED if math.isfinite(item.params[0]) else INVALID_PARAM1
+    if kind == MISSION and item.command not in (*PLACED, SET_HOME):
+        return ACCEPTED
+    return _fault_of_place(item, kind)
+
+
+def _fault_of_place(item: Item, kind: int) -> int:  # noqa: PLR0911
+    if item.frame not in (*AMSL, *ABOVE_HOME, *(MISSION_FRAME if kind != MISSION else ())):
+        return BAD_FRAME
+    if kind != MISSION or item.placed:
+        if not abs(item.latitude) <= 90.0:
+            return INVALID_X
+        if not abs(item.longitude) <= 180.0:
+            return INVALID_Y
+    if kind != FENCE and not (math.isfinite(item.altitude) and abs(item.altitude) < 1e5):
+        return INVALID_Z
+    circle = item.command in (CIRCLE_IN, CIRCLE_OUT)
+    if circle and not item.params[0] >= 0.0:  # PX4 takes 0, which holds nothing
+        return INVALID_PARAM1
+    if item.command in (POLYGON_IN, POLYGON_OUT) and not 3 <= item.params[0] <= MOST_ITEMS[FENCE]:
+        return INVALID_PARAM1
+    return ACCEPTED
+
+
+def polygons_are_whole(items: list[Item]) -> bool:
+    """Whether each polygon of a fence has as many corners, one after the other, as it says."""
+    k = 0
+    while k < len(items):
+        if items[k].command in (POLYGON_IN, POLYGON_OUT):
+            corners = int(items[k].params[0])
+            same = {(item.command, int(item.params[0])) for item in items[k : k + corners]}
+            if len(items) - k < corners or len(same) != 1:
+                return False
+            k += corners
+        else:
+            k += 1
+    return True
+
+
+def flies_for_ever(items: list[Item]) -> bool:
+    """Whether jumps can go round without any item that is flown or waits."""
+    busy = {*PLACED, DELAY, CONDITION_DELAY, CONDITION_YAW, RETURN_TO_LAUNCH}
+    for start, item in enumerate(items):
+        if item.command != JUMP:
+            continue
+        seen: set[int] = set()
+        k = start
+        while k < len(items) and items[k].command not in busy:
+            if k in seen:
+                return True
+            seen.add(k)
+            k = int(items[k].params[0]) if items[k].command == JUMP else k + 1
+    return False

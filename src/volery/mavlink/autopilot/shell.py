@@ -1,0 +1,76 @@
+"""The system shell over SERIAL_CONTROL: a few commands that only read, with PX4's prompt."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from volery.mavlink.autopilot.parameters import NAMES
+from volery.mavlink.codec import dialect
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.state import Source
+
+_SHELL_DEVICE = 10
+_REPLY, _RESPOND = 1, 2
+"""SERIAL_CONTROL_DEV and SERIAL_CONTROL_FLAG."""
+_CHUNK_BYTES = 70
+_MAX_LINE = 200
+_MAX_SHELLS = 8
+_PROMPT = "pxh> "
+_HELP = {
+    "help": "lists the commands",
+    "param show [NAME]": "prints parameters; NAME may end with *",
+    "ver": "prints the versions",
+}
+
+
+def take(pilot: Autopilot, source: Source, message: Any) -> None:
+    """Runs what a SERIAL_CONTROL completes to a line, and replies where that is asked for.
+
+    One line a message: what follows it in the same message is dropped.
+    """
+    shells = pilot.memory.shells
+    if message.device != _SHELL_DEVICE or message.flags & _REPLY or pilot.memory.state is None:
+        return
+    text = shells.pop(source, "") + bytes(message.data[: message.count]).decode("ascii", "replace")
+    text = text.replace("\r", "\n").replace("\0", "")
+    reply = ""
+    line, ended, _ = text.partition("\n")
+    if ended:
+        reply = f"{_run(pilot, line.split())}{_PROMPT}"
+    elif len(line) <= _MAX_LINE and len(shells) < _MAX_SHELLS:
+        shells[source] = line
+    if message.flags & _RESPOND:
+        _reply(pilot, source, reply)
+
+
+def _run(pilot: Autopilot, words: list[str]) -> str:
+    """Returns what a command prints."""
+    if not words:
+        return ""
+    if words == ["help"]:
+        return "Commands:\n" + "".join(f"  {name:<18} {what}\n" for name, what in _HELP.items())
+    if words[0] == "ver":
+        return f"HW arch: volery {pilot.build.airframe}\nPX4 version: 1.18.0 (simulated)\n"
+    if words[:2] == ["param", "show"] and len(words) <= 3:
+        wanted = words[2] if len(words) == 3 else "*"
+        return _parameters(pilot, wanted)
+    return f"Invalid command: {' '.join(words)[:40]}\ntype 'help' for a list of commands\n"
+
+
+def _parameters(pilot: Autopilot, wanted: str) -> str:
+    prefix = wanted.removesuffix("*")
+    found = [
+        name for name in NAMES if name == wanted or (name.startswith(prefix) and wanted[-1:] == "*")
+    ]
+    return "".join(f"  {name}: {pilot.parameter(name):g}\n" for name in found) or "no parameter\n"
+
+
+def _reply(pilot: Autopilot, source: Source, text: str) -> None:
+    raw = text.encode("ascii", "replace")
+    control = dialect().MAVLink_serial_control_message
+    for k in range(0, len(raw), _CHUNK_BYTES):
+        piece = raw[k : k + _CHUNK_BYTES]
+        data = list(piece.ljust(_CHUNK_BYTES, b"\0"))
+        pilot.send(control(_SHELL_DEVICE, _REPLY, 0, 0, len(piece), data), source[0])

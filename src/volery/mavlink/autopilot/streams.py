@@ -1,0 +1,107 @@
+"""Streams: which message goes out on which link how often, in simulated time.
+
+Rates are those of PX4's links: `onboard` for a companion computer, `normal` for a ground station
+(`mavlink_main.cpp` of PX4 1.18). SET_MESSAGE_INTERVAL changes them for its link.
+"""
+
+from __future__ import annotations
+
+import heapq
+from typing import TYPE_CHECKING, Any
+
+from volery.mavlink.autopilot import telemetry
+from volery.mavlink.autopilot.parameter_protocol import send_some
+from volery.mavlink.codec import dialect
+
+if TYPE_CHECKING:
+    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.state import Link
+
+NONE, ONBOARD, GROUND = 0, 1, 2
+_ALWAYS = {0: 1.0}
+_NORMAL = (
+    _ALWAYS
+    | {1: 1.0, 24: 5.0, 29: 1.0, 30: 15.0, 31: 10.0, 32: 1.0, 33: 5.0, 36: 1.0, 42: 1.0, 49: 0.2}
+    | {
+        74: 4.0,
+        83: 2.0,
+        85: 1.5,
+        141: 1.0,
+        147: 0.5,
+        230: 0.5,
+        242: 0.5,
+        245: 1.0,
+        360: 2.0,
+        436: 0.5,
+    }
+)
+RATES_HZ: dict[int, dict[int, float]] = {
+    NONE: _ALWAYS,
+    ONBOARD: _ALWAYS
+    | {1: 5.0, 2: 1.0, 24: 5.0, 29: 1.0, 30: 100.0, 31: 50.0, 32: 30.0, 33: 50.0, 36: 10.0, 42: 1.0}
+    | {49: 0.2, 74: 10.0, 83: 10.0, 85: 10.0, 105: 50.0, 111: 10.0, 141: 10.0, 147: 0.5}
+    | {230: 1.0, 242: 0.5, 245: 5.0, 331: 30.0, 360: 5.0, 436: 0.5},
+    GROUND: _NORMAL,
+}
+"""By profile and message id."""
+FASTEST_NS = 10_000_000
+"""As often as the vehicle's state comes."""
+_HEARTBEAT = 0
+"""Which cannot be asked to come otherwise."""
+
+
+def begin(link: Link, now_ns: int) -> Link:
+    """Give a link the streams of its profile."""
+    rates = RATES_HZ.get(link.profile, _ALWAYS)
+    link.periods_ns = {number: round(1e9 / rate) for number, rate in rates.items()}
+    link.due = [(now_ns, number) for number in sorted(link.periods_ns)]
+    return link
+
+
+def ask_for(pilot: Autopilot, link: Link, number: int, period_us: float) -> bool:
+    """Send a message each `period_us` on a link: 0 as at its beginning, -1 never.
+
+    Whether that can be; no faster than the state of the vehicle comes.
+    """
+    if number not in telemetry.BUILDERS or number == _HEARTBEAT:
+        return False
+    if period_us < 0.0:
+        link.periods_ns.pop(number, None)
+        return True
+    usual = RATES_HZ.get(link.profile, _ALWAYS).get(number)
+    if period_us == 0.0 and usual is None:
+        return ask_for(pilot, link, number, -1.0)
+    wanted = 1e9 / usual if period_us == 0.0 and usual is not None else period_us * 1e3
+    link.periods_ns[number] = max(FASTEST_NS, round(min(wanted, 1e15)))
+    link.due = [entry for entry in link.due if entry[1] != number]
+    heapq.heapify(link.due)
+    heapq.heappush(link.due, (pilot.memory.now_ns, number))
+    return True
+
+
+def interval_of(link: Link, number: int) -> Any:
+    """MESSAGE_INTERVAL of a message; -1 of one that is not sent, or that is not there."""
+    period_ns = link.periods_ns.get(number)
+    period_us = -1 if period_ns is None else period_ns // 1000
+    return dialect().MAVLink_message_interval_message(number, min(period_us, 2**31 - 1))
+
+
+def send_due(pilot: Autopilot) -> None:
+    """Send everything whose time has come; each message is built once for all links."""
+    now_ns = pilot.memory.now_ns
+    built: dict[int, Any] = {}
+    for link in tuple(pilot.memory.links.values()):
+        while link.due and link.due[0][0] <= now_ns:
+            instant_ns, number = link.due[0]
+            period_ns = link.periods_ns.get(number)
+            if period_ns is None:  # nobody wants it any more
+                heapq.heappop(link.due)
+                continue
+            late = (now_ns - instant_ns) // period_ns + 1
+            heapq.heapreplace(link.due, (instant_ns + late * period_ns, number))
+            if number not in built:
+                built[number] = telemetry.BUILDERS[number](pilot)
+            if built[number] is not None:
+                pilot.send(built[number], link.number)
+        if link.parameters_to_send:
+            send_some(pilot, link)

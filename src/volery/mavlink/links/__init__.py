@@ -1,0 +1,1 @@
+"""MAVLink connections of the built-in autopilots: UDP, TCP and serial lines."""

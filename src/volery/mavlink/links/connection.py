@@ -1,0 +1,83 @@
+"""What MAVLink's doors share: one connection that carries all vehicles."""
+
+from __future__ import annotations
+
+import errno
+
+from volery.mavlink.codec import Parser
+from volery.mavlink.framing import Framer
+from volery.mavlink.links.intake import IntakeAccount
+from volery.mavlink.links.signing import Signing
+from volery.mavlink.links.vehicle_registry import Fleet
+
+
+class Party:
+    """One connection that carries all vehicles: TCP clients and serial lines.
+
+    account: limits what is read of it; None: nothing does.
+    """
+
+    def __init__(
+        self,
+        fleet: Fleet,
+        number: int,
+        profile: int,
+        key: bytes | None = None,
+        account: IntakeAccount | None = None,
+    ) -> None:
+        self.number = number
+        self.has_spoken = False
+        """Whether a valid frame has come."""
+        self._account = account
+        self._signing = Signing(key, number)
+        self._fleet, self._profile = fleet, profile
+        self._framer, self._parser = Framer(), Parser()
+        self._systems: set[int] = set()
+
+    def greet(self, system: int) -> None:
+        """Have a vehicle send on it."""
+        self._systems.add(system)
+        self._fleet.send(system, self.number, self._profile, b"")
+
+    def take(self, data: bytes) -> float:
+        """Brings what came to the vehicles that it is for.
+
+        Returns for how many seconds nothing more must be read.
+        """
+        frames, cost = self._framer.feed(data), 0
+        parts: dict[int, list[bytes]] = {}
+        for frame in filter(self._signing.accepts, frames):
+            self.has_spoken = True
+            target = getattr(self._parser.decode(frame.data), "target_system", 0)
+            chosen = self._systems if target == 0 else self._systems & {target}
+            cost += max(0, len(chosen) - 1)
+            for system in chosen:
+                parts.setdefault(system, []).append(frame.data)
+        for system in sorted(parts):
+            self._fleet.send(system, self.number, self._profile, b"".join(parts[system]))
+        if self._account is None:
+            return 0.0
+        noise_bytes = len(data) - sum(len(frame.data) for frame in frames)
+        pause_s = self._account.charge(len(frames) + cost, noise_bytes)
+        return max(pause_s, self._fleet.pause_s)
+
+    def may_read(self) -> float:
+        """Returns for how many seconds more nothing must be read."""
+        return 0.0 if self._account is None else max(self._account.charge(), self._fleet.pause_s)
+
+    def sign(self, data: bytes) -> bytes:
+        """Frames as they go over this connection."""
+        return self._signing.sign(data)
+
+    def leave(self) -> None:
+        """Tell the vehicles that it is there no more."""
+        if self._account is not None:
+            self._account.close()
+        for system in self._systems:
+            self._fleet.close_link(system, self.number)
+
+
+def why_not(error: Exception) -> str:
+    """Why an address cannot be listened at."""
+    taken = isinstance(error, OSError) and error.errno == errno.EADDRINUSE
+    return "the port is taken" if taken else str(error)

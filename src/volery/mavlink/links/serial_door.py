@@ -1,0 +1,69 @@
+"""MAVLink on a serial line, to a radio or another program: all vehicles on it."""
+
+from __future__ import annotations
+
+import asyncio
+
+from volery.graph.session import Gateway
+from volery.mavlink.autopilot.streams import GROUND
+from volery.mavlink.codec import dialect
+from volery.mavlink.links.connection import Party
+from volery.mavlink.links.serial_line import SerialLine
+from volery.mavlink.links.vehicle_registry import Fleet, Sink
+
+
+class MavlinkSerial:
+    """All vehicles on one serial line: a radio, or a pseudo-terminal of another program.
+
+    path: of the device. baud: its speed.
+    """
+
+    def __init__(self, path: str, baud: int = 57600, *, key: bytes | None = None) -> None:
+        self._key = key
+        self._path, self._baud = path, baud
+        self._fleet: Fleet | None = None
+        self._looks: asyncio.Task[None] | None = None
+        self._line: SerialLine | None = None
+        self._party: Party | None = None
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        return f"MAVLink serial {self._path} at {self._baud} baud"
+
+    async def start(self, gateway: Gateway) -> None:
+        """Open the line. `BridgeError` where that is not possible."""
+        dialect()
+        self._line = SerialLine(self._path, self._baud, self._take)
+        self._fleet = Fleet(gateway, self.name, self._join, lambda _system: None)
+        self._party = Party(self._fleet, self._line.number, GROUND, self._key)
+        self._fleet.look()
+        self._looks = asyncio.create_task(self._fleet.keep_looking())
+
+    async def stop(self) -> None:
+        """Close the line."""
+        if self._looks is not None:
+            self._looks.cancel()
+            await asyncio.gather(self._looks, return_exceptions=True)
+        if self._party is not None:
+            self._party.leave()
+        if self._fleet is not None:
+            self._fleet.close()
+        if self._line is not None:
+            self._line.close()
+
+    def _join(self, _name: str, system: int) -> Sink:
+        assert self._party is not None
+        assert self._line is not None
+        self._party.greet(system)
+        line, party = self._line, self._party
+
+        def sink(number: int, data: bytes) -> None:
+            if number in (-1, party.number):
+                line.send(party.sign(data))
+
+        return sink
+
+    def _take(self, data: bytes) -> None:
+        if self._party is not None:
+            self._party.take(data)

@@ -1,0 +1,87 @@
+"""Gives the UAVs of a scenario autopilots, or what those outside need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from volery.mavlink.codec import dialect
+from volery.mavlink.hil.ardupilot_json import STATE_HZ
+from volery.scenario.load import parse_scenario
+from volery.scenario.node_names import is_same_node
+from volery.scenario.schema import Scenario
+
+NODE = "mavlink_autopilot"
+_CALIBRATED_IMU = "iim42653"
+
+
+def with_autopilots(scenario: Scenario) -> Scenario:
+    """The scenario with an autopilot beside each UAV whose type has none.
+
+    It is part of what is flown then: logs tell of it, and repeated flights have it too.
+    `BridgeError` where pymavlink is not installed.
+    """
+    dialect()
+    data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
+    for name, uav_type in scenario.types.items():
+        if not any(is_same_node(entry.node, NODE) for entry in uav_type.nodes):
+            kept = [entry.model_dump(exclude_unset=True) for entry in uav_type.nodes]
+            data["types"][name] = {**data["types"][name], "nodes": [*kept, {"node": NODE}]}
+    return _parsed_like(scenario, data)
+
+
+def with_px4(scenario: Scenario) -> Scenario:
+    """The scenario for real PX4s: every type has the sensors that they need, none starts by itself.
+
+    An IMU at 250 Hz, so that each step has a reading; magnetometer, barometer and GNSS where a type
+    has none. Where the scenario chooses no model of an IMU it is a calibrated one: beyond a bias of
+    0.3 m/s^2 PX4 does not arm.
+    """
+    dialect()
+    others = ("magnetometer", "barometer", "gnss")
+    return _with_sensors(scenario, {"imu": 250.0}, others, {"imu": _CALIBRATED_IMU})
+
+
+def with_ardupilot(scenario: Scenario) -> Scenario:
+    """The scenario for real ArduPilots: IMU and true state at 800 Hz; none starts by itself.
+
+    Physics steps that do not fit are made as long as the time between two states. ArduPilot makes
+    all further sensors of its own from the true state.
+    """
+    dialect()
+    if scenario.physics.rate_hz % STATE_HZ:
+        data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
+        data["physics"] = {**data.get("physics", {}), "rate_hz": STATE_HZ}
+        scenario = _parsed_like(scenario, data)
+    rate = float(STATE_HZ)
+    return _with_sensors(scenario, {"imu": rate, "ground_truth": rate}, ("battery",))
+
+
+def _with_sensors(
+    scenario: Scenario,
+    rates: Mapping[str, float],
+    others: Sequence[str],
+    models: Mapping[str, str] | None = None,
+) -> Scenario:
+    """Every type with these sensors; the UAVs wait on the ground.
+
+    rates: of some sensors, by kind. models: of those whose model the scenario does not choose.
+    """
+    data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
+    for name, uav_type in scenario.types.items():
+        sensors = [sensor.model_dump(exclude_unset=True) for sensor in uav_type.sensors]
+        kinds = {sensor["kind"] for sensor in sensors}
+        sensors += [{"kind": kind} for kind in (*rates, *others) if kind not in kinds]
+        for sensor in sensors:
+            if sensor["kind"] in rates:
+                sensor["rate_hz"] = rates[sensor["kind"]]
+            if models and sensor["kind"] in models:
+                sensor.setdefault("model", models[sensor["kind"]])
+        data["types"][name] = {**data["types"][name], "sensors": sensors}
+    data["uavs"] = [{**group, "on_start": "wait"} for group in data["uavs"]]
+    return _parsed_like(scenario, data)
+
+
+def _parsed_like(scenario: Scenario, data: dict[str, Any]) -> Scenario:
+    """The scenario of `data`, with the access of `scenario`."""
+    return parse_scenario(data, where=scenario.name, access=scenario.access)
