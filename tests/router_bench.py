@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from volery.comms.addresses import Identity
 from volery.comms.protocol import Kind
-from volery.comms.router import Router
-from volery.comms.settings import RouterSettings
-from volery.comms.station_core import StationCore
+from volery.comms.server.router import Router
+from volery.comms.server.settings import RouterSettings
+from volery.comms.station.core import StationCore
 
 MS = 1_000_000
 S = 1000 * MS

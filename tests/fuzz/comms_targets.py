@@ -2,35 +2,48 @@
 
 from __future__ import annotations
 
-from volery.comms import bodies
+from volery.comms import control_payloads
 from volery.comms.addresses import ALL, SERVER, Identity
 from volery.comms.protocol import FrameParser, Kind, encode_frame
-from volery.comms.router import Router
-from volery.comms.settings import RouterSettings
-from volery.comms.station_core import StationCore
+from volery.comms.server.router import Router
+from volery.comms.server.settings import RouterSettings
+from volery.comms.station.core import StationCore
 
 _HELLO = encode_frame(
-    Kind.HELLO, 1, SERVER, 7, payload=bodies.encode_hello(bodies.Hello(0, 1, 4, "a", ""))
+    Kind.HELLO,
+    1,
+    SERVER,
+    7,
+    payload=control_payloads.encode_hello(control_payloads.Hello(0, 1, 4, "a", "")),
 )
 _TALK = [
     encode_frame(Kind.COMMAND, 1, 2, 7, 1, 5, b"command"),
     encode_frame(Kind.SENSING, 1, ALL, 7, 2, 5, bytes(40)),
     encode_frame(Kind.SENSING, 1, 9, 7, 3, 5),
     encode_frame(
-        Kind.RECEIVED, 1, SERVER, 7, payload=bodies.encode_received([bodies.Received(2, 1, 1)])
+        Kind.RECEIVED,
+        1,
+        SERVER,
+        7,
+        payload=control_payloads.encode_received([control_payloads.Received(2, 1, 1)]),
     ),
     encode_frame(Kind.PING, 1, SERVER, 7),
 ]
 _ANSWERS = [
     encode_frame(
-        Kind.WELCOME, SERVER, 1, payload=bodies.encode_welcome(bodies.Welcome(3, 1, (1,)))
+        Kind.WELCOME,
+        SERVER,
+        1,
+        payload=control_payloads.encode_welcome(control_payloads.Welcome(3, 1, (1,))),
     ),
-    encode_frame(Kind.SETTLED, SERVER, 1, payload=bodies.encode_settled((1, 2))),
+    encode_frame(Kind.SETTLED, SERVER, 1, payload=control_payloads.encode_settled((1, 2))),
     encode_frame(
         Kind.REFUSAL,
         SERVER,
         1,
-        payload=bodies.encode_refusal(bodies.Refusal(bodies.Reason.FULL, 2, "full")),
+        payload=control_payloads.encode_refusal(
+            control_payloads.Refusal(control_payloads.Reason.FULL, 2, "full")
+        ),
     ),
     encode_frame(Kind.SENSING, 2, 1, 1, 1, 0, b"x"),
     encode_frame(Kind.PONG, SERVER, 1),
@@ -38,7 +51,11 @@ _ANSWERS = [
 _STREAMS = [b"".join((_HELLO, *_TALK[k:], *_TALK[:k])) for k in range(len(_TALK))]
 _BACK = [b"".join((*_ANSWERS[k:], *_ANSWERS[:k])) for k in range(len(_ANSWERS))]
 _FROM_2 = encode_frame(
-    Kind.HELLO, 2, SERVER, 1, payload=bodies.encode_hello(bodies.Hello(0, 2, 4, "b", ""))
+    Kind.HELLO,
+    2,
+    SERVER,
+    1,
+    payload=control_payloads.encode_hello(control_payloads.Hello(0, 2, 4, "b", "")),
 ) + encode_frame(Kind.SENSING, 2, 1, 1, 1, 0, b"hello")
 
 

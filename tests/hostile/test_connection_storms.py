@@ -31,7 +31,7 @@ SERVERS = """
     from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
     from volery.bridges.rosbridge.server import RosbridgeServer
     from volery.bridges.sensor_link.server import SensorLink
-    from volery.comms.server import CommsServer
+    from volery.comms.server.tcp import CommsServer
     from volery.core.connection_limits import SHARED
     from volery.mavlink.links.tcp_door import MavlinkTcp
     from volery.server.page_server import PageServer

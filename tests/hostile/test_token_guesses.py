@@ -19,9 +19,9 @@ from websockets.sync.client import connect
 from volery.bridges.doors import Doors
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.comms.addresses import Identity
-from volery.comms.server import CommsServer
-from volery.comms.settings import RouterSettings
-from volery.comms.station import Station
+from volery.comms.server.settings import RouterSettings
+from volery.comms.server.tcp import CommsServer
+from volery.comms.station.tcp import Station
 from volery.core.token_guesses import TokenGuesses
 from volery.server.page_server import PageServer
 from volery.server.rights import Tokens

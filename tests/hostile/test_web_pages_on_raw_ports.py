@@ -22,9 +22,9 @@ from volery.bridges.sensor_link.payloads import encode_payload
 from volery.bridges.sensor_link.server import SensorLink
 from volery.bridges.sensor_link.wire import Kind as SensorKind
 from volery.bridges.sensor_link.wire import encode_frame as sensor_frame
-from volery.comms.bodies import Hello, encode_hello
+from volery.comms.control_payloads import Hello, encode_hello
 from volery.comms.protocol import Kind, encode_frame
-from volery.comms.server import CommsServer
+from volery.comms.server.tcp import CommsServer
 from volery.core.preamble import Preamble
 from volery.graph import messages as m
 from volery.mavlink.codec import dialect

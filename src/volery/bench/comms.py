@@ -15,7 +15,7 @@ import numpy as np
 
 from volery.comms.addresses import Identity
 from volery.comms.protocol import Frame, Kind
-from volery.comms.station import Station
+from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError
 
 _STATIONS = 64

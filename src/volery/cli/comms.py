@@ -8,9 +8,9 @@ import signal
 
 import typer
 
-from volery.comms.server import CommsServer
-from volery.comms.settings import RouterSettings
-from volery.comms.statistics import Statistics
+from volery.comms.server.settings import RouterSettings
+from volery.comms.server.statistics import Statistics
+from volery.comms.server.tcp import CommsServer
 
 _TOLD_S = 10.0
 

@@ -97,7 +97,7 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
 
 
 def _comms(address: Address, terms: Terms) -> Door:
-    from volery.comms.uav_stations import UavStations
+    from volery.comms.station.station_bridge import UavStations
 
     return UavStations(*address, token=terms.token)
 

@@ -14,12 +14,12 @@ import typer
 
 from volery.cli.tables import print_table
 from volery.comms.addresses import Identity
-from volery.comms.bodies import Refusal
-from volery.comms.ground import HEAD, HELP, Ground
+from volery.comms.control_payloads import Refusal
 from volery.comms.protocol import Frame
-from volery.comms.server import PORT
-from volery.comms.station import Station
-from volery.comms.station_core import FATAL
+from volery.comms.server.tcp import PORT
+from volery.comms.station.core import FATAL
+from volery.comms.station.ground_station import HEAD, HELP, Ground
+from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError
 
 _LEAVE_S = 2.0

@@ -23,7 +23,7 @@ def comms(
 ) -> None:
     """Serve the radio network's stations until Ctrl-C: UAVs and ground stations."""
     from volery.cli.comms import serve_stations
-    from volery.comms.settings import RouterSettings
+    from volery.comms.server.settings import RouterSettings
 
     settings = RouterSettings(planes_per_batch=batch_size, token=token)
     serve_stations(host, port, settings, anywhere=allow_remote)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.comms.radio.net import RadioNet
+from volery.comms.radio.network import RadioNet
 from volery.core.errors import SnapshotError
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.comms.radio.link import RadioLink
-from volery.comms.radio.net import RadioNet
+from volery.comms.radio.channel import RadioLink
+from volery.comms.radio.network import RadioNet
 from volery.engine.engine import Engine
 from volery.graph.graph import Graph
 from volery.runtime.radio_sight import RadioSight

@@ -17,8 +17,7 @@ from volery.bench.comms import served
 from volery.bridges.doors import Doors
 from volery.cli.gcs import parse_server
 from volery.comms.addresses import ALL, ALL_GROUND, FIRST_GROUND, Identity, batch_address, is_meant
-from volery.comms.bodies import Reason, Refusal
-from volery.comms.ground import Ground
+from volery.comms.control_payloads import Reason, Refusal
 from volery.comms.payloads import (
     COMMANDS,
     MISSION,
@@ -33,10 +32,11 @@ from volery.comms.payloads import (
     encode_named,
 )
 from volery.comms.protocol import Frame, Kind
-from volery.comms.server import CommsServer
-from volery.comms.station import Station
-from volery.comms.targets import address_of
-from volery.comms.uav_stations import UavStations
+from volery.comms.server.tcp import CommsServer
+from volery.comms.station.address_parsing import address_of
+from volery.comms.station.ground_station import Ground
+from volery.comms.station.station_bridge import UavStations
+from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError
 from volery.graph.messages import Header, Point, String, Time, Vector3, message_type
 from volery.graph.zero import zero_message

@@ -17,7 +17,7 @@ from volery.comms.addresses import (
     batch_address,
     is_meant,
 )
-from volery.comms.bodies import (
+from volery.comms.control_payloads import (
     Hello,
     Reason,
     Received,

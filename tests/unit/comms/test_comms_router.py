@@ -6,13 +6,19 @@ import pytest
 from router_bench import MS, Bench, S
 
 from volery.comms.addresses import ALL, SERVER, Identity, batch_address
-from volery.comms.bodies import Hello, Reason, decode_refusal, decode_welcome, encode_hello
-from volery.comms.exchange import Exchange
-from volery.comms.link import Delivery
+from volery.comms.control_payloads import (
+    Hello,
+    Reason,
+    decode_refusal,
+    decode_welcome,
+    encode_hello,
+)
+from volery.comms.link_model import Delivery
+from volery.comms.local_network import Exchange
 from volery.comms.protocol import FrameParser, Kind, encode_frame
-from volery.comms.router import Router
-from volery.comms.settings import RouterSettings
-from volery.comms.station_core import StationCore
+from volery.comms.server.router import Router
+from volery.comms.server.settings import RouterSettings
+from volery.comms.station.core import StationCore
 from volery.core.errors import CommsError
 from volery.core.framing import Flaw
 

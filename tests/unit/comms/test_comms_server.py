@@ -9,11 +9,11 @@ import pytest
 
 from volery.bench.comms import Traffic, served
 from volery.comms.addresses import ALL, Identity
-from volery.comms.bodies import Hello, Reason, encode_hello
+from volery.comms.control_payloads import Hello, Reason, encode_hello
 from volery.comms.protocol import Kind, encode_frame
-from volery.comms.server import CommsServer
-from volery.comms.settings import RouterSettings
-from volery.comms.station import Station
+from volery.comms.server.settings import RouterSettings
+from volery.comms.server.tcp import CommsServer
+from volery.comms.station.tcp import Station
 from volery.core.errors import BridgeError, CommsError
 from volery.core.framing import Flaw
 

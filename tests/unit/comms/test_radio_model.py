@@ -9,7 +9,7 @@ import pytest
 
 from volery.comms.addresses import ALL
 from volery.comms.protocol import Frame, FrameParser, Kind, encode_frame
-from volery.comms.radio.link import RadioLink
+from volery.comms.radio.channel import RadioLink
 from volery.comms.radio.path_loss import (
     Paths,
     distance_loss_db,

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from volery.comms.radio_node import RadioNode
-from volery.comms.server import CommsServer
-from volery.comms.settings import RouterSettings
+from volery.comms.server.settings import RouterSettings
+from volery.comms.server.tcp import CommsServer
+from volery.comms.station.radio_node import RadioNode
 from volery.core.errors import GraphError
 from volery.graph.graph import Graph
 from volery.graph.messages import Published, String

@@ -5,7 +5,7 @@ import socket
 import struct
 from types import SimpleNamespace
 
-from volery.comms.server import CommsServer
+from volery.comms.server.tcp import CommsServer
 from volery.core.listening import write_while_open
 from volery.mavlink.links.tcp_door import _TcpClient
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
-from volery.comms.mailbox import Mailbox
 from volery.comms.protocol import FrameParser
-from volery.comms.rate import RateLimit
+from volery.comms.server.mailbox import Mailbox
+from volery.comms.server.rate import RateLimit
 
 
 @dataclass(slots=True)

@@ -14,12 +14,12 @@ import copy
 from typing import Any
 
 from volery.comms.addresses import Identity
-from volery.comms.link import Delivery, Link, ideal_link
+from volery.comms.link_model import Delivery, Link, ideal_link
 from volery.comms.protocol import Frame
-from volery.comms.router import Router
-from volery.comms.settings import RouterSettings
-from volery.comms.station_core import StationCore
-from volery.comms.statistics import Statistics
+from volery.comms.server.router import Router
+from volery.comms.server.settings import RouterSettings
+from volery.comms.server.statistics import Statistics
+from volery.comms.station.core import StationCore
 from volery.core.errors import CommsError
 
 _BOOT = 1

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from volery.comms.addresses import PLANES_PER_BATCH, Identity, is_meant, is_station
-from volery.comms.bodies import Refusal
-from volery.comms.freshness import Freshness
+from volery.comms.control_payloads import Refusal
 from volery.comms.payloads import (
     COMMANDS,
     MISSION,
@@ -23,8 +22,9 @@ from volery.comms.payloads import (
     encode_named,
 )
 from volery.comms.protocol import Frame, Kind
-from volery.comms.statuses import mission_gist, slam_gist
-from volery.comms.targets import address_of
+from volery.comms.station.address_parsing import address_of
+from volery.comms.station.clock_offset import Freshness
+from volery.comms.station.statuses import mission_gist, slam_gist
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
 from volery.graph.messages import Point, message_type

@@ -15,8 +15,7 @@ same times give the same bytes. Rules and promises: docs/comms.md.
 from __future__ import annotations
 
 from volery.comms.addresses import SERVER
-from volery.comms.admission import admit
-from volery.comms.bodies import (
+from volery.comms.control_payloads import (
     MOST_SEQUENCES,
     Reason,
     Refusal,
@@ -26,12 +25,13 @@ from volery.comms.bodies import (
     encode_settled,
     encode_welcome,
 )
-from volery.comms.known import Connection, Known
-from volery.comms.link import Link, ideal_link
-from volery.comms.post_office import PostOffice
+from volery.comms.link_model import Link, ideal_link
 from volery.comms.protocol import MESSAGES, Frame, Kind, encode_frame
-from volery.comms.settings import RouterSettings
-from volery.comms.statistics import Statistics
+from volery.comms.server.admission import admit
+from volery.comms.server.dispatcher import PostOffice
+from volery.comms.server.records import Connection, Known
+from volery.comms.server.settings import RouterSettings
+from volery.comms.server.statistics import Statistics
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
 

@@ -16,9 +16,9 @@ import errno
 import secrets
 import time
 
-from volery.comms.router import Router
-from volery.comms.settings import RouterSettings
-from volery.comms.statistics import Statistics
+from volery.comms.server.router import Router
+from volery.comms.server.settings import RouterSettings
+from volery.comms.server.statistics import Statistics
 from volery.core.errors import CommsError
 from volery.core.listener import Listener, open_listener
 from volery.core.listening import check_address, check_token, tend, write_while_open

@@ -16,10 +16,10 @@ import time
 from collections.abc import Callable
 
 from volery.comms.addresses import PLANES_PER_BATCH, Identity
-from volery.comms.bodies import Refusal
+from volery.comms.control_payloads import Refusal
 from volery.comms.protocol import Frame, Kind
-from volery.comms.server import PORT
-from volery.comms.station_core import StationCore
+from volery.comms.server.tcp import PORT
+from volery.comms.station.core import StationCore
 from volery.core.errors import CommsError
 from volery.core.listening import tend, write_while_open
 

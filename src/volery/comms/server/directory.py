@@ -10,12 +10,12 @@ from collections import deque
 from collections.abc import Iterator
 
 from volery.comms.addresses import is_meant, is_station
-from volery.comms.bodies import Reason
-from volery.comms.known import Known
-from volery.comms.mailbox import Mailbox
+from volery.comms.control_payloads import Reason
 from volery.comms.protocol import Frame, Kind
-from volery.comms.rate import RateLimit
-from volery.comms.settings import RouterSettings
+from volery.comms.server.mailbox import Mailbox
+from volery.comms.server.rate import RateLimit
+from volery.comms.server.records import Known
+from volery.comms.server.settings import RouterSettings
 from volery.core.clock import NS_PER_S
 
 _SWEEP_NS = NS_PER_S // 4

@@ -1,4 +1,4 @@
-"""The radio model as a `comms.link.Link`: one shared channel between stations at places."""
+"""The radio model as a `comms.link_model.Link`: one shared channel between stations at places."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.comms.addresses import is_station
-from volery.comms.link import Delivery
+from volery.comms.link_model import Delivery
 from volery.comms.protocol import Frame
 from volery.comms.radio.path_loss import Paths, loss_db
 from volery.comms.radio.reception import air_time_ns, packet_error_rate, snr_db

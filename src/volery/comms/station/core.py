@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections import deque
 
 from volery.comms.addresses import PLANES_PER_BATCH, SERVER, Identity
-from volery.comms.bodies import (
+from volery.comms.control_payloads import (
     Hello,
     Reason,
     Refusal,
@@ -28,9 +28,9 @@ from volery.comms.bodies import (
     encode_hello,
     encode_received,
 )
-from volery.comms.held import Held
-from volery.comms.inbox import Inbox
 from volery.comms.protocol import MESSAGES, Frame, FrameParser, Kind, encode_frame
+from volery.comms.station.receive_log import Inbox
+from volery.comms.station.send_buffer import Held
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
 

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from volery.comms.addresses import is_station
-from volery.comms.bodies import Received
+from volery.comms.control_payloads import Received
 from volery.comms.protocol import Frame, Kind
-from volery.comms.settings import RouterSettings
+from volery.comms.server.settings import RouterSettings
 
 
 class Waiting(NamedTuple):

@@ -16,8 +16,8 @@ import math
 from functools import partial
 from typing import Any
 
+from volery.comms.address_assignment import free_address
 from volery.comms.addresses import ALL_GROUND, PLANES_PER_BATCH, Identity
-from volery.comms.naming import free_address
 from volery.comms.payloads import (
     COMMANDS,
     MISSION,
@@ -33,9 +33,9 @@ from volery.comms.payloads import (
     encode_named,
 )
 from volery.comms.protocol import Frame, Kind
-from volery.comms.server import PORT
-from volery.comms.station import Station
-from volery.comms.statuses import slam_gist
+from volery.comms.server.tcp import PORT
+from volery.comms.station.statuses import slam_gist
+from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError, GraphError
 from volery.graph.mailbox import Mailbox
 from volery.graph.messages import message_type

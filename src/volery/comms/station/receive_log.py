@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from volery.comms.bodies import Received
+from volery.comms.control_payloads import Received
 from volery.comms.protocol import Frame
 
 _SESSIONS_KEPT = 8

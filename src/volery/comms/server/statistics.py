@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from volery.comms.bodies import Reason
+from volery.comms.control_payloads import Reason
 from volery.comms.protocol import FrameParser
 from volery.core.framing import Flaw
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from volery.comms.addresses import Identity
-from volery.comms.bodies import Hello, Reason, Refusal
-from volery.comms.settings import RouterSettings
+from volery.comms.control_payloads import Hello, Reason, Refusal
+from volery.comms.server.settings import RouterSettings
 from volery.core.counting import counted
 from volery.core.errors import CommsError
 from volery.core.listening import shows_token

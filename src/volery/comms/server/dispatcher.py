@@ -9,13 +9,13 @@ from __future__ import annotations
 import heapq
 
 from volery.comms.addresses import SERVER, is_station
-from volery.comms.bodies import Reason, Refusal, decode_received, encode_refusal
-from volery.comms.directory import Directory
-from volery.comms.known import Known
-from volery.comms.link import Link
+from volery.comms.control_payloads import Reason, Refusal, decode_received, encode_refusal
+from volery.comms.link_model import Link
 from volery.comms.protocol import Frame, Kind, encode_frame
-from volery.comms.settings import RouterSettings
-from volery.comms.statistics import Tally
+from volery.comms.server.directory import Directory
+from volery.comms.server.records import Known
+from volery.comms.server.settings import RouterSettings
+from volery.comms.server.statistics import Tally
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
 

@@ -2,7 +2,7 @@
 
 What a UAV publishes on a relayed topic `/uav1/NAME` is sent to all stations, each of which
 publishes what it hears on `/uav2/radio/NAME`. Nodes cannot tell this from a station of a real radio
-network (`comms.radio_node`) with the same topics.
+network (`comms.station.tcp.radio_node`) with the same topics.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from volery.comms.address_assignment import free_address
 from volery.comms.addresses import ALL, FIRST_GROUND, Identity
-from volery.comms.exchange import Exchange
-from volery.comms.link import Delivery, Link, ideal_link
-from volery.comms.naming import free_address
+from volery.comms.link_model import Delivery, Link, ideal_link
+from volery.comms.local_network import Exchange
 from volery.comms.payloads import decode_named, encode_named
 from volery.comms.protocol import Frame, Kind
-from volery.comms.radio.link import RadioLink
-from volery.comms.settings import RouterSettings
+from volery.comms.radio.channel import RadioLink
+from volery.comms.server.settings import RouterSettings
 from volery.core.errors import CommandError, CommsError
 from volery.graph.graph import Graph, Publisher, Subscription
 from volery.graph.messages import Published

@@ -15,12 +15,12 @@ import queue
 import threading
 from typing import Any
 
+from volery.comms.address_assignment import free_address
 from volery.comms.addresses import ALL, PLANES_PER_BATCH, Identity
-from volery.comms.naming import free_address
 from volery.comms.payloads import decode_named, encode_named
 from volery.comms.protocol import Frame, Kind
-from volery.comms.server import PORT
-from volery.comms.station import Station
+from volery.comms.server.tcp import PORT
+from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError, GraphError
 from volery.graph.messages import message_type
 from volery.graph.node import Node
