@@ -37,7 +37,7 @@ def search(uavs: int, odometry: str = "slam/odom", folder: str = "") -> Any:
         parameters = node.setdefault("parameters", {})
         if "odometry" in parameters:
             parameters["odometry"] = odometry
-        if node["node"].endswith(":Mapping"):
+        if node["node"] == "mapping":
             parameters["folder"] = folder
     return parse_scenario(data, access=scenario.access)
 
