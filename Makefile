@@ -70,7 +70,7 @@ test: lint page ## install what tests need, check everything, run the tests
 	@.ci/install_ros1
 	@.ci/install_browser
 	@if .ci/node_fits; then cd web && npm test --silent; fi
-	$(BIN)/python -m volery.runtime.warm_up
+	$(BIN)/python -m volery.runtime.warmup
 	$(BIN)/pytest -n 2 --dist loadfile -m 'not slow' tests
 
 bench: $(VENV)/.installed-bench page ## measure this machine and its peers, rewrite docs/benchmarks.md and docs/bridge_latency.md

@@ -12,7 +12,7 @@ import pytest
 
 from volery.core.clock import Schedule
 from volery.graph.messages import typestore
-from volery.runtime.sensor_fitting import RESULT_OF, noise_key
+from volery.runtime.build.sensor_suites import RESULT_OF, noise_key
 from volery.sensors import model as sensor_models
 
 NS = 1_000_000_000

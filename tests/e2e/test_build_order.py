@@ -13,8 +13,8 @@ import pytest
 _COMPILE = """
 import sys
 from volery import load_scenario
-from volery.runtime.warm_up.needs import needs_of
-from volery.runtime.warm_up.tasks import do
+from volery.runtime.warmup.requirements import needs_of
+from volery.runtime.warmup.tasks import do
 
 for task in needs_of(load_scenario("forest_survey"))[:: int(sys.argv[1])]:
     do(task)

@@ -27,7 +27,7 @@ with Simulation(load_scenario(sys.argv[1])) as simulation:
     simulation.run(float(sys.argv[2]))
 print(json.dumps([before, watch.compiled[before:], told]))
 """
-_REASON = "a `warm_ups` of a node, or `runtime.warm_up`, lacks what compiles these"
+_REASON = "a `warm_ups` of a node, or `runtime.warmup`, lacks what compiles these"
 
 
 @pytest.mark.slow
@@ -50,7 +50,7 @@ def test_nothing_is_compiled_in_flight(tmp_path: Path) -> None:
 @pytest.mark.timeout(900)
 def test_what_happens_rarely_in_flight_is_compiled_too(tmp_path: Path) -> None:
     """Motion and places lost and found, many divisions of maps: what unit tests have nodes do."""
-    _run(tmp_path, "-m", "volery.runtime.warm_up")
+    _run(tmp_path, "-m", "volery.runtime.warmup")
     folder = _TESTS / "unit" / "autonomy"
     names = ("slam_node", "slam_way", "planar_slam", "coverage_plans", "local_planning")
     files = [str(folder / f"test_{name}.py") for name in names]

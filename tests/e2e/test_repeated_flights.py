@@ -27,7 +27,7 @@ from volery.graph.messages import Twist, Vector3, message_type
 from volery.graph.reply import Reply
 from volery.graph.zero import zero_message
 from volery.runtime import Simulation
-from volery.runtime.command_kinds import Weight, weight_of
+from volery.runtime.replay.command_effects import Weight, weight_of
 from volery.scenario.load import parse_scenario
 
 SENSORS = [

@@ -16,8 +16,8 @@ from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.replay import Replay
 from volery.graph.messages import stamp_of
 from volery.runtime import Simulation
-from volery.runtime.slam_run.run import SlamOptions, SlamRun
-from volery.runtime.slam_run.sources import open_source
+from volery.runtime.replay.slam.offline_slam import SlamOptions, SlamRun
+from volery.runtime.replay.slam.sources import open_source
 from volery.scenario.load import parse_scenario
 
 SECONDS = 9.0

@@ -31,7 +31,7 @@ from volery.graph.graph import Graph
 from volery.graph.messages import Published, String, typestore
 from volery.graph.ros1 import ros1_codec
 from volery.graph.zero import zero_message
-from volery.runtime.slam_run.sources import open_source
+from volery.runtime.replay.slam.sources import open_source
 
 definition_store.MAX_FOREIGN = 60  # damaged definitions would be learned for ever
 

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib import image
 
 from volery.core import rotations
-from volery.runtime.worlds import (
+from volery.runtime.build.worlds import (
     build_city,
     build_forest,
     build_scene,

@@ -23,9 +23,9 @@ from volery.cli.trust import may_run_local_nodes
 from volery.core.errors import ScenarioError, VoleryError
 from volery.graph import messages as m
 from volery.runtime import Simulation
-from volery.runtime.node_loading import find_node, is_local, local_nodes
-from volery.runtime.origin import scenario_of
-from volery.runtime.warm_up.needs import needs_of
+from volery.runtime.build.node_loading import find_node, is_local, local_nodes
+from volery.runtime.replay.scenario_record import scenario_of
+from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import NodeEntry, Scenario
@@ -364,7 +364,7 @@ def test_helper_processes_import_nothing_from_the_working_folder(
     environment = {**os.environ, "VOLERY_CACHE_DIR": str(tmp_path / "cache")}
     script = (
         "from volery.autonomy.warm_up import scan_returns\n"
-        "from volery.runtime.warm_up.sharing import compile_all\n"
+        "from volery.runtime.warmup.parallel_compilation import compile_all\n"
         "compile_all([scan_returns])\n"
     )
     done = subprocess.run(

@@ -13,8 +13,8 @@ from volery.bridges.rosbridge.rosapi_parameters import NamedParameters, Paramete
 from volery.core.errors import BridgeError, CommandError, GraphError
 from volery.graph.graph import Graph
 from volery.graph.parameters import Parameter
-from volery.runtime.control_targets import names_in, parts_of
-from volery.runtime.pilots import Pilots, operator_name, same_operator
+from volery.runtime.vehicles.control_authority import Pilots, operator_name, same_operator
+from volery.runtime.vehicles.control_targets import names_in, parts_of
 from volery.scenario.faults import parse_fault
 from volery.server.crew_list import CrewList
 from volery.server.gate import PilotGate, service_of

@@ -16,9 +16,9 @@ from volery.bridges.logs.flights import Origin, read_flight
 from volery.core.errors import DataFileError, GraphError, RecordingError, ScenarioError, VoleryError
 from volery.graph import messages as m
 from volery.runtime import Simulation
-from volery.runtime.origin import scenario_of
-from volery.runtime.player import Player
-from volery.runtime.worlds import geometry_of
+from volery.runtime.build.worlds import geometry_of
+from volery.runtime.replay.log_player import Player
+from volery.runtime.replay.scenario_record import scenario_of
 from volery.scenario.access import SHIPPED_DATA, ScenarioAccess
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.shelf import Shelf

@@ -28,9 +28,9 @@ from volery.core.errors import GraphError, RecordingError
 from volery.graph import definition_store
 from volery.graph.graph import Graph
 from volery.graph.messages import Published, String
-from volery.runtime.command_log import CommandLog
+from volery.runtime.replay.command_log import CommandLog
+from volery.runtime.replay.slam.sources import open_source
 from volery.runtime.services.recording import Recording
-from volery.runtime.slam_run.sources import open_source
 from volery.server import log_check
 from volery.server.bounded_process import BoundedError, Bounds, run_bounded
 

@@ -11,7 +11,7 @@ from volery.bridges.topic_patterns import topic_filter
 from volery.core.errors import GraphError
 from volery.graph.zero import zero_message
 from volery.runtime.services.filters import name_filter
-from volery.runtime.services.offering import RefusedError
+from volery.runtime.services.results import RefusedError
 
 LONG = "a" * 20_000
 CATASTROPHIC = [

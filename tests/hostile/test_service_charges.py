@@ -13,7 +13,7 @@ from whole_world import offer_rosapi, whole_data
 
 from volery.bridges.logs.bag import open_log
 from volery.graph.reply import Reply
-from volery.runtime.player import Player
+from volery.runtime.replay.log_player import Player
 from volery.server.read_only import READ_ONLY_SERVICES
 
 TICK_S = 0.001

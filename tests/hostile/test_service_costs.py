@@ -9,7 +9,7 @@ from whole_world import Client
 
 from volery.engine.call_budget import MAX_FRACTION
 from volery.graph.messages import String
-from volery.runtime.services import choosing
+from volery.runtime.services import scenario_loading
 from volery.scenario import load
 from volery.scenario.shelf import Shelf
 from volery.server.read_only import READ_ONLY_SERVICES
@@ -26,8 +26,8 @@ def test_choices_are_made_out_once(client, monkeypatch):
     def forbidden(*_args, **_options):
         raise AssertionError("built again")
 
-    monkeypatch.setattr(choosing.Changes, "model_json_schema", forbidden)
-    monkeypatch.setattr(choosing, "describe", forbidden)
+    monkeypatch.setattr(scenario_loading.Changes, "model_json_schema", forbidden)
+    monkeypatch.setattr(scenario_loading, "describe", forbidden)
     assert client.call("/volery/get_choices", None).success
 
 

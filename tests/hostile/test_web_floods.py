@@ -30,7 +30,7 @@ from volery.bridges.frame_limits import (
 )
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.listener import MAX_UNPROVEN
-from volery.runtime.lobby import Lobby
+from volery.runtime.idle_server import Lobby
 from volery.server.http_protocol import READ_BYTES
 
 sys.path.append(str(Path(__file__).parents[1] / "unit" / "server"))

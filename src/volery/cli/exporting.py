@@ -12,7 +12,7 @@ from volery.core.errors import VoleryError
 def export_and_tell(scenario: str, file: Path, detail: str) -> None:
     """Write the file and say how large it is."""
     from volery import load_scenario
-    from volery.runtime.exporting import export_world
+    from volery.runtime.build.world_export import export_world
     from volery.world.trees import DetailLevel
 
     if file.suffix.lower() != ".glb":

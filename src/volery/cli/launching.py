@@ -73,7 +73,7 @@ def start_profile(
     access: which modules they may be; None: as of a scenario that a program makes.
     """
     from volery.bridges.nodes.profile import absolute_names
-    from volery.runtime.node_loading import start_node
+    from volery.runtime.build.node_loading import start_node
     from volery.scenario.schema import NodeEntry
 
     names = absolute_names(profile.remap, profile.namespace)

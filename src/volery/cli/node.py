@@ -44,8 +44,8 @@ def run_node(options: NodeOptions) -> None:
     from volery.bridges.nodes.late_link import LateLink
     from volery.bridges.nodes.profile import Profile, absolute_names, load_profile
     from volery.graph.messages import add_definitions
-    from volery.runtime.node_loading import start_node
-    from volery.runtime.warm_up.sharing import compile_all
+    from volery.runtime.build.node_loading import start_node
+    from volery.runtime.warmup.parallel_compilation import compile_all
     from volery.scenario.access import ScenarioAccess
     from volery.scenario.schema import NodeEntry
 

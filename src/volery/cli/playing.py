@@ -34,7 +34,7 @@ def play(
 
     Raises `RecordingError` where there is no log, or nothing in it.
     """
-    from volery.runtime.player import Player
+    from volery.runtime.replay.log_player import Player
     from volery.scenario.load import load_scenario
 
     own = None if scenario is None else load_scenario(scenario)

@@ -40,7 +40,7 @@ def recorded_scenario(flight: RecordedFlight, options: RunOptions) -> Scenario:
     Raises `ScenarioError` where the log is of another one than was named.
     """
     from volery import __version__, load_scenario
-    from volery.runtime.origin import scenario_of
+    from volery.runtime.replay.scenario_record import scenario_of
 
     origin = flight.origin
     if origin.version != __version__:

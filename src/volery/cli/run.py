@@ -105,7 +105,7 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
 
 def _wait_for_world(options: RunOptions, interrupts: Interrupts, page: Page) -> tuple[int, _Change]:
     """Keep the doors open with no world behind them; exit code, and what a client wants then."""
-    from volery.runtime.lobby import Lobby
+    from volery.runtime.idle_server import Lobby
 
     change = _Change(options)
     lobby = Lobby(change.ask)

@@ -171,7 +171,7 @@ class _Host:
 
     def _play(self, log: Path) -> None:
         """Open a log and stay with it."""
-        from volery.runtime.player import Player
+        from volery.runtime.replay.log_player import Player
 
         with Player(
             log, on_load=self._wish.ask, on_close=self._return, shelf=self._wish.shelf
@@ -214,7 +214,7 @@ class _Host:
 
     def _wait(self) -> None:
         """Keep the doors open with no world behind them."""
-        from volery.runtime.lobby import Lobby
+        from volery.runtime.idle_server import Lobby
 
         lobby = Lobby(self._wish.ask, self._wish.shelf)
         with open_doors(lobby, self._options.first), self._page.showing(lobby, self._trouble):

@@ -18,9 +18,9 @@ from volery.core.counting import counted
 from volery.core.errors import RecordingError, VoleryError
 
 if TYPE_CHECKING:
-    from volery.runtime.slam_run.beginning import Pose
-    from volery.runtime.slam_run.run import Outcome, SlamOptions, SlamRun
-    from volery.runtime.slam_run.sources import LogSource, TextSource
+    from volery.runtime.replay.slam.initial_pose import Pose
+    from volery.runtime.replay.slam.offline_slam import Outcome, SlamOptions, SlamRun
+    from volery.runtime.replay.slam.sources import LogSource, TextSource
 
 _MAPS = ("map.png", "map.pgm", "map.yaml")
 _NAMES = (*_MAPS, "path.tum", "summary.json")
@@ -57,9 +57,9 @@ class SlamAsked:
 def map_log(asked: SlamAsked) -> None:
     """Run the SLAM over a log, write what came of it and say so."""
     from volery.bridges.logs.text_layout import TextLayout
-    from volery.runtime.slam_run.channels import Asked, other_uavs
-    from volery.runtime.slam_run.run import SlamOptions
-    from volery.runtime.slam_run.sources import open_source
+    from volery.runtime.replay.slam.offline_slam import SlamOptions
+    from volery.runtime.replay.slam.sources import open_source
+    from volery.runtime.replay.slam.topic_selection import Asked, other_uavs
     from volery.scenario.data_files import load_data_file
 
     _check_folder(asked.out, overwrite=asked.overwrite)
@@ -95,7 +95,7 @@ def map_log(asked: SlamAsked) -> None:
 
 def _run(source: LogSource | TextSource, options: SlamOptions) -> SlamRun:
     """Ready to begin; where the log lacks something it is told whether it is whole."""
-    from volery.runtime.slam_run.run import SlamRun
+    from volery.runtime.replay.slam.offline_slam import SlamRun
 
     try:
         return SlamRun(source, options)
@@ -135,7 +135,7 @@ class _Progress:
 
 def _advise(outcome: Outcome, topics: dict[str, str]) -> None:
     """Say that an IMU might help that the log has and that was not used."""
-    from volery.runtime.slam_run.channels import IMU
+    from volery.runtime.replay.slam.topic_selection import IMU
 
     total = sum(outcome.states.values())
     poor = outcome.states.get("degraded", 0.0) + outcome.states.get("lost", 0.0)
@@ -181,7 +181,7 @@ def _numbers(text: str | None, count: int, option: str) -> Any:
 
 def _write(asked: SlamAsked, outcome: Outcome) -> float | None:
     """The path, and the map if there can be one: the width of its cells, m."""
-    from volery.runtime.slam_run.trajectory import write_tum
+    from volery.runtime.replay.slam.trajectory import write_tum
 
     asked.out.mkdir(parents=True, exist_ok=True)
     for name in _MAPS:
@@ -196,8 +196,8 @@ def _write(asked: SlamAsked, outcome: Outcome) -> float | None:
 
 def _write_map(asked: SlamAsked, outcome: Outcome) -> float:
     from volery.autonomy.mapping.grid_files import write_grid
-    from volery.runtime.slam_run.drawing import draw_map
-    from volery.runtime.slam_run.picture import write_picture
+    from volery.runtime.replay.slam.map_image import write_picture
+    from volery.runtime.replay.slam.map_rendering import draw_map
 
     grid = draw_map(outcome, asked.resolution, asked.reach)
     if grid.cell_m > asked.resolution:

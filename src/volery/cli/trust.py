@@ -46,7 +46,7 @@ def may_run_local_nodes(file: Path, nodes: Iterable[str], access: ScenarioAccess
 
     Asks at a terminal where that is not known. Raises `ScenarioError` where they may not run.
     """
-    from volery.runtime.node_loading import is_local
+    from volery.runtime.build.node_loading import is_local
 
     named = dict.fromkeys(node_module(node) for node in nodes)
     modules = [module for module in named if module is not None and is_local(module, access)]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from volery.bridges.logs.flights import Origin
 from volery.core.errors import VoleryError
-from volery.runtime.origin import scenario_of
-from volery.runtime.worlds import build_city, build_forest, build_terrain
+from volery.runtime.build.worlds import build_city, build_forest, build_terrain
+from volery.runtime.replay.scenario_record import scenario_of
 
 Array = NDArray[np.float64]
 

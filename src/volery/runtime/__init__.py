@@ -6,15 +6,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from volery.runtime.copies import Copies
-    from volery.runtime.progress import Progress
+    from volery.runtime.monitoring.progress import Progress
     from volery.runtime.simulation import Simulation
+    from volery.runtime.vectorized_simulation import Copies
 
 __all__ = ["Copies", "Progress", "Simulation"]
 
 _HOMES = {
-    "Copies": "volery.runtime.copies",
-    "Progress": "volery.runtime.progress",
+    "Copies": "volery.runtime.vectorized_simulation",
+    "Progress": "volery.runtime.monitoring.progress",
     "Simulation": "volery.runtime.simulation",
 }
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError
 from volery.graph.session import Taken
-from volery.runtime.command_kinds import restarts
+from volery.runtime.replay.command_effects import restarts
 
 if TYPE_CHECKING:
     from volery.engine.engine import Engine
     from volery.engine.pacing import Pacer
-    from volery.runtime.command_log import CommandLog
+    from volery.runtime.replay.command_log import CommandLog
     from volery.runtime.run_loop import RunLoop
 
 _PERIOD_S = 0.02

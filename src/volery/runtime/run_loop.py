@@ -9,7 +9,7 @@ from collections.abc import Callable
 from volery.core.clock import ns_from_s, s_from_ns
 from volery.engine.engine import Engine
 from volery.engine.pacing import Pacer
-from volery.runtime.progress import Progress, ProgressTeller
+from volery.runtime.monitoring.progress import Progress, ProgressTeller
 
 
 class RunLoop:

@@ -27,39 +27,39 @@ from volery.graph.nodes.failures import reported_failures
 from volery.graph.nodes.presence import outside_nodes
 from volery.graph.publishing import GraphPublisher
 from volery.graph.session import Gateway, Post
-from volery.runtime.assembly import assemble
-from volery.runtime.building import place
+from volery.runtime.build.assembly import assemble
+from volery.runtime.build.fleet import place
+from volery.runtime.build.geometry import Geometry, WorldTopic
+from volery.runtime.build.graph import all_down, plan_faults
+from volery.runtime.build.message_loading import learn_messages
+from volery.runtime.build.placement import Start
+from volery.runtime.build.radio import build_radio
+from volery.runtime.build.sensor_suites import lidar_mounts
+from volery.runtime.build.worlds import build_world
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
-from volery.runtime.command_log import CommandLog
-from volery.runtime.crew import Crew
 from volery.runtime.end_of_run import EndOfRun
-from volery.runtime.geometry import Geometry, WorldTopic
-from volery.runtime.graph_building import all_down, plan_faults
-from volery.runtime.grid_world import GridWorld
-from volery.runtime.keeping import Keeper
-from volery.runtime.lock_step import open_lock_step
-from volery.runtime.message_loading import learn_messages
-from volery.runtime.origin import tell_origin
-from volery.runtime.outlet import Outlet
-from volery.runtime.pilots import Pilots
-from volery.runtime.placement import Start
-from volery.runtime.progress import Progress
-from volery.runtime.radio_building import build_radio
-from volery.runtime.relocation import Relocator
-from volery.runtime.repetition import Repetition
+from volery.runtime.grid_map_manager import GridWorld
+from volery.runtime.monitoring import LiveTopics
+from volery.runtime.monitoring.output_sink import Outlet
+from volery.runtime.monitoring.progress import Progress
+from volery.runtime.monitoring.status import Told
+from volery.runtime.replay.command_log import CommandLog
+from volery.runtime.replay.command_replay import Repetition
+from volery.runtime.replay.scenario_record import tell_origin
 from volery.runtime.run_loop import RunLoop
-from volery.runtime.sensor_fitting import lidar_mounts
 from volery.runtime.services import Services, open_services
+from volery.runtime.services.lock_step import open_lock_step
+from volery.runtime.services.weather_messages import WeatherTopics
 from volery.runtime.services.worlds import OnLoad
 from volery.runtime.snapshot import Snapshot
-from volery.runtime.spawning import Spawner
-from volery.runtime.telling import LiveTopics
-from volery.runtime.telling.status import Told
-from volery.runtime.uav import Uav
-from volery.runtime.warm_up.needs import needs_of
-from volery.runtime.warm_up.sharing import compiled
-from volery.runtime.weather_messages import WeatherTopics
-from volery.runtime.worlds import build_world
+from volery.runtime.snapshot_manager import Keeper
+from volery.runtime.vehicles.control_authority import Pilots
+from volery.runtime.vehicles.manager import Crew
+from volery.runtime.vehicles.spawning import Spawner
+from volery.runtime.vehicles.teleport import Relocator
+from volery.runtime.vehicles.uav import Uav
+from volery.runtime.warmup.parallel_compilation import compiled
+from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario, UavType
 from volery.scenario.shelf import Shelf

@@ -13,7 +13,7 @@ from volery.core.errors import SnapshotError
 from volery.core.kept import KeepsState
 from volery.engine.partners import Partner
 from volery.graph.node import Node
-from volery.runtime.placement import Start
+from volery.runtime.build.placement import Start
 
 NodeKey = tuple[str, int]
 """Namespace of a node, and which of those there it is."""

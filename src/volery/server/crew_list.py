@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from volery.core.errors import BridgeError
-from volery.runtime.pilots import MOST_CHARACTERS, operator_key, operator_name
+from volery.runtime.vehicles.control_authority import MOST_CHARACTERS, operator_key, operator_name
 
 
 class CrewList:

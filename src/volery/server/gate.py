@@ -9,9 +9,14 @@ from typing import Any
 from volery.bridges.rosbridge.fields import absolute
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError, CommandError
-from volery.runtime.control_targets import names_in, parts_of
-from volery.runtime.pilots import MOST_CHARACTERS, Pilots, operator_name, same_operator
-from volery.runtime.services.piloting import HAND_OVER, RELEASE, TAKE
+from volery.runtime.services.control_authority import HAND_OVER, RELEASE, TAKE
+from volery.runtime.vehicles.control_authority import (
+    MOST_CHARACTERS,
+    Pilots,
+    operator_name,
+    same_operator,
+)
+from volery.runtime.vehicles.control_targets import names_in, parts_of
 from volery.server.crew_list import CrewList
 from volery.server.read_only import READ_ONLY_SERVICES
 

@@ -20,9 +20,9 @@ from volery.bridges.rosbridge.rosapi import RosApi
 from volery.bridges.rosbridge.tf_republisher import TfRepublisher
 from volery.graph.graph import Graph
 from volery.graph.session import Gateway
+from volery.runtime.build.geometry import Geometry
 from volery.runtime.end_of_run import EndOfRun
-from volery.runtime.geometry import Geometry
-from volery.runtime.pilots import Pilots
+from volery.runtime.vehicles.control_authority import Pilots
 from volery.scenario.schema import Scenario
 from volery.scenario.shelf import Shelf
 from volery.server.crew_list import CrewList

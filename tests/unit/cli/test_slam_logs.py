@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 from volery.autonomy.fixed_joints import LEVEL
 from volery.cli.app import app
 from volery.cli.slam import _advise
-from volery.runtime.slam_run.channels import Channels
-from volery.runtime.slam_run.run import Outcome, SlamRun
-from volery.runtime.slam_run.trajectory import Trajectory
+from volery.runtime.replay.slam.offline_slam import Outcome, SlamRun
+from volery.runtime.replay.slam.topic_selection import Channels
+from volery.runtime.replay.slam.trajectory import Trajectory
 
 CORNERS = [(0.0, 0.0), (16.0, 0.0)]
 FILES = ("map.pgm", "map.png", "map.yaml", "path.tum", "summary.json")
@@ -170,7 +170,7 @@ def test_a_folder_that_cannot_be_written_to_is_told_before_the_work(text, monkey
 @pytest.mark.parametrize("most", [40_000, 40])
 def test_a_map_that_is_too_large_costs_nothing_else(most, text, tmp_path, monkeypatch):
     """Its cells become coarser, and where that does not help the path is written all the same."""
-    monkeypatch.setattr("volery.runtime.slam_run.drawing._MOST_CELLS", most)
+    monkeypatch.setattr("volery.runtime.replay.slam.map_rendering._MOST_CELLS", most)
     out = tmp_path / "out"
     result = slam(text / "scans.txt", "--layout", text / "layout.toml", "--out", out)
     assert result.exit_code == 0, result.output

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from volery.core.errors import DivergenceError
-from volery.runtime.copies import Copies
+from volery.runtime.vectorized_simulation import Copies
 from volery.scenario.load import parse_scenario
 
 

@@ -7,7 +7,7 @@ from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.flights import read_flight
 from volery.mavlink.scenario_setup import NODE, with_autopilots
 from volery.runtime import Simulation
-from volery.runtime.origin import scenario_of
+from volery.runtime.replay.scenario_record import scenario_of
 
 
 def offboard_flight(simulation, station):

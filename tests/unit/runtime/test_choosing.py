@@ -8,7 +8,7 @@ from asking import ask
 
 from volery.core.errors import CommandError
 from volery.runtime import Simulation
-from volery.runtime.worlds import build_forest, build_terrain
+from volery.runtime.build.worlds import build_forest, build_terrain
 from volery.scenario import library
 from volery.scenario.changes import Changes, WorldRequest, apply
 from volery.scenario.load import load_scenario

@@ -16,9 +16,9 @@ from volery.graph.messages import String, Twist, Vector3, message_type
 from volery.graph.reply import Reply
 from volery.graph.session import Taken
 from volery.graph.zero import zero_message
-from volery.runtime import command_log
-from volery.runtime.command_kinds import Weight, weight_of
-from volery.runtime.origin import origin_of_scenario, scenario_of
+from volery.runtime.replay import command_log
+from volery.runtime.replay.command_effects import Weight, weight_of
+from volery.runtime.replay.scenario_record import origin_of_scenario, scenario_of
 from volery.scenario import library
 from volery.scenario.load import load_scenario
 

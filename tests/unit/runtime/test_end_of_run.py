@@ -7,7 +7,7 @@ from asking import ask, code_of, request_of
 
 from volery.core.errors import GraphError
 from volery.graph.reply import Reply
-from volery.runtime.services.playing import State
+from volery.runtime.services.simulation_state import State
 
 STANDARD_REFUSALS = (
     ("/set_simulation_state", {"state": {"state": int(State.PLAYING)}}),

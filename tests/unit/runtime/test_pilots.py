@@ -3,7 +3,7 @@
 import pytest
 
 from volery.core.errors import CommandError
-from volery.runtime.pilots import Pilots
+from volery.runtime.vehicles.control_authority import Pilots
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from volery.graph import messages as m
 from volery.graph.reply import Reply
 from volery.graph.zero import zero_message
 from volery.runtime import Simulation
-from volery.runtime.player import Player
+from volery.runtime.replay.log_player import Player
 from volery.scenario.load import load_scenario
 
 FORMATS = [".mcap", ".bag"]
@@ -165,7 +165,7 @@ def test_only_what_is_listened_to_is_decoded(flight, monkeypatch):
 
 def test_it_keeps_the_time_that_is_asked_for(flight, monkeypatch):
     wall = FakeWallClock()
-    monkeypatch.setattr("volery.runtime.player.time", wall.time)
+    monkeypatch.setattr("volery.runtime.replay.log_player.time", wall.time)
     with Player(flight, speed=4.0) as player:
         monkeypatch.setattr(player._inbox, "wait", wall.wait)
         visitor = Visitor(player)

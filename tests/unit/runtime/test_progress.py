@@ -3,7 +3,7 @@
 import pytest
 
 from volery.engine.pacing import Pacer
-from volery.runtime.progress import ProgressTeller
+from volery.runtime.monitoring.progress import ProgressTeller
 
 
 def test_what_was_flown_before_a_reset_counts_for_the_factor():

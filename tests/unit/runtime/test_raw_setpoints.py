@@ -7,7 +7,7 @@ import pytest
 from volery.core.errors import CommandError
 from volery.graph.zero import zero_message
 from volery.runtime import Simulation
-from volery.runtime.raw_setpoints import steer_to_message, turn_to_message
+from volery.runtime.vehicles.raw_setpoints import steer_to_message, turn_to_message
 from volery.scenario.load import parse_scenario
 
 FLAT = {

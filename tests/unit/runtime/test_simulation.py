@@ -18,7 +18,7 @@ from volery.graph.messages import (
     message_type,
     typestore,
 )
-from volery.runtime import progress
+from volery.runtime.monitoring import progress
 
 Duration = message_type("builtin_interfaces/msg/Duration")
 

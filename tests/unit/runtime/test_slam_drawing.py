@@ -10,10 +10,10 @@ from post_scans import CROWN, HEIGHT_M, TRUNK, scan_message, seen_from
 from volery.autonomy.fixed_joints import LEVEL
 from volery.autonomy.mapping.log_odds import OCCUPIED
 from volery.core import rotations
-from volery.runtime.slam_run.channels import Channels
-from volery.runtime.slam_run.drawing import draw_map
-from volery.runtime.slam_run.run import Outcome
-from volery.runtime.slam_run.trajectory import Trajectory
+from volery.runtime.replay.slam.map_rendering import draw_map
+from volery.runtime.replay.slam.offline_slam import Outcome
+from volery.runtime.replay.slam.topic_selection import Channels
+from volery.runtime.replay.slam.trajectory import Trajectory
 
 S = 1_000_000_000
 

@@ -26,8 +26,8 @@ from volery.graph.messages import (
     stamp_of,
 )
 from volery.graph.zero import zero_message
-from volery.runtime.slam_run.beginning import beginning_of
-from volery.runtime.slam_run.sources import open_source
+from volery.runtime.replay.slam.initial_pose import beginning_of
+from volery.runtime.replay.slam.sources import open_source
 
 SECONDS = 6.0
 STANDS_M = 0.12

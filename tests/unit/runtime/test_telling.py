@@ -9,7 +9,7 @@ from test_pause import InThread, wait_for
 from watching import Watcher
 
 from volery.graph.messages import Twist, Vector3
-from volery.runtime.telling.status import Speedometer
+from volery.runtime.monitoring.status import Speedometer
 
 TF = "/ground_truth/tf"
 VEHICLES = "/volery/vehicles"

@@ -14,9 +14,9 @@ from volery.autonomy import warm_up as seeing
 from volery.autonomy.mapping import warm_up as mapping
 from volery.core.errors import NodeError, ScenarioError
 from volery.graph.node import Node
-from volery.runtime.warm_up import parts, sharing, tasks
-from volery.runtime.warm_up.needs import all_needs, needs_of
-from volery.runtime.warm_up.tasks import name_of, task_of
+from volery.runtime.warmup import core_tasks, parallel_compilation, tasks
+from volery.runtime.warmup.requirements import all_needs, needs_of
+from volery.runtime.warmup.tasks import name_of, task_of
 from volery.scenario.load import load_scenario, parse_scenario
 
 
@@ -25,7 +25,7 @@ def named(found: list[tasks.Task]) -> set[str]:
 
 
 def test_nobody_waits_for_the_kernels_of_nodes_and_cameras_without_them() -> None:
-    assert needs_of(load_scenario("hover")) == [parts.dynamics, parts.sensing]
+    assert needs_of(load_scenario("hover")) == [core_tasks.dynamics, core_tasks.sensing]
 
 
 def test_a_scenario_needs_what_its_nodes_and_sensors_call() -> None:
@@ -43,11 +43,11 @@ def test_a_scenario_needs_what_its_nodes_and_sensors_call() -> None:
 @pytest.mark.parametrize(
     ("sensor", "world", "task"),
     [
-        ({"kind": "gnss"}, {}, parts.fixes),
-        ({"kind": "magnetometer"}, {}, parts.magnetic_fields),
-        ({"kind": "lidar", "model": "vlp_16"}, {}, parts.point_clouds),
-        ({"kind": "lidar"}, {"weather": {"fog_visibility_m": 50.0}}, parts.falling_drops),
-        ({"kind": "camera"}, {"weather": {"rain_mm_h": 5.0}}, parts.pictures_in_rain),
+        ({"kind": "gnss"}, {}, core_tasks.fixes),
+        ({"kind": "magnetometer"}, {}, core_tasks.magnetic_fields),
+        ({"kind": "lidar", "model": "vlp_16"}, {}, core_tasks.point_clouds),
+        ({"kind": "lidar"}, {"weather": {"fog_visibility_m": 50.0}}, core_tasks.falling_drops),
+        ({"kind": "camera"}, {"weather": {"rain_mm_h": 5.0}}, core_tasks.pictures_in_rain),
     ],
 )
 def test_rarer_sensors_compile_where_they_are(
@@ -83,7 +83,7 @@ def test_the_kernels_of_a_users_node_are_asked_for_at_each_start(
     assert [name_of(task) for task in found] == ["mine_alone:compile_mine"]
     assert not needs_of(parse_scenario(flat_data), nodes=False)[2:]
     for _ in range(2):
-        sharing.compile_all(found)
+        parallel_compilation.compile_all(found)
     assert capfd.readouterr().out == 2 * "compiled\n"
 
 
@@ -112,7 +112,7 @@ def test_a_users_warm_up_that_fails_is_told_of(
     monkeypatch.chdir(tmp_path)
     flat_data["nodes"] = [{"node": "broken_warm_ups:Fails"}]
     with pytest.raises(NodeError, match="broken_warm_ups:fail: ValueError: no array"):
-        sharing.compile_all(needs_of(parse_scenario(flat_data))[2:])
+        parallel_compilation.compile_all(needs_of(parse_scenario(flat_data))[2:])
     flat_data["nodes"] = [{"node": "broken_warm_ups:Names"}]
     with pytest.raises(ScenarioError, match="Names': warm_ups: NameError"):
         needs_of(parse_scenario(flat_data))
@@ -128,7 +128,8 @@ SHARED = """
 import os, sys
 from numba.core import event
 from volery.autonomy import warm_up
-from volery.runtime.warm_up import sharing, tasks
+from volery.runtime.warmup import tasks
+from volery.runtime.warmup import parallel_compilation
 from volery.core.compiled import cache_dir
 
 class Counting(event.Listener):
@@ -141,7 +142,7 @@ event.register("numba:compile", counting)
 if "alone" in sys.argv:
     sys.executable = "/bin/false"
 wanted = [warm_up.scan_returns, warm_up.scan_repeats]
-with sharing.compiled(wanted):
+with parallel_compilation.compiled(wanted):
     pass
 first = counting.count
 for task in wanted:
@@ -165,7 +166,7 @@ import pkgutil
 from importlib import import_module
 from numba.core.dispatcher import Dispatcher
 import volery.autonomy
-from volery.runtime.warm_up.needs import all_needs
+from volery.runtime.warmup.requirements import all_needs
 
 for task in all_needs():
     if task.__module__.startswith("volery.autonomy."):

@@ -1,8 +1,8 @@
 import pytest
 
 from volery.core.errors import DataFileError
-from volery.runtime.building import add_bodies
-from volery.runtime.placement import Start
+from volery.runtime.build.fleet import add_bodies
+from volery.runtime.build.placement import Start
 from volery.sensors.imu import load_imu_model
 from volery.sensors.lidar_model import load_lidar
 from volery.vehicle.airframe import load_airframe

@@ -9,7 +9,7 @@ from page_bench import ask, serving
 from PIL import Image
 
 from volery.core.errors import VoleryError
-from volery.runtime.worlds import build_forest, build_solids, build_terrain
+from volery.runtime.build.worlds import build_forest, build_solids, build_terrain
 from volery.scenario.load import load_scenario
 from volery.scenario.shelf import Shelf
 from volery.server.uploads import kinds, making

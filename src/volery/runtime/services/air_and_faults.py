@@ -7,8 +7,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from volery.core.errors import CommandError
-from volery.runtime.services.offering import Fields, offer_command
-from volery.runtime.weather_messages import changed, fields_of
+from volery.runtime.services.results import Fields, offer_command
+from volery.runtime.services.weather_messages import changed, fields_of
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation

@@ -18,7 +18,7 @@ from volery.runtime.services.filters import (
     name_filter,
     tag_filter,
 )
-from volery.runtime.services.offering import Code, Fields, RefusedError, filled, offer_result
+from volery.runtime.services.results import Code, Fields, RefusedError, filled, offer_result
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation

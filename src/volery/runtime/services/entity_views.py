@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.runtime.services.filters import Category
-from volery.runtime.uav import Uav
+from volery.runtime.vehicles.uav import Uav
 from volery.scenario.schema import UavType
 from volery.vehicle.body_shape import body_shape
 from volery.world.scene_content import BodyShape

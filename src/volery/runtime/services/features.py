@@ -9,7 +9,7 @@ import numpy as np
 
 from volery.graph.graph import Graph
 from volery.graph.messages import message_type
-from volery.runtime.services.offering import filled
+from volery.runtime.services.results import filled
 
 _SRV = "simulation_interfaces/srv/GetSimulatorFeatures"
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from volery.core.errors import PatternError
 from volery.core.patterns import posix_search
-from volery.runtime.services.offering import Code, RefusedError
+from volery.runtime.services.results import Code, RefusedError
 
 Array = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from volery.graph.messages import (
     single,
     time_from_ns,
 )
-from volery.runtime.grid_world import GridWorld
-from volery.runtime.services.offering import Fields, offer_command
+from volery.runtime.grid_map_manager import GridWorld
+from volery.runtime.services.results import Fields, offer_command
 from volery.scenario.grid_map import RECEIVED, GridMapWorld
 from volery.world.grid_maps import GridMap
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from volery.graph.graph import Graph
 from volery.graph.messages import Vector3
-from volery.runtime.placement import Start
+from volery.runtime.build.placement import Start
 from volery.runtime.services.entities import pose_message
 from volery.runtime.services.filters import BoundsType, tag_filter
-from volery.runtime.services.offering import Code, Fields, RefusedError, filled, offer_result
+from volery.runtime.services.results import Code, Fields, RefusedError, filled, offer_result
 
 _MSG = "simulation_interfaces/msg"
 _SRV = "simulation_interfaces/srv"

@@ -9,7 +9,7 @@ import numpy as np
 
 from volery.core.errors import CommandError
 from volery.runtime.services.features import PLAYER_FEATURES, offer_features
-from volery.runtime.services.offering import (
+from volery.runtime.services.results import (
     Code,
     Fields,
     Handler,
@@ -18,11 +18,11 @@ from volery.runtime.services.offering import (
     offer_command,
     offer_result,
 )
-from volery.runtime.services.playing import WRONG_TRANSITION, State
+from volery.runtime.services.simulation_state import WRONG_TRANSITION, State
 from volery.runtime.services.worlds import OnLoad, offer_worlds
 
 if TYPE_CHECKING:
-    from volery.runtime.player import Player
+    from volery.runtime.replay.log_player import Player
     from volery.scenario.shelf import Shelf
 
 __all__ = ["PlayerServices", "State"]

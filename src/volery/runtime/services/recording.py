@@ -11,8 +11,8 @@ from volery.bridges.logs.recordings_room import room_left
 from volery.core.errors import RecordingError
 from volery.graph.graph import Graph, Subscription
 from volery.graph.messages import Published
-from volery.runtime.command_log import CommandLog
-from volery.runtime.services.offering import Fields, offer_command
+from volery.runtime.replay.command_log import CommandLog
+from volery.runtime.services.results import Fields, offer_command
 
 _OURS = "volery_interfaces/srv"
 

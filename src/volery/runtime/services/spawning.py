@@ -6,7 +6,7 @@ import itertools
 from typing import TYPE_CHECKING, Any
 
 from volery.core.errors import PlacementError, SpawnError, SpawnFault, VoleryError
-from volery.runtime.services.offering import (
+from volery.runtime.services.results import (
     Code,
     Fields,
     RefusedError,

@@ -7,16 +7,16 @@ from typing import Any
 from volery.control.flight_modes import FlightMode
 from volery.core.errors import CommandError
 from volery.graph.graph import Graph
-from volery.runtime.raw_setpoints import steer_to_message, turn_to_message
-from volery.runtime.services.offering import Close, Fields, Handler, offer_command
-from volery.runtime.uav import Uav
+from volery.runtime.services.results import Close, Fields, Handler, offer_command
+from volery.runtime.vehicles.raw_setpoints import steer_to_message, turn_to_message
+from volery.runtime.vehicles.uav import Uav
 
 _TRIGGER = "std_srvs/srv/Trigger"
 _OURS = "volery_interfaces/srv"
 
 
 def offer_uav_services(graph: Graph, uav: Uav) -> list[Close]:
-    """Offer what `runtime.command_door` does not: the plain commands stand there.
+    """Offer what `runtime.vehicles.command_interface` does not: the plain commands stand there.
 
     What is returned withdraws it.
     """

@@ -8,9 +8,8 @@ from typing import Any
 
 from volery.core.errors import ScenarioError, VoleryError
 from volery.graph.graph import Graph
-from volery.runtime.services.choosing import offer_choices
 from volery.runtime.services.filters import tag_filter
-from volery.runtime.services.offering import (
+from volery.runtime.services.results import (
     Code,
     Fields,
     RefusedError,
@@ -18,6 +17,7 @@ from volery.runtime.services.offering import (
     offer_command,
     offer_result,
 )
+from volery.runtime.services.scenario_loading import offer_choices
 from volery.runtime.services.spawning import resource
 from volery.scenario import library
 from volery.scenario.changes import LogRequest, WorldRequest

@@ -24,8 +24,8 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
 
     Raises `VoleryError` where the file is no such thing, or no UAV finds a place.
     """
-    from volery.runtime.building import check_types, place
-    from volery.runtime.worlds import build_city, build_forest, build_scene, build_terrain
+    from volery.runtime.build.fleet import check_types, place
+    from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
     from volery.scenario.load import load_scenario
     from volery.server.uploads.scenario_file import check_contents, text_of
 

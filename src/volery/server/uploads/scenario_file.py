@@ -10,7 +10,7 @@ import tomllib
 from pathlib import Path
 
 from volery.core.errors import ScenarioError, reason_of
-from volery.runtime.node_loading import find_node
+from volery.runtime.build.node_loading import find_node
 from volery.scenario.schema import Scenario
 from volery.server.uploads.kinds import MAX_UAVS
 

@@ -1,0 +1,1 @@
+"""Builds a scenario's parts: world, fleet, sensors, estimators, nodes."""

@@ -1,0 +1,44 @@
+"""Everything of a simulation that is built for a given set of UAVs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from volery.control.fleet import Fleet
+from volery.engine.engine import SensorBank
+from volery.runtime.build.estimation import build_estimation
+from volery.runtime.build.fleet import add_bodies, build_fleet
+from volery.runtime.build.placement import Start
+from volery.runtime.build.sensor_suites import Fitted, fit_sensors
+from volery.runtime.build.sensors import build_banks
+from volery.scenario.schema import Scenario
+from volery.world.scene import Scene
+
+if TYPE_CHECKING:
+    from volery.engine.estimation import Estimation
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A fleet at its start, with sensors and estimators."""
+
+    fleet: Fleet
+    fitted: list[Fitted]
+    banks: list[SensorBank]
+    estimation: Estimation | None
+
+
+def assemble(scenario: Scenario, starts: Sequence[Start], scene: Scene) -> Assembly:
+    """Build the UAVs of `starts`, whose bodies take the place of those in `scene`.
+
+    Raises `ScenarioError` and `DataFileError` for what cannot be built; the scene is unchanged
+    then.
+    """
+    fleet = build_fleet(scenario, starts, tuple(start.name for start in starts))
+    fitted = fit_sensors(scenario, starts)
+    estimation = build_estimation(scenario, fitted, fleet)
+    banks = build_banks(scenario, fitted, fleet, scene, estimation)
+    add_bodies(scene, starts)
+    return Assembly(fleet, fitted, banks, estimation)

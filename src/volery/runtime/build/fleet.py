@@ -1,0 +1,111 @@
+"""Fleet and bodies of a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.fleet import Fleet
+from volery.control.flight_modes import FlightMode
+from volery.control.gains import ControlRates
+from volery.core.counting import counted
+from volery.core.errors import CommandError, DataFileError, ScenarioError
+from volery.runtime.build.placement import Start, place_uavs
+from volery.runtime.build.plant import plant_of_type
+from volery.runtime.build.worlds import build_weather
+from volery.scenario.schema import Scenario
+from volery.vehicle.airframe import Airframe, load_airframe
+from volery.vehicle.body_shape import body_shape
+from volery.world.scene import Scene
+from volery.world.terrain import Terrain
+
+
+def place(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[Start, ...]:
+    """Where every UAV starts. Raises `ScenarioError` for what cannot be."""
+    return place_uavs(scenario, airframes_of(scenario), scene, terrain)
+
+
+def check_types(scenario: Scenario) -> None:
+    """Raise a `ScenarioError` where UAVs of some type could not be built, in whatever world."""
+    for name, airframe in airframes_of(scenario).items():
+        plant_of_type(scenario, name, airframe)
+
+
+def airframes_of(scenario: Scenario) -> dict[str, Airframe]:
+    """Airframe of each type. Raises `ScenarioError` for one that cannot be, or wear of another."""
+    airframes: dict[str, Airframe] = {}
+    for name, kind in scenario.types.items():
+        try:
+            airframes[name] = load_airframe(scenario.access.find_model(kind.airframe))
+        except DataFileError as error:
+            key = f"{scenario.name}: types.{name}.airframe"
+            raise DataFileError(f"{key}: {error}") from None
+        rotors = len(airframes[name].rotors.places)
+        if kind.wear and kind.plant != "rigid_body":
+            raise ScenarioError(
+                f'{scenario.name}: types.{name}.wear: rotors wear with plant = "rigid_body" alone'
+            )
+        if len(kind.wear) not in (0, rotors):
+            raise ScenarioError(
+                f"{scenario.name}: types.{name}.wear has "
+                f"{counted(len(kind.wear), 'entry', 'entries')}; {kind.airframe} "
+                f"has {rotors} rotors, and needs one for each, or none"
+            )
+    return airframes
+
+
+def build_fleet(
+    scenario: Scenario, starts: Sequence[Start], names: Sequence[str], *, copies: int = 1
+) -> Fleet:
+    """The UAVs at their places in the scenario's weather, `names` in messages.
+
+    `copies`: how often `starts` holds the scenario's UAVs, copy after copy.
+    """
+    physics = scenario.physics
+    fleet = Fleet(
+        [start.airframe for start in starts],
+        np.array([start.position_map for start in starts]),
+        np.array([start.attitude for start in starts]),
+        dt_ns=1_000_000_000 // scenario.physics.rate_hz,
+        on_contact=scenario.physics.on_contact,
+        control=ControlRates(physics.guidance_rate_hz, max(250.0, physics.guidance_rate_hz)),
+        names=names,
+        mode=[FlightMode.LANDED if start.on_ground else FlightMode.HOLD for start in starts],
+        plants=[plant_of_type(scenario, start.type_name, start.airframe) for start in starts],
+        wear=[scenario.types[start.type_name].wear for start in starts],
+        battery_charge=[scenario.types[start.type_name].battery_charge for start in starts],
+        weather=build_weather(scenario),
+        seed=scenario.seed,
+        copies=np.repeat(np.arange(copies), len(starts) // copies),
+    )
+    for row, start in enumerate(starts):
+        flight = scenario.types[start.type_name].flight
+        fleet.set_command_timeout(flight.command_timeout_s, row)
+    return fleet
+
+
+def check_free(fleet: Fleet, row: int, position_map: NDArray[np.float64]) -> None:
+    """`CommandError` where another UAV is too near to `position_map` (3,) m for UAV `row`."""
+    radius = np.array([airframe.body.collision_radius_m for airframe in fleet.airframes])
+    apart = np.linalg.norm(fleet.state.position_map - position_map, axis=1)
+    apart[row] = np.inf
+    nearest = int(np.argmin(apart - radius))
+    if apart[nearest] < radius[nearest] + radius[row]:
+        raise CommandError(
+            f"{fleet.names[row]} cannot go back to its start: {fleet.names[nearest]} is there"
+        )
+
+
+def add_bodies(scene: Scene, starts: Sequence[Start], *, copies: int = 1) -> None:
+    """Make the UAVs' bodies visible to the sensors of their own copy."""
+    kinds: list[Airframe] = []
+    for start in starts:
+        if start.airframe not in kinds:  # files may give two airframes one name
+            kinds.append(start.airframe)
+    scene.set_bodies(
+        [body_shape(airframe) for airframe in kinds],
+        [kinds.index(start.airframe) for start in starts],
+        copies=copies,
+    )

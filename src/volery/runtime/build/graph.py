@@ -1,0 +1,104 @@
+"""What of a scenario takes part in the graph: sensors' topics, nodes, faults and the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from volery.control.flight_modes import FlightMode
+from volery.core import rotations
+from volery.core.clock import ns_from_s
+from volery.core.errors import CommandError, ScenarioError
+from volery.engine.engine import Engine
+from volery.engine.events import Event
+from volery.engine.faults import FaultPlan
+from volery.graph.camera_messages import Camera
+from volery.graph.graph import Graph
+from volery.graph.node import Context, Node
+from volery.graph.publishing import GraphPublisher
+from volery.runtime.build.node_loading import start_node
+from volery.runtime.build.placement import Start
+from volery.runtime.build.sensor_suites import RESULT_OF, Fitted
+from volery.runtime.vehicles.uav import Uav
+from volery.scenario.camera import CameraSensor
+from volery.scenario.schema import EstimateSensor, NodeEntry, Scenario
+from volery.sensors.samples import JointAngles
+
+
+def announce_sensors(publisher: GraphPublisher, fitted: Sequence[Fitted]) -> None:
+    """Advertise what the sensors publish."""
+    for sensor in fitted:
+        if sensor.lidar is not None:
+            publisher.announce_lidar(sensor.id, sensor.lidar, sensor.topic, sensor.mount)
+        elif isinstance(sensor.spec, CameraSensor):
+            camera = Camera(sensor.id, sensor.spec, sensor.left)
+            publisher.announce_camera(camera, sensor.mount)
+        else:
+            kind, spec = RESULT_OF[sensor.spec.kind], sensor.spec
+            by_a_node = isinstance(spec, EstimateSensor) and spec.pose is not None
+            publisher.announce(sensor.id, kind, sensor.mount, in_map=not by_a_node)
+        if sensor.mount.nods:
+            publisher.announce(sensor.id, JointAngles, sensor.mount)
+
+
+START_POSE = "{start_pose}"
+"""A node's parameter with this value gets the place of take-off, as people measure it."""
+
+
+def start_nodes(
+    scenario: Scenario,
+    starts: Sequence[Start],
+    graph: Graph,
+    engine: Engine,
+    now_ns: Callable[[], int],
+) -> list[Node]:
+    """The nodes that run beside the UAVs, in fleet order."""
+    nodes = []
+    for start in starts:
+        for k, entry in enumerate(scenario.types[start.type_name].nodes):
+            where = f"{scenario.name}: types.{start.type_name}.nodes[{k}]"
+            context = Context(
+                graph, engine, now_ns, ns_from_s(entry.latency_s), access=scenario.access
+            )
+            own = _with_start(entry, start)
+            nodes.append(start_node(own, context, f"/{start.name}", where, scenario.access))
+    return nodes
+
+
+def _with_start(entry: NodeEntry, start: Start) -> NodeEntry:
+    """An entry whose parameters know where the UAV begins: x, y, z, m, and yaw, rad, in the map."""
+    if START_POSE not in entry.parameters.values():
+        return entry
+    pose = [*start.position_map.tolist(), float(rotations.yaw_of(start.attitude))]
+    known = {k: pose if v == START_POSE else v for k, v in entry.parameters.items()}
+    return entry.model_copy(update={"parameters": known})
+
+
+def start_system_nodes(
+    scenario: Scenario, graph: Graph, engine: Engine, now_ns: Callable[[], int]
+) -> list[Node]:
+    """The nodes of the whole system, in the order of the scenario."""
+    nodes = []
+    for k, entry in enumerate(scenario.nodes):
+        context = Context(graph, engine, now_ns, ns_from_s(entry.latency_s), access=scenario.access)
+        where = f"{scenario.name}: nodes[{k}]"
+        nodes.append(start_node(entry, context, "", where, scenario.access))
+    return nodes
+
+
+def plan_faults(plan: FaultPlan, scenario: Scenario) -> None:
+    """Plan the scenario's faults; `ScenarioError` names the one that cannot be."""
+    for k, fault in enumerate(scenario.faults):
+        try:
+            plan.add(fault)
+        except CommandError as error:
+            raise ScenarioError(f"{scenario.name}: faults[{k}]: {error}") from None
+
+
+def all_down(uavs: Mapping[str, Uav], events: Sequence[Event]) -> bool:
+    """Whether every UAV has flown and is down for good."""
+    modes = [uav.mode for uav in uavs.values()]
+    flown = {event.uav for event in events}
+    return all(
+        mode is FlightMode.CRASHED or (mode is FlightMode.LANDED and name in flown)
+        for name, mode in zip(uavs, modes, strict=True)
+    )

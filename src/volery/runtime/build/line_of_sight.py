@@ -1,0 +1,93 @@
+"""What stands between two antennas: a ray from surface to surface, and the crowns it passes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.comms.radio.path_loss import Paths
+from volery.runtime.build.radio_crowns import Crowns
+from volery.world.forest import Forest
+from volery.world.materials import Material
+from volery.world.scene import Hits, Scene
+
+Array = NDArray[np.float64]
+
+_MOST_SURFACES = 192
+"""What is behind so many counts as clear: by then no signal is left."""
+_PAST_LEAF_M, _PAST_SURFACE_M = 0.25, 0.02
+"""So far behind a leaf, or another surface, the ray goes on."""
+_TRUNK_M = 2.0
+"""Wood of one tree within so much of the ray is one trunk. Modelling choice."""
+_NEAREST_M = 0.05
+
+
+class RadioSight:
+    """Looks along straight lines through the static world; UAVs and things do not count."""
+
+    def __init__(self, scene: Scene, forest: Forest | None) -> None:
+        self._scene = scene
+        self._crowns = None if forest is None else Crowns(forest)
+        self._twin = scene.twin()
+        self._solids = scene.solids
+
+    def __call__(self, starts: Array, ends: Array) -> Paths:
+        """What stands between places (P, 3) and (P, 3), m, map."""
+        if self._scene.solids is not self._solids:  # a grid map has changed
+            self._twin, self._solids = self._scene.twin(), self._scene.solids
+        rays = _Rays(starts, ends)
+        for _ in range(_MOST_SURFACES):
+            if not len(rays.going):
+                break
+            at, direction = rays.here()
+            rays.take(self._twin.cast(at, direction, float(rays.length.max(initial=0.0))))
+        if self._crowns is not None:
+            for k, (start, end) in enumerate(zip(starts, ends, strict=True)):
+                rays.paths.foliage_m[k] = self._crowns.along(start, end)
+        return rays.paths
+
+
+class _Rays:
+    """P rays on their way; `going` are the numbers of those that have not arrived."""
+
+    def __init__(self, starts: Array, ends: Array) -> None:
+        count = len(starts)
+        self.paths = Paths.clear(count)
+        self.length: Array = np.linalg.norm(ends - starts, axis=1)
+        self._starts = starts
+        self._direction = (ends - starts) / np.maximum(self.length, _NEAREST_M)[:, None]
+        self._at = np.zeros(count)
+        """Travelled so far, m."""
+        self._wood = np.full(count, -np.inf)
+        """Where the last wood was."""
+        self._tree = np.full(count, -1)
+        """Whose wood that was."""
+        self.going = np.flatnonzero(self.length > _NEAREST_M)
+
+    def here(self) -> tuple[Array, Array]:
+        """Where the rays that go on begin anew, and which way."""
+        g = self.going
+        direction = self._direction[g]
+        return self._starts[g] + self._at[g, None] * direction, direction
+
+    def take(self, hits: Hits) -> None:
+        """Go on to the next surfaces."""
+        met = self._at[self.going] + hits.distance
+        before_end = met < self.length[self.going]
+        g, met = self.going[before_end], met[before_end]
+        material, instance = hits.material[before_end], hits.instance[before_end]
+
+        leaf = material == Material.LEAF
+        wood = material == Material.WOOD
+        self._pass_wood(g[wood], met[wood], instance[wood])
+        ground = instance == 0
+        self.paths.ground[g[ground]] = True
+        self.paths.walls[g[~(leaf | wood | ground)]] += 1
+
+        self._at[g] = met + np.where(leaf, _PAST_LEAF_M, _PAST_SURFACE_M)
+        self.going = g[~ground]
+
+    def _pass_wood(self, g: NDArray[np.int64], met: Array, tree: NDArray[np.int32]) -> None:
+        same = (tree == self._tree[g]) & (met - self._wood[g] <= _TRUNK_M)
+        self.paths.trunks[g[~same]] += 1
+        self._wood[g], self._tree[g] = met, tree

@@ -1,0 +1,38 @@
+"""The radio of a scenario in a running simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.comms.radio.channel import RadioLink
+from volery.comms.radio.network import RadioNet
+from volery.engine.engine import Engine
+from volery.graph.graph import Graph
+from volery.runtime.build.line_of_sight import RadioSight
+from volery.scenario.schema import Scenario
+from volery.world.forest import Forest
+
+Array = NDArray[np.float64]
+
+
+def build_radio(
+    scenario: Scenario, graph: Graph, engine: Engine, forest: Forest | None
+) -> RadioNet | None:
+    """The network that UAVs of a scenario join; None where it has no radio."""
+    radio = scenario.radio
+    if radio is None:
+        return None
+
+    def places() -> Mapping[int, Array]:
+        position = engine.fleet.state.position_map
+        rows = {name: row for row, name in enumerate(engine.names)}
+        return {address: position[rows[name]] for name, address in net.addresses().items()}
+
+    link = None
+    if radio.links == "modelled":
+        link = RadioLink(radio, scenario.seed, places, RadioSight(engine.scene, forest))
+    net = RadioNet(graph, engine, radio.topics, link)
+    return net

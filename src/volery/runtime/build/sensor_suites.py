@@ -1,0 +1,212 @@
+"""Which sensors every UAV carries, where, and with which stream of noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from volery.core import rotations
+from volery.core.errors import DataFileError, ScenarioError
+from volery.core.rng import stream_key
+from volery.graph.lidar_publishing import lidar_topic
+from volery.runtime.build.placement import Start
+from volery.scenario import schema
+from volery.scenario.camera import CameraSensor
+from volery.sensors.lidar_model import LidarModel, load_lidar
+from volery.sensors.mount import Mount, make_mount
+from volery.sensors.samples import (
+    BatteryReadings,
+    CameraFrames,
+    GnssReadings,
+    ImuReadings,
+    LidarScans,
+    MagneticReadings,
+    OdometryReadings,
+    PressureReadings,
+    RangeReadings,
+    Samples,
+    SensorId,
+)
+from volery.sensors.scan_patterns import PlanarScan
+
+if TYPE_CHECKING:
+    pass
+
+RESULT_OF: dict[str, type[Samples]] = {
+    "lidar": LidarScans,
+    "camera": CameraFrames,
+    "imu": ImuReadings,
+    "sonar": RangeReadings,
+    "odometry": OdometryReadings,
+    "estimate": OdometryReadings,
+    "ground_truth": OdometryReadings,
+    "gnss": GnssReadings,
+    "barometer": PressureReadings,
+    "magnetometer": MagneticReadings,
+    "battery": BatteryReadings,
+}
+"""What each kind of sensor measures."""
+
+
+PICTURE = ("width", "height", "horizontal_fov_deg", "samples")
+"""What a scenario may change of a camera's model."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One sensor on one UAV, before it joins a bank."""
+
+    id: SensorId
+    spec: Any
+    mount: Mount
+    key: np.uint64
+    lidar: LidarModel | None = None
+    """What kind of LIDAR it is, if it is one."""
+    left: SensorId | None = None
+    """The left camera of a stereo pair, of which this is the right one."""
+
+    @property
+    def bank_key(self) -> tuple[Any, ...]:
+        """Sensors with equal keys are sampled together."""
+        spec = self.spec
+        rate, model = getattr(spec, "rate_hz", None), getattr(spec, "model", None)
+        noise, intensities = getattr(spec, "noise", None), getattr(spec, "intensities", None)
+        picture = [getattr(spec, name, None) for name in PICTURE]
+        return (spec.kind, model, rate, spec.phase_s, noise, intensities, *picture)
+
+    @property
+    def topic(self) -> str:
+        """Where a LIDAR's scans or points go."""
+        assert self.lidar is not None
+        return lidar_topic(self.id, self.lidar, self.spec.topic)
+
+
+def fit_sensors(scenario: schema.Scenario, starts: Sequence[Start]) -> list[Fitted]:
+    """Every sensor of every UAV, in fleet order.
+
+    Raises `DataFileError` for a LIDAR model that cannot be loaded, `ScenarioError` where two LIDARs
+    of a UAV have one topic.
+    """
+    models = _LidarModels(scenario)
+    fitted = [
+        Fitted(
+            SensorId(row, start.name, spec.name),
+            spec,
+            _mount(spec),
+            noise_key(scenario.seed, spec.kind, SensorId(row, start.name, spec.name)),
+            models.load(spec) if isinstance(spec, schema.LidarSensor) else None,
+        )
+        for row, start in enumerate(starts)
+        for spec in scenario.types[start.type_name].sensors
+    ]
+    fitted = [camera for sensor in fitted for camera in _pair(scenario.seed, sensor)]
+    _check_topics(scenario, fitted)
+    return fitted
+
+
+def _pair(seed: int, sensor: Fitted) -> list[Fitted]:
+    """The left and the right camera of a stereo pair; any other sensor as it is."""
+    spec = sensor.spec
+    if not isinstance(spec, CameraSensor) or spec.stereo is None:
+        return [sensor]
+    ids = [replace(sensor.id, name=f"{spec.name}/{side}") for side in ("left", "right")]
+    aside = [0.5 * spec.stereo.baseline_m, -0.5 * spec.stereo.baseline_m]  # y is to the left
+    return [
+        replace(
+            sensor,
+            id=own,
+            mount=_moved(sensor.mount, y),
+            key=noise_key(seed, spec.kind, own),
+            left=None if own is ids[0] else ids[0],
+        )
+        for own, y in zip(ids, aside, strict=True)
+    ]
+
+
+def _moved(mount: Mount, y: float) -> Mount:
+    """The mount, `y` m further along its own y axis."""
+    offset = rotations.rotate(mount.attitude_body, np.array([0.0, y, 0.0]))
+    return mount._replace(position_body=mount.position_body + offset)
+
+
+def refit(fitted: Sequence[Fitted], seed: int, first_row: int = 0) -> list[Fitted]:
+    """The same sensors with the noise of a run of `seed`, on UAVs from `first_row` on."""
+    return [
+        replace(
+            sensor,
+            id=replace(sensor.id, uav=sensor.id.uav + first_row),
+            key=noise_key(seed, sensor.spec.kind, sensor.id),
+        )
+        for sensor in fitted
+    ]
+
+
+def noise_key(seed: int, kind: str, sensor: SensorId) -> np.uint64:
+    """Noise stream of a sensor in a run with `seed`; `kind` is the name of its bank."""
+    return stream_key(seed, f"{sensor.uav_name}/{kind}/{sensor.name}")
+
+
+class _LidarModels:
+    """Loads each LIDAR model of a scenario once."""
+
+    def __init__(self, scenario: schema.Scenario) -> None:
+        self._scenario = scenario
+        self._loaded: dict[str, LidarModel] = {}
+
+    def load(self, spec: schema.LidarSensor) -> LidarModel:
+        """Model of a LIDAR; errors name the scenario and the sensor."""
+        if spec.model not in self._loaded:
+            try:
+                self._loaded[spec.model] = load_lidar(self._scenario.access.find_model(spec.model))
+            except DataFileError as error:
+                where = f"{self._scenario.name}: sensor '{spec.name}'"
+                raise DataFileError(f"{where}: {error}") from None
+        return self._loaded[spec.model]
+
+
+def _check_topics(scenario: schema.Scenario, fitted: Sequence[Fitted]) -> None:
+    """Refuse LIDARs that would publish on one topic."""
+    taken: dict[str, str] = {}
+    for sensor in fitted:
+        if sensor.lidar is None:
+            continue
+        other = taken.setdefault(sensor.topic, sensor.id.name)
+        if other != sensor.id.name:
+            raise ScenarioError(
+                f"{scenario.name}: sensors '{other}' and '{sensor.id.name}' both publish on "
+                f"{sensor.topic}; give one of them another `topic`"
+            )
+
+
+def lidar_mounts(fitted: Sequence[Fitted], *, planar: bool) -> Mapping[str, Mount]:
+    """Topics of LaserScans, or of PointCloud2s, and how their LIDARs are mounted."""
+    return MappingProxyType(
+        {
+            sensor.topic: sensor.mount
+            for sensor in fitted
+            if sensor.lidar is not None and isinstance(sensor.lidar.scan, PlanarScan) == planar
+        }
+    )
+
+
+def _mount(spec: Any) -> Mount:
+    if not hasattr(spec, "position_m"):
+        return make_mount()
+    roll, pitch, yaw = (math.radians(angle) for angle in spec.rpy_deg)
+    attitude = rotations.from_rpy(roll, pitch, yaw)
+    nodding: schema.Nodding | None = getattr(spec, "nodding", None)
+    if nodding is None:
+        return make_mount(spec.position_m, attitude)
+    return make_mount(
+        spec.position_m,
+        attitude,
+        amplitude_rad=math.radians(nodding.amplitude_deg),
+        period_s=nodding.period_s,
+        offset_rad=math.radians(nodding.offset_deg),
+        phase_rad=math.radians(nodding.phase_deg),
+    )

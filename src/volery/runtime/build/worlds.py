@@ -1,0 +1,248 @@
+"""Builds terrain, forest, city, solids and weather of a scenario."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING
+
+from volery.core.counting import counted
+from volery.core.errors import DataFileError, ScenarioError, VoleryError
+from volery.core.geodesy import LocalFrame
+from volery.runtime.build.actors import build_things
+from volery.runtime.build.geometry import Geometry
+from volery.runtime.build.grid_map import starting_blocks
+from volery.runtime.build.user_meshes import mesh_solids
+from volery.scenario import wind as schema
+from volery.scenario.schema import (
+    GridTerrain,
+    InventoryForest,
+    ProceduralForest,
+    Scenario,
+    World,
+)
+from volery.world.city import City, FurnitureRule, HeightRule, StreetRule
+from volery.world.city import build_city as city_of_outlines
+from volery.world.forest import Forest, forest_from_inventory, procedural_forest
+from volery.world.forest_joining import joined
+from volery.world.ground_cover import BARE_GROUND
+from volery.world.scene import Scene, Solid
+from volery.world.terrain import Terrain
+from volery.world.weather import (
+    W20_M_S,
+    Gust,
+    LogProfile,
+    Particles,
+    PowerProfile,
+    Weather,
+    WindField,
+)
+from volery.world.weather.sun import sun_angles
+
+if TYPE_CHECKING:
+    from volery.sensors.cameras.weather_light import LightOfTheHour
+
+
+def build_terrain(scenario: Scenario) -> Terrain:
+    """Ground of the scenario."""
+    terrain = scenario.world.terrain
+    if isinstance(terrain, GridTerrain):
+        try:
+            path = scenario.access.find_file(terrain.file)
+            return Terrain.from_csv(path, terrain.spacing_m, origin=terrain.origin_m)
+        except DataFileError as error:
+            raise DataFileError(f"{scenario.name}: world.terrain: {error}") from None
+    reach = terrain.extent_m
+    return Terrain.flat(2.0 * reach, terrain.height_m, origin=(-reach, -reach))
+
+
+def build_city(scenario: Scenario, terrain: Terrain) -> City | None:
+    """City of the scenario, None where it has none. Raises `DataFileError`."""
+    city, origin = scenario.world.city, scenario.world.origin
+    if city is None:
+        return None
+    streets = city.streets
+    try:
+        return city_of_outlines(
+            scenario.access.find_file(city.file),
+            LocalFrame.from_degrees(origin.latitude_deg, origin.longitude_deg, origin.altitude_m),
+            terrain,
+            seed=scenario.world_seed,
+            region=city.region_m,
+            heights=HeightRule(city.storey_m, city.default_height_m),
+            streets=StreetRule(streets.widest_m, streets.pavement_m),
+            furniture=FurnitureRule(
+                streets.lamp_spacing_m, streets.tree_spacing_m, streets.tree_share
+            ),
+        )
+    except DataFileError as error:
+        raise DataFileError(f"{scenario.name}: world.city: {error}") from None
+
+
+def build_forest(scenario: Scenario, terrain: Terrain, city: City | None = None) -> Forest | None:
+    """Trees of the scenario, those of a city's streets last; None where it has no forest.
+
+    Raises `ScenarioError` where the forest cannot grow, has no trees or reaches beyond the terrain.
+    """
+    try:
+        forest = _grow(scenario, terrain)
+    except VoleryError as error:
+        raise ScenarioError(f"{scenario.name}: world.forest: {error}") from None
+    if isinstance(scenario.world.forest, InventoryForest) and not forest:
+        raise ScenarioError(f"{scenario.name}: world.forest: the inventory has no tree there")
+    if forest:
+        x0, y0, x1, y1 = terrain.bounds
+        x, y = forest.position_map[:, 0], forest.position_map[:, 1]
+        outside = int(((x < x0) | (x > x1) | (y < y0) | (y > y1)).sum())
+        if outside:
+            raise ScenarioError(
+                f"{scenario.name}: world.forest: {counted(outside, 'tree')} beyond the "
+                f"terrain, which reaches from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m; "
+                "region_m crops an inventory"
+            )
+    return joined(forest, _street_trees(scenario, terrain, city))
+
+
+def _street_trees(scenario: Scenario, terrain: Terrain, city: City | None) -> Forest | None:
+    settings = scenario.world.city
+    if city is None or settings is None or not len(city.trees):
+        return None
+    species, seed = settings.streets.tree_species, scenario.world_seed
+    try:
+        return forest_from_inventory(city.trees, species=species, seed=seed, terrain=terrain)
+    except VoleryError as error:
+        raise ScenarioError(f"{scenario.name}: world.city.streets: {error}") from None
+
+
+def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
+    forest = scenario.world.forest
+    if isinstance(forest, InventoryForest):
+        return forest_from_inventory(
+            scenario.access.find_file(forest.file),
+            region=forest.region_m,
+            share=forest.share,
+            species=forest.species,
+            species_map=forest.species_map,
+            seed=scenario.world_seed,
+            terrain=terrain,
+        )
+    if isinstance(forest, ProceduralForest):
+        return procedural_forest(
+            forest.region_m,
+            trees=forest.trees,
+            minimum_spacing_m=forest.minimum_spacing_m,
+            species=forest.species,
+            seed=scenario.world_seed,
+            terrain=terrain,
+        )
+    return None
+
+
+def build_solids(
+    scenario: Scenario, terrain: Terrain, city: City | None = None
+) -> tuple[Solid, ...]:
+    """What stands in the scenario's world beside the trees, one kind after the other."""
+    buildings = city.solids if city is not None else ()
+    blocks = starting_blocks(scenario, terrain)  # last: they can change, others keep numbers
+    return (*buildings, *mesh_solids(scenario), *blocks)
+
+
+def build_scene(
+    scenario: Scenario,
+    terrain: Terrain,
+    forest: Forest | None,
+    city: City | None = None,
+    *,
+    threads: int = 1,
+) -> Scene:
+    """All that sensors of the scenario can see but for the UAVs."""
+    scene = Scene(
+        terrain,
+        forest,
+        solids=build_solids(scenario, terrain, city),
+        cover=BARE_GROUND if city is None else city.cover,
+        threads=threads,
+    )
+    things = build_things(scenario, terrain)
+    if things is not None:
+        scene.set_things(things)
+    return scene
+
+
+def build_world(
+    scenario: Scenario, threads: int
+) -> tuple[Terrain, City | None, Forest | None, Scene]:
+    """Everything that stands in the world of a scenario, and the scene that holds it."""
+    terrain = build_terrain(scenario)
+    city = build_city(scenario, terrain)
+    forest = build_forest(scenario, terrain, city)
+    return terrain, city, forest, build_scene(scenario, terrain, forest, city, threads=threads)
+
+
+def geometry_of(scenario: Scenario) -> Geometry:
+    """What stands in the world of a scenario at its beginning, for a picture of it."""
+    terrain = build_terrain(scenario)
+    city = build_city(scenario, terrain)
+    forest = build_forest(scenario, terrain, city)
+    cover = BARE_GROUND if city is None else city.cover
+    return Geometry(terrain, forest, tuple(build_solids(scenario, terrain, city)), cover)
+
+
+def build_weather(scenario: Scenario) -> Weather:
+    """Air of the scenario. Raises `DataFileError` where its wind field cannot be read."""
+    wind = scenario.world.wind
+    return Weather(
+        wind.velocity_m_s,
+        _profile_of(wind),
+        _read_field(scenario),
+        W20_M_S[wind.turbulence] if wind.w20_m_s is None else wind.w20_m_s,
+        tuple(_gust_of(gust, wind) for gust in wind.gusts),
+        _particles_of(scenario),
+        scenario.world.light.hour_of_day,
+    )
+
+
+def sun_in(world: World, weather: Weather) -> tuple[float, float]:
+    """Elevation and azimuth, deg, of the sun in a weather."""
+    if weather.hour_of_day is None:
+        return world.light.sun_elevation_deg, world.light.sun_azimuth_deg
+    return sun_angles(world.origin.latitude_deg, world.light.date, weather.hour_of_day)
+
+
+def light_of(world: World) -> LightOfTheHour:
+    """The light that cameras see by, by weather and hour."""
+    from volery.sensors.cameras.weather_light import LightOfTheHour
+
+    return LightOfTheHour(partial(sun_in, world), world.light.visibility_m)
+
+
+def _particles_of(scenario: Scenario) -> Particles:
+    given = scenario.world.weather
+    return Particles(**{k: v for k, v in given.model_dump().items() if v is not None})
+
+
+def _profile_of(wind: schema.Wind) -> LogProfile | PowerProfile | None:
+    profile = wind.profile
+    if isinstance(profile, schema.LogProfile):
+        return LogProfile(profile.reference_height_m, profile.roughness_m)
+    if isinstance(profile, schema.PowerProfile):
+        return PowerProfile(profile.reference_height_m, profile.exponent)
+    return None
+
+
+def _read_field(scenario: Scenario) -> WindField | None:
+    name = scenario.world.wind.field
+    if name is None:
+        return None
+    try:
+        return WindField.from_file(scenario.access.find_file(name))
+    except DataFileError as error:
+        raise DataFileError(f"{scenario.name}: world.wind.field: {error}") from None
+
+
+def _gust_of(gust: schema.Gust, wind: schema.Wind) -> Gust:
+    end_s = math.inf if gust.end_s is None else gust.end_s
+    if gust.rise_m is None:
+        return Gust(gust.amplitude_m_s, gust.start_s, gust.rise_s or 0.0, end_s)
+    rise_s = gust.rise_m / wind.speed_m_s
+    return Gust(gust.amplitude_m_s, gust.start_s, rise_s, end_s, wind.velocity_m_s)

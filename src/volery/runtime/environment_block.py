@@ -1,0 +1,262 @@
+"""A block of copies: their UAVs as rows of one fleet, driven by one engine in one thread."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.clock import NS_PER_S
+from volery.core.errors import CommandError, DivergenceError
+from volery.engine.engine import Engine
+from volery.engine.events import Event
+from volery.runtime.build.estimation import build_estimation
+from volery.runtime.build.fleet import add_bodies, build_fleet
+from volery.runtime.build.placement import Start
+from volery.runtime.build.sensor_suites import Fitted, fit_sensors, refit
+from volery.runtime.build.sensors import build_banks
+from volery.runtime.vehicles.uav import Uav
+from volery.scenario.schema import Scenario
+from volery.sensors.bank import Bank
+from volery.sensors.samples import Samples
+from volery.world.scene import Scene
+from volery.world.terrain import Terrain
+
+Reading: TypeAlias = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class CopyEvent:
+    """Something that happened in one copy."""
+
+    copy: int
+    event: Event
+
+
+class CopyBlock:
+    """Copies `first`, `first` + 1, ... of a scenario, one for each of `seeds`."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        starts: Sequence[Start],
+        terrain: Terrain,
+        scene: Scene,
+        seeds: Sequence[int],
+        first: int,
+    ) -> None:
+        self.seeds = list(seeds)
+        self._scenario = scenario
+        self._starts = tuple(starts)
+        self._first = first
+        copies = len(self.seeds)
+        everyone = self._starts * copies
+        names = tuple(f"{k}/{start.name}" for k in range(copies) for start in self._starts)
+        self.fleet = build_fleet(scenario, everyone, names, copies=copies)
+        self._scene = scene.twin()
+        add_bodies(self._scene, everyone, copies=copies)
+        self._fitted = fit_sensors(scenario, self._starts)
+        fitted = [f for k in range(copies) for f in self._fit(k)]
+        estimation = build_estimation(scenario, fitted, self.fleet)
+        self._engine = Engine(
+            self.fleet,
+            self._scene,
+            terrain,
+            build_banks(scenario, fitted, self.fleet, self._scene, estimation),
+            names,
+            self,
+            crash_on_contact=scenario.physics.on_contact == "crash",
+            estimation=estimation,
+            copies=copies,
+        )
+        banks = self._engine.banks
+        self._bank_of = {id(bank.sensors): k for k, bank in enumerate(banks)}
+        self._places = _places(banks)
+        self._latest: list[Samples | None] = [None] * len(banks)
+        self._events: list[CopyEvent] = []
+        self._began_ns = np.zeros(copies, np.int64)
+        self._stir_air(np.arange(copies))
+        self._start_state = self.fleet.get_state()
+        self._take_off(np.arange(len(everyone)))
+
+    # -------------------------------------------------------------------------------------- time
+
+    @property
+    def step(self) -> int:
+        """Physics steps done."""
+        return self.fleet.step
+
+    @property
+    def dt_ns(self) -> int:
+        """Physics step."""
+        return self.fleet.dt_ns
+
+    @property
+    def time_ns(self) -> int:
+        """Time since the block began."""
+        return self._engine.time_ns
+
+    @property
+    def common_period_s(self) -> float:
+        """Period after which guidance and all sensors fire together again."""
+        periods = [Fraction(self.fleet.guidance_period_ns, NS_PER_S)]
+        periods += [1 / bank.schedule.rate_hz for bank in self._engine.banks]
+        down = math.lcm(*(p.denominator for p in periods))
+        return math.lcm(*(int(p * down) for p in periods)) / down
+
+    def age_s(self) -> NDArray[np.float64]:
+        """(copies,) time since each began."""
+        return (self.time_ns - self._began_ns) / NS_PER_S
+
+    def advance_to(self, step: int) -> None:
+        """Advance all copies. `DivergenceError` names the copy whose state is not physical."""
+        try:
+            self._engine.advance_to(step)
+            self._engine.state_check.glance()
+        except DivergenceError as error:
+            raise self._of_copy(error) from None
+
+    def reset(self, copies: NDArray[np.int64], seeds: Sequence[int] | None) -> None:
+        """Put some copies back to their start."""
+        if seeds is not None:
+            for k, seed in zip(copies, seeds, strict=True):
+                self.seeds[k] = seed
+        crew = len(self._starts)
+        rows = (copies[:, None] * crew + np.arange(crew)).ravel()
+        self.fleet.restart(self._start_state, rows)
+        self._stir_air(copies)
+        self._engine.collisions.forget(rows)
+        self._began_ns[copies] = self.time_ns
+        keys = self._keys_of(copies)
+        for samples, fresh in self._engine.restart_sensors(rows, keys):
+            self._renew(samples, fresh)
+        self._take_off(rows)
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that changes."""
+        try:
+            self._engine.state_check.look()
+        except DivergenceError as error:
+            raise self._of_copy(error) from None
+        return {
+            "engine": self._engine.get_state(),
+            "latest": list(self._latest),
+            "events": list(self._events),
+            "began": self._began_ns.copy(),
+            "seeds": list(self.seeds),
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._engine.set_state(state["engine"])
+        self._latest = list(state["latest"])
+        self._events = list(state["events"])
+        self._began_ns = state["began"].copy()
+        self.seeds = list(state["seeds"])
+
+    # ---------------------------------------------------------------------------- what is known
+
+    def uav(self, copy: int, name: str) -> Uav:
+        """Handle on one UAV."""
+        place = [start.name for start in self._starts].index(name)
+        row = copy * len(self._starts) + place
+        flight = self._scenario.types[self._starts[place].type_name].flight
+        return Uav(self.fleet, row, name, flight)
+
+    def reading(self, uav: str, sensor: str) -> Reading | None:
+        """Last measurement of one sensor of each copy; arrays are (copies, ...)."""
+        try:
+            bank, rows = self._places[uav, sensor]
+        except KeyError:
+            known = ", ".join(f"{uav} {sensor}" for uav, sensor in self._places)
+            raise CommandError(f"no sensor '{sensor}' of '{uav}'; known: {known}") from None
+        samples = self._latest[bank]
+        if samples is None:
+            return None
+        return {name: array[rows] for name, array in _arrays(samples).items()}
+
+    def drain_events(self) -> list[CopyEvent]:
+        """Events since the last call."""
+        events, self._events = self._events, []
+        return events
+
+    # ------------------------------------------------------------------------ the engine's sink
+
+    def advanced(self, first_step: int, last_step: int) -> None:
+        """Take in computed steps: nobody asks."""
+
+    def sampled(self, samples: Samples) -> None:
+        """Keep the last measurement of every bank."""
+        self._latest[self._bank_of[id(samples.sensors)]] = samples
+
+    def happened(self, event: Event) -> None:
+        """Keep an event under its copy."""
+        copy, name = event.uav.split("/")
+        partner = event.partner.split("/")[-1]
+        own = replace(event, uav=name, partner=partner)
+        self._events.append(CopyEvent(self._first + int(copy), own))
+
+    def deliver(self) -> None:
+        """Nothing is queued."""
+
+    # ------------------------------------------------------------------------------------- inside
+
+    def _of_copy(self, error: DivergenceError) -> DivergenceError:
+        """The error with the number that the copy has among all, not in this block."""
+        number, name = error.uav.split("/")
+        copy = self._first + int(number)
+        text = str(error).replace(error.uav, f"{name} of copy {copy}", 1)
+        return DivergenceError(f"{copy}/{name}", error.time_s, text)
+
+    def _renew(self, samples: Samples, rows: NDArray[np.int64]) -> None:
+        """Put the measurements of restarted sensors in the place of those of their former life."""
+        bank = self._bank_of[id(samples.sensors)]
+        last = self._latest[bank]
+        if last is not None:
+            changed: dict[str, Any] = {}
+            for name, array in _arrays(last).items():
+                changed[name] = array.copy()
+                changed[name][rows] = _arrays(samples)[name][rows]
+            self._latest[bank] = replace(last, **changed)
+
+    def _fit(self, copy: int) -> list[Fitted]:
+        return refit(self._fitted, self.seeds[copy], copy * len(self._starts))
+
+    def _take_off(self, rows: NDArray[np.int64]) -> None:
+        """Let those of the UAVs `rows` take off that do so by themselves."""
+        for row in rows.tolist():
+            start = self._starts[row % len(self._starts)]
+            if start.takes_off:
+                flight = self._scenario.types[start.type_name].flight
+                self.fleet.take_off(row, flight.take_off_altitude_m)
+
+    def _stir_air(self, copies: NDArray[np.int64]) -> None:
+        """Give each copy the turbulence of its own seed."""
+        crew = len(self._starts)
+        names = [start.name for start in self._starts]
+        for k in copies:
+            self.fleet.seed_turbulence(self.seeds[k], k * crew + np.arange(crew), names)
+
+    def _keys_of(self, copies: NDArray[np.int64]) -> dict[tuple[int, str], np.uint64]:
+        """Noise streams by UAV row and name of the sensor."""
+        return {(f.id.uav, f.id.name): f.key for k in copies for f in self._fit(int(k))}
+
+
+def _arrays(samples: Samples) -> dict[str, NDArray[Any]]:
+    return {name: v for name, v in vars(samples).items() if isinstance(v, np.ndarray)}
+
+
+def _places(banks: Sequence[Bank]) -> dict[tuple[str, str], tuple[int, NDArray[np.int64]]]:
+    """Bank and its rows of each sensor that a copy has, by names of UAV and sensor."""
+    places: dict[tuple[str, str], tuple[int, list[int]]] = {}
+    for k, bank in enumerate(banks):
+        if bank.name == "joints":
+            continue
+        for row, sensor in enumerate(bank.sensors):
+            places.setdefault((sensor.uav_name, sensor.name), (k, []))[1].append(row)
+    return {names: (k, np.array(rows)) for names, (k, rows) in places.items()}

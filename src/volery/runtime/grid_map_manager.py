@@ -1,0 +1,106 @@
+"""The grid map of a running simulation: which one stands there, how high, how large."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from volery.core.errors import CommandError
+from volery.engine.engine import Engine
+from volery.runtime.build.grid_map import blocks_of, read_grid_map
+from volery.scenario.schema import Scenario
+from volery.world.grid_maps import GridMap
+from volery.world.scene import Solid
+
+
+class GridWorld:
+    """Shows one grid map at a time in the world of an engine, from one physics step to the next.
+
+    All maps of the scenario are read at the start, so that a broken file shows then. A change is
+    an event of kind `world`. Whoever is in a new block touches it with the next step.
+    """
+
+    def __init__(self, scenario: Scenario, engine: Engine) -> None:
+        world = scenario.world.grid_map
+        self._engine = engine
+        self.tell: Callable[[GridMap], None] = lambda _grid: None
+        """Called with each map that is shown; it must change nothing."""
+        self.on_blocks: Callable[[], object] = lambda: None
+        """Called when other blocks stand there, also after a restore; it must change nothing."""
+        entries = () if world is None else world.maps
+        self._maps = {entry.called: read_grid_map(scenario, entry) for entry in entries}
+        starting = None if world is None or world.starting is None else self._maps[world.starting]
+        self._current: GridMap | None = starting
+        solids = engine.scene.solids
+        count = 0 if starting is None or starting.bounds_of_blocks() is None else 1
+        self._others = solids[: len(solids) - count]
+        """What else stands in the world."""
+        self._blocks: tuple[Solid, ...] = solids[len(solids) - count :]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Maps of the scenario, and the last one that came over the graph."""
+        return tuple(self._maps)
+
+    @property
+    def current(self) -> GridMap | None:
+        """The map that stands there; None before there is any."""
+        return self._current
+
+    def change(
+        self,
+        name: str | None = None,
+        *,
+        block_height_m: float | None = None,
+        cell_size_m: float | None = None,
+    ) -> GridMap:
+        """Show another map, or the present one higher, lower, larger or smaller.
+
+        Without a height, blocks stay as high as they are now; without a cell size, cells are as
+        large as those of that map were last. The origin stays where it is. Raises `CommandError`
+        for an unknown map, a size that cannot be, and blocks beyond the terrain; nothing changes
+        then.
+        """
+        if name is not None and name not in self._maps:
+            known = ", ".join(self._maps) or "none"
+            raise CommandError(f"there is no grid map '{name}'; known: {known}")
+        grid = self._current if name is None else self._maps[name]
+        if grid is None:
+            raise CommandError("there is no grid map yet; name one, or send one")
+        if block_height_m is None and self._current is not None:
+            block_height_m = self._current.block_height_m
+        changed = replace(
+            grid,
+            cell_size_m=grid.cell_size_m if cell_size_m is None else cell_size_m,
+            block_height_m=grid.block_height_m if block_height_m is None else block_height_m,
+        )
+        self.show(changed)
+        return changed
+
+    def show(self, grid: GridMap) -> None:
+        """Let the blocks of `grid` stand in the world; its name can be chosen again later."""
+        blocks = blocks_of(grid, self._engine.ground)
+        self._maps = {**self._maps, grid.name: grid}
+        self._stand(grid, blocks)
+        self._engine.note_world(grid.describe())
+        self.tell(grid)
+
+    def refuse(self, reason: str) -> None:
+        """Tell in an event why a map that came over the graph is not shown."""
+        self._engine.note_world(f"a grid map was refused: {reason}")
+
+    def get_state(self) -> object:
+        """What a snapshot keeps: which map stands there, and its blocks."""
+        return self._current, self._blocks, self._maps
+
+    def set_state(self, state: object) -> None:
+        """Go back to a kept state. Whoever calls this puts the engine's state back afterwards."""
+        assert isinstance(state, tuple)
+        current, blocks, self._maps = state
+        if current is not self._current:
+            self._stand(current, blocks)
+
+    def _stand(self, grid: GridMap | None, blocks: tuple[Solid, ...]) -> None:
+        self._engine.replace_solids((*self._others, *blocks))
+        self._current, self._blocks = grid, blocks
+        self.on_blocks()

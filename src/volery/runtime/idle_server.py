@@ -1,0 +1,53 @@
+"""What clients meet while no world is loaded: a graph with the services that make sense then."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from volery.engine.commands import Inbox
+from volery.graph.graph import Graph
+from volery.graph.session import Gateway
+from volery.runtime.services.features import offer_features
+from volery.runtime.services.results import Fields, RefusedError, filled, offer_result
+from volery.runtime.services.simulation_state import WRONG_TRANSITION, State
+from volery.runtime.services.worlds import OnLoad, offer_worlds
+from volery.scenario.shelf import Shelf
+
+_SRV = "simulation_interfaces/srv"
+
+
+class Lobby:
+    """Stands behind the doors between two simulations, in the state NO_WORLD.
+
+    Clients can ask for features, state and worlds, load one, or quit. Its owner calls `wait` until
+    `on_load` was called or it is `quitting`.
+    """
+
+    def __init__(self, on_load: OnLoad, shelf: Shelf | None = None) -> None:
+        self.quitting = False
+        self._inbox = Inbox()
+        self.graph = Graph(lambda: 0, self._inbox.post)
+        self.gateway = Gateway(self.graph, self._inbox.post)
+        offer_features(self.graph, loads_worlds=True)
+        offer_worlds(self.graph, None, on_load, shelf)
+        get, put = f"{_SRV}/GetSimulationState", f"{_SRV}/SetSimulationState"
+        offer_result(self.graph, "/get_simulation_state", get, self._get_state)
+        offer_result(self.graph, "/set_simulation_state", put, self._set_state)
+
+    def be_prompt(self) -> None:
+        """As of `Simulation`; here nothing else is done anyway."""
+
+    def wait(self, timeout_s: float) -> None:
+        """Serve clients for up to so long, or until the next of them came."""
+        self._inbox.wait(timeout_s)
+        self._inbox.work_off()
+        self.graph.deliver()
+
+    def _get_state(self, _request: Any) -> Fields:
+        state = State.QUITTING if self.quitting else State.NO_WORLD
+        return {"state": filled("simulation_interfaces/msg/SimulationState", {"state": int(state)})}
+
+    def _set_state(self, request: Any) -> None:
+        if int(request.state.state) != State.QUITTING:
+            raise RefusedError(WRONG_TRANSITION, "no world is loaded; load one, or quit")
+        self.quitting = True

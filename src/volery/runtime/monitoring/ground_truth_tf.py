@@ -1,0 +1,70 @@
+"""`/ground_truth/tf`: where all UAVs and things truly are, in one message.
+
+For pages and renderers. Autonomy must not read it: on a robot there is nothing like it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.engine.engine import Engine
+from volery.graph.graph import Graph
+from volery.graph.messages import (
+    Quaternion,
+    TFMessage,
+    Transform,
+    TransformStamped,
+    Vector3,
+    header,
+)
+from volery.graph.rows import Rows
+from volery.runtime.monitoring.live_topic import Present
+
+Array = NDArray[np.float64]
+
+TOPIC = "/ground_truth/tf"
+_PERIOD_S = 0.02
+_LEAST_S = 0.05
+"""Between two messages that are shown: smooth enough to the eye at a twentieth of real time."""
+
+
+def tell_poses(graph: Graph, engine: Engine) -> Present:
+    """Tell `map -> uavN/base_link` of every UAV in fleet order, then `map -> NAME` of things."""
+    publisher = graph.advertise(TOPIC, TFMessage)
+    return Present(
+        publisher, lambda: _message(engine), lambda: _content(engine), _PERIOD_S, _LEAST_S
+    )
+
+
+def _message(engine: Engine) -> TFMessage:
+    state, things = engine.fleet.state, engine.things
+    frames = [f"{name}/base_link" for name in engine.names]
+    poses = np.hstack([state.position_map, state.attitude])
+    if things is not None:
+        frames += things.names
+        poses = np.vstack([poses, things.poses_at(engine.time_ns)])
+    stamp = header(engine.time_ns, "map")
+    transforms: Any = Rows(len(frames), lambda: _transforms(stamp, frames, poses))
+    return TFMessage(transforms)
+
+
+def _transforms(stamp: Any, frames: list[str], poses: Array) -> Iterator[TransformStamped]:
+    """One a frame; poses (N, 7) of x y z qx qy qz qw."""
+    for frame, (x, y, z, *turn) in zip(frames, poses.tolist(), strict=True):
+        yield TransformStamped(stamp, frame, Transform(Vector3(x, y, z), Quaternion(*turn)))
+
+
+def _content(engine: Engine) -> tuple[Any, ...]:
+    state, things = engine.fleet.state, engine.things
+    moving = b"" if things is None else things.poses_at(engine.time_ns).tobytes()
+    return (
+        engine.time_ns,
+        engine.names,
+        state.position_map.tobytes(),
+        state.attitude.tobytes(),
+        moving,
+    )

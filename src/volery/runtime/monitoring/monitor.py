@@ -1,0 +1,41 @@
+"""All topics for people who watch, looked after by the thread that runs the simulation."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from volery.engine.engine import Engine
+from volery.runtime.monitoring.ground_truth_tf import tell_poses
+from volery.runtime.monitoring.status import Status, Told
+from volery.runtime.monitoring.vehicles import Vehicles
+
+if TYPE_CHECKING:
+    from volery.runtime.simulation import Simulation
+
+
+class LiveTopics:
+    """Tells of places, vehicles and the run itself; changes nothing of what is simulated."""
+
+    def __init__(self, simulation: Simulation, engine: Engine, told: Told) -> None:
+        self._graph = simulation.graph
+        vehicles = Vehicles(
+            engine, simulation.uavs, simulation.gateway, simulation.pilots.holder_of
+        )
+        self._present = (tell_poses(simulation.graph, engine), vehicles.present)
+        self._status = Status(simulation, told)
+        for present in self._present:
+            present.begin(engine.every)
+
+    def look(self) -> None:
+        """Show what is new; between ticks, as often as one likes."""
+        now_s = time.perf_counter()
+        for present in self._present:
+            present.look(now_s)
+        self._status.look(now_s)
+
+    def jumped(self) -> None:
+        """Tell everything anew: another state was restored, or the start."""
+        self._graph.show_kept()
+        self._status.jumped()
+        self.look()

@@ -1,0 +1,65 @@
+"""Where the engine's steps, measurements and events go: digest, graph and list."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from volery.control.fleet import Fleet
+from volery.engine.events import Event
+from volery.graph.graph import Graph
+from volery.graph.messages import Published
+from volery.graph.publishing import GraphPublisher
+from volery.runtime.monitoring.digest import Digest
+from volery.sensors.samples import Samples
+
+NOT_OF_THE_WORLD = ("/volery/", "/ground_truth/tf", "/rosout")
+"""Topics of the simulation and its clients, of poses that are in already, and of nodes' logs."""
+
+
+class Outlet:
+    """The engine's `Sink` in a simulation."""
+
+    def __init__(self, fleet: Fleet, graph: Graph, publisher: GraphPublisher) -> None:
+        self.fleet = fleet
+        self._graph = graph
+        self._publisher = publisher
+        self.events: list[Event] = []
+        """Everything that happened so far, oldest first."""
+        self.digest: Digest | None = None
+        self.watch: Callable[[], None] | None = None
+        """Called after each call of the fused step, for measurements; it must change nothing."""
+
+    def enable_digest(self) -> None:
+        """Fingerprint all states and messages from now on."""
+        if self.digest is None:
+            self.digest = Digest()
+            self._graph.subscribe_all(self._fingerprint)
+
+    def _fingerprint(self, published: Published) -> None:
+        if self.digest is not None and not published.topic.startswith(NOT_OF_THE_WORLD):
+            self.digest.add_message(published)
+
+    def take_fingerprint(self) -> None:
+        """Take the present states into the digest, if there is one."""
+        if self.digest is not None:
+            self.digest.add_states(self.fleet)
+
+    def advanced(self, first_step: int, last_step: int) -> None:
+        """Take in computed steps."""
+        if self.digest is not None:
+            self.digest.add_steps(self.fleet.history, first_step, last_step)
+        if self.watch is not None:
+            self.watch()
+
+    def sampled(self, samples: Samples) -> None:
+        """Publish measurements."""
+        self._publisher.publish(samples)
+
+    def happened(self, event: Event) -> None:
+        """Keep and publish an event."""
+        self.events.append(event)
+        self._publisher.publish_event(event)
+
+    def deliver(self) -> None:
+        """Hand out queued messages."""
+        self._graph.deliver()

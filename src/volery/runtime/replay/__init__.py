@@ -1,0 +1,1 @@
+"""Recorded flights: played back, flown again by their commands, mapped by a SLAM."""

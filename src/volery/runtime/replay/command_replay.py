@@ -1,0 +1,176 @@
+"""A recorded flight flown again: every command of its clients, at the moment at which it was taken.
+
+    flight = read_flight(Path("flight.mcap"))
+    with Simulation(scenario_of(flight.origin, load_scenario("mine.toml"))) as simulation:
+        simulation.repeat(flight)
+        simulation.run()
+
+Pauses, speeds and single steps change no results and are not repeated; the flight goes as fast as
+it is asked to and ends where the recorded one did.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+from volery.bridges.logs.flights import Command, RecordedFlight
+from volery.core.errors import CommandError, GraphError
+from volery.engine.commands import Moment
+from volery.engine.engine import Engine
+from volery.engine.pacing import Pacer
+from volery.graph.graph import Graph, Publisher
+from volery.graph.reply import Reply
+from volery.graph.session import Gateway, Taken
+from volery.runtime.replay.command_effects import Weight, weight_of
+from volery.runtime.replay.command_log import CommandLog
+from volery.runtime.services.simulation_state import State
+
+_SET_STATE = "simulation_interfaces/srv/SetSimulationState"
+
+
+class Repetition:
+    """Takes the commands of a recorded flight; the `Repeats` of an engine."""
+
+    def __init__(
+        self,
+        flight: RecordedFlight,
+        gateway: Gateway,
+        engine: Engine,
+        pacer: Pacer,
+        log: CommandLog,
+    ) -> None:
+        self._commands: Sequence[Command] = flight.commands
+        self._engine = engine
+        self._pacer = pacer
+        self._log = log
+        self._next = 0
+        self._end_step = -(-flight.end_ns // engine.dt_ns)
+        self._graph = gateway.graph
+        self._clients = _Clients(gateway.graph)
+        self._stopped = False
+        self.over = False
+        """Whether the recorded flight ended here."""
+        if any(command.taken.name.startswith("/rosapi/") for command in self._commands):
+            from volery.bridges.rosbridge.rosapi import RosApi
+
+            RosApi(gateway, "ros2", gateway.graph.now_ns).start()
+
+    def next_step(self) -> int | None:
+        """Physics step of the next command, or of the end; None once it is over."""
+        if self._next < len(self._commands):
+            return self._commands[self._next].step
+        return None if self.over else max(self._end_step, self._engine.fleet.step)
+
+    def take(self) -> bool:
+        """Take the commands of the engine's moment; whether there were any.
+
+        Raises `CommandError` where the flight does not come by the moment of the next one: then it
+        is not the recorded flight.
+        """
+        first = self._next
+        while (command := self._due()) is not None:
+            self._next += 1
+            self._repeat(command.taken)
+        ended = self._next == len(self._commands) and self._engine.fleet.step >= self._end_step
+        self.over = self.over or ended
+        return self._next > first
+
+    def _due(self) -> Command | None:
+        if self._next == len(self._commands):
+            return None
+        command = self._commands[self._next]
+        moment, here = Moment(command.step, command.turn), self._engine.moment
+        if moment < here:
+            raise CommandError(
+                f"the flight is not the recorded one: command {command.number} "
+                f"({command.taken.kind} {command.taken.name}) was taken at step {moment.step}, "
+                f"turn {moment.turn}, and it is at step {here.step}, turn {here.turn} already"
+            )
+        return command if moment == here else None
+
+    def _repeat(self, taken: Taken) -> None:
+        if taken.kind == "end":
+            self.over = True
+            return
+        if self._is_left_out(taken):
+            return
+        self._log.note(taken, weight_of(taken))
+        paused = self._pacer.paused
+        # What broke in the hands of a service, or was refused, broke and was refused then too.
+        with suppress(Exception), self._graph.on_behalf_of(taken.client):
+            self._clients.do(taken)
+        if self._pacer.paused and not paused:
+            self._pacer.resume()
+
+    def _is_left_out(self, taken: Taken) -> bool:
+        """Whether a command changed only the pace, or was refused because of the pace."""
+        if taken.kind == "call" and taken.type == _SET_STATE:
+            state = State.STOPPED if taken.content is None else taken.content.state.state
+            again = self._stopped and self._engine.time_ns == 0
+            self._stopped = state == State.STOPPED or (self._stopped and state != State.PLAYING)
+            return again or state != State.STOPPED
+        return taken.kind in ("call", "goal", "cancel") and weight_of(taken) is Weight.PACES
+
+
+class _Clients:
+    """Does what the clients of a recorded flight did."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self._publishers: dict[tuple[str, str], Publisher] = {}
+        self._requests: dict[str, list[Reply]] = {}
+        self._deeds: dict[str, Callable[[Taken], None]] = {
+            "call": self._call,
+            "publish": self._publish,
+            "advertise": self._advertise,
+            "unadvertise": self._unadvertise,
+            "offer": self._offer,
+            "withdraw": self._withdraw,
+            "answer": lambda taken: self._request(taken).answer(taken.content),
+            "failure": lambda taken: self._request(taken).fail(GraphError(taken.content or "")),
+        }
+
+    def do(self, taken: Taken) -> None:
+        """Do it again; raises whatever a service that it calls raises."""
+        self._deeds[taken.kind](taken)
+
+    def _call(self, taken: Taken) -> None:
+        self._graph.call_async(taken.name, taken.content, Reply(_nobody_hears, _nobody_hears))
+
+    def _publish(self, taken: Taken) -> None:
+        key = taken.client, taken.name
+        if key not in self._publishers:
+            self._advertise(taken)
+        if taken.content is not None:
+            self._publishers[key].publish(taken.content)
+
+    def _advertise(self, taken: Taken) -> None:
+        self._unadvertise(taken)
+        self._publishers[taken.client, taken.name] = self._graph.advertise(
+            taken.name, taken.type, latched=taken.latched
+        )
+
+    def _unadvertise(self, taken: Taken) -> None:
+        publisher = self._publishers.pop((taken.client, taken.name), None)
+        if publisher is not None:
+            publisher.cancel()
+
+    def _offer(self, taken: Taken) -> None:
+        requests = self._requests[taken.name] = []
+
+        def ask(_request: Any, reply: Reply) -> None:
+            requests.append(reply)
+
+        self._graph.offer_async(taken.name, taken.type, ask)
+
+    def _withdraw(self, taken: Taken) -> None:
+        self._graph.withdraw(taken.name)
+
+    def _request(self, taken: Taken) -> Reply:
+        return self._requests[taken.name][taken.request]
+
+
+def _nobody_hears(_answer: object) -> None:
+    """The client is not here."""

@@ -1,0 +1,128 @@
+"""Where the LIDARs of a log sit in the body, by the first that tells it of a few."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from volery.autonomy.fixed_joints import FixedJoints, Mount
+from volery.bridges.logs.flights import ORIGIN_TOPIC, Origin
+from volery.core import rotations
+from volery.core.errors import RecordingError, ScenarioError
+from volery.runtime.replay.scenario_record import scenario_of
+from volery.runtime.replay.slam.sources import Heard
+
+_BODIES = ("base_link", "base_footprint", "base")
+"""Last parts of names that the body's frame goes by."""
+_STRING = "std_msgs/msg/String"
+
+
+class Log(Protocol):
+    """What is asked of a log here."""
+
+    path: Path
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """Types by topic."""
+
+    def messages(self, wanted: set[str]) -> Iterator[Heard]:
+        """Those of some topics in the order of the file."""
+
+
+def frames_of(source: Log, topics: dict[str, str]) -> dict[str, str]:
+    """Frames of scanners, topics by name, as their first messages have them.
+
+    Names whose topics say nothing are left out.
+    """
+    names = {topic: name for name, topic in topics.items()}
+    frames: dict[str, str] = {}
+    for topic, _, message in source.messages(set(names)):
+        frames.setdefault(names[topic], message.header.frame_id)
+        if len(frames) == len(names):
+            break
+    return frames
+
+
+def read_joints(source: Log, frames: set[str]) -> tuple[FixedJoints, set[str]]:
+    """Joints between frames of scanners and the body, and the frames of which nothing tells.
+
+    First counts `/tf_static`, then `/tf`, of whose moving joints the place alone is taken (what
+    they turn by is not the mount's), then the scenario that the log tells.
+    """
+    joints = FixedJoints()
+    for _, _, message in source.messages({"/tf_static"} & set(source.topics)):
+        joints.add(message)
+    open_ = {frame for frame in frames if not _is_in_body(joints, frame)}
+    if open_ and "/tf" in source.topics:
+        _join_moving(source, joints, open_)
+    unknown = {frame for frame in open_ if frame not in joints.joints}
+    if unknown and source.topics.get(ORIGIN_TOPIC) == _STRING:
+        _join_by_scenario(source, joints, unknown)
+    return joints, {frame for frame in unknown if frame not in joints.joints}
+
+
+def _chain(joints: FixedJoints, frame: str) -> list[str]:
+    """The frame and those before it."""
+    chain = [frame]
+    while chain[-1] in joints.joints and len(chain) < 17:
+        chain.append(joints.joints[chain[-1]][0])
+    return chain
+
+
+def _is_body(frame: str) -> bool:
+    return frame.rpartition("/")[2] in _BODIES
+
+
+def _is_in_body(joints: FixedJoints, frame: str) -> bool:
+    return any(map(_is_body, _chain(joints, frame)))
+
+
+def _join_moving(source: Log, joints: FixedJoints, frames: set[str]) -> None:
+    """Add what `/tf` tells of these frames, or of those that they hang on.
+
+    Where no frame goes by a body's name, a joint of the frame itself counts alone: those before it
+    may be the vehicle's own motion.
+    """
+    both = FixedJoints()
+    both.joints = dict(joints.joints)
+    for _, _, message in source.messages({"/tf"}):
+        for found in message.transforms:
+            p, child = found.transform.translation, found.child_frame_id
+            if (
+                child not in both.joints
+                and not _is_body(child)
+                and np.isfinite([p.x, p.y, p.z]).all()
+            ):
+                place = Mount(np.array([p.x, p.y, p.z]), rotations.IDENTITY)
+                both.joints[child] = found.header.frame_id, place
+        if all(_is_in_body(both, frame) for frame in frames):
+            break
+    for frame in frames:
+        names = _chain(both, frame) if _is_in_body(both, frame) else [frame]
+        joints.joints |= {name: both.joints[name] for name in names if name in both.joints}
+
+
+def _join_by_scenario(source: Log, joints: FixedJoints, frames: set[str]) -> None:
+    """Add the mounts of the scenario that was flown."""
+    for _, _, message in source.messages({ORIGIN_TOPIC}):
+        try:
+            scenario = scenario_of(Origin.from_json(message.data))
+        except (RecordingError, ScenarioError):  # of another version
+            return
+        kinds = [group.type for group in scenario.uavs for _ in range(group.count)]
+        for number, kind in enumerate(kinds, 1):
+            for sensor in scenario.types[kind].sensors:
+                frame = f"uav{number}/laser_{sensor.name}"
+                if sensor.kind == "lidar" and frame in frames:
+                    joints.joints[frame] = f"uav{number}/base_link", _mount(sensor)
+        return
+
+
+def _mount(sensor: Any) -> Mount:
+    turn = rotations.from_rpy(*(math.radians(angle) for angle in sensor.rpy_deg))
+    return Mount(np.array(sensor.position_m, np.float64), turn)

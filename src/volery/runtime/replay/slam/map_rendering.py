@@ -1,0 +1,137 @@
+"""The map that scans at their final poses make."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.fixed_joints import Mount
+from volery.autonomy.mapping.columns import Columns
+from volery.autonomy.mapping.log_odds import LogOddsGrid
+from volery.core import rotations
+from volery.core.errors import RecordingError
+from volery.graph.messages import LaserScan, stamp_of
+from volery.runtime.replay.slam.offline_slam import Outcome
+from volery.runtime.replay.slam.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+_NEAREST_M = 0.05
+_MARGIN_M = 1.0
+_MOST_CELLS = 100_000_000
+_COARSEST_M = 2.0
+"""Width of cells in which a map says nothing any more: it is of a way that ran away."""
+_SLAB_M = 0.5
+"""Returns so far above or below the scanner, along a leaning scan, are of other things: ground,
+branches."""
+
+
+_OVER_GROUND_M = 0.6
+"""What a flying scanner meets lower than this may be the ground."""
+_EVERY, _NEAREST_GROUND_M, _FARTHEST_GROUND_M = 4, 0.6, 20.0
+"""Beams of the nodding LIDAR that tell where the ground is: each fourth, m."""
+
+
+def draw_map(outcome: Outcome, cell_m: float, reach_m: float) -> LogOddsGrid:
+    """The grid of a run; returns beyond `reach_m` are free space up to there.
+
+    Its cells are `cell_m` wide, or so many times doubled that it needs no more memory than there
+    may be. `RecordingError` where that makes them too coarse.
+    """
+    ground = _ground(outcome)
+    rays = [
+        _rays(outcome.trajectory, row, scan, outcome.mount(scan.header.frame_id), reach_m, ground)
+        for row, scan in outcome.scans
+    ]
+    ends = [np.concatenate([starts[:1], ends]) for starts, ends, _ in rays if len(starts)]
+    spread = np.concatenate(ends) if ends else outcome.trajectory.position[:, :2]
+    low, high = spread.min(axis=0) - _MARGIN_M, spread.max(axis=0) + _MARGIN_M
+    grid = LogOddsGrid(low, high, fitting_cell(high - low, cell_m))
+    for starts, ends_, hits in rays:
+        grid.add(starts, ends_, hits)
+    return grid
+
+
+def fitting_cell(size: Array, cell_m: float) -> float:
+    """Width of the cells that a map of a size (2,) m can have, the one wished for or a coarser.
+
+    `RecordingError` where there is none.
+    """
+    wished = cell_m
+    while np.isfinite(size).all() and cell_m <= max(_COARSEST_M, wished):
+        if float(np.prod(size / cell_m)) <= _MOST_CELLS:
+            return cell_m
+        cell_m *= 2.0
+    raise RecordingError(
+        f"a map of {size[0]:.0f} m x {size[1]:.0f} m is too large: the way ran away"
+    )
+
+
+def _rays(
+    trajectory: Trajectory,
+    row: int,
+    scan: LaserScan,
+    mount: Mount,
+    reach_m: float,
+    ground: Columns | None,
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Starts and ends (K, 2) of a scan in the map, and which end in something."""
+    ranges = np.asarray(scan.ranges, np.float64)
+    nearest = max(_NEAREST_M, float(scan.range_min))
+    most = float(scan.range_max)
+    rows = np.flatnonzero((ranges >= nearest) & (ranges <= (most if most > 0.0 else math.inf)))
+    length = np.minimum(ranges[rows], reach_m)
+    hits = ranges[rows] <= reach_m
+    angle = float(scan.angle_min) + rows * float(scan.angle_increment)
+    flat = np.stack([length * np.cos(angle), length * np.sin(angle), np.zeros(len(rows))], axis=1)
+    place, turn = _poses(trajectory, row, scan, rows)
+    starts = rotations.rotate(turn, mount.position) + place
+    ends = rotations.rotate(rotations.multiply(turn, mount.attitude), flat) + starts
+    rise = np.abs(ends[:, 2] - starts[:, 2])
+    short = np.minimum(_SLAB_M / np.maximum(rise, 1e-9), 1.0)[:, None]
+    ends = starts + short * (ends - starts)
+    hits &= short[:, 0] >= 1.0
+    if ground is not None:  # where it has not been seen a return may well be one of it
+        hits[hits] = ground.heights_m(ends[hits]) > _OVER_GROUND_M
+    return starts[:, :2], ends[:, :2], hits
+
+
+def _ground(outcome: Outcome) -> Columns | None:
+    """Where the ground is, by the nodding LIDAR; None where there is none."""
+    if not outcome.nodding or not len(outcome.nods):
+        return None
+    found = [np.zeros((0, 3))]
+    for row, scan in outcome.nodding:
+        ranges = np.asarray(scan.ranges, np.float64)[::_EVERY]
+        near = (ranges > _NEAREST_GROUND_M) & (ranges < _FARTHEST_GROUND_M)
+        length, beams = ranges[near], np.flatnonzero(near) * _EVERY
+        when = stamp_of(scan) * 1e-9 + beams * float(scan.time_increment)
+        nod = np.interp(when, outcome.nods[:, 0], outcome.nods[:, 1])
+        angle = float(scan.angle_min) + beams * float(scan.angle_increment)
+        x, y = length * np.cos(angle), length * np.sin(angle)
+        along = np.stack([np.cos(nod) * x, y, -np.sin(nod) * x], axis=1)
+        mount = outcome.mount(scan.header.frame_id)
+        body = rotations.rotate(mount.attitude, along) + mount.position
+        place, turn = _poses(outcome.trajectory, row, scan, beams)
+        found.append(rotations.rotate(turn, body) + place)
+    return Columns(np.concatenate(found))
+
+
+def _poses(
+    trajectory: Trajectory, row: int, scan: LaserScan, beams: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Where the body was at each beam: positions (K, 3), attitudes (K, 4)."""
+    first = stamp_of(scan) - int(trajectory.time_ns[row]) + int(trajectory.clock_ns[row])
+    when = first + beams * (float(scan.time_increment) * 1e9)
+    clock = trajectory.clock_ns
+    after = np.clip(np.searchsorted(clock, when, side="right"), 1, max(len(clock) - 1, 1))
+    before = after - 1
+    after = np.minimum(after, len(clock) - 1)
+    span = np.maximum(clock[after] - clock[before], 1)
+    share = np.clip((when - clock[before]) / span, 0.0, 1.0)[:, None]
+    place = trajectory.position[before] * (1.0 - share) + trajectory.position[after] * share
+    one, other = trajectory.attitude[before], trajectory.attitude[after]
+    sign = np.where((one * other).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+    return place, rotations.normalize((1.0 - share) * one + share * sign * other)

@@ -1,0 +1,272 @@
+"""Running the SLAM node over a log: everything that it says, and the scans that make the map."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.fixed_joints import FixedJoints, Mount
+from volery.core.clock import NS_PER_S
+from volery.core.errors import RecordingError
+from volery.graph.messages import LaserScan, stamp_of
+from volery.runtime.replay.slam.extrinsics import frames_of, read_joints
+from volery.runtime.replay.slam.initial_pose import beginning_of
+from volery.runtime.replay.slam.log_host import LogHost
+from volery.runtime.replay.slam.sources import LogSource, TextSource
+from volery.runtime.replay.slam.topic_selection import LEVEL, NODDING, Asked, Channels, choose
+from volery.runtime.replay.slam.trajectory import Trajectory, corrected, way_m
+from volery.runtime.warmup.parallel_compilation import compile_all
+
+Array = NDArray[np.float64]
+
+_JOINT = "laser_nodding"
+_APART_M, _APART_RAD = 0.25, 0.2
+"""Between scans that are drawn into the map."""
+_NODDING_NS = 175_000_000
+"""Between nodding scans that tell where the ground is; a second is no multiple of it."""
+_PROGRESS_S = 0.5
+_PATIENCE_S = 60.0
+"""In which the node tells of its last corrections; the first path is that of the log's end."""
+
+
+@dataclass(frozen=True)
+class SlamOptions:
+    """What the user may say beside the log."""
+
+    asked: Asked = field(default_factory=Asked)
+    start: tuple[float, float, float, float] | None = None
+    """x, y, z in m and yaw in rad; None: as a log of Volery's tells it, else the map's origin."""
+    level_mount: tuple[float, float, float] | None = None
+    nodding_mount: tuple[float, float, float] | None = None
+    reach_m: float = 30.0
+    loop_closures: bool = True
+
+
+@dataclass
+class Outcome:
+    """What came of a run."""
+
+    channels: Channels
+    trajectory: Trajectory
+    scans: list[tuple[int, LaserScan]]
+    """Row of the trajectory, and the scan of then."""
+    mount: Callable[[str], Mount]
+    """Of a scanner, by its frame."""
+    heard: int
+    """Scans."""
+    lasted_s: float
+    """Time of the log."""
+    cpu_s: float
+    """Of the node alone."""
+    status: dict[str, Any]
+    """The last one."""
+    states: dict[str, float] = field(default_factory=dict)
+    """Seconds in each state."""
+    problems: dict[str, float] = field(default_factory=dict)
+    """Seconds with each problem."""
+    nodding: list[tuple[int, LaserScan]] = field(default_factory=list)
+    """As `scans`, of the nodding LIDAR; empty where there is none."""
+    nods: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    """(J, 2) times, s, and angles of its mount, rad, positive down; times rise."""
+    wheels_m: float | None = None
+    """Way over ground by the odometry that was heard; None: none was."""
+
+
+class SlamRun:
+    """Feeds a node with a log. `RecordingError` where the log has not what it needs."""
+
+    def __init__(self, source: LogSource | TextSource, options: SlamOptions) -> None:
+        self._source, self._options = source, options
+        self.channels = choose(source.path, source.topics, options.asked)
+        self.start = options.start or beginning_of(source, self.channels.uav, self.channels.scan)
+        """Where it begins; None: at the map's origin."""
+        self._joints = FixedJoints()
+        self._frames: dict[str, str] = {}
+        """Of the LIDARs, level and nodding, that the node hears."""
+        self._host = LogHost()
+        self._odometry: list[tuple[float, ...]] = []
+        self._times: list[int] = []
+        self._wheels: list[tuple[float, float]] = []
+        """Places of the log's odometry."""
+        self._scans: list[tuple[int, LaserScan]] = []
+        self._nodding: list[tuple[int, LaserScan]] = []
+        self._next_nodding_ns = 0
+        self._nods: list[tuple[float, float]] = []
+        self._newest: LaserScan | None = None
+        self._drawn: tuple[float, float, float] | None = None
+        self._path: Any = None
+        self._tilt = np.array([0.0, 0.0, 0.0, 1.0])
+        self._status: dict[str, Any] = {}
+        self._states: dict[str, float] = defaultdict(float)
+        self._problems: dict[str, float] = defaultdict(float)
+        self._status_ns = 0
+
+    def run(self, tell: Callable[[int, float], None] | None = None) -> Outcome:
+        """Go through the whole log; `tell` hears of scans and seconds of the log so far."""
+        uav, host = self.channels.uav, self._host
+        self._start_node()
+        host.listen(f"/{uav}/slam/odom", self._on_odometry)
+        host.listen(f"/{uav}/slam/status", self._on_status)
+        host.listen("/tf", self._on_tf)
+        names = {theirs: ours for ours, theirs in self.channels.names.items()}
+        heard, cpu, first, before, lasted = 0, 0.0, None, 0, 0
+        told = time.monotonic()
+        for topic, time_ns, message in self._source.messages(set(names)):
+            ours = names[topic]
+            if ours == f"/{uav}/{LEVEL}":
+                heard, self._newest = heard + 1, message
+            if topic == "/tf_static":
+                self._joints.add(message)
+            if ours == f"/{uav}/odom":
+                place = message.pose.pose.position
+                self._wheels.append((place.x, place.y))
+            self._keep_nodding(ours, time_ns, message)
+            if first is not None:
+                lasted += max(time_ns - before, 0)
+            first, before = first or time_ns, time_ns
+            began = time.thread_time()
+            host.hear(ours, time_ns, message)
+            cpu += time.thread_time() - began
+            if tell is not None and time.monotonic() - told > _PROGRESS_S:
+                told = time.monotonic()
+                tell(heard, lasted / NS_PER_S)
+        self._end()
+        return self._outcome(heard, lasted / NS_PER_S, cpu)
+
+    def _keep_nodding(self, topic: str, time_ns: int, message: Any) -> None:
+        uav = self.channels.uav
+        if topic == f"/{uav}/joint_states" and _JOINT in message.name:
+            angle = float(message.position[list(message.name).index(_JOINT)])
+            self._nods.append((stamp_of(message) / NS_PER_S, angle))
+        elif topic == f"/{uav}/{NODDING}" and self._times and time_ns >= self._next_nodding_ns:
+            self._next_nodding_ns = time_ns + _NODDING_NS
+            self._nodding.append((len(self._times) - 1, message))
+
+    def _start_node(self) -> None:
+        o, uav = self._options, self.channels.uav
+        parameters: dict[str, Any] = {"reach_m": o.reach_m, "loop_closures": o.loop_closures}
+        if self.start is not None:
+            parameters["start"] = list(self.start)
+        level = None if o.level_mount is None else list(o.level_mount)
+        options = {"context": self._host.context(), "namespace": f"/{uav}"}
+        if not self.channels.has_imu:
+            from volery.autonomy.slam.planar_node import PlanarSlam
+
+            compile_all(PlanarSlam.warm_ups())
+            if level is not None:
+                parameters["mount"] = [*level, 0.0, 0.0, 0.0]
+            PlanarSlam(**options, parameter_overrides=parameters)
+            return
+        from volery.autonomy.slam.slam_node import Slam
+
+        compile_all(Slam.warm_ups())
+        self._find_mounts()
+        for name, frame in self._frames.items():
+            parameters[f"{name}_mount"] = [float(v) for v in self._mount(frame).position]
+        Slam(**options, parameter_overrides=parameters)
+
+    def _find_mounts(self) -> None:
+        """Where the LIDARs sit must be known before the node begins."""
+        o, names, uav = self._options, self.channels.names, self.channels.uav
+        topics = {"level": f"/{uav}/{LEVEL}", "nodding": f"/{uav}/{NODDING}"}
+        self._frames = frames_of(
+            self._source, {name: names[topic] for name, topic in topics.items() if topic in names}
+        )
+        told = {"level": o.level_mount, "nodding": o.nodding_mount}
+        asked = {frame for name, frame in self._frames.items() if told[name] is None}
+        self._joints, unknown = read_joints(self._source, set(self._frames.values()))
+        for name, frame in self._frames.items():
+            if frame in unknown & asked:
+                raise RecordingError(
+                    f"{self._source.path}: nothing in it tells where {frame} sits in the body "
+                    f"(/tf_static, /tf, /volery/scenario): --{name}-mount X,Y,Z says it"
+                )
+
+    # ------------------------------------------------------------------------------ what it tells
+
+    def _on_odometry(self, message: Any) -> None:
+        p, q = message.pose.pose.position, message.pose.pose.orientation
+        self._times.append(stamp_of(message))
+        self._odometry.append((p.x, p.y, p.z, q.x, q.y, q.z, q.w))
+        scan = self._newest
+        if scan is None:
+            return
+        yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
+        last = self._drawn
+        if last is not None:
+            turn = abs(math.remainder(yaw - last[2], math.tau))
+            if math.hypot(p.x - last[0], p.y - last[1]) < _APART_M and turn < _APART_RAD:
+                return
+        self._drawn, self._newest = (p.x, p.y, yaw), None
+        self._scans.append((len(self._times) - 1, scan))
+
+    def _on_status(self, message: Any) -> None:
+        self._count_time()
+        self._status = json.loads(message.data)
+
+    def _count_time(self) -> None:
+        """Add the time since the last status to what that one said."""
+        now = self._host.now_ns()
+        if self._status and now > self._status_ns:
+            seconds = (now - self._status_ns) / NS_PER_S
+            self._states[self._status["state"]] += seconds
+            for problem in self._status["problems"]:
+                self._problems[problem] += seconds
+        self._status_ns = now
+
+    def _on_tf(self, message: Any) -> None:
+        for found in message.transforms:
+            if found.header.frame_id == "map":
+                q = found.transform.rotation
+                self._tilt = np.array([q.x, q.y, q.z, q.w])
+
+    def _end(self) -> None:
+        """Wait for the whole path at last."""
+        told: list[Any] = []
+        self._count_time()
+        status, self._status = self._status, {}
+        self._host.listen(f"/{self.channels.uav}/slam/path", told.append)
+        self._host.wait(_PATIENCE_S, lambda: len(told) > 1)
+        self._path = told[-1] if told else None
+        self._status = {**status, **self._last_counts()}
+
+    def _last_counts(self) -> dict[str, Any]:
+        """What has come to count since the log's end."""
+        return {k: v for k, v in self._status.items() if k in ("closures", "keyframes")}
+
+    def _outcome(self, heard: int, lasted_s: float, cpu_s: float) -> Outcome:
+        if not self._times:
+            reason = ", ".join(self._status.get("problems", ())) or "no scan was usable"
+            raise RecordingError(f"{self._source.path}: the SLAM never began ({reason})")
+        poses = [] if self._path is None else self._path.poses
+        keyframe_ns = np.array([stamp_of(one) for one in poses], np.int64)
+        keyframes = np.array([_four(one.pose) for one in poses]).reshape(-1, 4)
+        way = np.array(self._odometry)
+        trajectory = corrected(
+            np.array(self._times, np.int64), way[:, :3], way[:, 3:], keyframe_ns, keyframes,
+            self._tilt,
+        )  # fmt: skip
+        return Outcome(
+            self.channels, trajectory, self._scans, self._mount, heard, lasted_s, cpu_s,
+            self._status, self._states, self._problems, self._nodding,
+            np.array(sorted(self._nods)).reshape(-1, 2),
+            way_m(np.array(self._wheels)) if self._wheels else None,
+        )  # fmt: skip
+
+    def _mount(self, frame: str) -> Mount:
+        o, found = self._options, self._joints.mount_of(frame)
+        place = o.nodding_mount if frame == self._frames.get("nodding") else o.level_mount
+        return found if place is None else Mount(np.array(place), found.attitude)
+
+
+def _four(pose: Any) -> tuple[float, float, float, float]:
+    p, q = pose.position, pose.orientation
+    return p.x, p.y, p.z, 2.0 * math.atan2(q.z, q.w)

@@ -1,0 +1,117 @@
+"""Messages of any log: MCAP, ROS 1 bag, ROS 2 bag, or a scanner's text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from volery.bridges.logs.decoding import LogDecoder
+from volery.bridges.logs.reader import summarize
+from volery.bridges.logs.records import LogWalk, log_format
+from volery.bridges.logs.text_layout import TextLayout
+from volery.bridges.logs.text_scans import TextScans
+from volery.core.counting import counted
+from volery.core.errors import GraphError, RecordingError
+from volery.runtime.replay.slam.ros2_bags import BagWalk, bag_topics
+
+
+class Heard(NamedTuple):
+    """A message of a log."""
+
+    topic: str
+    time_ns: int
+    message: Any
+
+
+@dataclass
+class LogSource:
+    """A log with messages of types; afterwards `trouble` says what was wrong, if anything."""
+
+    path: Path
+    topics: dict[str, str]
+    """Types by topic."""
+    trouble: str = ""
+    refused: int = 0
+    """Messages that cannot be read."""
+    damage: str = ""
+    """What can be seen of the file without reading its messages."""
+    doubts: tuple[str, ...] = ()
+    _walk: Any = field(default=None, repr=False)
+
+    def messages(self, wanted: set[str]) -> Iterator[Heard]:
+        """Those of some topics in the order of the file."""
+        decoder = LogDecoder()
+        walk = self._walk(self.path)
+        for record in walk:
+            if record.topic.topic not in wanted:
+                continue
+            try:
+                message = decoder.decode(record).message
+            except GraphError as error:
+                self.refused += 1
+                self.trouble = self.trouble or f"{record.topic.topic}: {error}"
+                continue
+            yield Heard(record.topic.topic, record.time_ns, message)
+        self.trouble = self.trouble or getattr(walk, "trouble", "")
+
+
+@dataclass
+class TextSource:
+    """A scanner's text log; its topics are those that `volery convert` writes."""
+
+    path: Path
+    layout: TextLayout
+    trouble: str = ""
+    refused: int = 0
+    """Lines left out."""
+    damage: str = ""
+    doubts: list[str] = field(default_factory=list)
+    """What may be wrong with the layout."""
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """Types by topic."""
+        uav = f"/{self.layout.uav}"
+        found = {
+            f"{uav}/{self.layout.topic}": "sensor_msgs/msg/LaserScan",
+            "/tf_static": "tf2_msgs/msg/TFMessage",
+        }
+        if self.layout.odometry or self.layout.wheels:
+            found[f"{uav}/odom"] = "nav_msgs/msg/Odometry"
+        return found
+
+    def messages(self, wanted: set[str]) -> Iterator[Heard]:
+        """Those of some topics in the order of the lines."""
+        scans = TextScans(self.path, self.layout)
+        for published in scans:
+            if published.topic in wanted:
+                yield Heard(published.topic, published.time_ns, published.message)
+        self.refused, self.doubts = scans.left_out, scans.doubts
+        if scans.left_out:
+            self.trouble = f"{counted(scans.left_out, 'line')} left out; {scans.trouble}"
+
+
+def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | TextSource:
+    """The log at a path: text where a layout is given.
+
+    Raises
+    ------
+    RecordingError
+        There is no such log, or it is none.
+
+    """
+    if layout is not None:
+        return TextSource(path, layout)
+    if path.is_dir() or path.suffix == ".db3":
+        return LogSource(path, bag_topics(path), _walk=BagWalk)
+    try:
+        log_format(path)
+    except RecordingError as error:
+        if not path.is_file() or path.suffix in (".mcap", ".bag") or path.stat().st_size == 0:
+            raise
+        raise RecordingError(f"{error}; a scanner's text log needs --layout") from None
+    summary = summarize(path)
+    topics = {t.topic: t.msgtype for t in summary.topics}
+    return LogSource(path, topics, damage=summary.trouble, _walk=LogWalk)

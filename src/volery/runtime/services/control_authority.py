@@ -1,0 +1,36 @@
+"""Services by which pilots agree who steers which UAV."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from volery.graph.graph import Graph
+from volery.runtime.services.results import Fields, offer_command
+from volery.runtime.vehicles.control_authority import Pilots
+
+_OURS = "volery_interfaces/srv"
+TAKE, RELEASE, HAND_OVER = (
+    "/volery/take_control",
+    "/volery/release_control",
+    "/volery/hand_over",
+)
+
+
+def offer_piloting(graph: Graph, pilots: Pilots) -> None:
+    """Offer taking, releasing and handing over; see `Pilots`."""
+
+    def take(request: Any) -> Fields:
+        pilots.take(request.uav, request.pilot)
+        return {"message": f"{request.pilot} steers {request.uav}"}
+
+    def release(request: Any) -> Fields:
+        pilots.release(request.uav, request.pilot)
+        return {"message": f"{request.pilot} steers {request.uav or 'nothing'} no more"}
+
+    def hand_over(request: Any) -> Fields:
+        pilots.hand_over(request.uav, request.pilot, request.to)
+        return {"message": f"{request.to} steers {request.uav}"}
+
+    offer_command(graph, TAKE, f"{_OURS}/TakeControl", take)
+    offer_command(graph, RELEASE, f"{_OURS}/ReleaseControl", release)
+    offer_command(graph, HAND_OVER, f"{_OURS}/HandOver", hand_over)

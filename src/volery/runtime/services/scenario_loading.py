@@ -1,0 +1,79 @@
+"""Scenarios that clients load with changes: how many fly, what they carry, how dense a wood is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any
+
+from volery.core.errors import CommandError
+from volery.graph.graph import Graph
+from volery.runtime.build.fleet import check_types
+from volery.runtime.services.results import Fields, offer_command
+from volery.scenario import changes as scenario_changes
+from volery.scenario.changes import Changes, WorldRequest
+from volery.scenario.schema import Scenario
+from volery.scenario.sensor_sets import SENSOR_SETS, describe
+from volery.vehicle.airframe import airframe_names
+
+_OURS = "volery_interfaces/srv"
+
+
+def offer_choices(
+    graph: Graph,
+    names: Callable[[], Sequence[str]],
+    find: Callable[[str], Scenario],
+    change: Callable[[WorldRequest], None],
+) -> None:
+    """Offer `/volery/load_scenario` and `/volery/get_choices`.
+
+    names, find: scenarios that can be had. change: has another one flown, or refuses.
+    """
+
+    def load(request: Any) -> Fields:
+        if request.scenario not in names():
+            known = ", ".join(names())
+            raise CommandError(f"no scenario '{request.scenario}'; known: {known}")
+        changes = scenario_changes.parse_changes(request.changes)
+        _check_airframe(changes)
+        check_types(scenario_changes.apply(find(request.scenario), changes))
+        change(WorldRequest(request.scenario, changes))
+        return {"message": f"{request.scenario} is being loaded"}
+
+    def choices(_request: Any) -> Fields:
+        return {
+            "scenarios": list(names()),
+            "airframes": list(_airframes()),
+            "sensor_sets": list(SENSOR_SETS),
+            "sensor_set_descriptions": list(_descriptions()),
+            "changes_schema": _changes_schema(),
+        }
+
+    offer_command(graph, "/volery/load_scenario", f"{_OURS}/LoadScenario", load)
+    offer_command(graph, "/volery/get_choices", f"{_OURS}/GetChoices", choices)
+
+
+@cache
+def _changes_schema() -> str:
+    """JSON schema of what can be changed; building it takes tens of milliseconds."""
+    return json.dumps(Changes.model_json_schema())
+
+
+@cache
+def _airframes() -> tuple[str, ...]:
+    return airframe_names()
+
+
+@cache
+def _descriptions() -> tuple[str, ...]:
+    return tuple(describe(name) for name in SENSOR_SETS)
+
+
+def _check_airframe(changes: Changes) -> None:
+    """Clients choose among those that ship: a name may not become a path."""
+    if changes.airframe is not None and changes.airframe not in airframe_names():
+        known = ", ".join(airframe_names())
+        raise CommandError(
+            f"changes: key 'airframe': there is no '{changes.airframe}'; known: {known}"
+        )

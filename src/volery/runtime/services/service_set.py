@@ -1,0 +1,81 @@
+"""Everything that clients can ask of a simulation, offered in one place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from volery.runtime.services.actors import offer_things
+from volery.runtime.services.air_and_faults import offer_air_and_faults
+from volery.runtime.services.control_authority import offer_piloting
+from volery.runtime.services.entities import Entities
+from volery.runtime.services.features import offer_features
+from volery.runtime.services.grid_maps import offer_grid_maps
+from volery.runtime.services.named_poses import offer_named_poses
+from volery.runtime.services.recording import Recording
+from volery.runtime.services.simulation_state import Playing
+from volery.runtime.services.single_steps import offer_steps
+from volery.runtime.services.snapshot_services import KeptStates
+from volery.runtime.services.spawning import Spawning
+from volery.runtime.services.worlds import OnLoad, offer_worlds
+from volery.scenario.shelf import Shelf
+
+if TYPE_CHECKING:
+    from volery.runtime.simulation import Simulation
+
+
+class Services:
+    """What the services of one simulation hold on to."""
+
+    def __init__(self, playing: Playing, recording: Recording) -> None:
+        self._playing = playing
+        self._recording = recording
+
+    @property
+    def state(self) -> int:
+        """State of the simulation, as the standard numbers it."""
+        return int(self._playing.state)
+
+    @property
+    def recording(self) -> str:
+        """What a client is recording, below the folder of recordings; empty: nothing."""
+        return self._recording.name
+
+    def close(self) -> None:
+        """Give it back."""
+        self._recording.close()
+
+
+def open_services(
+    simulation: Simulation,
+    *,
+    recordings: Path | None = None,
+    on_load: OnLoad | None = None,
+    shelf: Shelf | None = None,
+    every: Callable[..., None],
+) -> Services:
+    """Offer the standard's services and ours; what the arguments mean, `Simulation` says.
+
+    `every(period_s, callback, wanted=...)` has something done in simulated time.
+    """
+    graph = simulation.graph
+    offer_features(graph, loads_worlds=on_load is not None)
+    Entities(simulation).offer()
+    Spawning(simulation).offer()
+    playing = Playing(simulation)
+    playing.offer()
+    offer_steps(simulation)
+    offer_worlds(graph, simulation.scenario, on_load, shelf)
+    offer_named_poses(graph, simulation.starts)
+    offer_air_and_faults(simulation)
+    if simulation.things is not None:
+        offer_things(simulation, simulation.things, every)
+    if simulation.scenario.world.grid_map is not None:
+        settings = simulation.scenario.world.grid_map
+        offer_grid_maps(graph, simulation.grid_world, settings, lambda: simulation.time_ns)
+    offer_piloting(graph, simulation.pilots)
+    KeptStates(simulation).offer()
+    recording = Recording(graph, recordings, simulation.commands)
+    recording.offer()
+    return Services(playing, recording)

@@ -1,0 +1,120 @@
+"""Playing, pausing, stopping, quitting and resetting a simulation, by the standard."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any
+
+from volery.core.errors import SnapshotError
+from volery.runtime.replay.command_effects import CONTINUE_RUN
+from volery.runtime.services.results import (
+    Code,
+    Fields,
+    RefusedError,
+    filled,
+    offer_command,
+    offer_result,
+)
+
+if TYPE_CHECKING:
+    from volery.runtime.simulation import Simulation
+
+_SRV = "simulation_interfaces/srv"
+_ALREADY_THERE = 101
+_TRANSITION_FAILED = 102
+WRONG_TRANSITION = 103
+_TIME, _STATE, _SPAWNED, _ALL = 1, 2, 4, 255
+
+
+class State(IntEnum):
+    """`simulation_interfaces/msg/SimulationState`."""
+
+    STOPPED = 0
+    PLAYING = 1
+    PAUSED = 2
+    QUITTING = 3
+    NO_WORLD = 4
+    LOADING_WORLD = 5
+
+
+class Playing:
+    """The state of a simulation: stopped is paused at the start, after a reset."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._stopped = False
+
+    def offer(self) -> None:
+        """Offer the services of the simulation's state."""
+        graph = self._simulation.graph
+        for name, srvtype, handler in (
+            ("get_simulation_state", "GetSimulationState", self._get),
+            ("set_simulation_state", "SetSimulationState", self._set),
+            ("reset_simulation", "ResetSimulation", self._reset),
+        ):
+            offer_result(graph, f"/{name}", f"{_SRV}/{srvtype}", handler)
+        offer_command(graph, CONTINUE_RUN, "std_srvs/srv/Trigger", self._continue)
+
+    def _continue(self, _request: Any) -> Fields:
+        self._simulation.end.fly_on()
+        return {"message": "the flight continues past the scenario's end"}
+
+    @property
+    def state(self) -> State:
+        """The present state."""
+        simulation = self._simulation
+        if simulation.quitting:
+            return State.QUITTING
+        if not simulation.paused:
+            return State.PLAYING
+        return State.STOPPED if self._stopped and simulation.time_ns == 0 else State.PAUSED
+
+    def _get(self, _request: Any) -> Fields:
+        state = {"state": int(self.state)}
+        return {"state": filled("simulation_interfaces/msg/SimulationState", state)}
+
+    def _set(self, request: Any) -> None:
+        wanted, state = int(request.state.state), self.state
+        if wanted == state:
+            raise RefusedError(_ALREADY_THERE, f"the simulation is {state.name} already")
+        if state is State.QUITTING:
+            raise RefusedError(WRONG_TRANSITION, "the simulation quits")
+        if wanted == State.PLAYING:
+            if self._simulation.end.waits:
+                raise RefusedError(WRONG_TRANSITION, self._simulation.end.notice)
+            self._stopped = False
+            self._simulation.resume()
+        elif wanted == State.PAUSED:
+            if state is State.STOPPED:
+                raise RefusedError(WRONG_TRANSITION, "it is stopped; play it, then pause it")
+            self._simulation.pause()
+        elif wanted == State.STOPPED:
+            self._stop()
+        elif wanted == State.QUITTING:
+            self._simulation.quit()
+        else:
+            raise RefusedError(WRONG_TRANSITION, f"state {wanted} cannot be asked for")
+
+    def _stop(self) -> None:
+        try:
+            self._simulation.reset()
+        except SnapshotError as error:
+            raise RefusedError(_TRANSITION_FAILED, str(error)) from None
+        self._stopped = True
+        self._simulation.pause()
+
+    def _reset(self, request: Any) -> None:
+        """Time and state go back together, and take the UAVs with them that were spawned."""
+        scope = int(request.scope)
+        if scope != _ALL and scope & ~(_TIME | _STATE | _SPAWNED):
+            raise RefusedError(Code.OPERATION_FAILED, f"there is no scope {scope}")
+        if scope == _SPAWNED:
+            self._simulation.delete_spawned()
+            return
+        if scope not in (0, _ALL) and not (scope & _TIME and scope & _STATE):
+            reason = "time and state are reset together: SCOPE_DEFAULT, SCOPE_ALL, or both bits"
+            raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
+        if scope == _TIME | _STATE and self._simulation.spawned:
+            reason = "spawned UAVs go with a reset: add SCOPE_SPAWNED, or delete them first"
+            raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
+        self._simulation.reset()

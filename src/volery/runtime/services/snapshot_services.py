@@ -1,0 +1,70 @@
+"""States of the simulation, kept by name in memory; its speed; single UAVs begun anew."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from volery.core.errors import CommandError
+from volery.graph.messages import time_from_ns
+from volery.runtime.services.results import Fields, offer_command
+from volery.runtime.snapshot import Snapshot
+
+if TYPE_CHECKING:
+    from volery.runtime.simulation import Simulation
+
+_OURS = "volery_interfaces/srv"
+_MOST_STATES = 16
+_LONGEST_NAME = 100
+
+
+class KeptStates:
+    """Offers `/volery/snapshot`, `restore`, `forget_snapshot`, `list_snapshots`, `reset_uav`."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._kept: dict[str, Snapshot] = {}
+
+    def offer(self) -> None:
+        """Offer the services."""
+        graph = self._simulation.graph
+        for name, handler in (
+            ("snapshot", self._keep),
+            ("restore", self._restore),
+            ("forget_snapshot", self._forget),
+            ("reset_uav", lambda request: self._simulation.reset_uav(request.name)),
+        ):
+            offer_command(graph, f"/volery/{name}", f"{_OURS}/ByName", handler)
+        offer_command(graph, "/volery/list_snapshots", f"{_OURS}/ListSnapshots", self._list)
+        offer_command(graph, "/volery/set_speed", f"{_OURS}/SetSpeed", self._set_speed)
+
+    def _keep(self, request: Any) -> Fields:
+        name = request.name
+        if not 0 < len(name) <= _LONGEST_NAME:
+            raise CommandError(f"the name of a state has 1 to {_LONGEST_NAME} characters")
+        if name not in self._kept and len(self._kept) >= _MOST_STATES:
+            raise CommandError(f"{_MOST_STATES} states are kept; forget one first")
+        kept = self._kept[name] = self._simulation.snapshot()
+        return {"message": f"kept the state at {kept.time_s:.3f} s"}
+
+    def _restore(self, request: Any) -> Fields:
+        kept = self._find(request.name)
+        self._simulation.restore(kept)
+        return {"message": f"back at {kept.time_s:.3f} s"}
+
+    def _forget(self, request: Any) -> None:
+        self._find(request.name)
+        del self._kept[request.name]
+
+    def _list(self, _request: Any) -> Fields:
+        stamps = [time_from_ns(kept.time_ns) for kept in self._kept.values()]
+        return {"names": list(self._kept), "stamps": stamps}
+
+    def _find(self, name: str) -> Snapshot:
+        if name not in self._kept:
+            known = ", ".join(self._kept) or "none"
+            raise CommandError(f"no state '{name}' is kept; known: {known}")
+        return self._kept[name]
+
+    def _set_speed(self, request: Any) -> None:
+        factor = request.factor
+        self._simulation.set_speed(None if factor <= 0.0 else factor)

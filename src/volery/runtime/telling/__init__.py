@@ -1,7 +1,0 @@
-"""What people who watch are told of a running simulation: places, vehicles, how it runs."""
-
-from __future__ import annotations
-
-from volery.runtime.telling.live import LiveTopics
-
-__all__ = ["LiveTopics"]

@@ -1,0 +1,259 @@
+"""Many independent copies of a scenario, stepped together: for learning and Monte Carlo.
+
+All copies share the world and one clock; each has its own UAVs, noise and wind, set by its own
+seed, and goes back to the start by itself. Copies neither see nor touch one another. They are dealt
+out to the threads in blocks, and a block's UAVs are rows of one fleet: one kernel call moves them
+all.
+
+    with Copies(load_scenario("hover"), 1024) as copies:
+        copies.command_velocity(np.tile([1.0, 0.0, 0.0], (1024, 1, 1)))
+        copies.run(0.1)
+        height = copies.state().position_map[:, 0, 2]
+        copies.reset(np.flatnonzero(height < 0.5))
+
+There is no graph: commands and readings are arrays. Nodes of the scenario do not run.
+"""
+
+from __future__ import annotations
+
+import bisect
+import itertools
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.core.clock import ns_from_s, s_from_ns
+from volery.core.counting import counted
+from volery.core.errors import CommandError, ScenarioError
+from volery.runtime.build.fleet import place
+from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
+from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
+from volery.runtime.environment_block import CopyBlock, CopyEvent, Reading
+from volery.runtime.vehicles.uav import Uav
+from volery.runtime.warmup.parallel_compilation import compiled
+from volery.runtime.warmup.requirements import needs_of
+from volery.scenario.schema import Scenario
+from volery.vehicle.fleet import FleetState
+
+Array = NDArray[np.float64]
+
+
+class Copies:
+    """`count` copies of `scenario`, each with `n` UAVs.
+
+    seeds: one for each copy; by default the scenario's and those after it. threads: results do not
+    depend on their number. All copies share the world that the scenario's seed grows: `scenario` is
+    the one given with that world fixed (`world.seed`), and a copy of seed s does what
+    `Simulation(copies.scenario.with_(seed=s))` does. Raises `ScenarioError` where the scenario
+    cannot be built.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        count: int,
+        *,
+        seeds: Sequence[int] | None = None,
+        threads: int = 2,
+    ) -> None:
+        if count < 1 or threads < 1:
+            raise ScenarioError(f"at least 1 copy and 1 thread (found {count} and {threads})")
+        if seeds is None:
+            seeds = range(scenario.seed, scenario.seed + count)
+        if len(seeds) != count:
+            raise ScenarioError(_without_seeds(count, len(seeds)))
+        scenario = scenario.with_(world={"seed": scenario.world_seed})
+        self.scenario = scenario
+        with compiled(needs_of(scenario, nodes=False)):
+            self.terrain = build_terrain(scenario)
+            self.city = build_city(scenario, self.terrain)
+            self.forest = build_forest(scenario, self.terrain, self.city)
+            self.scene = build_scene(scenario, self.terrain, self.forest, self.city)
+        self._starts = place(scenario, self.scene, self.terrain)
+        ends = np.linspace(0, count, min(threads, count) + 1).round().astype(int).tolist()
+        self._blocks = [
+            CopyBlock(scenario, self._starts, self.terrain, self.scene, seeds[a:b], a)
+            for a, b in itertools.pairwise(ends)
+        ]
+        self._first: list[int] = ends[:-1]
+        self._owed_ns = 0
+        self._closed = False
+        self._pool = ThreadPoolExecutor(len(self._blocks), thread_name_prefix="volery-copies")
+
+    # -------------------------------------------------------------------------------------- time
+
+    @property
+    def count(self) -> int:
+        """Number of copies."""
+        return sum(len(block.seeds) for block in self._blocks)
+
+    @property
+    def uav_names(self) -> tuple[str, ...]:
+        """The n UAVs of each copy."""
+        return tuple(start.name for start in self._starts)
+
+    @property
+    def time_ns(self) -> int:
+        """Time since all copies began; a copy that was reset began later."""
+        return self._blocks[0].time_ns
+
+    @property
+    def time_s(self) -> float:
+        """`time_ns` in seconds."""
+        return s_from_ns(self.time_ns)
+
+    @property
+    def age_s(self) -> Array:
+        """(K,) simulated time of each copy since its start or last reset."""
+        return np.concatenate([block.age_s() for block in self._blocks])
+
+    @property
+    def common_period_s(self) -> float:
+        """A reset at a multiple of this is exact: guidance and sensors all fire there.
+
+        At another time a copy's state and noise are those of a fresh one as well, but its guidance
+        and sensors keep the phase that they have for all copies.
+        """
+        return self._blocks[0].common_period_s
+
+    def step(self, steps: int = 1) -> None:
+        """Advance by physics steps."""
+        self._check_open()
+        check_steps(steps)
+        target = self._blocks[0].step + steps
+        others = [self._pool.submit(block.advance_to, target) for block in self._blocks[1:]]
+        self._blocks[0].advance_to(target)
+        for other in others:
+            other.result()
+
+    def run(self, seconds: float) -> None:
+        """Advance by `seconds`; parts of a step are owed to the next call."""
+        self._check_open()
+        check_seconds(seconds)
+        dt_ns = self._blocks[0].dt_ns
+        steps, self._owed_ns = divmod(self._owed_ns + ns_from_s(seconds), dt_ns)
+        self.step(steps)
+
+    def reset(self, copies: ArrayLike | None = None, seeds: Sequence[int] | None = None) -> None:
+        """Put `copies` (all by default) back to the start, with the seeds they have or new ones."""
+        chosen = self._chosen(copies)
+        for seed in seeds or ():
+            check_reset_seed(self.scenario, seed)
+        if seeds is not None and len(seeds) != len(chosen):
+            raise CommandError(_without_seeds(len(chosen), len(seeds)))
+        for block, first in zip(self._blocks, self._first, strict=True):
+            here = np.flatnonzero((chosen >= first) & (chosen < first + len(block.seeds)))
+            if len(here):
+                own = None if seeds is None else [seeds[k] for k in here.tolist()]
+                block.reset(chosen[here] - first, own)
+
+    def get_state(self) -> list[Any]:
+        """The present state of all copies, for `set_state`."""
+        return [self._owed_ns, *(block.get_state() for block in self._blocks)]
+
+    def set_state(self, state: Sequence[Any]) -> None:
+        """Go back to a state that `get_state` of this object gave."""
+        self._owed_ns = state[0]
+        for block, kept in zip(self._blocks, state[1:], strict=True):
+            block.set_state(kept)
+
+    def close(self) -> None:
+        """Give threads and scene memory back; nothing can be simulated afterwards."""
+        if not self._closed:
+            self._closed = True
+            self._pool.shutdown()
+            self.scene.close()
+
+    def __enter__(self) -> Copies:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self.close()
+
+    # ---------------------------------------------------------------------------- what is known
+
+    def state(self) -> FleetState:
+        """States of all UAVs now; each array is (K, n, ...) and a copy."""
+        parts = [block.fleet.state for block in self._blocks]
+        shape = (self.count, len(self._starts))
+        return FleetState(
+            *(
+                np.concatenate(arrays).reshape(*shape, *arrays[0].shape[1:])
+                for arrays in zip(*parts, strict=True)
+            )
+        )
+
+    def reading(self, uav: str, sensor: str) -> Reading | None:
+        """What that sensor of each copy measured last; None before its first measurement.
+
+        Arrays by the names of `sensors.samples`, each (K, ...): `reading["ranges"]`.
+        """
+        parts = [block.reading(uav, sensor) for block in self._blocks]
+        found = [part for part in parts if part is not None]
+        if not found:
+            return None
+        return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
+
+    def drain_events(self) -> list[CopyEvent]:
+        """What has happened since the last call, by time and copy."""
+        events = [event for block in self._blocks for event in block.drain_events()]
+        return sorted(events, key=lambda e: (e.event.time_ns, e.copy))
+
+    def uav(self, copy: int, name: str) -> Uav:
+        """Handle on one UAV of one copy."""
+        self._chosen([copy])
+        k = bisect.bisect_right(self._first, copy) - 1
+        return self._blocks[k].uav(copy - self._first[k], name)
+
+    # --------------------------------------------------------------------------------- commands
+
+    def command_velocity(self, velocity: ArrayLike, yaw_rate: ArrayLike = 0.0) -> None:
+        """Fly all UAVs at `velocity` (K, n, 3) m/s in their level heading frames (FLU).
+
+        They turn at `yaw_rate` (K, n) rad/s. UAVs on the ground, wrecks and those that take off do
+        not heed it.
+        """
+        shape = (self.count, len(self._starts))
+        velocity = _spread("velocity", velocity, (*shape, 3))
+        yaw_rate = _spread("yaw_rate", yaw_rate, shape)
+        for block, first in zip(self._blocks, self._first, strict=True):
+            rows = slice(first, first + len(block.seeds))
+            block.fleet.command_velocities(
+                velocity[rows].reshape(-1, 3), yaw_rate[rows].reshape(-1)
+            )
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise CommandError("the copies are closed; make new ones")
+
+    def _chosen(self, copies: ArrayLike | None) -> NDArray[np.int64]:
+        chosen = np.arange(self.count) if copies is None else np.atleast_1d(np.asarray(copies))
+        if chosen.dtype == bool:
+            if chosen.shape != (self.count,):
+                raise CommandError(
+                    f"a mask of copies has one entry for each of {self.count}, not {chosen.shape}"
+                )
+            chosen = np.flatnonzero(chosen)
+        if len(chosen) and (chosen.ndim != 1 or not np.issubdtype(chosen.dtype, np.integer)):
+            raise CommandError(f"copies are named by whole numbers or a mask, not {copies!r}")
+        if len(chosen) and not 0 <= chosen.min() <= chosen.max() < self.count:
+            raise CommandError(f"copies are numbered 0 to {self.count - 1}")
+        return chosen.astype(np.int64)
+
+
+def _spread(what: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Finite numbers for all UAVs from as many, or from fewer that stand for several."""
+    try:
+        spread = np.broadcast_to(np.asarray(values, dtype=np.float64), shape)
+    except (TypeError, ValueError):
+        raise CommandError(f"{what}: numbers that fit {shape} are needed") from None
+    if not np.isfinite(spread).all():
+        raise CommandError(f"{what} must be finite")
+    return spread
+
+
+def _without_seeds(copies: int, seeds: int) -> str:
+    return f"{counted(copies, 'copy', 'copies')} with {counted(seeds, 'seed')}: each needs one"

@@ -1,0 +1,1 @@
+"""The UAVs of a running simulation: handles, commands, spawning, control authority."""

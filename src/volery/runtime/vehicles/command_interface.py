@@ -1,0 +1,129 @@
+"""The topics and services by which the graph commands UAVs."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from volery.control.flight_modes import FlightMode
+from volery.core import rotations
+from volery.core.errors import CommandError
+from volery.core.vectors import norm
+from volery.graph.graph import Graph
+from volery.graph.messages import (
+    MultiDOFJointTrajectory,
+    PoseStamped,
+    Published,
+    Twist,
+    TwistStamped,
+    header,
+)
+from volery.runtime.services.results import Close, offer_command
+from volery.runtime.vehicles.raw_setpoints import steer_to_message, turn_rotors, turn_to_message
+from volery.runtime.vehicles.trajectory_messages import follow_message
+from volery.runtime.vehicles.uav import Uav
+
+_TRIGGER = "std_srvs/srv/Trigger"
+_SPEEDS = "std_msgs/msg/Float32MultiArray"
+_POSITION_TARGET = "mavros_msgs/msg/PositionTarget"
+_ATTITUDE_TARGET = "mavros_msgs/msg/AttitudeTarget"
+_DOWN = (FlightMode.LANDED, FlightMode.CRASHED)
+_BUSY = (FlightMode.TAKE_OFF, FlightMode.LAND, FlightMode.RETURN)
+"""Modes that no topic ends: who asks for a landing gets it while a stream of Twists goes on."""
+
+_log = logging.getLogger(__name__)
+
+
+def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Close]:
+    """Listen to the topics that command one UAV, offer its plain services.
+
+    `cmd_vel`, `goal_pose`, `trajectory`, `setpoint_raw/local` and `setpoint_raw/attitude`
+    (`runtime.vehicles.raw_setpoints`), `rotor_speeds` (fractions of full speed) and, for a kinematic
+    UAV that something outside moves, `pose_command`: its pose from the next step on.
+
+    A Twist is taken in the level heading frame, a pose and a trajectory in the map. On the ground,
+    during take-off, landing and return they are ignored. One that is none, with nan in it or in
+    another frame, is not flown: whoever sent it cannot be told, so a warning is logged, once a
+    topic. A Twist that is taken comes out again on `cmd_vel/applied`, stamped with the simulated
+    time from which it is in force, by which clients measure round trips. The services take_off,
+    hold, land and return_home answer with `success` and a reason. What is returned ends all that.
+    """
+    applied = graph.advertise(f"/{uav.name}/cmd_vel/applied", TwistStamped)
+
+    def on_twist(twist: Any) -> None:
+        linear, angular = twist.linear, twist.angular
+        uav.command_velocity([linear.x, linear.y, linear.z], angular.z)
+        if applied.wanted:
+            stamp = header(now_ns(), f"{uav.name}/base_link")
+            applied.publish(TwistStamped(header=stamp, twist=twist))
+
+    topics: dict[str, tuple[type[Any] | str, Callable[[Any], None]]] = {
+        "cmd_vel": (Twist, on_twist),
+        "goal_pose": (PoseStamped, lambda pose: go_to_message(uav, pose)),
+        "trajectory": (MultiDOFJointTrajectory, lambda message: follow_message(uav, message)),
+        "pose_command": (PoseStamped, lambda pose: stand_at_message(uav, pose)),
+        "rotor_speeds": (_SPEEDS, lambda speeds: turn_rotors(uav, speeds)),
+        "setpoint_raw/local": (_POSITION_TARGET, lambda target: steer_to_message(uav, target)),
+        "setpoint_raw/attitude": (_ATTITUDE_TARGET, lambda target: turn_to_message(uav, target)),
+    }
+    closes: list[Close] = [applied.cancel]
+    for name, (message_class, take) in topics.items():
+        topic = f"/{uav.name}/{name}"
+        closes.append(graph.subscribe(topic, _careful(uav, take, topic), message_class).cancel)
+    actions: dict[str, Callable[[], None]] = {
+        "take_off": uav.take_off,
+        "hold": uav.hold,
+        "land": uav.land,
+        "return_home": uav.return_home,
+    }
+    for name, action in actions.items():
+        path = f"/{uav.name}/{name}"
+        closes.append(offer_command(graph, path, _TRIGGER, _without_request(action)))
+    return closes
+
+
+def go_to_message(uav: Uav, message: Any) -> None:
+    """Send `uav` to a PoseStamped in the map; a rotation of zeros keeps the heading.
+
+    Raises `CommandError`, also for another frame.
+    """
+    if message.header.frame_id not in ("", "map"):
+        raise CommandError(f"goals are in 'map', not in '{message.header.frame_id}'")
+    place, turn = message.pose.position, message.pose.orientation
+    q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=np.float64)
+    if not np.isfinite(q).all():
+        raise CommandError("the rotation of a goal must be finite")
+    yaw = float(rotations.yaw_of(q)) if norm(q) > 0.5 else None
+    uav.go_to([place.x, place.y, place.z], yaw)
+
+
+def stand_at_message(uav: Uav, message: Any) -> None:
+    """Put a kinematic `uav` at a PoseStamped in the map. Raises `CommandError`."""
+    if message.header.frame_id not in ("", "map"):
+        raise CommandError(f"poses are in 'map', not in '{message.header.frame_id}'")
+    place, turn = message.pose.position, message.pose.orientation
+    uav.command_pose([place.x, place.y, place.z], [turn.x, turn.y, turn.z, turn.w])
+
+
+def _careful(uav: Uav, take: Callable[[Any], None], topic: str) -> Callable[[Published], None]:
+    told = False
+
+    def receive(published: Published) -> None:
+        nonlocal told
+        if uav.mode in _BUSY:
+            return
+        try:
+            take(published.message)
+        except (CommandError, AttributeError) as error:
+            if not told and uav.mode not in _DOWN:
+                told = True
+                _log.warning("%s: a command is not obeyed: %s", topic, error)
+
+    return receive
+
+
+def _without_request(action: Callable[[], None]) -> Callable[[Any], None]:
+    return lambda _request: action()

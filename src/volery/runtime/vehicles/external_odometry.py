@@ -1,0 +1,97 @@
+"""Odometry that nodes make of their own sensors, on its way to the estimators of their UAVs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.flight_modes import FlightMode
+from volery.core.clock import NS_PER_S
+from volery.core.vectors import norm
+from volery.engine.engine import Engine
+from volery.engine.events import EventKind
+from volery.graph.graph import Graph
+from volery.graph.messages import Odometry, Published, stamp_of
+from volery.runtime.services.results import Close
+from volery.scenario.schema import EstimateSensor, PoseAid, Sensor
+
+Array = NDArray[np.float64]
+
+_LOOK_S = 0.1
+_SILENT_S, _TOLD_S = 2.0, 5.0
+"""Poses that have not come for so long are missed, and told of. Modelling choices."""
+
+
+class PoseAids:
+    """The odometry topics that estimators of UAVs listen to; `start` has them watched.
+
+    Where none is heard, a UAV that stands with its rotors off is known not to move: without that
+    its estimate would run away. Silence is an event, since in flight nothing helps.
+    """
+
+    def __init__(self, graph: Graph, engine: Engine) -> None:
+        self._graph = graph
+        self._engine = engine
+        self._watched: dict[str, tuple[str, int]] = {}
+        """Topic of a UAV, and since when it is listened to, ns."""
+
+    def start(self, every: Callable[..., None]) -> None:
+        """Look after them each `_LOOK_S` of simulated time."""
+        every(_LOOK_S, self._look, wanted=lambda: bool(self._watched))
+
+    def open(self, uav_name: str, sensors: Iterable[Sensor]) -> list[Close]:
+        """Feed the estimator of a UAV with the odometry that its sensor "estimate" names."""
+        aids = [s.pose for s in sensors if isinstance(s, EstimateSensor) and s.pose is not None]
+        closes: list[Close] = []
+        for aid in aids:
+            topic = f"/{uav_name}/{aid.topic}"
+            self._watched[uav_name] = aid.topic, self._engine.time_ns
+            take = _taker(self._engine, uav_name, aid)
+            closes.append(self._graph.subscribe(topic, take, Odometry).cancel)
+            closes.append(partial(self._forget, uav_name))
+        return closes
+
+    def _forget(self, uav_name: str) -> None:
+        self._watched.pop(uav_name, None)
+
+    def _look(self) -> None:
+        engine, estimation = self._engine, self._engine.estimation
+        if estimation is None:
+            return
+        now = engine.time_ns
+        for uav_name, (topic, since_ns) in self._watched.items():
+            row = engine.names.index(uav_name)
+            since = max(estimation.pose_ns(row), since_ns if since_ns <= now else 0)
+            silent_s = (now - since) / NS_PER_S
+            if silent_s >= _SILENT_S and engine.fleet.mode(row) is FlightMode.LANDED:
+                estimation.stand_still(row, now)
+            if _TOLD_S <= silent_s < _TOLD_S + _LOOK_S:  # once, without anything to remember
+                engine.note(row, EventKind.FAULT, f"hears no poses on {topic}: its estimate drifts")
+
+
+def _taker(engine: Engine, uav_name: str, aid: PoseAid) -> Callable[[Published], None]:
+    gap_ns = round(NS_PER_S / aid.rate_hz)
+    sigma_rad = math.radians(aid.sigma_deg)
+
+    def take(published: Published) -> None:
+        from volery.engine.estimation import Pose  # late: its kernels compile for seconds
+
+        stamp_ns = stamp_of(published.message)
+        place, turn = _read(published.message)
+        readable = np.isfinite(place).all() and 0.9 < norm(turn) < 1.1
+        if not readable or stamp_ns > engine.time_ns or engine.estimation is None:
+            return
+        pose = Pose(stamp_ns, place, turn, aid.sigma_m, sigma_rad)
+        engine.estimation.take_pose(engine.names.index(uav_name), pose, gap_ns=gap_ns)
+
+    return take
+
+
+def _read(message: Any) -> tuple[Array, Array]:
+    p, q = message.pose.pose.position, message.pose.pose.orientation
+    return np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])

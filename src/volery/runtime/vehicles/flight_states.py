@@ -1,0 +1,131 @@
+"""`/uavN/flight_state` and `/uavN/get_build`: what an autopilot on the graph knows of its UAV.
+
+The state is what the controllers fly on, an estimate where the UAV has one that flies. It comes at
+a fixed rate where a node of the simulation subscribes to it, and who records everything gets it
+only then; clients outside alone are shown it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from volery.control.flight_modes import FlightMode
+from volery.engine.engine import Engine
+from volery.graph.graph import Graph, Publisher
+from volery.graph.messages import Point, Pose, Quaternion, Vector3, header, message_type
+from volery.runtime.services.results import Close, Fields, offer_command
+from volery.runtime.vehicles.uav import Uav
+from volery.scenario.navigation import Origin
+from volery.vehicle.airframe import GRAVITY
+
+PERIOD_S = 0.01
+"""As often as the fastest stream of PX4's onboard link (ATTITUDE, 100 Hz)."""
+_TYPE = "volery_interfaces/msg/FlightState"
+_BUILD = "volery_interfaces/srv/GetBuild"
+_NO_BATTERY = (math.nan, math.nan, math.nan)
+_MODES = tuple(FlightMode(k).name for k in range(len(FlightMode)))
+
+
+class FlightStates:
+    """Tells of the UAVs of an engine; `start` has them told of at their rate."""
+
+    def __init__(self, graph: Graph, engine: Engine, origin: Origin) -> None:
+        self._graph = graph
+        self._engine = engine
+        self._origin = origin
+        self._publishers: dict[str, Publisher] = {}
+
+    def start(self, every: Callable[..., None]) -> None:
+        """Tell each `PERIOD_S` of simulated time from now on."""
+        every(PERIOD_S, self._tell, wanted=lambda: bool(self._wanted()))
+
+    def open(self, uav: Uav) -> list[Close]:
+        """Tell of one more; what is returned ends that."""
+        publisher = self._graph.advertise(f"/{uav.name}/flight_state", _TYPE)
+        self._publishers[uav.name] = publisher
+
+        def close() -> None:
+            del self._publishers[uav.name]
+            publisher.cancel()
+
+        offered = offer_command(
+            self._graph, f"/{uav.name}/get_build", _BUILD, lambda _request: self._build(uav)
+        )
+        return [close, offered]
+
+    def _wanted(self) -> list[tuple[int, Publisher]]:
+        """Rows of the UAVs that somebody wants to know of."""
+        told = [(k, self._publishers[name]) for k, name in enumerate(self._engine.names)]
+        return [(k, publisher) for k, publisher in told if publisher.heard or publisher.watched]
+
+    def _tell(self) -> None:
+        wanted = self._wanted()
+        for (_, publisher), message in zip(wanted, self._messages(wanted), strict=True):
+            if publisher.heard:
+                publisher.publish(message)
+            else:
+                publisher.show(message)
+
+    def _messages(self, wanted: list[tuple[int, Publisher]]) -> Iterator[Any]:
+        engine = self._engine
+        fleet, state = engine.fleet, engine.fleet.state
+        rows = np.array([k for k, _ in wanted], np.int64)
+        motion, rates = fleet.believed(rows)
+        in_air = (fleet.modes != FlightMode.LANDED) & ~state.on_ground & ~state.asleep
+        battery = (state.battery_charge, state.battery_voltage, state.battery_current)
+        batteries = np.stack([column[rows] for column in battery], axis=-1)
+        columns = zip(
+            rows.tolist(),
+            fleet.modes[rows].tolist(),
+            in_air[rows].tolist(),
+            state.crashed[rows].tolist(),
+            motion.position.tolist(),
+            motion.attitude.tolist(),
+            motion.velocity.tolist(),
+            rates.tolist(),
+            state.acceleration_map[rows].tolist(),
+            batteries.tolist(),
+            strict=True,
+        )
+        stamp = header(engine.time_ns, "map")
+        one = message_type(_TYPE)
+        for k, mode, airborne, crashed, place, q, v, w, a, power in columns:
+            airframe = fleet.airframes[k]
+            rotors = airframe.rotors
+            shares = state.rotor_speed[k, : len(rotors.places)] / rotors.max_speed_rad_s
+            yield one(
+                stamp,
+                _MODES[mode],
+                airborne,
+                crashed,
+                Pose(Point(*place), Quaternion(*q)),
+                Vector3(*v),
+                Vector3(*w),
+                Vector3(*a),
+                *(_NO_BATTERY if airframe.battery is None else power),
+                shares.astype(np.float32),
+            )
+
+    def _build(self, uav: Uav) -> Fields:
+        airframe = uav.airframe
+        limits, battery, origin = airframe.limits, airframe.battery, self._origin
+        most_thrust = len(airframe.rotors.places) * airframe.max_rotor_thrust
+        fields: dict[str, Any] = {
+            "airframe": airframe.name,
+            "rotors": len(airframe.rotors.places),
+            "hover_thrust": airframe.body.mass_kg * GRAVITY / most_thrust,
+            "speed": limits.speed_m_s,
+            "climb": limits.climb_m_s,
+            "descent": limits.descent_m_s,
+            "tilt": math.radians(limits.tilt_deg),
+            "battery_cells": 0 if battery is None else battery.cells,
+            "battery_capacity": 0.0 if battery is None else battery.capacity_ah,
+            "latitude": origin.latitude_deg,
+            "longitude": origin.longitude_deg,
+            "altitude": origin.altitude_m,
+        }
+        return fields

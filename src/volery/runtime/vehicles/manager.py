@@ -1,0 +1,212 @@
+"""The UAVs of a running simulation with all that is theirs, and how they come and go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.comms.radio.network import RadioNet
+from volery.core.errors import CommandError, PlacementError
+from volery.engine.engine import Engine
+from volery.engine.faults import FaultPlan
+from volery.graph.graph import Graph
+from volery.graph.node import Node
+from volery.graph.publishing import GraphPublisher
+from volery.runtime.build.assembly import Assembly, assemble
+from volery.runtime.build.graph import announce_sensors, start_nodes, start_system_nodes
+from volery.runtime.build.placement import Start, check_room
+from volery.runtime.build.sensor_suites import Fitted, refit
+from volery.runtime.monitoring.output_sink import Outlet
+from volery.runtime.services.results import Close
+from volery.runtime.services.uav_services import offer_uav_services
+from volery.runtime.vehicles.command_interface import open_commands
+from volery.runtime.vehicles.external_odometry import PoseAids
+from volery.runtime.vehicles.flight_states import FlightStates
+from volery.runtime.vehicles.uav import Uav
+from volery.scenario.schema import Scenario, Sensor
+from volery.vehicle.airframe import Airframe
+from volery.world.terrain import Terrain
+
+Array = NDArray[np.float64]
+
+_ROOT = "/"
+"""Namespace of the nodes of the whole system."""
+
+
+@dataclass
+class Beginning:
+    """How a UAV begins: its row in a state of a fleet that has not moved yet."""
+
+    fleet: dict[str, Any]
+    row: int
+
+
+@dataclass
+class Crew:
+    """The UAVs of an engine: starts, sensors, handles, commands on the graph, nodes.
+
+    `open(parts)` makes the first ones; `regroup(starts)` replaces them by others, of whom those
+    that were there already go on undisturbed.
+    """
+
+    scenario: Scenario
+    """With every type that may be flown."""
+    engine: Engine
+    graph: Graph
+    publisher: GraphPublisher
+    outlet: Outlet
+    faults: FaultPlan
+    starts: tuple[Start, ...]
+    """In fleet order."""
+    terrain: Terrain
+    radio: RadioNet | None = None
+    fitted: list[Fitted] = field(default_factory=list)
+    uavs: dict[str, Uav] = field(default_factory=dict)
+    nodes: list[Node] = field(default_factory=list)
+    """In fleet order, then those of the whole system."""
+    beginnings: dict[str, Beginning] = field(default_factory=dict)
+    flight_states: FlightStates = field(init=False)
+    pose_aids: PoseAids = field(init=False)
+    _closes: dict[str, list[Close]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        origin = self.scenario.world.origin
+        self.pose_aids = PoseAids(self.graph, self.engine)
+        self.flight_states = FlightStates(self.graph, self.engine, origin)
+
+    def open(self, parts: Assembly) -> None:
+        """Let the UAVs that the engine was made with take part in the graph."""
+        self.flight_states.start(self.engine.every)
+        self.pose_aids.start(self.engine.every)
+        self._take_over(parts, self.starts)
+        self.start_nodes()
+
+    def regroup(self, starts: Sequence[Start]) -> None:
+        """Fly with the UAVs `starts` from now on; nodes of new ones wait for `start_nodes`."""
+        if not self.engine.stands:
+            raise CommandError("UAVs come and go between ticks; use post()")
+        if not starts:
+            raise CommandError("a simulation needs at least one UAV")
+        parts = assemble(self.scenario, starts, self.engine.scene)
+        new = [start for start in starts if start not in self.starts]
+        going_on = {start.name for start in starts if start in self.starts}
+        for start in self.starts:
+            if start.name not in going_on:
+                self._dismiss(start.name)
+        self.starts = tuple(starts)
+        self._take_over(parts, new, going_on)
+
+    def start_nodes(self) -> None:
+        """Start the nodes of UAVs that have none yet, and those of the system if none runs."""
+        served = {node.get_namespace() for node in self.nodes}
+        alone = [start for start in self.starts if f"/{start.name}" not in served]
+        now_ns = self._now_ns
+        self.nodes += start_nodes(self.scenario, alone, self.graph, self.engine, now_ns)
+        if _ROOT not in served:
+            self.nodes += start_system_nodes(self.scenario, self.graph, self.engine, now_ns)
+        order = {f"/{start.name}": row for row, start in enumerate(self.starts)}
+        self.nodes.sort(key=lambda node: order.get(node.get_namespace(), len(order)))
+
+    def take_off(self, names: Iterable[str]) -> None:
+        """Let those of the UAVs take off that do so by themselves."""
+        chosen = set(names)
+        for start in self.starts:
+            if start.takes_off and start.name in chosen:
+                self.uavs[start.name].take_off()
+
+    def reseed(self, seed: int) -> None:
+        """Let sensors that begin anew, and UAVs that come, have the random streams of `seed`."""
+        if seed != self.scenario.seed:
+            self.scenario = self.scenario.model_copy(update={"seed": seed})
+            self.fitted = refit(self.fitted, seed)
+
+    def restart_nodes(self, name: str) -> None:
+        """Make the nodes of one UAV anew."""
+        self._end_nodes_of(name)
+        self.start_nodes()
+
+    def end_nodes(self) -> None:
+        """End all nodes."""
+        while self.nodes:
+            self.nodes.pop().destroy_node()
+
+    # -------------------------------------------------------------------------------- inside
+
+    def _take_over(
+        self, parts: Assembly, new: Sequence[Start], going_on: set[str] | None = None
+    ) -> None:
+        names = tuple(start.name for start in self.starts)
+        begun = parts.fleet.get_state()
+        if going_on is not None:
+            self.engine.regroup(parts.fleet, parts.banks, names, parts.estimation, going_on)
+            self.outlet.fleet = parts.fleet
+        self.fitted = parts.fitted
+        fresh = {start.name for start in new}
+        announce_sensors(self.publisher, [f for f in self.fitted if f.id.uav_name in fresh])
+        self.publisher.arrange(names)
+        for bank in parts.banks:
+            if bank.name == "camera":
+                cameras: Any = bank
+                cameras.bank.wants = partial(self.publisher.cameras.wanted_parts, bank.sensors)
+                self.publisher.cameras.set_size(bank.sensors, cameras.bank.pixels)
+        for row, start in enumerate(self.starts):
+            if start.name in fresh:
+                self.beginnings[start.name] = Beginning(begun, row)
+                self._enlist(start, row)
+            else:
+                self.uavs[start.name].move_to((parts.fleet, row))
+        self.uavs.update({name: self.uavs.pop(name) for name in names})  # in fleet order
+        if going_on is not None:
+            self.faults.enlist(fresh)
+            self._restart_sensors(fresh)
+
+    def _enlist(self, start: Start, row: int) -> None:
+        flight = self.scenario.types[start.type_name].flight
+        uav = Uav(self.engine.fleet, row, start.name, flight, start.type_name, self._check_goal)
+        self.uavs[start.name] = uav
+        closes = self._closes[start.name] = [
+            *open_commands(self.graph, uav, self._now_ns),
+            *offer_uav_services(self.graph, uav),
+            *self.flight_states.open(uav),
+            *self.pose_aids.open(start.name, self._sensors_of(start)),
+        ]
+        if self.radio is not None and self.scenario.types[start.type_name].radio:
+            closes.append(self.radio.join(start.name))
+
+    def _check_goal(self, position: Array, airframe: Airframe) -> None:
+        """`CommandError` for a goal under the ground or in an obstacle."""
+        at = ", ".join(f"{coordinate:.2f}" for coordinate in position)
+        scene, terrain = self.engine.scene, self.terrain
+        try:
+            check_room(position, airframe, scene, terrain, f"the goal ({at}) m")
+        except PlacementError as error:
+            raise CommandError(str(error)) from None
+
+    def _sensors_of(self, start: Start) -> Sequence[Sensor]:
+        return self.scenario.types[start.type_name].sensors
+
+    def _dismiss(self, name: str) -> None:
+        self._end_nodes_of(name)
+        for close in self._closes.pop(name):
+            close()
+        self.publisher.retire(name)
+        self.uavs.pop(name).move_to(None)
+        del self.beginnings[name]
+
+    def _end_nodes_of(self, name: str) -> None:
+        for node in [node for node in self.nodes if node.get_namespace() == f"/{name}"]:
+            node.destroy_node()
+            self.nodes.remove(node)
+
+    def _restart_sensors(self, fresh: set[str]) -> None:
+        keys = {(f.id.uav, f.id.name): f.key for f in self.fitted if f.id.uav_name in fresh}
+        rows = [row for row, start in enumerate(self.starts) if start.name in fresh]
+        self.engine.restart_sensors(np.array(rows, np.int64), keys)
+
+    def _now_ns(self) -> int:
+        return self.engine.time_ns

@@ -1,0 +1,130 @@
+"""UAVs that come and go while the simulation runs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from volery.control.setpoints import checked_attitude
+from volery.core.errors import (
+    CommandError,
+    PlacementError,
+    SpawnError,
+    SpawnFault,
+)
+from volery.runtime.build.placement import Start, check_place, on_ground, stands_on_ground
+from volery.runtime.snapshot_manager import Keeper
+from volery.runtime.vehicles.manager import Crew
+from volery.runtime.vehicles.teleport import near
+from volery.runtime.vehicles.uav import Uav
+from volery.scenario.schema import (
+    BatterySensor,
+    GroundTruthSensor,
+    ImuSensor,
+    OdometrySensor,
+    Sensor,
+    UavType,
+)
+from volery.vehicle.airframe import Airframe, airframe_names, load_airframe
+from volery.world.scene import Scene
+from volery.world.terrain import Terrain
+
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
+_TAKEN = ("volery", "tf", "tf_static", "clock", "events", "rosapi", "map", "map_in", "things")
+"""What else stands at the root of the graph."""
+
+
+class Spawner:
+    """Adds UAVs to a crew and takes them out."""
+
+    def __init__(self, crew: Crew, keeper: Keeper, scene: Scene, terrain: Terrain) -> None:
+        self._crew = crew
+        self._keeper = keeper
+        self._scene = scene
+        self._terrain = terrain
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What can be spawned: the scenario's types, and airframes with the usual sensors."""
+        types = self._crew.scenario.types
+        return (*types, *(name for name in airframe_names() if name not in types))
+
+    def spawn(self, name: str, kind: str, position_map: ArrayLike, attitude: ArrayLike) -> Uav:
+        """Add a UAV; what the arguments mean and what is raised, `Simulation.spawn_uav` says."""
+        self._check_name(name)
+        airframe = self._airframe_of(kind)
+        start = self._start(name, kind, airframe, position_map, attitude)
+        before = self._crew.starts
+        try:
+            self._crew.regroup((*before, start))
+            self._crew.start_nodes()
+        except Exception:
+            if self._crew.starts != before:
+                self._crew.regroup(before)
+            raise
+        self._keeper.enlist(name)
+        return self._crew.uavs[name]
+
+    def delete(self, names: Collection[str]) -> None:
+        """Take UAVs out. Raises `CommandError` where none would be left."""
+        if names:
+            self._crew.regroup([start for start in self._crew.starts if start.name not in names])
+
+    def _check_name(self, name: str) -> None:
+        if not _NAME.fullmatch(name) or name in _TAKEN:
+            raise SpawnError(
+                SpawnFault.NAME,
+                f"'{name}' is no name for a UAV: up to 40 of a-z, 0-9 and _, a letter first, and "
+                f"none of {', '.join(_TAKEN)}",
+            )
+        if name in self._crew.uavs:
+            raise SpawnError(SpawnFault.NAME_TAKEN, f"there is a UAV '{name}' already")
+        things = self._scene.things
+        if things is not None and name in things.names:
+            raise SpawnError(SpawnFault.NAME_TAKEN, f"there is a thing '{name}' already")
+
+    def _airframe_of(self, kind: str) -> Airframe:
+        if kind not in self.kinds:
+            known = ", ".join(self.kinds)
+            raise SpawnError(SpawnFault.TYPE, f"there is no UAV type '{kind}'; known: {known}")
+        scenario = self._crew.scenario
+        if kind not in scenario.types:
+            types = {**scenario.types, kind: usual_type(load_airframe(kind))}
+            self._crew.scenario = scenario = scenario.model_copy(update={"types": types})
+        return load_airframe(scenario.access.find_model(scenario.types[kind].airframe))
+
+    def _start(
+        self,
+        name: str,
+        kind: str,
+        airframe: Airframe,
+        position_map: ArrayLike,
+        attitude: ArrayLike,
+    ) -> Start:
+        place = np.asarray(position_map, dtype=np.float64)
+        if place.shape != (3,) or not np.isfinite(place).all():
+            raise PlacementError(f"a position is three finite numbers, not {position_map!r}")
+        try:
+            turn = checked_attitude(attitude)
+        except CommandError as error:
+            raise PlacementError(str(error)) from None
+        place = on_ground(place, airframe, self._terrain)
+        others = near(self._crew.starts, self._crew.engine.fleet.state.position_map, place)
+        check_place(place, airframe, self._scene, self._terrain, others, name)
+        stands = stands_on_ground(place, airframe, self._terrain)
+        return Start(name, kind, airframe, place, turn, on_ground=stands, takes_off=False)
+
+
+def usual_type(airframe: Airframe) -> UavType:
+    """A type for an airframe that no scenario describes: with IMU, odometry and ground truth."""
+    sensors: list[Sensor] = [
+        ImuSensor(kind="imu"),
+        OdometrySensor(kind="odometry"),
+        GroundTruthSensor(kind="ground_truth"),
+    ]
+    if airframe.battery is not None:
+        sensors.append(BatterySensor(kind="battery"))
+    return UavType(airframe=airframe.name, sensors=tuple(sensors))

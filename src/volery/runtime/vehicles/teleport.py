@@ -1,0 +1,82 @@
+"""UAVs that are put somewhere else while the simulation runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from volery.core import rotations
+from volery.core.errors import CommandError, PlacementError
+from volery.engine.engine import Engine
+from volery.runtime.build.placement import Start, check_place, lifted, stands_on_ground
+from volery.runtime.vehicles.manager import Crew
+from volery.world.scene import Scene
+from volery.world.terrain import Terrain
+
+Array = NDArray[np.float64]
+
+_REACH_M = 10.0
+"""Larger than any two UAVs."""
+
+
+class Relocator:
+    """Puts UAVs of an engine where there is room for them."""
+
+    def __init__(
+        self,
+        engine: Engine,
+        scene: Scene,
+        terrain: Terrain,
+        crew: Crew,
+    ) -> None:
+        self._engine = engine
+        self._scene = scene
+        self._terrain = terrain
+        self._crew = crew
+
+    def place(self, row: int, position_map: ArrayLike, attitude: ArrayLike) -> None:
+        """Put UAV `row` at (3,) m with (4,) x y z w, map from body; its motion goes on there.
+
+        One that flies holds there; one that stood hovers if that is in the air. Its estimate
+        begins anew. Raises `PlacementError` with the reason where it cannot be.
+        """
+        position = np.asarray(position_map, dtype=np.float64)
+        if position.shape != (3,) or not np.isfinite(position).all():
+            raise PlacementError(f"a position is three finite numbers, not {position_map!r}")
+        fleet, start = self._engine.fleet, self._crew.starts[row]
+        try:
+            position = lifted(position, start.airframe, self._terrain)
+            self._check(row, position)
+            in_air = not stands_on_ground(position, start.airframe, self._terrain)
+            fleet.put(row, position, attitude, in_air=in_air)
+        except CommandError as error:
+            raise PlacementError(str(error)) from None
+        self._engine.collisions.forget(np.array([row]))
+        streams = {f.id.uav: f.key for f in self._crew.fitted if f.id.name == "odom"}
+        if self._engine.estimation is not None and row in streams:
+            self._engine.estimation.restart({row: streams[row]})
+
+    def move(self, row: int, velocity_map: ArrayLike, omega_map: ArrayLike) -> None:
+        """Let UAV `row` move at (3,) m/s and turn at (3,) rad/s, both map, from now on.
+
+        Its controllers take it from there. Raises `CommandError` for what cannot be.
+        """
+        attitude = self._engine.fleet.state.attitude[row]
+        omega_body = rotations.rotate(rotations.conjugate(attitude), np.asarray(omega_map))
+        self._engine.fleet.push(row, velocity_map, omega_body)
+
+    def _check(self, row: int, position: Array) -> None:
+        start = self._crew.starts[row]
+        present = self._engine.fleet.state.position_map
+        around = near(self._crew.starts, present, position)
+        others = [other for other in around if other.name != start.name]
+        check_place(position, start.airframe, self._scene, self._terrain, others, start.name)
+
+
+def near(starts: Sequence[Start], present: Array, position: Array) -> list[Start]:
+    """Those of the UAVs that are within reach of `position` (3,) m, at their `present` (N, 3) m."""
+    rows = np.flatnonzero(np.linalg.norm(present - position, axis=1) < _REACH_M).tolist()
+    return [replace(starts[row], position_map=present[row]) for row in rows]

@@ -1,0 +1,72 @@
+"""Trajectories of the graph: trajectory_msgs/MultiDOFJointTrajectory as a UAV takes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.trajectory import Trajectory
+from volery.core import rotations
+from volery.core.errors import CommandError
+from volery.runtime.vehicles.uav import Uav
+
+Array = NDArray[np.float64]
+
+
+def follow_message(uav: Uav, message: Any) -> None:
+    """Command `uav` by a MultiDOFJointTrajectory, whose first joint is the vehicle.
+
+    One point at time 0 is a trajectory setpoint; else the points are flown from now on, whatever
+    the stamp. Transforms, velocities and accelerations are those of `base_link` in `map`, headings
+    come from the rotations. Raises CommandError, also for another frame.
+    """
+    if message.header.frame_id not in ("", "map"):
+        raise CommandError(f"trajectories are in 'map', not in '{message.header.frame_id}'")
+    points = message.points
+    if not len(points) or not all(len(point.transforms) for point in points):
+        raise CommandError("a trajectory needs points, each with a transform")
+    times = [p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in points]
+    position = np.array([_vector(p.transforms[0].translation) for p in points])
+    yaw = np.array([_yaw(p.transforms[0].rotation) for p in points])
+    velocity = _of_all([p.velocities for p in points], "linear")
+    acceleration = _of_all([p.accelerations for p in points], "linear")
+    turn = _of_all([p.velocities for p in points], "angular")
+    yaw_rate = None if turn is None else turn[:, 2]
+    if len(points) > 1 or times[0] > 0.0:
+        if len(points) == 1:  # reached from the present motion, and held there
+            times, position, yaw = _held(times, position, yaw)
+            velocity = acceleration = yaw_rate = None
+        uav.follow(Trajectory.from_samples(times, position, velocity, acceleration, yaw, yaw_rate))
+        return
+    rest = np.zeros((1, 3))
+    uav.command_setpoint(
+        position[0],
+        (rest if velocity is None else velocity)[0],
+        (rest if acceleration is None else acceleration)[0],
+        float(yaw[0]),
+        0.0 if yaw_rate is None else float(yaw_rate[0]),
+    )
+
+
+def _held(times: list[float], position: Array, yaw: Array) -> tuple[list[float], Array, Array]:
+    return [times[0], times[0] + 0.1], np.repeat(position, 2, axis=0), np.repeat(yaw, 2)
+
+
+def _of_all(parts: list[Any], name: str) -> Array | None:
+    """Vectors (K, 3) of the first joint where every point has one; None where some lacks it."""
+    if not all(len(part) for part in parts):
+        return None
+    return np.array([_vector(getattr(part[0], name)) for part in parts])
+
+
+def _vector(message: Any) -> list[float]:
+    return [message.x, message.y, message.z]
+
+
+def _yaw(message: Any) -> float:
+    q = np.array([message.x, message.y, message.z, message.w], dtype=np.float64)
+    if not 0.9 <= float(np.linalg.norm(q)) <= 1.1:
+        raise CommandError("rotations of a trajectory must be unit quaternions")
+    return float(rotations.yaw_of(q))

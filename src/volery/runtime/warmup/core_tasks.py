@@ -1,0 +1,186 @@
+"""Tasks that compile what the simulation itself calls: dynamics, sensors, estimators."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.fleet import Fleet
+from volery.core import rotations
+from volery.core.clock import Schedule
+from volery.core.geodesy import LocalFrame
+from volery.engine.collisions import BOUNCE, Collisions
+from volery.runtime.build.worlds import light_of
+from volery.scenario.schema import World
+from volery.sensors.gnss import GnssBank, load_gnss_model
+from volery.sensors.imu import ImuBank, load_imu_model
+from volery.sensors.joints import JointBank
+from volery.sensors.lidar_bank import LidarBank
+from volery.sensors.lidar_model import load_lidar
+from volery.sensors.magnetometer import MagnetometerBank, load_magnetometer_model
+from volery.sensors.mount import make_mount
+from volery.sensors.odometry import GroundTruthBank
+from volery.sensors.point_cloud import PointMaker
+from volery.sensors.samples import SensorId
+from volery.sensors.sonar import SonarBank, load_sonar_model
+from volery.vehicle.airframe import load_airframe
+from volery.vehicle.body_shape import body_shape
+from volery.vehicle.kinematic import Kinematic
+from volery.vehicle.plants import Plant, RigidBody
+from volery.world.scene import Scene
+from volery.world.terrain import Terrain
+from volery.world.weather import Particles, Weather
+
+
+def dynamics() -> None:
+    """The fused step, for rigid bodies alone, and what places UAVs on the ground."""
+    terrain = Terrain.flat(extent_m=10.0)
+    terrain.height([0.0], [0.0])
+    _fleet().advance(0, terrain.grid)
+
+
+def sensing() -> None:
+    """Contacts, and sensors of the kinds that most UAVs have."""
+    for count in (2, 1):  # views of a single one have another memory layout: some more kernels
+        _look_and_measure(count)
+
+
+def _look_and_measure(count: int) -> None:
+    fleet, scene = _fleet(count), _scene()
+    scene.clearance(np.zeros((1, 3)), 1.0, include_terrain=False)
+    scene.enclosing(np.zeros((1, 3)))
+    scene.set_bodies([body_shape(fleet.airframes[0])], [0] * count)
+    sensors, place, turn = _sensors(count), np.zeros((count, 3)), _level(count)
+    schedule, mounts = Schedule.from_hz(40.0), (make_mount(amplitude_rad=0.5, period_s=2.0),)
+    keys = np.zeros(count, dtype=np.uint64)
+    for bank in (
+        LidarBank(load_lidar(), schedule, sensors, count * mounts, keys, scene),
+        SonarBank(load_sonar_model("downward_sonar"), schedule, sensors, place, turn, keys, scene),
+        ImuBank(load_imu_model("adis16448"), schedule, sensors, place, turn, keys),
+        GroundTruthBank(schedule, sensors),
+        JointBank(sensors, count * mounts),
+    ):
+        bank.sample(0, 0, fleet)
+    names = tuple(sensor.uav_name for sensor in sensors)
+    Collisions(fleet, scene, names, BOUNCE, lambda _event: None).resolve(0)
+    scene.close()
+
+
+def point_clouds() -> None:
+    """LIDARs with many rings, and their points."""
+    fleet, scene = _fleet(), _scene()
+    PointMaker(_clouds(scene).sample(0, 0, fleet)).points(0)
+    scene.close()
+
+
+def falling_drops() -> None:
+    """Echoes of what falls and hangs in the air."""
+    fleet, scene = _fleet(), _scene()
+    fleet.set_weather(_RAIN)
+    _clouds(scene).sample(0, 0, fleet)
+    scene.close()
+
+
+def pictures() -> None:
+    """Cameras, and the points of their pictures."""
+    _take_pictures(Weather())
+
+
+def pictures_in_rain() -> None:
+    """Drops and flakes in pictures."""
+    _take_pictures(_RAIN)
+
+
+_RAIN = Weather(particles=Particles(rain_mm_h=1.0))
+
+
+def _take_pictures(weather: Weather) -> None:
+    from volery.sensors.cameras.bank import CameraBank
+    from volery.sensors.cameras.cloud import organised_points
+    from volery.sensors.cameras.model import load_camera
+
+    scene, fleet, sensors = _scene(), _fleet(), _sensors()
+    fleet.set_weather(weather)
+    model = load_camera().model_copy(update={"width": 8, "height": 8})
+    schedule, keys = Schedule.from_hz(10.0), np.zeros(2, dtype=np.uint64)
+    mounts = 2 * (make_mount(),)
+    bank = CameraBank(model, schedule, sensors, mounts, keys, scene, light_of(World()))
+    frames = bank.sample(0, 0, fleet)
+    organised_points(model, frames.depth[0], frames.colour[0])
+    scene.close()
+
+
+def fixes() -> None:
+    """GNSS."""
+    gnss, schedule, keys = (
+        load_gnss_model("gnss_m8"),
+        Schedule.from_hz(10.0),
+        np.zeros(2, np.uint64),
+    )
+    place = np.zeros((2, 3))
+    GnssBank(gnss, schedule, _sensors(), place, keys, LocalFrame(0, 0, 0)).sample(0, 0, _fleet())
+
+
+def magnetic_fields() -> None:
+    """Magnetometers."""
+    compass, schedule = load_magnetometer_model("magnetometer_px4"), Schedule.from_hz(10.0)
+    keys = np.zeros(2, np.uint64)
+    bank = MagnetometerBank(compass, schedule, _sensors(), _level(), keys, np.zeros(3))
+    bank.sample(0, 0, _fleet())
+
+
+def estimates() -> None:
+    """The UAVs' estimators."""
+    from volery.control.estimator.estimator import Estimator
+    from volery.control.estimator.settings import EstimatorSettings
+
+    still, level = np.zeros((2, 3)), _level()
+    rows, up = np.arange(2), np.tile([0.0, 0.0, 9.8], (2, 1))
+    estimator = Estimator(2, EstimatorSettings(), position=still, velocity=still, attitude=level)
+    estimator.fuse_pressure_height(rows, 1, np.zeros(2), 1.0)
+    estimator.predict(rows, 5_000_000, still, up)
+    estimator.covariance(rows)
+
+
+def other_plants() -> None:
+    """The fused step with plants other than rigid bodies."""
+    _fleet(plant=Kinematic()).advance(0, Terrain.flat(extent_m=10.0).grid)
+
+
+def _clouds(scene: Scene) -> LidarBank:
+    schedule, mounts = Schedule.from_hz(10.0), 2 * (make_mount(),)
+    keys = np.zeros(2, dtype=np.uint64)
+    return LidarBank(load_lidar("vlp_16"), schedule, _sensors(), mounts, keys, scene)
+
+
+def _scene() -> Scene:
+    return Scene(Terrain.flat(extent_m=10.0), None)
+
+
+def _sensors(count: int = 2) -> tuple[SensorId, ...]:
+    return tuple(SensorId(row, f"uav{row + 1}", "sensor") for row in range(count))
+
+
+def _level(count: int = 2) -> NDArray[np.float64]:
+    return np.tile(rotations.IDENTITY, (count, 1))
+
+
+def _fleet(count: int = 2, plant: Plant | None = None) -> Fleet:
+    places = [[3.0 * row, 0.0, 1.0] for row in range(count)]
+    return Fleet(
+        [load_airframe("f450")] * count, places, _level(count), plants=plant or RigidBody()
+    )
+
+
+ALWAYS = dynamics, sensing
+"""What each scenario needs; the longest ones, to begin with."""
+SOMETIMES = (
+    pictures,
+    estimates,
+    point_clouds,
+    falling_drops,
+    pictures_in_rain,
+    other_plants,
+    fixes,
+    magnetic_fields,
+)
