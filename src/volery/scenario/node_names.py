@@ -7,6 +7,7 @@ in `pyproject.toml`.
 from __future__ import annotations
 
 import difflib
+import warnings
 
 from volery.core.entry_points import EntryPoints
 from volery.core.errors import ScenarioError
@@ -15,6 +16,26 @@ NODE_PATTERN = r"^(\w[\w-]*|[\w.]+:\w+)$"
 """What scenarios, profiles and the command line take: a registered name or `module:Class`."""
 
 _REGISTERED = EntryPoints("volery.nodes")
+_FORMER_PATHS = {
+    "volery.autonomy.avoidance_fsm:RegionAvoidance": "region_avoidance",
+    "volery.autonomy.cooperative_search:CooperativeSearch": "cooperative_search",
+    "volery.autonomy.coverage.planner_node:CoveragePlanner": "coverage",
+    "volery.autonomy.depth_avoidance:DepthAvoidance": "depth_avoidance",
+    "volery.autonomy.gap_following:GapFollowing": "gap_following",
+    "volery.autonomy.mapping.mapping_node:Mapping": "mapping",
+    "volery.autonomy.mapping.merging_node:MapMerging": "map_merging",
+    "volery.autonomy.planning.exploring_node:Exploring": "exploration",
+    "volery.autonomy.planning.follower:TrajectoryFollower": "trajectory_follower",
+    "volery.autonomy.planning.global_planner:GlobalPlanner": "global_planner",
+    "volery.autonomy.planning.local_planner:LocalPlanner": "local_planner",
+    "volery.autonomy.slam.planar_node:PlanarSlam": "planar_slam",
+    "volery.autonomy.slam.slam_node:Slam": "slam",
+    "volery.autonomy.target_detection:TargetDetection": "target_detection",
+    "volery.autonomy.task_manager:TaskManager": "task_manager",
+    "volery.comms.radio_node:RadioNode": "radio",
+    "volery.mavlink.node:Autopilot": "mavlink_autopilot",
+}
+"""Names by the paths that recorded logs hold, from before nodes had names."""
 
 
 def registered_nodes() -> dict[str, str]:
@@ -25,8 +46,11 @@ def registered_nodes() -> dict[str, str]:
 def node_path(node: str) -> str:
     """Returns a node's `module:Class`. Imports nothing.
 
-    Raises `ScenarioError` for a name that no installed package registers.
+    Raises `ScenarioError` for a name that no installed package registers. Warns of a path
+    that a node has no longer.
     """
+    if node in _FORMER_PATHS:
+        return _moved(node)
     if ":" in node:
         return node
     path = _REGISTERED.find(node)
@@ -37,6 +61,15 @@ def node_path(node: str) -> str:
         raise ScenarioError(
             f"no node '{node}'{hint} It is neither module:Class nor one of: {', '.join(known)}"
         )
+    return path
+
+
+def _moved(node: str) -> str:
+    """Returns where a node is now that had this path when nodes got names."""
+    name = _FORMER_PATHS[node]
+    path = node_path(name)
+    if path != node:
+        warnings.warn(f"node '{node}' is named '{name}' now", DeprecationWarning, stacklevel=3)
     return path
 
 
