@@ -41,8 +41,8 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
     """Listen to the topics that command one UAV, offer its plain services.
 
     `cmd_vel`, `goal_pose`, `trajectory`, `setpoint_raw/local` and `setpoint_raw/attitude`
-    (`runtime.vehicles.raw_setpoints`), `rotor_speeds` (fractions of full speed) and, for a kinematic
-    UAV that something outside moves, `pose_command`: its pose from the next step on.
+    (`vehicles.raw_setpoints`), `rotor_speeds` (fractions of full speed) and, for a kinematic UAV
+    that something outside moves, `pose_command`: its pose from the next step on.
 
     A Twist is taken in the level heading frame, a pose and a trajectory in the map. On the ground,
     during take-off, landing and return they are ignored. One that is none, with nan in it or in
