@@ -8,7 +8,7 @@ from volery import Simulation, load_scenario
 from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.recorded_topics import recorded_topics
-from volery.graph.camera_publishing import CameraPublisher
+from volery.publishing.camera_publishing import CameraPublisher
 
 pytestmark = pytest.mark.slow
 SHARE = 1.0 / 3.0

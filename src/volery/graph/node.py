@@ -278,7 +278,7 @@ class Node(ParameterMethods):
         below the working folder.
         """
         folder = str(self.declare_parameter(name, default).value)
-        if not self._context.access.allows_work_folder(folder):
+        if not self._context.allows_folder(folder):
             raise NodeError(
                 f"node {self.full_name}: parameter {name}: a scenario of a log or of an upload may "
                 "name folders below the working folder only"

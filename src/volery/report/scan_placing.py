@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.graph.lidar_publishing import cloud_points
+from volery.publishing.lidar_publishing import cloud_points
 
 Array = NDArray[np.float64]
 

@@ -25,8 +25,8 @@ from volery.graph.graph import Graph
 from volery.graph.node import Node
 from volery.graph.nodes.failures import reported_failures
 from volery.graph.nodes.presence import outside_nodes
-from volery.graph.publishing import GraphPublisher
 from volery.graph.session import Gateway, Post
+from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.assembly import assemble
 from volery.runtime.build.fleet import place
 from volery.runtime.build.geometry import Geometry, WorldTopic

@@ -15,7 +15,7 @@ from volery.engine.faults import FaultPlan
 from volery.engine.partners import Partner
 from volery.graph.graph import Graph
 from volery.graph.node import Node
-from volery.graph.publishing import GraphPublisher
+from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.fleet import check_free
 from volery.runtime.build.placement import Start
 from volery.runtime.build.sensor_suites import Fitted

@@ -14,7 +14,10 @@ from typing import Any
 
 from volery.graph.graph import Graph
 from volery.graph.nodes.timer import Timers
-from volery.scenario.access import ScenarioAccess
+
+
+def _allows_every_folder(_folder: str) -> bool:
+    return True
 
 
 @dataclass(frozen=True)
@@ -31,8 +34,8 @@ class Context:
     latency_ns: int = 0
     remap: Mapping[str, str] = field(default_factory=dict)
     """Other names for topics and services: absolute name of the node's to that of the graph."""
-    access: ScenarioAccess = field(default_factory=ScenarioAccess)
-    """What the scenario that names the node may reach."""
+    allows_folder: Callable[[str], bool] = _allows_every_folder
+    """Whether the node may write into a folder of this name."""
 
 
 @dataclass(frozen=True)

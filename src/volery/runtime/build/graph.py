@@ -11,10 +11,10 @@ from volery.core.errors import CommandError, ScenarioError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.engine.faults import FaultPlan
-from volery.graph.camera_messages import Camera
 from volery.graph.graph import Graph
 from volery.graph.node import Context, Node
-from volery.graph.publishing import GraphPublisher
+from volery.publishing.camera_messages import Camera
+from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.node_loading import start_node
 from volery.runtime.build.placement import Start
 from volery.runtime.build.sensor_suites import RESULT_OF, Fitted
@@ -56,9 +56,7 @@ def start_nodes(
     for start in starts:
         for k, entry in enumerate(scenario.types[start.type_name].nodes):
             where = f"{scenario.name}: types.{start.type_name}.nodes[{k}]"
-            context = Context(
-                graph, engine, now_ns, ns_from_s(entry.latency_s), access=scenario.access
-            )
+            context = _context(scenario, entry, graph, engine, now_ns)
             own = _with_start(entry, start)
             nodes.append(start_node(own, context, f"/{start.name}", where, scenario.access))
     return nodes
@@ -79,10 +77,23 @@ def start_system_nodes(
     """The nodes of the whole system, in the order of the scenario."""
     nodes = []
     for k, entry in enumerate(scenario.nodes):
-        context = Context(graph, engine, now_ns, ns_from_s(entry.latency_s), access=scenario.access)
+        context = _context(scenario, entry, graph, engine, now_ns)
         where = f"{scenario.name}: nodes[{k}]"
         nodes.append(start_node(entry, context, "", where, scenario.access))
     return nodes
+
+
+def _context(
+    scenario: Scenario, entry: NodeEntry, graph: Graph, engine: Engine, now_ns: Callable[[], int]
+) -> Context:
+    """Returns the context of one node entry of the scenario."""
+    return Context(
+        graph,
+        engine,
+        now_ns,
+        ns_from_s(entry.latency_s),
+        allows_folder=scenario.access.allows_work_folder,
+    )
 
 
 def plan_faults(plan: FaultPlan, scenario: Scenario) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from volery.core import rotations
 from volery.core.errors import DataFileError, ScenarioError
 from volery.core.rng import stream_key
-from volery.graph.lidar_publishing import lidar_topic
+from volery.publishing.lidar_publishing import lidar_topic
 from volery.runtime.build.placement import Start
 from volery.scenario import schema
 from volery.scenario.camera import CameraSensor

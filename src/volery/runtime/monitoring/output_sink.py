@@ -8,7 +8,7 @@ from volery.control.fleet import Fleet
 from volery.engine.events import Event
 from volery.graph.graph import Graph
 from volery.graph.messages import Published
-from volery.graph.publishing import GraphPublisher
+from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.monitoring.digest import Digest
 from volery.sensors.samples import Samples
 

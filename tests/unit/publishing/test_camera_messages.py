@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from volery.core.errors import ScenarioError
-from volery.graph import picture_codecs
+from volery.publishing import image_codecs
 from volery.scenario.load import parse_scenario
 from volery.sensors.cameras.model import CameraModel
 
@@ -85,7 +85,7 @@ def test_depth_in_millimetres(look):
 
 def test_millimetres_of_what_is_not_known_are_zero():
     depth = np.array([[np.nan, np.inf, -np.inf, 65.535, 65.536, 1.0004]], np.float32)
-    np.testing.assert_array_equal(picture_codecs.millimetres(depth), [[0, 0, 0, 65535, 0, 1000]])
+    np.testing.assert_array_equal(image_codecs.millimetres(depth), [[0, 0, 0, 65535, 0, 1000]])
 
 
 def test_jpeg_is_the_picture_within_its_loss(look):
@@ -131,7 +131,7 @@ def test_compressed_depth_in_metres(look):
 
 def test_compressed_depth_of_what_16_bits_do_not_reach_is_unknown():
     depth = np.array([[0.1, 0.2, 199.0, 200.0, np.nan, np.inf, -np.inf]], np.float32)
-    data = bytes(picture_codecs.packed_metres(depth, 200.0))
+    data = bytes(image_codecs.packed_metres(depth, 200.0))
     coded = cv2.imdecode(np.frombuffer(data[12:], np.uint8), cv2.IMREAD_UNCHANGED)
     np.testing.assert_array_equal(coded > 0, [[False, True, True, False, False, False, False]])
 
@@ -175,7 +175,7 @@ def test_only_what_somebody_receives_is_coded(look, monkeypatch):
         raise AssertionError("nobody wanted this")
 
     for name in ("jpeg", "png", "packed_metres", "packed_millimetres"):
-        monkeypatch.setattr(picture_codecs, name, refuse)
+        monkeypatch.setattr(image_codecs, name, refuse)
     look("image_raw", "depth", points="xyzrgb")
     with pytest.raises(AssertionError, match="nobody wanted"):
         look("image_raw/compressed")

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.graph.graph import Graph, Publisher
-from volery.graph.lidar_returns import ReturnsPublisher
 from volery.graph.messages import (
     LaserEcho,
     LaserScan,
@@ -23,6 +22,7 @@ from volery.graph.messages import (
     header,
     single,
 )
+from volery.publishing.lidar_returns import ReturnsPublisher
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
 from volery.sensors.point_cloud import POINT, PointMaker

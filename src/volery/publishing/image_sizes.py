@@ -12,7 +12,7 @@ _POINTS = 15.0
 """Bytes a pixel after the LZ4 of a log, of a forest by day: measured on `forest_cameras`."""
 
 
-def bytes_per_picture(settings: CameraSensor, pixels: int) -> dict[str, float]:
+def bytes_per_image(settings: CameraSensor, pixels: int) -> dict[str, float]:
     """Returns about how many bytes of a log each topic takes a picture, by the topic's end.
 
     pixels: number of them in a picture.

@@ -1,4 +1,4 @@
-"""The topics of a sensor: `/UAV/SENSOR` and a suffix, and how their messages are made."""
+"""The topics of a sensor, `/UAV/SENSOR` and a suffix, and how to make their messages."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 from volery.sensors.samples import SensorId
 
 
-class Channel(NamedTuple):
+class SensorTopic(NamedTuple):
     """One of the topics of a sensor."""
 
     suffix: str
     message_class: type[Any]
     message: Callable[[Any, int], Any]
-    """(samples, row) -> message, or None where there is nothing to tell."""
+    """(samples, row) -> message, or None where the sensor has no value to publish."""
 
-    def topic(self, sensor: SensorId) -> str:
-        """Name of the topic."""
+    def name_of(self, sensor: SensorId) -> str:
+        """Returns the topic's name for one sensor."""
         return f"/{sensor.uav_name}/{sensor.name}{self.suffix}"

@@ -17,11 +17,7 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.engine.events import Event
-from volery.graph.camera_messages import OPTICAL_ATTITUDE, Camera, optical_frame
-from volery.graph.camera_publishing import CameraPublisher
-from volery.graph.channels import Channel
 from volery.graph.graph import Graph, Publisher
-from volery.graph.lidar_publishing import LidarPublisher, laser_frame
 from volery.graph.messages import (
     BatteryState,
     Clock,
@@ -44,7 +40,11 @@ from volery.graph.messages import (
     single,
     time_from_ns,
 )
-from volery.graph.navigation_messages import NAVIGATION_CHANNELS
+from volery.publishing.camera_messages import OPTICAL_ATTITUDE, Camera, optical_frame
+from volery.publishing.camera_publishing import CameraPublisher
+from volery.publishing.lidar_publishing import LidarPublisher, laser_frame
+from volery.publishing.navigation_messages import NAVIGATION_TOPICS
+from volery.publishing.sensor_topics import SensorTopic
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.samples import (
@@ -62,8 +62,8 @@ from volery.vehicle.battery import BatteryLevel
 
 Array = NDArray[np.float64]
 
-CHANNELS: dict[type[Any], tuple[Channel, ...]] = {**NAVIGATION_CHANNELS}
-"""Topics of the kinds of samples that have a channel for each."""
+SENSOR_TOPICS: dict[type[Any], tuple[SensorTopic, ...]] = {**NAVIGATION_TOPICS}
+"""Topics of each kind of samples whose messages are made row by row."""
 
 _NO_EFFORT = np.zeros(0)
 _UNKNOWN_ORIENTATION = np.full(9, 0.0)
@@ -96,7 +96,7 @@ class GraphPublisher:
             RangeReadings: self._ranges,
             OdometryReadings: self._odometry,
             JointAngles: self._joints,
-            **dict.fromkeys(CHANNELS, self._by_channel),
+            **dict.fromkeys(SENSOR_TOPICS, self._by_topic),
             BatteryReadings: self._batteries,
         }
 
@@ -119,9 +119,9 @@ class GraphPublisher:
         elif kind is BatteryReadings:
             self._advertise(f"/{sensor.uav_name}/{sensor.name}", BatteryState)
         else:
-            if kind in CHANNELS:
-                for channel in CHANNELS[kind]:
-                    self._advertise(channel.topic(sensor), channel.message_class)
+            if kind in SENSOR_TOPICS:
+                for topic in SENSOR_TOPICS[kind]:
+                    self._advertise(topic.name_of(sensor), topic.message_class)
             else:
                 message_class = Imu if kind is ImuReadings else Range
                 self._advertise(f"/{sensor.uav_name}/{sensor.name}", message_class)
@@ -297,12 +297,12 @@ class GraphPublisher:
         if transforms:
             self._tf.publish(TFMessage(transforms))
 
-    def _by_channel(self, samples: Any) -> None:
-        for channel in CHANNELS[type(samples)]:
+    def _by_topic(self, samples: Any) -> None:
+        for topic in SENSOR_TOPICS[type(samples)]:
             for row, sensor in enumerate(samples.sensors):
-                publisher = self._publishers[channel.topic(sensor)]
+                publisher = self._publishers[topic.name_of(sensor)]
                 if publisher.wanted:
-                    message = channel.message(samples, row)
+                    message = topic.message(samples, row)
                     if message is not None:
                         publisher.publish(message)
 

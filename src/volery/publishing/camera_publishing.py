@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from volery.graph import camera_messages as messages
-from volery.graph.camera_messages import Camera
 from volery.graph.graph import Graph, Publisher
 from volery.graph.messages import CameraInfo, CompressedImage, Image, PointCloud2
-from volery.graph.picture_sizes import bytes_per_picture
+from volery.publishing import camera_messages as messages
+from volery.publishing.camera_messages import Camera
+from volery.publishing.image_sizes import bytes_per_image
 from volery.scenario.camera import CameraSensor
 from volery.sensors.cameras.camera import Part
 from volery.sensors.samples import CameraFrames, SensorId
 
 
-class _Channel(NamedTuple):
+class _CameraTopic(NamedTuple):
     """One of the topics of a camera."""
 
     suffix: str
@@ -42,23 +42,23 @@ def _of_points(settings: CameraSensor) -> tuple[Part, ...]:
     return parts[settings.points]
 
 
-_CHANNELS = (
-    _Channel("/image_raw", Image, messages.colour, _always("colour")),
-    _Channel(
+_TOPICS = (
+    _CameraTopic("/image_raw", Image, messages.colour, _always("colour")),
+    _CameraTopic(
         "/image_raw/compressed", CompressedImage, messages.compressed, _if_compressed("colour")
     ),
-    _Channel("/depth", Image, messages.depth, _always("depth")),
-    _Channel(
+    _CameraTopic("/depth", Image, messages.depth, _always("depth")),
+    _CameraTopic(
         "/depth/compressedDepth",
         CompressedImage,
         messages.compressed_depth,
         _if_compressed("depth"),
     ),
-    _Channel("/points", PointCloud2, messages.points, _of_points),
+    _CameraTopic("/points", PointCloud2, messages.points, _of_points),
     # Intrinsics come with the cheapest part.
-    _Channel("/camera_info", CameraInfo, messages.camera_info, _always("depth")),
-    _Channel("/labels/instance", Image, messages.instance, _always("labels")),
-    _Channel("/labels/material", Image, messages.material, _always("labels")),
+    _CameraTopic("/camera_info", CameraInfo, messages.camera_info, _always("depth")),
+    _CameraTopic("/labels/instance", Image, messages.instance, _always("labels")),
+    _CameraTopic("/labels/material", Image, messages.material, _always("labels")),
 )
 
 
@@ -85,12 +85,12 @@ class CameraPublisher:
         self._cameras[sensor.path] = camera
         self._outlets[sensor.path] = [
             _Outlet(
-                self._graph.advertise(f"/{sensor.path}{channel.suffix}", channel.message_class),
-                channel.message,
+                self._graph.advertise(f"/{sensor.path}{topic.suffix}", topic.message_class),
+                topic.message,
                 parts,
             )
-            for channel in _CHANNELS
-            if (parts := channel.parts(camera.settings))
+            for topic in _TOPICS
+            if (parts := topic.parts(camera.settings))
         ]
 
     def set_size(self, cameras: Sequence[SensorId], pixels: int) -> None:
@@ -102,7 +102,7 @@ class CameraPublisher:
         return {
             f"/{path}{end}": size * camera.settings.rate_hz
             for path, camera in self._cameras.items()
-            for end, size in bytes_per_picture(camera.settings, self._pixels.get(path, 0)).items()
+            for end, size in bytes_per_image(camera.settings, self._pixels.get(path, 0)).items()
         }
 
     def retire(self, uav_name: str) -> None:

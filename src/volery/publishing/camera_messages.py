@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.graph import picture_codecs as codecs
 from volery.graph.messages import (
     CameraInfo,
     CompressedImage,
@@ -25,6 +24,7 @@ from volery.graph.messages import (
     RegionOfInterest,
     header,
 )
+from volery.publishing import image_codecs as codecs
 from volery.scenario.camera import CameraSensor
 from volery.sensors.cameras.cloud import COLOURED, organised_points
 from volery.sensors.samples import CameraFrames, SensorId

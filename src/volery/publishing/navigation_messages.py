@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.graph.channels import Channel
 from volery.graph.messages import (
     FluidPressure,
     MagneticField,
@@ -20,6 +19,7 @@ from volery.graph.messages import (
     Vector3,
     header,
 )
+from volery.publishing.sensor_topics import SensorTopic
 from volery.sensors.samples import GnssReadings, MagneticReadings, PressureReadings, SensorId
 
 Array = NDArray[np.float64]
@@ -88,16 +88,16 @@ def magnetic_field(readings: MagneticReadings, row: int) -> MagneticField:
     )
 
 
-NAVIGATION_CHANNELS: dict[type[Any], tuple[Channel, ...]] = {
+NAVIGATION_TOPICS: dict[type[Any], tuple[SensorTopic, ...]] = {
     GnssReadings: (
-        Channel("", NavSatFix, fix),
-        Channel("_velocity", TwistWithCovarianceStamped, fix_velocity),
+        SensorTopic("", NavSatFix, fix),
+        SensorTopic("_velocity", TwistWithCovarianceStamped, fix_velocity),
     ),
     PressureReadings: (
-        Channel("", FluidPressure, pressure),
-        Channel("/temperature", Temperature, temperature),
+        SensorTopic("", FluidPressure, pressure),
+        SensorTopic("/temperature", Temperature, temperature),
     ),
-    MagneticReadings: (Channel("", MagneticField, magnetic_field),),
+    MagneticReadings: (SensorTopic("", MagneticField, magnetic_field),),
 }
 """Topics of each kind of samples."""
 

@@ -1,0 +1,1 @@
+"""Publishes sensor samples, states and events as messages on the graph."""
