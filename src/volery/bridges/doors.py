@@ -13,10 +13,11 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Coroutine
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from volery.bridges.loop_thread import LoopThread
 from volery.core.errors import BridgeError
+from volery.graph.bridge_kind import Bridge
 from volery.graph.session import Gateway
 
 T = TypeVar("T")
@@ -25,26 +26,12 @@ _log = logging.getLogger(__name__)
 _LONGEST_START_S = 30.0
 
 
-class Door(Protocol):
-    """One way into the graph."""
-
-    @property
-    def name(self) -> str:
-        """What it is and where, for people: `ROS-TCP 127.0.0.1:10000`."""
-
-    async def start(self, gateway: Gateway) -> None:
-        """Begin to serve, or to connect. `BridgeError` where that is not possible."""
-
-    async def stop(self) -> None:
-        """Let everybody go and give everything back; also after a start that failed."""
-
-
 class Doors:
     """The thread in which doors work. Use it as a context manager, or call `close`."""
 
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
-        self._doors: list[Door] = []
+        self._doors: list[Bridge] = []
         self._thread = LoopThread("volery-doors")
         self._closed = False
         self._thread.start()
@@ -54,7 +41,7 @@ class Doors:
         """Names of the open doors."""
         return tuple(door.name for door in self._doors)
 
-    def open(self, door: Door) -> None:
+    def open(self, door: Bridge) -> None:
         """Start a door; `BridgeError` where that is not possible."""
         if self._closed:
             raise BridgeError("the doors are closed")

@@ -10,6 +10,9 @@ from volery.core.errors import BridgeError
 if TYPE_CHECKING:
     from volery.scenario.schema import Scenario
 
+BUILT_IN = ("mavlink", "mavlink-tcp", "mavlink-serial")
+"""Bridges to the autopilots that Volery has for the UAVs."""
+
 _OUTSIDE = ("px4", "px4-serial", "ardupilot")
 """Doors whose autopilots fly the UAVs."""
 _EVERY = ("px4", "ardupilot")
@@ -29,7 +32,7 @@ def check_doors(options: RunOptions) -> None:
     """`BridgeError` for doors that would fight over UAVs, and options that nothing would heed."""
     names = _names(options)
     _check_autopilots(names)
-    if options.mavlink_key is not None and not any(name.startswith("mavlink") for name in names):
+    if options.mavlink_key is not None and not set(names) & set(BUILT_IN):
         raise BridgeError("--mavlink-key signs MAVLink, and no such door is open: --door mavlink")
     heeds_silence = any(name in _OUTSIDE for name in names)
     waits_otherwise = options.autopilot_timeout_s != RunOptions.autopilot_timeout_s
@@ -91,7 +94,7 @@ def check_autopilots(scenario: Scenario, options: RunOptions) -> None:
 
 
 def _check_autopilots(names: list[str]) -> None:
-    built_in = next((name for name in names if name.startswith("mavlink")), None)
+    built_in = next((name for name in names if name in BUILT_IN), None)
     outside = [name for name in names if name in _OUTSIDE]
     if built_in is not None and outside:
         raise BridgeError(

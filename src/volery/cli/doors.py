@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from volery.cli.door_checks import check_autopilots
+from volery.cli.door_checks import BUILT_IN, check_autopilots
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
 
 if TYPE_CHECKING:
-    from volery.bridges.door_names import Address, Terms
-    from volery.bridges.doors import Door
-    from volery.mavlink.hil.lock_step import Patience
+    from volery.bridges.bridge_factory import Bridge, BridgeOptions
     from volery.mavlink.hil.px4_door import Px4Door
     from volery.mavlink.hil.px4_processes import Px4Instances
     from volery.scenario.schema import Scenario
@@ -34,7 +32,7 @@ def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
         find_px4(options.px4_dir)  # a wrong folder is told before anything is built
     check_autopilots(scenario, options)
     names = {text.partition("=")[0] for text in options.doors}
-    if any(name.startswith("mavlink") for name in names):
+    if names & set(BUILT_IN):
         from volery.mavlink.scenario_setup import with_autopilots
 
         scenario = with_autopilots(scenario)
@@ -55,38 +53,11 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
     if not options.doors:
         yield
         return
-    from volery.bridges.door_names import DoorKind, Terms, make_door
+    from volery.bridges.bridge_factory import make_bridge
     from volery.bridges.doors import Doors
 
-    patience, key = _patience_of(options), _key_of(options)
-    terms = Terms(
-        options.allow_remote,
-        options.token,
-        options.domain_id,
-        options.interfaces,
-        report=lambda text: typer.echo(text, err=True),
-    )
-    more = {
-        "comms": DoorKind(10200, _comms),
-        "mavlink": DoorKind(14540, lambda address, terms: _mavlink(address, terms, key)),
-        "px4": DoorKind(
-            4560,
-            lambda address, terms: _px4(
-                address, terms, patience, are_ours=options.px4_dir is not None
-            ),
-        ),
-        "px4-serial": DoorKind(
-            921600, lambda address, _terms: _px4_serial(address, patience), on_line=True
-        ),
-        "ardupilot": DoorKind(
-            9002, lambda address, terms: _ardupilot(address, terms, patience, simulation)
-        ),
-        "mavlink-tcp": DoorKind(5760, lambda address, terms: _mavlink_tcp(address, terms, key)),
-        "mavlink-serial": DoorKind(
-            57600, lambda address, _terms: _mavlink_serial(address, key), on_line=True
-        ),
-    }
-    wanted = [make_door(text, terms, more) for text in options.doors]
+    bridge_options = _bridge_options(options)
+    wanted = [make_bridge(text, bridge_options) for text in options.doors]
     with Doors(simulation.gateway) as doors:
         for door in wanted:
             doors.open(door)
@@ -96,79 +67,24 @@ def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
             yield
 
 
-def _comms(address: Address, terms: Terms) -> Door:
-    from volery.comms.station.station_bridge import UavStations
+def _bridge_options(options: RunOptions) -> BridgeOptions:
+    from volery.bridges.bridge_factory import BridgeOptions
 
-    return UavStations(*address, token=terms.token)
-
-
-def _mavlink(address: Address, terms: Terms, key: bytes | None) -> Door:
-    from volery.mavlink.links.udp_door import MavlinkUdp
-
-    return MavlinkUdp(*address, anywhere=terms.anywhere, key=key)
-
-
-def _mavlink_tcp(address: Address, terms: Terms, key: bytes | None) -> Door:
-    from volery.mavlink.links.tcp_door import MavlinkTcp
-
-    return MavlinkTcp(*address, anywhere=terms.anywhere, key=key)
-
-
-def _mavlink_serial(address: Address, key: bytes | None) -> Door:
-    from volery.mavlink.links.serial_door import MavlinkSerial
-
-    return MavlinkSerial(*address, key=key)
-
-
-def _key_of(options: RunOptions) -> bytes | None:
-    if options.mavlink_key is None:
-        return None
-    from volery.mavlink.links.signing import key_of
-
-    return key_of(options.mavlink_key)
-
-
-def _px4(address: Address, terms: Terms, patience: Patience, *, are_ours: bool) -> Door:
-    """`are_ours`: the run starts the PX4s, and tells by itself of those that do not come."""
-    from volery.mavlink.hil.connection_notice import NOTICE_S
-    from volery.mavlink.hil.px4_door import Px4Door
-
-    return Px4Door(
-        *address,
-        patience=patience,
-        anywhere=terms.anywhere,
-        notice_s=None if are_ours else NOTICE_S,
+    return BridgeOptions(
+        allow_remote=options.allow_remote,
+        token=options.token,
+        report=lambda text: typer.echo(text, err=True),
+        domain_id=options.domain_id,
+        interfaces=options.interfaces,
+        mavlink_key=options.mavlink_key,
+        autopilot_timeout_s=options.autopilot_timeout_s,
+        drop_on_timeout=options.drop_silent,
+        reports_missing_autopilots=options.px4_dir is None,  # else `_px4_instances` does
     )
 
 
-def _px4_serial(address: Address, patience: Patience) -> Door:
-    from volery.mavlink.hil.px4_serial_door import Px4Serial
-
-    return Px4Serial(*address, patience=patience)
-
-
-def _ardupilot(address: Address, terms: Terms, patience: Patience, simulation: Any) -> Door:
-    from volery.mavlink.hil.ardupilot_door import ArdupilotDoor
-    from volery.mavlink.hil.ardupilot_json import Rotor
-
-    rotors = {
-        name: [
-            Rotor(place.position_m[0], place.position_m[1], place.direction)
-            for place in uav.airframe.rotors.places
-        ]
-        for name, uav in getattr(simulation, "uavs", {}).items()
-    }
-    return ArdupilotDoor(rotors, *address, patience=patience, anywhere=terms.anywhere)
-
-
-def _patience_of(options: RunOptions) -> Patience:
-    from volery.mavlink.hil.lock_step import Patience
-
-    return Patience(options.autopilot_timeout_s, options.drop_silent)
-
-
 @contextmanager
-def _px4_instances(simulation: Any, doors: list[Door], options: RunOptions) -> Iterator[None]:
+def _px4_instances(simulation: Any, bridges: list[Bridge], options: RunOptions) -> Iterator[None]:
     """Run a PX4 for each UAV where that was asked for, and wait until all are connected."""
     if options.px4_dir is None:
         yield
@@ -179,7 +95,7 @@ def _px4_instances(simulation: Any, doors: list[Door], options: RunOptions) -> I
 
     build, count = find_px4(options.px4_dir), len(simulation.uav_names)
     parameters = [parameters_for(uav.airframe) for uav in simulation.uavs.values()]
-    door = next(door for door in doors if isinstance(door, Px4Door))
+    door = next(bridge for bridge in bridges if isinstance(bridge, Px4Door))
     with Px4Instances(build, count, speed=options.speed, parameters=parameters) as instances:
         typer.echo(f"started {build.binary}, instances 0 to {count - 1}", err=True)
         end_s = time.monotonic() + _LONGEST_START_S

@@ -1,22 +1,34 @@
-"""Names that installed packages give to classes and functions, from Python's entry points.
+"""Names that installed packages give to their objects, from Python's entry points.
 
 A package adds its own in its `pyproject.toml`:
 
     [project.entry-points."volery.nodes"]
     my_planner = "my_package.planning:Planner"
 
-A name that Volery gives means what Volery says, whatever else is installed.
+A name that Volery ships keeps its meaning, whatever else is installed.
 """
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterable
 from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from importlib.metadata import Distribution, EntryPoint
 
 _OWN = "volery."
+_log = logging.getLogger(__name__)
+
+
+class _Target(NamedTuple):
+    value: str
+    package: str
 
 
 class EntryPoints:
-    """The names of one group; installed packages are read at the first use."""
+    """The names of one group; the first use reads the metadata of installed packages."""
 
     def __init__(self, group: str) -> None:
         self._group = group
@@ -26,15 +38,47 @@ class EntryPoints:
         return sorted(self._targets)
 
     def find(self, name: str) -> str | None:
-        """Returns the `module:attribute` that a name stands for, without importing it."""
-        return self._targets.get(name)
+        """Returns the `module:attribute` of a name without importing it; None: no such name."""
+        target = self._targets.get(name)
+        return None if target is None else target.value
+
+    def package(self, name: str) -> str:
+        """Returns the package that adds a name; empty: no such name."""
+        target = self._targets.get(name)
+        return "" if target is None else target.package
 
     @cached_property
-    def _targets(self) -> dict[str, str]:
-        from importlib.metadata import entry_points
+    def _targets(self) -> dict[str, _Target]:
+        from importlib.metadata import distributions
 
-        found: dict[str, str] = {}
-        for point in entry_points(group=self._group):
-            if point.name not in found or point.value.startswith(_OWN):
-                found[point.name] = point.value
+        found: dict[str, _Target] = {}
+        for package in distributions():
+            for point in _points_of(package, self._group):
+                known = found.get(point.name)
+                if known is None or (_is_own(point.value) and not _is_own(known.value)):
+                    found[point.name] = _Target(point.value, _name_of(package))
         return found
+
+
+def _points_of(package: Distribution, group: str) -> Iterable[EntryPoint]:
+    """Returns a package's entry points of a group; logs why they cannot be read, and returns none.
+
+    `importlib.metadata.entry_points` would fail for all packages together.
+    """
+    try:
+        return package.entry_points.select(group=group)
+    except Exception as error:  # whatever a damaged file causes there
+        _log.warning("package %s: its entry points cannot be read: %s", _name_of(package), error)
+        return ()
+
+
+def _name_of(package: Distribution) -> str:
+    try:
+        name = package.metadata["Name"]
+    except Exception:  # whatever a damaged file causes there
+        name = None
+    return name or f"without a name in {package.locate_file('')}"
+
+
+def _is_own(value: str) -> bool:
+    return value.startswith(_OWN)

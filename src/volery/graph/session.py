@@ -17,7 +17,7 @@ from __future__ import annotations
 import itertools
 import logging
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -30,6 +30,7 @@ from volery.graph.nodes.failures import report_failure
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
 from volery.graph.read_budget import ReadBudgets, Reading, write_budgets
 from volery.graph.reply import Reply
+from volery.graph.rotor_layout import RotorLayout
 
 Post = Callable[[Callable[[], Any]], "Future[Any]"]
 """Has a function called by the simulation's thread; the future holds its result or error."""
@@ -90,18 +91,21 @@ class Gateway:
         open_queue: Callable[[], Post] | None = None,
         is_busy: Callable[[], bool] = lambda: False,
         is_late: Callable[[], bool] = lambda: False,
+        rotor_layouts: Callable[[], Mapping[str, RotorLayout]] = dict,
     ) -> None:
         """Take how sessions post: `open_queue()` is asked for each client, else all use `post`.
 
         What one client posts through its queue is done in its order, at its own expense: a client
         that costs the simulation's thread too much time waits for its turn. `is_busy()` tells
         whether the simulation has no time to spare for reading from clients, `is_late()` whether it
-        does not keep its pace; see `read_budget`.
+        does not keep its pace; see `read_budget`. `rotor_layouts()` returns the rotors of each
+        UAV by its name, in any thread.
         """
         self.read_budgets = ReadBudgets(is_busy)
         self.write_budgets = write_budgets(is_late)
         self.graph = graph
         self.watch: Watch = watch or _look_away
+        self.rotor_layouts = rotor_layouts
         self._post = post
         self._open_queue = open_queue
         self._sessions: list[Session] = []

@@ -55,6 +55,7 @@ from volery.runtime.snapshot import Snapshot
 from volery.runtime.snapshot_manager import Keeper
 from volery.runtime.vehicles.control_authority import Pilots
 from volery.runtime.vehicles.manager import Crew
+from volery.runtime.vehicles.rotor_layouts import rotor_layouts
 from volery.runtime.vehicles.spawning import Spawner
 from volery.runtime.vehicles.teleport import Relocator
 from volery.runtime.vehicles.uav import Uav
@@ -131,6 +132,7 @@ class Simulation:
             open_queue=self._open_queue,
             is_busy=self._is_busy,
             is_late=lambda: self._pacer.speed is not None and self._is_busy(),
+            rotor_layouts=lambda: rotor_layouts(self.uavs),
         )
         publisher = GraphPublisher(self.graph)
         self.outlet = Outlet(parts.fleet, self.graph, publisher)

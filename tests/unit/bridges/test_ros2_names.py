@@ -6,7 +6,7 @@ import importlib.util
 
 import pytest
 
-from volery.bridges.door_names import Terms, make_door
+from volery.bridges.bridge_factory import BridgeOptions, make_bridge
 from volery.bridges.ros2 import environment
 from volery.bridges.ros2.dds.domain import configuration
 from volery.bridges.ros2.middleware import Profile
@@ -173,10 +173,10 @@ def test_nothing_leaves_the_machine_unless_interfaces_are_named():
 
 
 def test_doors_by_name(monkeypatch):
-    assert make_door("ros2=7", Terms()).door._terms.domain_id == 7
-    named = make_door("ros2", Terms(domain_id=9, interfaces=("eth0",))).door._terms
+    assert make_bridge("ros2=7", BridgeOptions()).door._terms.domain_id == 7
+    named = make_bridge("ros2", BridgeOptions(domain_id=9, interfaces=("eth0",))).door._terms
     assert named == ("dds", 9, ("eth0",), "")
     with pytest.raises(BridgeError, match="--ros2-interface"):
-        make_door("ros2=10.0.0.1:7", Terms())
-    zenoh = make_door("ros2-zenoh=10.0.0.7:7447", Terms(domain_id=3)).door._terms
+        make_bridge("ros2=10.0.0.1:7", BridgeOptions())
+    zenoh = make_bridge("ros2-zenoh=10.0.0.7:7447", BridgeOptions(domain_id=3)).door._terms
     assert zenoh == ("zenoh", 3, (), "10.0.0.7:7447")

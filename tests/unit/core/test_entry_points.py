@@ -34,3 +34,18 @@ def test_no_other_package_takes_a_name_of_volery(install, package):
     install("mmm", slam="volery.autonomy.slam:Slam")
     install(package, slam="evil:Slam")
     assert EntryPoints("volery.tests").find("slam") == "volery.autonomy.slam:Slam"
+
+
+def test_the_package_of_a_name_is_known(install):
+    install("birds", robin="birds.small:Robin")
+    points = EntryPoints("volery.tests")
+    assert (points.package("robin"), points.package("oak")) == ("birds", "")
+
+
+@pytest.mark.parametrize("damage", [b"robin\n", b"\xff = a:b\n"])
+def test_a_package_with_damaged_metadata_does_not_break_others(install, tmp_path, caplog, damage):
+    install("aaa")
+    (tmp_path / "aaa-1.0.dist-info" / "entry_points.txt").write_bytes(b"[volery.tests]\n" + damage)
+    install("birds", robin="birds.small:Robin")
+    assert EntryPoints("volery.tests").names() == ["robin"]
+    assert "package aaa: its entry points cannot be read" in caplog.text

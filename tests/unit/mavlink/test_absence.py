@@ -6,7 +6,6 @@ import time
 import pytest
 from autopilot_bench import free_port, irises
 from px4_stand_in import Terminal, connect
-from test_ardupilot import X
 
 from volery.bridges.doors import Doors
 from volery.mavlink.hil.ardupilot_door import ArdupilotDoor
@@ -77,9 +76,7 @@ def test_nothing_is_said_by_a_door_that_closes_before_or_is_not_to(opened, caplo
 
 def test_missing_ardupilots_are_told_of(opened, caplog):
     port = free_port(socket.SOCK_DGRAM)
-    simulation = opened(
-        with_ardupilot(irises()), ArdupilotDoor({"uav1": X}, port=port, notice_s=SOON_S)
-    )
+    simulation = opened(with_ardupilot(irises()), ArdupilotDoor(port=port, notice_s=SOON_S))
     (told,) = heard(caplog, simulation)
     assert told.startswith(f"no ArduPilot yet for uav1 (UDP 127.0.0.1:{port}): it stands still")
     assert "start with: arducopter --model JSON" in told

@@ -14,10 +14,10 @@ from autopilot_bench import free_port, irises
 
 from volery.bridges.doors import Doors
 from volery.core.errors import BridgeError, PartnerError
+from volery.graph.rotor_layout import RotorPosition
 from volery.mavlink.hil.ardupilot_door import ArdupilotDoor
 from volery.mavlink.hil.ardupilot_json import (
     STATE_HZ,
-    Rotor,
     State,
     motors_of,
     parse_servos,
@@ -30,10 +30,10 @@ from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
 
 X = (
-    Rotor(0.1, -0.2, "ccw"),
-    Rotor(-0.1, 0.2, "ccw"),
-    Rotor(0.1, 0.2, "cw"),
-    Rotor(-0.1, -0.2, "cw"),
+    RotorPosition(0.1, -0.2, "ccw"),
+    RotorPosition(-0.1, 0.2, "ccw"),
+    RotorPosition(0.1, 0.2, "cw"),
+    RotorPosition(-0.1, -0.2, "cw"),
 )
 CLIMB = 1780
 """microseconds: 0.78 of full speed; 0.73 carries an iris."""
@@ -55,8 +55,7 @@ def opened():
         simulation = Simulation(scenario(count), threads=1)
         doors = Doors(simulation.gateway)
         closing.extend([doors, simulation])
-        rotors = dict.fromkeys(simulation.uavs, X)
-        door = ArdupilotDoor(rotors, port=free_port(socket.SOCK_DGRAM), patience=patience)
+        door = ArdupilotDoor(port=free_port(socket.SOCK_DGRAM), patience=patience)
         doors.open(door)
         simulation.take_in()
         return simulation, door
@@ -249,10 +248,10 @@ def test_motors_follow_the_arms():
     assert motors_of(X) == (0, 1, 2, 3)
     assert motors_of(tuple(reversed(X))) == (3, 2, 1, 0)
     plus = [
-        Rotor(0.2, 0.0, "cw"),
-        Rotor(0.0, 0.2, "ccw"),
-        Rotor(-0.2, 0.0, "cw"),
-        Rotor(0, -1, "ccw"),
+        RotorPosition(0.2, 0.0, "cw"),
+        RotorPosition(0.0, 0.2, "ccw"),
+        RotorPosition(-0.2, 0.0, "cw"),
+        RotorPosition(0, -1, "ccw"),
     ]
     assert motors_of(plus) == (2, 1, 3, 0)
     assert shares([1000, 1500, 2100, 900], (1, 0, 3, 2)) == [0.5, 0.0, 0.0, 1.0]
@@ -263,7 +262,9 @@ def test_arms_that_arducopter_does_not_fly():
         motors_of(
             [rotor._replace(direction={"cw": "ccw", "ccw": "cw"}[rotor.direction]) for rotor in X]
         )
-    six = [Rotor(math.cos(k * math.pi / 3), math.sin(k * math.pi / 3), "cw") for k in range(6)]
+    six = [
+        RotorPosition(math.cos(k * math.pi / 3), math.sin(k * math.pi / 3), "cw") for k in range(6)
+    ]
     with pytest.raises(BridgeError, match="quadrotors"):
         motors_of(six)
 
@@ -275,7 +276,7 @@ def test_a_port_that_is_taken_is_told():
         simulation = Simulation(scenario(1), threads=1)
         with simulation, Doors(simulation.gateway) as doors:
             with pytest.raises(BridgeError) as told:
-                doors.open(ArdupilotDoor({"uav1": X}, port=port))
+                doors.open(ArdupilotDoor(port=port))
             assert str(told.value) == (
                 f"uav1: cannot listen on UDP 127.0.0.1:{port}: the port is taken"
             )

@@ -8,7 +8,7 @@ import time
 import pytest
 from flying_bench import scenario
 
-from volery.bridges.door_names import Terms, make_door
+from volery.bridges.bridge_factory import BridgeOptions, make_bridge
 from volery.bridges.doors import Doors
 from volery.cli.doors import open_doors
 from volery.cli.flight import RunOptions
@@ -108,13 +108,7 @@ def test_a_port_that_is_taken_is_told(running):
         doors.open(MavlinkUdp(port=BASE))
     assert str(told.value) == f"uav1: cannot listen on UDP port {BASE + 40}: the port is taken"
     with pytest.raises(BridgeError, match="other machines"):
-        running.doors.open(make_door("mavlink=0.0.0.0:14540", Terms(), _kinds()))
-
-
-def _kinds():
-    from volery.bridges.door_names import DoorKind
-
-    return {"mavlink": DoorKind(1, lambda a, t: MavlinkUdp(*a, anywhere=t.anywhere))}
+        running.doors.open(make_bridge("mavlink=0.0.0.0:14540", BridgeOptions()))
 
 
 def test_tcp_carries_all_vehicles_on_each_connection(running):

@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 
 
 class Ros1Door:
-    """The whole simulation as one ROS 1 node; a `bridges.doors.Door`.
+    """The whole simulation as one ROS 1 node; a `graph.bridge_kind.Bridge`.
 
     Parameters
     ----------

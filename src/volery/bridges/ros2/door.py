@@ -47,7 +47,7 @@ _log = logging.getLogger(__name__)
 
 
 class Ros2Door:
-    """The whole simulation in a ROS 2 graph; a `bridges.doors.Door`.
+    """The whole simulation in a ROS 2 graph; a `graph.bridge_kind.Bridge`.
 
     Parameters
     ----------

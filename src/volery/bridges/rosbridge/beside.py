@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from volery.bridges.doors import Door
 from volery.bridges.rosbridge.rosapi import RosApi
+from volery.graph.bridge_kind import Bridge
 from volery.graph.session import Gateway
 
 
 class WithRosApi:
     """A door, and the rosapi services where nobody offers them yet."""
 
-    def __init__(self, door: Door) -> None:
+    def __init__(self, door: Bridge) -> None:
         self.door = door
         self._rosapi: RosApi | None = None
 

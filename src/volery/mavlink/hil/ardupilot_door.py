@@ -1,7 +1,7 @@
 """Real ArduCopters fly the UAVs: ArduPilot's JSON interface over UDP, in lock step.
 
     with Simulation(with_ardupilot(scenario)) as simulation, Doors(simulation.gateway) as doors:
-        doors.open(ArdupilotDoor(rotors))     # 9002 + 10 i; `arducopter --model JSON -I i` speaks
+        doors.open(ArdupilotDoor())     # 9002 + 10 i; `arducopter --model JSON -I i` speaks
         simulation.run(speed=1.0)
 
 Every 1.25 ms of simulated time each ArduPilot is told the state of its UAV, and the simulation
@@ -16,7 +16,6 @@ import asyncio
 import logging
 import math
 import time
-from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from volery.core.clock import NS_PER_S
@@ -26,7 +25,6 @@ from volery.graph.session import Gateway
 from volery.mavlink.autopilot.vehicle import Vector
 from volery.mavlink.hil.ardupilot_json import (
     STATE_HZ,
-    Rotor,
     Servos,
     State,
     motors_of,
@@ -63,23 +61,21 @@ Address = tuple[Any, ...]
 class ArdupilotDoor:
     """Listens for instance i, the autopilot of the i-th UAV, at `port` + 10 i.
 
-    rotors: of each UAV by its name, in the order of its airframe. notice_s: wall time after which
-    it is said that ArduPilots are missing.
+    The gateway knows the rotors of each UAV. notice_s: wall time after which the bridge logs that
+    ArduPilots are missing; None: the caller reports them.
     """
 
     def __init__(
         self,
-        rotors: Mapping[str, Sequence[Rotor]],
         host: str = "127.0.0.1",
         port: int = PORT,
         *,
         patience: Patience = PATIENCE,
         anywhere: bool = False,
-        notice_s: float = NOTICE_S,
+        notice_s: float | None = NOTICE_S,
     ) -> None:
         self._notice_s = notice_s
         self._absence: Absence | None = None
-        self._rotors = rotors
         self._host, self._port = host, port
         self._patience = patience
         self._anywhere = anywhere
@@ -98,12 +94,13 @@ class ArdupilotDoor:
     async def start(self, gateway: Gateway) -> None:
         """Begin to listen. `BridgeError` where a port is taken, or a UAV cannot be flown so."""
         check_address(self._host, anywhere=self._anywhere, flag="--allow-remote")
-        uavs = [uav for uav in uavs_with(gateway, _TRUTH) if uav in self._rotors]
+        rotors = gateway.rotor_layouts()
+        uavs = [uav for uav in uavs_with(gateway, _TRUTH) if uav in rotors]
         if not uavs:
             raise BridgeError("no UAV tells the true state that an ArduPilot needs")
         for k, uav in enumerate(uavs):
             try:
-                motors = motors_of(self._rotors[uav])
+                motors = motors_of(rotors[uav])
             except BridgeError as error:
                 raise BridgeError(f"{uav}: {error}") from None
             seat = _Seat(gateway, uav, motors, self._patience)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from volery.core.errors import BridgeError
 from volery.core.frames import frd_of_flu, ned_of_enu, q_ned_frd_of_enu_flu
+from volery.graph.rotor_layout import RotorLayout
 from volery.mavlink.autopilot.vehicle import Quaternion, Vector
 
 STATE_HZ = 800
@@ -41,14 +42,6 @@ class Servos(NamedTuple):
     """Counts from 0 at its start; one that comes again was not answered."""
     pwm: tuple[int, ...]
     """microseconds; 0: no output."""
-
-
-class Rotor(NamedTuple):
-    """Where a rotor is, m, FLU, and how it turns seen from above."""
-
-    x: float
-    y: float
-    direction: str
 
 
 class State(NamedTuple):
@@ -92,7 +85,7 @@ def state_line(time_s: float, state: State) -> bytes:
     return b"\n" + json.dumps(told, separators=(",", ":"), allow_nan=False).encode() + b"\n"
 
 
-def motors_of(rotors: Sequence[Rotor]) -> tuple[int, ...]:
+def motors_of(rotors: RotorLayout) -> tuple[int, ...]:
     """Which of ArduCopter's outputs, from 0, turns each rotor of a quadrotor.
 
     Arms as an X are its FRAME_TYPE 1, arms as a plus 0. `BridgeError` for any other shape, and for

@@ -16,7 +16,7 @@ _log = logging.getLogger(__name__)
 
 
 class Absence:
-    """Looks once, in the loop that runs, after `after_s`; `cancel` keeps it from looking.
+    """Looks once, in the loop that runs, after `after_s` (None: never) unless `cancel` comes first.
 
     what: the kind of autopilot. missing: where it is awaited, by UAV that has none. hint: how to
     start it.
@@ -27,14 +27,17 @@ class Absence:
         what: str,
         missing: Callable[[], Mapping[str, str]],
         hint: Callable[[], str],
-        after_s: float = NOTICE_S,
+        after_s: float | None = NOTICE_S,
     ) -> None:
         self._what, self._missing, self._hint = what, missing, hint
-        self._timer = asyncio.get_running_loop().call_later(after_s, self._look)
+        self._timer: asyncio.TimerHandle | None = None
+        if after_s is not None:
+            self._timer = asyncio.get_running_loop().call_later(after_s, self._look)
 
     def cancel(self) -> None:
         """Say nothing; a second time nothing happens."""
-        self._timer.cancel()
+        if self._timer is not None:
+            self._timer.cancel()
 
     def _look(self) -> None:
         missing = self._missing()

@@ -28,7 +28,7 @@ class Px4Serial:
     """Serves the first UAV that no other autopilot door serves.
 
     path: of the device. baud: its speed. notice_s: wall time after which it is said that nothing is
-    heard there.
+    heard there; None: the caller says so.
     """
 
     is_for_any_thread = False
@@ -39,7 +39,7 @@ class Px4Serial:
         baud: int = BAUD,
         *,
         patience: Patience = PATIENCE,
-        notice_s: float = NOTICE_S,
+        notice_s: float | None = NOTICE_S,
     ) -> None:
         self._path, self._baud = path, baud
         self._patience = patience

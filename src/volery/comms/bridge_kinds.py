@@ -1,0 +1,14 @@
+"""The bridge of this package; `pyproject.toml` gives it its name."""
+
+from __future__ import annotations
+
+from volery.graph.bridge_kind import Address, Bridge, BridgeKind, BridgeOptions
+
+
+def _comms(address: Address, options: BridgeOptions) -> Bridge:
+    from volery.comms.station.station_bridge import UavStations
+
+    return UavStations(*address, token=options.token)
+
+
+COMMS = BridgeKind(10200, _comms)
