@@ -1,1 +1,1 @@
-"""Carriers of messages in and out of the graph: here, log files."""
+"""Carries messages between the graph and other programs or log files."""
