@@ -114,10 +114,7 @@ def _embree() -> str:
         finally:
             device.close()
     except embree.EmbreeError as error:
-        raise UnfitError(
-            f"{error}; LIDARs will be slow: "
-            "run `pip install --force-reinstall embreex==4.4.0.post1`"
-        ) from None
+        raise UnfitError(str(error)) from None
     return f"library of embreex {version('embreex')} loads and hits a triangle"
 
 

@@ -112,9 +112,7 @@ class Engine:
         self._response = CRASH if crash_on_contact else BOUNCE
         self.things = scene.things
         """What moves through the world by itself, where there is anything."""
-        self._looks = (
-            None if self.things is None else ThingLooks(self.things, compiled=scene.compiled)
-        )
+        self._looks = None if self.things is None else ThingLooks(self.things)
         self.collisions = self._new_collisions(copies)
         self.state_check = StateCheck(fleet)
         self.banks = tuple(banks)

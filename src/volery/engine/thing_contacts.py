@@ -38,13 +38,13 @@ Touch = Callable[[int, int, Array, bool, int], None]
 class ThingLooks:
     """The things of a world, and looks at their shapes from near by, in their own frames."""
 
-    def __init__(self, things: MovingThings, *, compiled: bool) -> None:
+    def __init__(self, things: MovingThings) -> None:
         self.things = things
         self._reach = [2.0 * shape.radius + _FARTHEST_LOOK_M for shape in things.shapes]
         by_shape: dict[int, Scene] = {}
         for shape in things.shapes:
             if id(shape) not in by_shape:
-                by_shape[id(shape)] = _alone(shape, compiled=compiled)
+                by_shape[id(shape)] = _alone(shape)
         self._scenes = [by_shape[id(shape)] for shape in things.shapes]
 
     def from_place(self, k: int, pose: Array, place: Array) -> tuple[Array, float]:
@@ -59,9 +59,9 @@ class ThingLooks:
         return rotations.rotate(pose[3:], away), distance
 
 
-def _alone(shape: BodyShape, *, compiled: bool) -> Scene:
+def _alone(shape: BodyShape) -> Scene:
     solids = [Solid(mesh, material, "") for mesh, material in shape.parts]
-    return Scene(None, None, solids=solids, backend="embree" if compiled else "embreex")
+    return Scene(None, None, solids=solids)
 
 
 class ThingContacts:

@@ -15,13 +15,11 @@ from volery.sensors.beam_table import BeamTable, packets_of
 from volery.sensors.echo_kernels import Echoes, Surfaces
 from volery.sensors.lidar_kernels import PIECE, measure_batch, scan_batch
 from volery.sensors.lidar_model import LidarModel
-from volery.sensors.measure_kernels import measure_scan
 from volery.sensors.mount import Mount
 from volery.sensors.particle_echo_kernels import weather_scans
 from volery.sensors.particle_echoes import ParticleTable
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.embree import LANES
-from volery.world.embreex_fallback import EmbreexBackend
 from volery.world.scene import Scene
 from volery.world.scene_kernels import new_block, thread_block
 
@@ -135,21 +133,6 @@ def _clear_echoes(
     start, end = _interval(model, batch, history)
     bodies = move_bodies(scene, history, start, end)
     table = model.scan.table(_sweep_number(model, batch))
-    if not scene.compiled:
-        surfaces = _surfaces(1, beams)
-        for scan in range(scans):
-            _cast_plainly(scene, model, table, batch, scan, history, (start, end), surfaces)
-            measure_scan(
-                model.constants,
-                batch.key[scan],
-                batch.scan_number[scan],
-                batch.sweep_start_ns[scan],
-                scan,
-                0,
-                surfaces,
-                echoes,
-            )
-        return echoes
     handle, constants, counter = scene.handle, model.constants, new_counter()
     rays = min(beams, PIECE * LANES)
     common = _surfaces(scans, beams) if packets_of(beams) > PIECE else None
@@ -236,38 +219,3 @@ def _surfaces(scans: int, beams: int) -> Surfaces:
         flat.cosine[:needed].reshape(shape),
         flat.material[:needed].reshape(shape),
     )
-
-
-def _cast_plainly(
-    scene: Scene,
-    model: LidarModel,
-    table: BeamTable,
-    batch: LidarBatch,
-    scan: int,
-    history: PoseHistory,
-    interval: tuple[int, int],
-    surfaces: Surfaces,
-) -> None:
-    """What one scan meets (first row of `surfaces`), through the fallback backend."""
-    backend = scene.backend
-    assert isinstance(backend, EmbreexBackend)
-    origins, directions, times = _rays(table, batch, scan, history)
-    normal = np.empty((model.beams, 3), np.float32)
-    instance = np.empty(model.beams, np.int32)
-    fraction = np.clip((times - interval[0]) / max(interval[1] - interval[0], 1), 0.0, 1.0)
-    backend.cast(
-        scene.handle,
-        scene.workers,
-        origins,
-        directions,
-        model.range.max_m,
-        np.array([batch.uav[scan]], dtype=np.int32),
-        fraction,
-        (
-            surfaces.distance[0, : model.beams],
-            normal,
-            instance,
-            surfaces.material[0, : model.beams],
-        ),
-    )
-    surfaces.cosine[0, : model.beams] = np.abs(np.einsum("ij,ij->i", normal, directions))

@@ -50,8 +50,16 @@ class EmbreeError(VoleryError):
     """Embree refused a call; the message names the call and Embree's reason."""
 
 
+EMBREEX_VERSION = "4.4.0.post1"
+"""Of the wheel: it names its libraries by their hashes, and holds the Embree that fits here."""
+
+
 class EmbreeUnavailableError(EmbreeError):
-    """The library, or something in it that is needed, is not there."""
+    """The library, or something in it that is needed, is not there; the message says the fix."""
+
+    def __init__(self, reason: str) -> None:
+        command = f"pip install --force-reinstall embreex=={EMBREEX_VERSION}"
+        super().__init__(f"{reason}; run `{command}`")
 
 
 SUPPORTED_MAJOR_MINOR = (4, 4)

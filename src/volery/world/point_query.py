@@ -2,8 +2,7 @@
 
 Embree walks its search tree and calls back for every triangle that may be near; the callback is
 compiled, so no Python runs. Distances are taken in the map frame, in double precision, and are
-therefore right for trees scaled unequally in height and width, too. `nearest_in_all` does the same
-without Embree, over everything: slow, for the fallback and as the reference of tests.
+therefore right for trees scaled unequally in height and width, too.
 """
 
 from __future__ import annotations
@@ -56,8 +55,6 @@ class TriangleTable(NamedTuple):
     """(instances,)."""
     transform: NDArray[np.float64]
     """(instances, 12) rows of the 3x4 matrix, map from instance."""
-    bounds: NDArray[np.float64]
-    """(instances, 6) lowest and highest corner in the map; empty instances: low > high."""
 
 
 class QueryMemory(NamedTuple):
@@ -271,46 +268,6 @@ def nearest_points(
         context[CONTEXT_INSTANCE_PRIMITIVE] = _INVALID
         context[CONTEXT_STACK_SIZE] = 0
         point_query(scene, query.ctypes.data, context.ctypes.data, callback, user.ctypes.data)
-        instance[i] = int(state[_INSTANCE])
-        distance[i] = np.sqrt(state[_SQUARED]) if instance[i] >= 0 else reach
-        for j in range(3):
-            nearest[i, j] = state[_NEAREST + j]
-
-
-@kernel
-def nearest_in_all(
-    table: TriangleTable,
-    first_instance: int,
-    points: NDArray[np.float64],
-    reach: float,
-    distance: NDArray[np.float64],
-    nearest: NDArray[np.float64],
-    instance: NDArray[np.int32],
-) -> None:
-    """The same without Embree: every triangle of every instance whose box is near enough."""
-    state = np.zeros(_STATE_WORDS)
-    limit = min(reach, _FAR_AWAY_M)
-    for i in range(points.shape[0]):
-        for j in range(3):
-            state[_POINT + j] = points[i, j]
-            state[_NEAREST + j] = points[i, j]
-        state[_SQUARED] = limit * limit
-        state[_INSTANCE] = -1.0
-        for n in range(first_instance, table.part_count.shape[0]):
-            squared = 0.0
-            for j in range(3):
-                gap = max(
-                    table.bounds[n, j] - points[i, j], points[i, j] - table.bounds[n, 3 + j], 0.0
-                )
-                squared += gap * gap
-            if squared >= state[_SQUARED]:
-                continue
-            matrix = table.transform[n]
-            for part in range(table.first_part[n], table.first_part[n] + table.part_count[n]):
-                for triangle in range(table.length[part]):
-                    _try_triangle(
-                        state, table.vertices[part], table.triangles[part], triangle, matrix, n
-                    )
         instance[i] = int(state[_INSTANCE])
         distance[i] = np.sqrt(state[_SQUARED]) if instance[i] >= 0 else reach
         for j in range(3):

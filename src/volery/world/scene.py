@@ -1,29 +1,25 @@
 """The scene: everything a ray can hit, and the questions one can ask of it.
 
 Instances are numbered: -1 nothing, 0 the terrain, 1..T the trees in forest order, then the solids,
-then, from `moving_offset`, one moving body a UAV, then the things that move by themselves. Rays are
-cast by Embree (`embree_backend`), or, where its library cannot be used, through embreex's public
-call (`embreex_fallback`).
+then, from `moving_offset`, one moving body a UAV, then the things that move by themselves. Embree
+casts the rays (`embree_backend`).
 """
 
 from __future__ import annotations
 
 import copy
 import itertools
-import warnings
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.workers import Workers
-from volery.world.embree import EmbreeUnavailableError
 from volery.world.embree_backend import EmbreeBackend
-from volery.world.embreex_fallback import EmbreexBackend
 from volery.world.ground_cover import BARE_GROUND, GroundCover
 from volery.world.moving_bodies import NO_ROWS, body_rows, body_table, with_blades
-from volery.world.scene_content import BodyShape, Look, SceneContent, Solid, collect, with_solids
+from volery.world.scene_content import BodyShape, Look, Solid, collect, with_solids
 from volery.world.scene_memory import SceneHandle
 from volery.world.terrain import Terrain
 from volery.world.things.moving import MovingThings
@@ -33,8 +29,6 @@ if TYPE_CHECKING:
     from volery.world.forest import Forest
 
 __all__ = ["BodyShape", "Clearance", "Hits", "Look", "Scene", "Solid"]
-
-Backend = Literal["auto", "embree", "embreex"]
 
 
 class Hits(NamedTuple):
@@ -64,9 +58,8 @@ class Clearance(NamedTuple):
 class Scene:
     """Static world, whose solids can be replaced, plus the moving bodies of UAVs and things.
 
-    backend: "embree" (an error where it is unavailable), "embreex" (the plain fallback) or "auto"
-    (the first if possible, else the second with a warning). `threads` share batches above 5,000
-    rays; results do not depend on their number, bit for bit.
+    `threads` share batches above 5,000 rays; results do not depend on their number, bit for bit.
+    `EmbreeUnavailableError` where Embree's library is missing or another one than is needed.
     """
 
     def __init__(
@@ -77,13 +70,12 @@ class Scene:
         detail: DetailLevel = DetailLevel.SENSING,
         solids: Sequence[Solid] = (),
         cover: GroundCover = BARE_GROUND,
-        backend: Backend = "auto",
         threads: int = 1,
     ) -> None:
         self.workers = Workers(threads)
         self.solids = tuple(solids)
         self._content = collect(terrain, forest, detail, self.solids, cover)
-        self.backend: EmbreeBackend | EmbreexBackend = _make_backend(self._content, backend)
+        self.backend = EmbreeBackend(self._content)
         self.things: MovingThings | None = None
         """What moves by itself and is seen by all."""
         self._uav_rows, self._thing_rows, self._crew = NO_ROWS, NO_ROWS, 1
@@ -94,11 +86,6 @@ class Scene:
     def moving_offset(self) -> int:
         """Instance number of the first UAV's body."""
         return self._content.instances
-
-    @property
-    def compiled(self) -> bool:
-        """Whether kernels can cast in this scene through `handle`."""
-        return isinstance(self.backend, EmbreeBackend)
 
     @property
     def handle(self) -> SceneHandle:
@@ -308,22 +295,6 @@ def _new_hits(count: int) -> Hits:
         np.empty(count, np.int32),
         np.empty(count, np.uint8),
     )
-
-
-def _make_backend(content: SceneContent, backend: Backend) -> EmbreeBackend | EmbreexBackend:
-    if backend == "embreex":
-        return EmbreexBackend(content)
-    try:
-        return EmbreeBackend(content)
-    except EmbreeUnavailableError as error:
-        if backend == "embree":
-            raise
-        warnings.warn(
-            f"casting rays through embreex's slow public call, because {error}",
-            RuntimeWarning,
-            stacklevel=3,
-        )
-        return EmbreexBackend(content)
 
 
 def _ray_arrays(

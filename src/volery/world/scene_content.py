@@ -1,4 +1,4 @@
-"""What a scene holds, as flat tables that both ray casting backends read.
+"""What a scene holds, as flat tables that the ray casting reads.
 
 Instances: 0 is the terrain, 1..T the trees in forest order, then the solids. An instance shows one
 or more parts; a part is a mesh with a material, shared by all instances of a tree model. A tree has
@@ -135,27 +135,6 @@ def rotor_table(shapes: Sequence[BodyShape]) -> NDArray[np.float64]:
     return table
 
 
-def _part_bounds(part: PaddedMesh) -> NDArray[np.float64]:
-    vertices = part.vertices[:-1]
-    if not len(vertices):
-        return np.array([[np.inf] * 3, [-np.inf] * 3])
-    return np.stack([vertices.min(axis=0), vertices.max(axis=0)]).astype(np.float64)
-
-
-def _instance_bounds(
-    low: NDArray[np.float64], high: NDArray[np.float64], transform: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Boxes (N, 6) in the map that hold the boxes (N, 3), (N, 3) turned by (N, 3, 4)."""
-    empty: NDArray[np.bool_] = np.logical_not(np.isfinite(low).all(axis=1))
-    low, high = np.where(empty[:, None], 0.0, low), np.where(empty[:, None], 0.0, high)
-    centre, half = (low + high) / 2.0, (high - low) / 2.0
-    middle = np.einsum("nij,nj->ni", transform[:, :, :3], centre) + transform[:, :, 3]
-    extent = np.einsum("nij,nj->ni", np.abs(transform[:, :, :3]), half)
-    bounds = np.concatenate([middle - extent, middle + extent], axis=1)
-    bounds[empty] = [np.inf] * 3 + [-np.inf] * 3
-    return bounds
-
-
 def _looks(before: int, solids: Sequence[Solid]) -> NDArray[np.float32]:
     rows = np.zeros((before + len(solids), 6), dtype=np.float32)
     for row, solid in zip(rows[before:], solids, strict=True):
@@ -186,11 +165,9 @@ def with_solids(content: SceneContent, kept: int, solids: Sequence[Solid]) -> Sc
     count = len(solids)
     transform = np.tile(np.eye(3, 4), (count, 1, 1))
     upright = np.tile(np.eye(3, dtype=np.float32).reshape(1, 9), (count, 1))
-    boxes = np.array([_part_bounds(part) for part in new]).reshape(-1, 2, 3)
     material = np.zeros((count, MATERIALS), dtype=np.uint8)
     for row, solid in zip(material, solids, strict=True):
         row[:] = solid.material, solid.material if solid.top is None else solid.top
-    bounds = _instance_bounds(boxes[:, 0], boxes[:, 1], transform)
     vertices, triangles, length = _memory_of(new)
     places = len(staying) + np.arange(count)
     return replace(
@@ -203,7 +180,6 @@ def with_solids(content: SceneContent, kept: int, solids: Sequence[Solid]) -> Sc
             first_part=np.concatenate([old.first_part[:first], places]),
             part_count=np.concatenate([old.part_count[:first], np.ones(count, dtype=np.int64)]),
             transform=np.concatenate([old.transform[:first], transform.reshape(count, 12)]),
-            bounds=np.concatenate([old.bounds[:first], bounds]),
         ),
         material=np.concatenate([content.material[:first], material]),
         look=np.concatenate([content.look[:first], _looks(0, solids)]),
@@ -258,12 +234,6 @@ def _collect_land(
         parts_of[1:] = _TREE_PARTS
         material[1:] = (Material.WOOD, Material.LEAF)
 
-    boxes = np.array([_part_bounds(part) for part in parts]).reshape(-1, 2, 3)
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    for k in range(_TREE_PARTS):
-        rows = parts_of > k
-        low[rows] = np.minimum(low[rows], boxes[first[rows] + k, 0])
-        high[rows] = np.maximum(high[rows], boxes[first[rows] + k, 1])
     inverse = np.linalg.inv(transforms[:, :, :3])
     return SceneContent(
         parts=parts,
@@ -274,7 +244,6 @@ def _collect_land(
             first_part=first,
             part_count=parts_of,
             transform=transforms.reshape(count, 12),
-            bounds=_instance_bounds(low, high, transforms),
         ),
         material=material,
         normal_matrix=np.ascontiguousarray(

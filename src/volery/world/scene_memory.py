@@ -1,6 +1,6 @@
 """What the compiled queries of a scene read and write: its tables, and memory for rays.
 
-Written by `scene` and its backends, read by `scene_kernels`, `body_kernels` and the sensors.
+Written by `scene` and `embree_backend`, read by `scene_kernels`, `body_kernels` and the sensors.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from plain_scene import PlainScene, plain_echoes
 from scanning import DT_NS, LEVEL, echoes_of, flying, solids, standing
 from scene_samples import cylinder, drone_shape, small_forest, wall
 
@@ -97,7 +98,7 @@ def test_slow_tables_are_exact_too(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["vlp_16", "mid_40", "utm_30lx_ew"])
-def test_backends_threads_and_batches_agree(name):
+def test_threads_batches_and_the_oracle_agree(name):
     model = load_lidar(name)
     forest, terrain = small_forest(), Terrain.flat(extent_m=20.0)
     place = np.array([[5.0, 5.0, 2.0], [10.0, 12.0, 3.0], [15.0, 6.0, 1.5]])
@@ -115,9 +116,9 @@ def test_backends_threads_and_batches_agree(name):
         scene.close()
     for a, b in zip(*results, strict=True):
         assert a.tobytes() == b.tobytes()
-    plain = Scene(terrain, forest, backend="embreex")
+    plain = PlainScene(terrain, forest)
     plain.set_bodies([drone_shape()], np.zeros(3, int))
-    other = sample_echoes(plain, model, batch, history, intensities=True)
+    other = plain_echoes(plain, model, batch, history)
     plain.close()
     for a, b, close in zip(
         other, results[0], (2.5e-3, 0.02 * model.intensity.maximum), strict=True

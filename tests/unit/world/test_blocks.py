@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from plain_scene import PlainScene
 
 from volery.core.errors import CommandError
 from volery.world.grid_maps import GridMap, block_mesh
@@ -101,11 +102,11 @@ def test_no_ray_slips_between_the_faces(yaw):
     scene.close()
 
 
-@pytest.mark.parametrize("backend", ["embree", "embreex"])
-def test_inside_of_a_block_the_distance_is_below_zero(backend):
+@pytest.mark.parametrize("scene_class", [Scene, PlainScene])
+def test_inside_of_a_block_the_distance_is_below_zero(scene_class):
     cells = np.zeros((9, 9), bool)
     cells[2:7, 2:7] = True
-    scene = Scene(None, None, solids=[solid(grid_of(cells, cell=1.0, height=4.0))], backend=backend)
+    scene = scene_class(None, None, solids=[solid(grid_of(cells, cell=1.0, height=4.0))])
     points = [[4.5, 4.5, 3.0], [2.25, 4.0, 2.0], [1.5, 4.0, 2.0], [4.5, 4.5, 5.0], [5.0, 5.0, 1.0]]
     found = scene.clearance(points, 20.0, include_terrain=False)
     np.testing.assert_allclose(found.distance, [-1.0, -0.25, 0.5, 1.0, -2.0], atol=1e-6)
@@ -133,9 +134,9 @@ def test_blocks_replace_each_other_and_leave_the_rest():
         block_mesh(grid_of(np.ones((1, 1), bool), origin_m=(50, 0)), 0, 9), Material.WALL, "w"
     )
     first, second = (grid_of(random_cells(seed), origin_m=(0.0, 10.0)) for seed in (1, 2))
-    for backend in ("embree", "embreex"):
-        scene = Scene(None, None, solids=[wall, solid(first)], backend=backend)
-        fresh = Scene(None, None, solids=[wall, solid(second)], backend=backend)
+    for scene_class in (Scene, PlainScene):
+        scene = scene_class(None, None, solids=[wall, solid(first)])
+        fresh = scene_class(None, None, solids=[wall, solid(second)])
         rng = np.random.default_rng(0)
         o = rng.uniform([0, 5, 0.5], [60, 60, 8], (3000, 3))
         d = rng.normal(size=(3000, 3))

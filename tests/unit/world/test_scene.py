@@ -1,35 +1,36 @@
-"""Rays, occlusion and clearance against known geometry, brute force and the fallback."""
+"""Rays, occlusion and clearance against known geometry, brute force and embreex's own call."""
 
 from __future__ import annotations
 
+import re
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import pytest
+from plain_scene import PlainScene
 from scene_samples import cylinder, drone_shape, small_forest, unit, wall
 
 from volery.core import rotations
 from volery.world import embree, embree_backend
 from volery.world.materials import Material
 from volery.world.mesh import Mesh
-from volery.world.point_query import nearest_in_all
 from volery.world.scene import Scene, Solid
 from volery.world.terrain import Terrain
 
 
-def small_world(backend, **options):
-    return Scene(
+def small_world(scene_class=Scene, **options):
+    return scene_class(
         Terrain.flat(extent_m=20.0),
         small_forest(),
         solids=[Solid(cylinder(1.0, 3.0, 48, x=10.0, y=10.0), Material.WALL, "pillar")],
-        backend=backend,
         **options,
     )
 
 
 @pytest.fixture(scope="module")
 def scenes():
-    both = small_world("embree"), small_world("embreex")
+    both = small_world(), small_world(PlainScene)
     rng = np.random.default_rng(5)
     position = rng.uniform([3, 3, 1], [17, 17, 4], (9, 3))
     attitude = unit(rng.normal(size=(9, 4)))
@@ -93,13 +94,12 @@ def test_occlusion_means_that_the_cast_ends_before_the_target(scenes):
 
 
 def test_clearance_is_exact_against_every_triangle(scenes):
-    main, _, _ = scenes
+    main, plain, _ = scenes
     points = np.random.default_rng(9).uniform([-2, -2, -1], [22, 22, 9], (400, 3))
-    table = main._content.table
     for reach in (0.5, 4.0, np.inf):
         found = main.clearance(points, reach)
         true = np.empty(400), np.empty((400, 3)), np.empty(400, np.int32)
-        nearest_in_all(table, 0, points, reach, *true)
+        plain.backend.clearance(points, reach, True, true)
         np.testing.assert_allclose(found.distance, true[0], atol=1e-9)
         np.testing.assert_allclose(found.nearest, true[1], atol=1e-6)
         seen = found.instance >= 0
@@ -189,7 +189,7 @@ def test_a_uav_sees_others_and_never_itself():
 
 
 def test_results_do_not_depend_on_threads_or_on_the_rest_of_the_batch():
-    one, two = small_world("embree"), small_world("embree", threads=2)
+    one, two = small_world(), small_world(threads=2)
     o, d, _ = some_rays(np.array([[10.0, 10, 3]]), count=20000)
     a, b = one.cast(o, d, 15.0), two.cast(o, d, 15.0)
     for x, y in zip(a, b, strict=True):
@@ -201,17 +201,13 @@ def test_results_do_not_depend_on_threads_or_on_the_rest_of_the_batch():
     two.close()
 
 
-def test_without_the_library_the_fallback_serves_with_a_warning(monkeypatch):
-    def missing():
-        raise embree.EmbreeUnavailableError("no libembree4 in /nowhere")
-
-    monkeypatch.setattr(embree, "load", missing)
-    with pytest.warns(RuntimeWarning, match="no libembree4"):
-        scene = Scene(None, None, solids=[Solid(wall(3.0), Material.WALL, "wall")])
-    assert not scene.compiled
-    assert scene.cast([[0, 0, 0]], [[1, 0, 0]], 10.0).distance[0] == pytest.approx(3.0)
-    with pytest.raises(embree.EmbreeUnavailableError):
-        Scene(None, None, backend="embree")
+def test_without_the_library_the_error_says_how_to_install_it(monkeypatch, tmp_path):
+    monkeypatch.setattr(embree, "load", embree.load.__wrapped__)
+    monkeypatch.setattr(embree, "library_folder", lambda: tmp_path)
+    wanted = rf"no libembree4 in {tmp_path}; run `pip install --force-reinstall embreex==(\S+)`"
+    with pytest.raises(embree.EmbreeUnavailableError, match=wanted) as raised:
+        Scene(None, None)
+    assert version("embreex") == re.search(wanted, str(raised.value))[1]
 
 
 def test_a_wrong_layout_or_version_is_noticed(monkeypatch):
@@ -221,7 +217,7 @@ def test_a_wrong_layout_or_version_is_noticed(monkeypatch):
     monkeypatch.undo()
     monkeypatch.setattr(embree, "_cast_one", lambda *_: (1.0, 0, 0))
     with pytest.raises(embree.EmbreeUnavailableError, match="not laid out"):
-        Scene(None, None, backend="embree")
+        Scene(None, None)
 
 
 def test_embree_errors_become_exceptions():
@@ -239,10 +235,10 @@ def test_scenes_leave_no_thread_behind():
     """A worker of Embree's that spins would take half a core from all that follows."""
     threads = Path("/proc/self/task")
     wall_before = Solid(wall(3.0), Material.WALL, "wall")
-    Scene(None, None, solids=[wall_before], backend="embree").close()
+    Scene(None, None, solids=[wall_before]).close()
     before = len(list(threads.iterdir()))
     for _ in range(3):
-        scene = Scene(None, None, solids=[wall_before], backend="embree")
+        scene = Scene(None, None, solids=[wall_before])
         scene.cast([[0, 0, 0]], [[1, 0, 0]], 10.0)
         scene.close()
         assert len(list(threads.iterdir())) == before

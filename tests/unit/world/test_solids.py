@@ -1,7 +1,8 @@
-"""Points inside of solids, and what solids and the ground are made of, by both backends."""
+"""Points inside of solids, and what solids and the ground are made of."""
 
 import numpy as np
 import pytest
+from plain_scene import PlainScene
 from scene_samples import wall
 
 from volery.world.ground_cover import GroundCover
@@ -28,13 +29,13 @@ def is_inside(points, x):
     return in_yz & (points[:, 0] > x) & (points[:, 0] < x + 2.0)
 
 
-@pytest.mark.parametrize("backend", ["embree", "embreex"])
-def test_points_inside_of_closed_solids(backend):
+@pytest.mark.parametrize("scene_class", [Scene, PlainScene])
+def test_points_inside_of_closed_solids(scene_class):
     points = np.random.default_rng(5).uniform(-1.0, 8.0, (500, 3))
     sheet = Mesh(cube(6.0).vertices, cube(6.0).triangles[-2:])  # its lid alone
     meshes = [cube(), wall(3.0), cube(4.0), sheet]
     solids = [Solid(m, Material.WALL, "solid", is_shell=not m.is_closed) for m in meshes]
-    scene = Scene(None, None, solids=solids, backend=backend)
+    scene = scene_class(None, None, solids=solids)
     wanted = np.full(500, -1)
     wanted[is_inside(points, 0.0)] = 1
     wanted[is_inside(points, 4.0)] = 3
@@ -53,12 +54,12 @@ def test_what_is_closed():
     ).is_closed
 
 
-@pytest.mark.parametrize("backend", ["embree", "embreex"])
-def test_materials_of_tops_sides_and_ground(backend):
+@pytest.mark.parametrize("scene_class", [Scene, PlainScene])
+def test_materials_of_tops_sides_and_ground(scene_class):
     cover = GroundCover(np.array([[Material.ASPHALT, Material.PAVING]], np.uint8), -5.0, -5.0, 5.0)
     solid = Solid(cube(), Material.FACADE, "cube", top=Material.ROOF)
     terrain = Terrain.flat(40.0, origin=(-20.0, -20.0))
-    scene = Scene(terrain, None, solids=[solid], cover=cover, backend=backend)
+    scene = scene_class(terrain, None, solids=[solid], cover=cover)
     places = [
         [1.0, 0.7, 9.0],
         [-2.0, -2.0, 9.0],

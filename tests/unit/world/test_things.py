@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from plain_scene import PlainScene
 
 from volery.core import rotations
 from volery.core.errors import CommandError
@@ -136,12 +137,12 @@ def two_things():
     )
 
 
-@pytest.mark.parametrize("backend", ["embree", "embreex"])
-def test_all_see_things_and_each_copy_its_own_uavs(backend):
+@pytest.mark.parametrize("scene_class", [Scene, PlainScene])
+def test_all_see_things_and_each_copy_its_own_uavs(scene_class):
     from volery.vehicle.airframe import load_airframe
     from volery.vehicle.body_shape import body_shape
 
-    scene = Scene(None, None, backend=backend)
+    scene = scene_class(None, None)
     things = two_things()
     scene.set_things(things)
     scene.set_bodies([body_shape(load_airframe("f450"))], [0, 0, 0, 0], copies=2)
@@ -171,7 +172,7 @@ def test_all_see_things_and_each_copy_its_own_uavs(backend):
     scene.move_things(0, 4_000_000_000)
     half = scene.cast([[10.0, 0.0, 1.2]], [[-1.0, 0.0, 0.0]], 7.5, fraction=0.5)
     assert scene.instance_name(int(half.instance[0])) == "anna"  # half way through the interval
-    twin = scene.twin() if backend == "embree" else scene
+    twin = scene.twin()
     twin.move_things(2_000_000_000, 2_000_000_000)
     assert twin.cast([[10.0, 0.0, 1.2]], [[-1.0, 0.0, 0.0]], 7.5).instance[0] >= 0
     scene.close()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from plain_scene import PlainScene
 
 from volery.world.forest import procedural_forest
 from volery.world.materials import Material
@@ -53,11 +54,11 @@ def test_what_has_no_foot_stays_whole():
     assert foot.triangle_count == crown.triangle_count == 0
 
 
-@pytest.mark.parametrize("backend", ["embree", "embreex"])
-def test_hits_name_tree_and_material_of_either_piece(backend):
+@pytest.mark.parametrize("scene_class", [Scene, PlainScene])
+def test_hits_name_tree_and_material_of_either_piece(scene_class):
     terrain = Terrain.flat(30.0)
     trees = forest(terrain, "beilschmiedia_pendula")
-    scene = Scene(terrain, trees, backend=backend)
+    scene = scene_class(terrain, trees)
     try:
         for row, transform in enumerate(trees.tree_transforms()):
             tree = trees.models[trees.model_index[row]].levels[DetailLevel.SENSING]

@@ -50,8 +50,6 @@ class CameraBank(NoisyBank):
                 f"camera '{model.name}': readout_s = {model.readout_s} is too long; "
                 f"{_LONGEST_READOUT_NS / 1e9} at most"
             )
-        if not scene.compiled:
-            raise DataFileError("cameras need Embree's library, which `volery doctor` looks for")
         super().__init__(schedule, sensors, keys)
         self.lag_ns = model.readout_ns
         self.wants: Callable[[], Collection[Part]] = lambda: EVERY_PART

@@ -63,8 +63,6 @@ def take(
     The same picture comes of any number of threads. falling: drops and flakes, which are seen in
     the colour picture alone.
     """
-    if not scene.compiled:
-        raise NotImplementedError("cameras need Embree's library; see `volery doctor`")
     shots, pixels = len(batch.uav), model.width * model.height
     colour, depth, labels = (pixels if part in parts else 0 for part in EVERY_PART)
     if colour and falling:

@@ -1,8 +1,7 @@
-"""The plain way: everything flattened to one mesh, cast with embreex's own Python call.
+"""An oracle for scenes: all meshes flattened to one, cast with embreex's own Python call.
 
-It serves where `world.embree` finds no library, and as its check. A tree is stored as often as it
-stands, so it suits small worlds: a forest of 5,000 trees takes gigabytes. Point queries look at
-every triangle nearby, compiled. Results agree with the main backend's within 1e-4 m.
+Each tree is stored as often as it occurs, so it suits small worlds. Point queries look at every
+triangle. Results agree with those of `Scene` within 1e-4 m.
 """
 
 from __future__ import annotations
@@ -11,13 +10,19 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.core.workers import Workers
+from volery.sensors.lidar import Echoes, LidarBatch, move_bodies, scan_rays
+from volery.sensors.lidar_model import LidarModel
+from volery.sensors.measure_kernels import Surfaces, measure_scan
+from volery.vehicle.pose_history import PoseHistory
 from volery.world.ground_cover import ground_material
 from volery.world.mesh import Mesh, concatenate
-from volery.world.point_query import nearest_in_all
+from volery.world.scene import Scene
 from volery.world.scene_content import MATERIALS, BodyShape, SceneContent
 from volery.world.scene_memory import BodyTable, SceneHandle
 
@@ -29,9 +34,6 @@ class FlatScene:
     """Meshes, one after the other, in one embreex scene."""
 
     def __init__(self, meshes: Sequence[Mesh]) -> None:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
         self._ends = np.cumsum([len(mesh) for mesh in meshes])
         whole = concatenate(list(meshes))
         self._scene: Any = None
@@ -59,14 +61,58 @@ class FlatScene:
         return hit, found["tfar"][hit], found["Ng"][hit].astype(np.float64), mesh
 
 
-class EmbreexBackend:
+class PlainScene(Scene):
+    """A scene that asks embreex's public call."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.backend.close()
+        self.backend = PlainBackend(self._content)
+
+
+def plain_echoes(
+    scene: PlainScene, model: LidarModel, batch: LidarBatch, history: PoseHistory
+) -> Echoes:
+    """What `sample_echoes` yields, with intensities, in clear air."""
+    scans, beams = len(batch.uav), model.beams
+    shape = (scans, model.echoes, beams)
+    echoes = Echoes(np.empty(shape, np.float32), np.empty(shape, np.float32))
+    start = int(batch.sweep_start_ns.min())
+    end = int(batch.sweep_start_ns.max()) + model.sweep_duration_ns
+    move_bodies(scene, history, start, end)
+    for scan in range(scans):
+        surfaces = Surfaces(
+            np.empty((1, beams), np.float32),
+            np.empty((1, beams), np.float32),
+            np.empty((1, beams), np.uint8),
+        )
+        origins, directions, times = scan_rays(model, batch, scan, history)
+        normal, instance = np.empty((beams, 3), np.float32), np.empty(beams, np.int32)
+        scene.backend.cast(
+            scene.handle,
+            scene.workers,
+            origins,
+            directions,
+            model.range.max_m,
+            np.array([batch.uav[scan]], dtype=np.int32),
+            np.clip((times - start) / max(end - start, 1), 0.0, 1.0),
+            (surfaces.distance[0], normal, instance, surfaces.material[0]),
+        )
+        surfaces.cosine[0] = np.abs(np.einsum("ij,ij->i", normal, directions))
+        key, number = batch.key[scan], batch.scan_number[scan]
+        sweep_start = batch.sweep_start_ns[scan]
+        measure_scan(model.constants, key, number, sweep_start, scan, 0, surfaces, echoes)
+    return echoes
+
+
+class PlainBackend:
     """The same queries as `EmbreeBackend` through embreex's public call."""
 
     def __init__(self, content: SceneContent) -> None:
         self._shapes: list[FlatScene] = []
         self._flatten(content)
 
-    def replace_solids(self, content: SceneContent, first: int) -> None:  # noqa: ARG002
+    def replace_solids(self, content: SceneContent, first: int) -> None:
         """Go on with `content`; everything is flattened anew."""
         self._flatten(content)
 
@@ -75,11 +121,14 @@ class EmbreexBackend:
         self._blocks: list[tuple[int, int]] = []  # (instance, material) of each flattened mesh
         table = content.table
         flat = []
+        self._corners: list[NDArray[np.float64]] = []  # (T, 3, 3) of each, without its rounding
         for instance in range(content.instances):
             matrix = table.transform[instance].reshape(3, 4)
             for k in range(int(table.part_count[instance])):
                 part = content.parts[int(table.first_part[instance]) + k]
-                flat.append(Mesh(part.vertices[:-1], part.triangles).transformed(matrix))
+                mesh = Mesh(part.vertices[:-1], part.triangles)
+                flat.append(mesh.transformed(matrix))
+                self._corners.append(mesh.corners @ matrix[:, :3].T + matrix[:, 3])
                 self._blocks.append((instance, k % MATERIALS))
         self._flat = FlatScene(flat)
         self._solids = FlatScene(flat[len(flat) - content.solids :])
@@ -109,7 +158,7 @@ class EmbreexBackend:
     def cast(
         self,
         handle: SceneHandle,
-        workers: Workers,  # noqa: ARG002 - embreex's call uses one thread
+        workers: Workers,
         origins: NDArray[np.float64],
         directions: NDArray[np.float64],
         reach: float,
@@ -184,7 +233,19 @@ class EmbreexBackend:
         out: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]],
     ) -> None:
         """Fill distance, nearest, instance."""
-        nearest_in_all(self._content.table, 0 if include_terrain else 1, points, reach, *out)
+        first = 0 if include_terrain else 1
+        wanted = [k for k, (instance, _) in enumerate(self._blocks) if instance >= first]
+        corners = np.concatenate([np.zeros((0, 3, 3)), *(self._corners[k] for k in wanted)])
+        owners = [np.full(len(self._corners[k]), self._blocks[k][0]) for k in wanted]
+        owner = np.concatenate([np.zeros(0, np.int64), *owners])
+        distance, nearest, instance = out
+        distance[:], nearest[:], instance[:] = reach, points, -1
+        for i, point in enumerate(points):
+            places = nearest_on_triangles(point, corners)
+            away = np.linalg.norm(places - point, axis=1)
+            k = int(away.argmin()) if len(away) else -1
+            if k >= 0 and away[k] < reach:
+                distance[i], nearest[i], instance[i] = away[k], places[k], owner[k]
 
     def enclosing(self, points: NDArray[np.float64], out: NDArray[np.int32]) -> None:
         """Fill `out` with the closed solid that each point lies in, -1 for none."""
@@ -197,6 +258,26 @@ class EmbreexBackend:
     def close(self) -> None:
         """Forget the scenes."""
         self._shapes.clear()
+
+
+def nearest_on_triangles(
+    point: NDArray[np.float64], corners: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(T, 3) m, the nearest place of each triangle (T, 3, 3) to a point (3,)."""
+    edges = np.roll(corners, -1, axis=1) - corners
+    to_point = point - corners
+    squared = np.einsum("tij,tij->ti", edges, edges)
+    along = np.einsum("tij,tij->ti", to_point, edges) / np.where(squared > 0.0, squared, 1.0)
+    on_edges = corners + np.clip(along, 0.0, 1.0)[..., None] * edges
+    best = np.linalg.norm(on_edges - point, axis=2).argmin(axis=1)
+    nearest = np.asarray(on_edges[np.arange(len(corners)), best])
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    sides = np.einsum("tij,tj->ti", np.cross(edges, to_point), normal)
+    area = np.einsum("ti,ti->t", normal, normal)
+    over = (sides >= 0.0).all(axis=1) & (area > 0.0)
+    height = np.einsum("ti,ti->t", to_point[:, 0], normal)[over] / area[over]
+    nearest[over] = point - height[:, None] * normal[over]
+    return nearest
 
 
 def _looks_up(normal: NDArray[np.float64]) -> NDArray[np.bool_]:
