@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -21,8 +20,10 @@ from volery.autonomy.mapping.octree import Octree
 from volery.autonomy.mapping.scan_intake import ScanIntake
 from volery.autonomy.motion_history import MotionHistory, NodHistory
 from volery.autonomy.number_lists import declare_mount
+from volery.autonomy.odometry_topics import subscribe_odometry
 from volery.autonomy.scan_points import Pose
 from volery.autonomy.scan_rays import Beams, RayMaker, Rays
+from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, NodeError
 from volery.core.kept import keep, put_back
@@ -33,7 +34,6 @@ from volery.graph.messages import (
     Odometry,
     Range,
     String,
-    TFMessage,
     stamp_of,
 )
 from volery.graph.node import Node
@@ -120,15 +120,12 @@ class Mapping(Node):
             self._load(map_file)
 
     def _open(self) -> None:
-        odometry = str(self.declare_parameter("odometry", "odom").value)
         voxels_s = float(self.declare_parameter("voxels_period_s", 10.0, least=0.01).value)
         grid_s = float(self.declare_parameter("grid_period_s", 1.0, least=0.01).value)
         self._voxels = self.create_publisher(reports.OCTOMAP, "octomap_binary", 1, latched=True)
         self._level = self.create_publisher(OccupancyGrid, "projected_map", 1, latched=True)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)
-        self.create_subscription(Odometry, odometry, self._on_odometry, 5)
-        if self.declare_parameter("corrected", True).value:
-            self.create_subscription(TFMessage, "/tf", self._frame.on_tf, 50)
+        subscribe_odometry(self, self._frame, self._on_odometry, depth=5)
         self.create_subscription(JointState, "joint_states", self._on_joint, 5)
         self.create_subscription(Range, "range", self._on_range, 5)
         for name, lidar in (("level", "horizontal"), ("nodding", "nodding")):
@@ -225,10 +222,7 @@ class Mapping(Node):
             "trimmed": self._octree.forgotten,
             "outside": self._grid.outside,
         }
-        text = json.dumps(told)
-        if text != self._told:
-            self._told = text
-            self._status.publish(String(text))
+        self._told = publish_status(self._status, told, self._told)
 
     def _problems(self) -> list[str]:
         """What keeps the map from growing, in words."""

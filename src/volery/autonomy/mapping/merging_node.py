@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -12,6 +11,7 @@ from volery.autonomy.map_frame import MAP
 from volery.autonomy.mapping.merging import PlacedMap, merged
 from volery.autonomy.mapping.reports import OCTOMAP, octomap_message, voxels_of
 from volery.autonomy.motion_history import Placement
+from volery.autonomy.status import publish_status
 from volery.core.errors import DataFileError, PlanError
 from volery.core.kept import keep, put_back
 from volery.core.vectors import norm
@@ -134,7 +134,4 @@ class MapMerging(Node):
 
     def _tell(self, count: int, reason: str) -> None:
         told = {"merged": count, "reason": reason, "left_out": dict(sorted(self._reasons.items()))}
-        text = json.dumps(told)
-        if text != self._told:
-            self._told = text
-            self._status.publish(String(text))
+        self._told = publish_status(self._status, told, self._told)

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from volery.autonomy.map_frame import MAP, MapFrame
 from volery.autonomy.mapping.reports import grid_values_message
+from volery.autonomy.odometry_topics import subscribe_odometry
 from volery.autonomy.planning.search_area import SearchArea
 from volery.autonomy.planning.viewpoints import Viewpoint, next_viewpoint
 from volery.autonomy.scan_points import Pose as Motion
+from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
 from volery.core.counting import counted
 from volery.core.errors import PlanError
@@ -29,7 +31,6 @@ from volery.graph.messages import (
     PoseStamped,
     Quaternion,
     String,
-    TFMessage,
     header,
     message_type,
     single,
@@ -118,16 +119,13 @@ class Exploring(Node):
         self._open()
 
     def _open(self) -> None:
-        odometry = str(self.declare_parameter("odometry", "odom").value)
         self._goals = self.create_publisher(PoseStamped, "planning/goal", 1)
         self._status = self.create_publisher(String, "exploration/status", 1, latched=True)
         self._covered = self.create_publisher(Float32, "exploration/covered", 1)
         self._searched = self.create_publisher(
             OccupancyGrid, "exploration/searched", 1, latched=True
         )
-        self.create_subscription(Odometry, odometry, self._on_odometry, 1)
-        if self.declare_parameter("corrected", True).value:
-            self.create_subscription(TFMessage, "/tf", self._frame.on_tf, 50)
+        subscribe_odometry(self, self._frame, self._on_odometry, depth=1)
         self.create_subscription(POLYGON, "search_area", self._on_area, 1)
         self.create_subscription(OccupancyGrid, "projected_map", self._on_grid, 1)
         self.create_subscription(String, "planning/goal_status", self._on_goal_status, 5)
@@ -270,10 +268,7 @@ class Exploring(Node):
             "goal": None if goal is None else [round(v, 2) for v in goal.place.tolist()],
             "given_up": len(self._refused),
         }
-        text = json.dumps(told)
-        if text != self._told:
-            self._told = text
-            self._status.publish(String(text))
+        self._told = publish_status(self._status, told, self._told)
 
     def _tell_searched(self) -> None:
         if self._area is None or not self._searched.wanted:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import Any
 
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.planning.trajectory_form import Samples, samples_of
 from volery.autonomy.scan_points import Pose
+from volery.autonomy.status import publish_status
 from volery.autonomy.stuck_sensors import is_stuck
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.kept import keep, put_back
@@ -142,7 +142,5 @@ class TrajectoryFollower(Node):
         )
 
     def _tell(self, state: str, reason: str) -> None:
-        text = json.dumps({"state": state, "reason": reason})
-        if text != self._told:
-            self._told = text
-            self._status.publish(String(text))
+        told = {"state": state, "reason": reason}
+        self._told = publish_status(self._status, told, self._told)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -13,9 +12,11 @@ from numpy.typing import NDArray
 from volery.autonomy.map_frame import MAP, MapFrame
 from volery.autonomy.mapping.reports import OCTOMAP, voxels_of
 from volery.autonomy.number_lists import declare_numbers
+from volery.autonomy.odometry_topics import subscribe_odometry
 from volery.autonomy.planning.global_path import Search, plan_way
 from volery.autonomy.planning.voxel_space import Solid, VoxelSpace
 from volery.autonomy.scan_points import Pose as Motion
+from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, NodeError, PlanError
 from volery.core.kept import keep, put_back
@@ -28,7 +29,6 @@ from volery.graph.messages import (
     PoseStamped,
     Quaternion,
     String,
-    TFMessage,
     header,
 )
 from volery.graph.node import Node
@@ -99,12 +99,9 @@ class GlobalPlanner(Node):
         self._open()
 
     def _open(self) -> None:
-        odometry = str(self.declare_parameter("odometry", "odom").value)
         self._path = self.create_publisher(PathMessage, "planning/path", 1, latched=True)
         self._status = self.create_publisher(String, "planning/goal_status", 1, latched=True)
-        self.create_subscription(Odometry, odometry, self._on_odometry, 1)
-        if self.declare_parameter("corrected", True).value:
-            self.create_subscription(TFMessage, "/tf", self._frame.on_tf, 50)
+        subscribe_odometry(self, self._frame, self._on_odometry, depth=1)
         self.create_subscription(PoseStamped, "planning/goal", self._on_goal, 1)
         self.create_subscription(OCTOMAP, "octomap_binary", self._on_map, 1)
         self.create_subscription(Bool, "planning/pause", self._on_pause, 1)
@@ -251,7 +248,5 @@ class GlobalPlanner(Node):
     def _tell(self, state: str, reason: str, length_m: float) -> None:
         goal = None if self._goal is None else [round(v, 2) for v in self._goal.tolist()]
         told = {"state": state, "reason": reason, "goal": goal, "length_m": round(length_m, 1)}
-        text = json.dumps({**told, "plans": self._plans})
-        if text != self._told:
-            self._told = text
-            self._status.publish(String(text))
+        told = {**told, "plans": self._plans}
+        self._told = publish_status(self._status, told, self._told)

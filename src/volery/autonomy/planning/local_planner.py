@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.map_frame import MAP, UNKNOWN_PLACE, MapFrame
 from volery.autonomy.number_lists import declare_mount
+from volery.autonomy.odometry_topics import subscribe_odometry
 from volery.autonomy.planning.local_planning import Doing, LocalPlanning, Policy, Sight
 from volery.autonomy.planning.neighbours import Neighbours
 from volery.autonomy.planning.primitives import Limits, Path, State
@@ -30,7 +31,6 @@ from volery.graph.messages import (
     PathMessage,
     Range,
     String,
-    TFMessage,
     message_type,
 )
 from volery.graph.node import Node
@@ -114,13 +114,10 @@ class LocalPlanner(Node):
         self._open()
 
     def _open(self) -> None:
-        odometry = str(self.declare_parameter("odometry", "odom").value)
         period = float(self.declare_parameter("period_s", 0.18, least=0.01, most=60.0).value)
         self._trajectory = self.create_publisher(MultiDOFJointTrajectory, "planning/trajectory", 1)
         self._status = self.create_publisher(String, "planning/status", 1, latched=True)
-        self.create_subscription(Odometry, odometry, self._on_odometry, 5)
-        if self.declare_parameter("corrected", True).value:
-            self.create_subscription(TFMessage, "/tf", self._frame.on_tf, 50)
+        subscribe_odometry(self, self._frame, self._on_odometry, depth=5)
         for name, topic in (("level", "horizontal"), ("nodding", "nodding")):
             scans = f"laser/{topic}/scan"
             self.create_subscription(LaserScan, scans, self._scan_listener(name), 5)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -20,6 +19,7 @@ from volery.autonomy.slam.planar.odometry import WheelOdometry, step_between
 from volery.autonomy.slam.planar.scans import returns
 from volery.autonomy.slam.planar.settings import PlanarSettings, Returns
 from volery.autonomy.slam.planar.way import PlanarWay
+from volery.autonomy.status import publish_status
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back
@@ -247,10 +247,7 @@ class PlanarSlam(Node):
             "refused": self._refused + self._odometry.refused,
             "clock_set": self._resets,
         }
-        text = json.dumps(told)
-        if text != self._told:
-            self._told = text
-            self._status.publish(String(text))
+        self._told = publish_status(self._status, told, self._told)
         self._tell_path()
 
     def _tell_path(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -21,6 +20,7 @@ from volery.autonomy.slam.settings import ImuNoise, Matching
 from volery.autonomy.slam.sweep import Sweep
 from volery.autonomy.slam.tracker import Tracker
 from volery.autonomy.slam.way import Way
+from volery.autonomy.status import publish_status
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back
@@ -260,10 +260,7 @@ class Slam(Node):
             "refused": self._refused + t.refused,
             "clock_set": self._resets,
         }
-        text = json.dumps(told)
-        if text != self._told:
-            self._told = text
-            self._status.publish(String(text))
+        self._told = publish_status(self._status, told, self._told)
         shown = (len(way.frames), way.closures)
         if shown != self._shown and way.frames:
             self._shown = shown
