@@ -1,45 +1,35 @@
 import { Vector3 } from "three";
 import type { CameraPose } from "../state/view.ts";
+import { Gaze } from "./Gaze.ts";
 import type { Input } from "./input.ts";
-import {
-  clamp,
-  easing,
-  FOV,
-  lookFromTo,
-  wayOf,
-  type Eye,
-  type Rig,
-  type Surroundings,
-} from "./rig.ts";
+import { clamp, directionOf, easing, FOV, lookFromTo } from "./rig.ts";
+import type { Eye, Rig, Surroundings } from "./rig.ts";
 
 const TURN = 0.005;
 const HEADING_S = 0.35;
+const PITCH = -0.28;
 
 /** Behind the selected UAV and a little above, turning with its heading. */
 export class Chase implements Rig {
   private heading: number | null = null;
-  /** What the hands added. */
-  private aside = 0;
-  private pitch = -0.28;
+  /** Relative to the heading. */
+  private readonly gaze = new Gaze(0, PITCH, -1.5, 0.6);
   private away = 1;
-  private readonly way = new Vector3();
+  private readonly direction = new Vector3();
   private readonly nose = new Vector3();
 
   enter(_eye: Eye, _around: Surroundings, kept: CameraPose | null): void {
     this.heading = null;
-    this.aside = kept?.yaw ?? 0;
-    this.pitch = kept?.pitch ?? -0.28;
+    this.gaze.set(kept ?? { yaw: 0, pitch: PITCH });
     this.away = kept !== null && kept.distance > 0 ? kept.distance : 1;
   }
 
   focus(): void {
-    this.aside = 0;
-    this.pitch = -0.28;
+    this.gaze.set({ yaw: 0, pitch: PITCH });
   }
 
   update(input: Input, around: Surroundings, stepS: number, eye: Eye): void {
-    this.aside -= TURN * input.turnX;
-    this.pitch = clamp(-1.5, this.pitch - TURN * input.turnY, 0.6);
+    this.gaze.turn(input, -TURN);
     this.away = clamp(0.3, this.away * input.zoom, 20);
     const { uav } = around;
     if (uav === null) return; // the picture stays as it was
@@ -47,9 +37,9 @@ export class Chase implements Rig {
     const yaw = Math.atan2(this.nose.y, this.nose.x);
     this.heading ??= yaw;
     this.heading += easing(stepS, HEADING_S) * turnTo(this.heading, yaw);
-    wayOf(this.heading + this.aside, this.pitch, this.way);
+    directionOf(this.heading + this.gaze.yaw, this.gaze.pitch, this.direction);
     const distance = 7.5 * uav.reach * this.away;
-    eye.position.copy(uav.position).addScaledVector(this.way, -distance);
+    eye.position.copy(uav.position).addScaledVector(this.direction, -distance);
     const ground = around.heightAt(eye.position.x, eye.position.y);
     eye.position.z = Math.max(eye.position.z, ground + 0.3);
     lookFromTo(eye.position, uav.position, eye.quaternion);
@@ -61,15 +51,15 @@ export class Chase implements Rig {
       x: 0,
       y: 0,
       z: 0,
-      yaw: this.aside,
-      pitch: this.pitch,
+      yaw: this.gaze.yaw,
+      pitch: this.gaze.pitch,
       distance: this.away,
       follows: true,
     };
   }
 }
 
-/** The shorter way round from one heading to another. */
+/** The smaller turn from one heading to another. */
 function turnTo(from: number, to: number): number {
   const turn = (to - from) % (2 * Math.PI);
   if (turn > Math.PI) return turn - 2 * Math.PI;

@@ -1,19 +1,10 @@
 import { Vector3 } from "three";
 import { fittingDistance } from "../lib/framing.ts";
 import type { CameraPose } from "../state/view.ts";
+import { Gaze } from "./Gaze.ts";
 import type { Input } from "./input.ts";
-import {
-  clamp,
-  easing,
-  FOV,
-  headingOf,
-  lookFromTo,
-  STEEPEST,
-  wayOf,
-  type Eye,
-  type Rig,
-  type Surroundings,
-} from "./rig.ts";
+import { clamp, directionOf, easing, FOV, headingOf, lookFromTo } from "./rig.ts";
+import type { Eye, Rig, Surroundings } from "./rig.ts";
 
 const TURN = 0.0052;
 const DAMPING_S = 0.07;
@@ -25,13 +16,12 @@ const ABOVE_GROUND_M = 0.25;
 export class Orbit implements Rig {
   private readonly target = new Vector3();
   private readonly shownTarget = new Vector3();
-  private yaw = 0.7;
-  private pitch = -0.35;
+  private readonly gaze = new Gaze(0.7, -0.35);
   private distance = 12;
   private shown = { yaw: 0.7, pitch: -0.35, distance: 12 };
   private follows = true;
   private placed = false;
-  private readonly way = new Vector3();
+  private readonly step = new Vector3();
   /** From the UAV that is followed to what the camera looks at: the middle of its group, at first. */
   private readonly offset = new Vector3();
   private followed = "";
@@ -39,8 +29,7 @@ export class Orbit implements Rig {
   enter(eye: Eye, around: Surroundings, kept: CameraPose | null): void {
     if (kept !== null) {
       this.target.set(kept.x, kept.y, kept.z);
-      this.yaw = kept.yaw;
-      this.pitch = clamp(-STEEPEST, kept.pitch, STEEPEST);
+      this.gaze.set(kept);
       this.distance = clamp(NEAREST_M, kept.distance, FARTHEST_M);
       this.follows = kept.follows;
       this.placed = true;
@@ -49,7 +38,7 @@ export class Orbit implements Rig {
     }
     if (this.placed && around.uav !== null) {
       const { yaw } = headingOf(eye.quaternion);
-      this.yaw = yaw;
+      this.gaze.yaw = yaw;
     }
     this.begin(around);
   }
@@ -66,14 +55,15 @@ export class Orbit implements Rig {
     this.followed = uav.name;
     this.target.fromArray(group.middle);
     this.offset.copy(this.target).sub(uav.position);
-    this.pitch = -0.3;
+    this.gaze.pitch = -0.3;
     this.distance = clamp(14 * uav.reach, fittingDistance(group.radius, FOV, aspect), 120);
     this.settle();
   }
 
   private settle(): void {
     this.shownTarget.copy(this.target);
-    this.shown = { yaw: this.yaw, pitch: this.pitch, distance: this.distance };
+    const { yaw, pitch } = this.gaze;
+    this.shown = { yaw, pitch, distance: this.distance };
   }
 
   focus(around: Surroundings): void {
@@ -85,14 +75,13 @@ export class Orbit implements Rig {
 
   update(input: Input, around: Surroundings, stepS: number, eye: Eye): void {
     if (!this.placed && around.uav !== null) this.begin(around);
-    this.yaw -= TURN * input.turnX;
-    this.pitch = clamp(-STEEPEST, this.pitch - TURN * input.turnY, STEEPEST);
+    this.gaze.turn(input, -TURN);
     this.distance = clamp(NEAREST_M, this.distance * input.zoom, FARTHEST_M);
     if (input.panX !== 0 || input.panY !== 0) this.pan(input, eye);
     if (this.follows && around.uav !== null) this.follow(around.uav);
     this.ease(stepS);
-    wayOf(this.shown.yaw, this.shown.pitch, this.way);
-    eye.position.copy(this.shownTarget).addScaledVector(this.way, -this.shown.distance);
+    directionOf(this.shown.yaw, this.shown.pitch, this.step);
+    eye.position.copy(this.shownTarget).addScaledVector(this.step, -this.shown.distance);
     const ground = around.heightAt(eye.position.x, eye.position.y) + ABOVE_GROUND_M;
     eye.position.z = Math.max(eye.position.z, ground);
     lookFromTo(eye.position, this.shownTarget, eye.quaternion);
@@ -109,8 +98,8 @@ export class Orbit implements Rig {
   private ease(stepS: number): void {
     const share = easing(stepS, DAMPING_S);
     const { shown } = this;
-    shown.yaw += share * (this.yaw - shown.yaw);
-    shown.pitch += share * (this.pitch - shown.pitch);
+    shown.yaw += share * (this.gaze.yaw - shown.yaw);
+    shown.pitch += share * (this.gaze.pitch - shown.pitch);
     shown.distance *= (this.distance / shown.distance) ** share;
     // What is followed is as smooth as its messages; only leaps need easing.
     const gap = this.shownTarget.distanceTo(this.target);
@@ -121,12 +110,13 @@ export class Orbit implements Rig {
   private pan({ panX, panY }: Input, { quaternion }: Eye): void {
     this.follows = false;
     const scale = 0.0011 * this.distance;
-    this.target.add(this.way.set(-panX * scale, panY * scale, 0).applyQuaternion(quaternion));
+    this.target.add(this.step.set(-panX * scale, panY * scale, 0).applyQuaternion(quaternion));
   }
 
   pose(): CameraPose {
     const { x, y, z } = this.target;
-    const { yaw, pitch, distance, follows } = this;
+    const { distance, follows } = this;
+    const { yaw, pitch } = this.gaze;
     return { x, y, z, yaw, pitch, distance, follows };
   }
 }

@@ -50,18 +50,18 @@ export const STEEPEST = Math.PI / 2 - 0.02;
 const UP = new Vector3(0, 0, 1);
 const ORIGIN = new Vector3();
 const matrix = new Matrix4();
-const way = new Vector3();
+const direction = new Vector3();
 
 /** Direction from heading (counter-clockwise from x) and pitch (up), rad. */
-export function wayOf(yaw: number, pitch: number, out: Vector3): Vector3 {
+export function directionOf(yaw: number, pitch: number, out: Vector3): Vector3 {
   const level = Math.cos(pitch);
   return out.set(level * Math.cos(yaw), level * Math.sin(yaw), Math.sin(pitch));
 }
 
 /** Let a camera look along heading and pitch. */
 export function lookAlong(yaw: number, pitch: number, out: Quaternion): void {
-  wayOf(yaw, pitch, way);
-  out.setFromRotationMatrix(matrix.lookAt(ORIGIN, way, UP));
+  directionOf(yaw, pitch, direction);
+  out.setFromRotationMatrix(matrix.lookAt(ORIGIN, direction, UP));
 }
 
 export function lookFromTo(from: Vector3, to: Vector3, out: Quaternion): void {
@@ -70,11 +70,14 @@ export function lookFromTo(from: Vector3, to: Vector3, out: Quaternion): void {
 
 /** Heading and pitch in which a camera looks. */
 export function headingOf(quaternion: Quaternion): { yaw: number; pitch: number } {
-  way.set(0, 0, -1).applyQuaternion(quaternion);
-  return { yaw: Math.atan2(way.y, way.x), pitch: Math.asin(Math.max(-1, Math.min(1, way.z))) };
+  direction.set(0, 0, -1).applyQuaternion(quaternion);
+  return {
+    yaw: Math.atan2(direction.y, direction.x),
+    pitch: Math.asin(clamp(-1, direction.z, 1)),
+  };
 }
 
-/** Share of the way to go in a step, for what comes near with a time constant. */
+/** Fraction of a difference to remove in a step, for a decay with a time constant. */
 export function easing(stepS: number, timeS: number): number {
   return 1 - Math.exp(-stepS / timeS);
 }

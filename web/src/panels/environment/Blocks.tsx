@@ -6,10 +6,29 @@ import { succeeds } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { useSimulation } from "../../state/simulation.ts";
 import { Section } from "../inspector/Section.tsx";
-import { Dial } from "./Dial.tsx";
+import { FieldDials, type DialField } from "./FieldDials.tsx";
 
 /** Blocks are built anew with each change: fewer of them than of weather, ms. */
 const SEND_MS = 250;
+
+const FIELDS: readonly DialField<"block_height" | "cell_size">[] = [
+  {
+    key: "block_height",
+    name: "Height",
+    min: 0.5,
+    max: 30,
+    step: 0.5,
+    text: (height) => `${height.toFixed(1)} m`,
+  },
+  {
+    key: "cell_size",
+    name: "Size of a cell",
+    min: 0.5,
+    max: 10,
+    step: 0.25,
+    text: (size) => `${size.toFixed(2)} m`,
+  },
+];
 
 /** Height and size of obstacles, and which map of them stands; only in a world that has one. */
 export function Blocks() {
@@ -41,25 +60,11 @@ export function Blocks() {
           onChange={(name) => name !== null && sender.offer({ name })}
         />
       )}
-      <Dial
-        name="Height"
-        min={0.5}
-        max={30}
-        step={0.5}
-        value={map.block_height}
-        text={(height) => `${height.toFixed(1)} m`}
+      <FieldDials
+        fields={FIELDS}
+        values={map}
         disabled={disabled}
-        onChange={(block_height) => sender.offer({ block_height })}
-      />
-      <Dial
-        name="Size of a cell"
-        min={0.5}
-        max={10}
-        step={0.25}
-        value={map.cell_size}
-        text={(size) => `${size.toFixed(2)} m`}
-        disabled={disabled}
-        onChange={(cell_size) => sender.offer({ cell_size })}
+        change={(changes) => sender.offer(changes)}
       />
     </Section>
   );

@@ -1,10 +1,12 @@
-import { Badge, Button, Group, ScrollArea, SegmentedControl, Text, TextInput } from "@mantine/core";
-import { Search, Trash2 } from "lucide-react";
+import { Badge, Button, Group, ScrollArea, SegmentedControl, Text } from "@mantine/core";
+import { Trash2 } from "lucide-react";
 import { memo, useState } from "react";
+import { matcher } from "../../lib/filter.ts";
 import { clockText } from "../../lib/time.ts";
 import { clearJournal, useJournal, type Entry, type EntrySort } from "../../state/journal.ts";
 import { select, useVehicles } from "../../state/vehicles.ts";
 import { look } from "../../state/view.ts";
+import { FilterInput } from "../shared/FilterInput.tsx";
 import classes from "./Log.module.css";
 
 const SORTS = [
@@ -20,10 +22,11 @@ const MOST_SHOWN = 300;
 export default function Log() {
   const { entries } = useJournal();
   const [sort, setSort] = useState("all");
-  const [sought, setSought] = useState("");
-  const words = sought.toLowerCase().split(/\s+/);
+  const [filter, setFilter] = useState("");
+  const matches = matcher(filter);
   const fitting = entries.filter(
-    (entry) => (sort === "all" || entry.sort === sort) && holds(entry, words),
+    ({ sort: its, who, kind, text }) =>
+      (sort === "all" || its === sort) && matches(`${who} ${kind} ${text}`),
   );
   return (
     <div className={classes.panel}>
@@ -35,14 +38,12 @@ export default function Log() {
           value={sort}
           onChange={setSort}
         />
-        <TextInput
-          size="xs"
-          w={220}
-          leftSection={<Search size={14} />}
+        <FilterInput
+          label="Filter the log"
           placeholder="Filter"
-          aria-label="Filter the log"
-          value={sought}
-          onChange={(event) => setSought(event.currentTarget.value)}
+          w={220}
+          value={filter}
+          onChange={setFilter}
         />
         <Button
           size="compact-xs"
@@ -68,11 +69,6 @@ export default function Log() {
       </ScrollArea>
     </div>
   );
-}
-
-function holds({ who, kind, text }: Entry, words: readonly string[]): boolean {
-  const all = `${who} ${kind} ${text}`.toLowerCase();
-  return words.every((word) => all.includes(word));
 }
 
 const Row = memo(function Row({ entry }: { entry: Entry }) {

@@ -7,16 +7,17 @@ import {
   SimpleGrid,
   Stack,
   Text,
-  TextInput,
   Tooltip,
 } from "@mantine/core";
-import { Search, Upload } from "lucide-react";
+import { Upload } from "lucide-react";
 import { useEffect, useState } from "react";
 import { ENDINGS, UPLOAD_HINT } from "../../lib/fileKinds.ts";
+import { matcher } from "../../lib/filter.ts";
 import { scenarios, type ScenarioCard } from "../../link/commands.ts";
 import { reasonOf } from "../../state/notices.ts";
 import { useSimulation } from "../../state/simulation.ts";
 import { closeWindow, offerFile, useWindows } from "../../state/windows.ts";
+import { FilterInput } from "../shared/FilterInput.tsx";
 import { Card } from "./Card.tsx";
 import { Start } from "./Start.tsx";
 
@@ -57,22 +58,21 @@ export default function Scenarios() {
 function Gallery({ cards, choose }: { cards: ScenarioCard[]; choose: (name: string) => void }) {
   const [filter, setFilter] = useState("");
   const present = useSimulation(({ server }) => server?.scenario);
-  const words = filter.toLowerCase().split(/\s+/);
-  const shown = cards.filter((card) => {
-    const text = `${card.name} ${card.description} ${card.airframes.join(" ")} ${card.world}`;
-    return words.every((word) => text.toLowerCase().includes(word));
-  });
+  const matches = matcher(filter);
+  const shown = cards.filter(({ name, description, airframes, world }) =>
+    matches(`${name} ${description} ${airframes.join(" ")} ${world}`),
+  );
   return (
     <Stack gap="sm">
       <Group gap="sm" wrap="nowrap">
-        <TextInput
+        <FilterInput
+          label="Search"
+          placeholder="Search"
+          size="sm"
           flex={1}
           data-autofocus
-          aria-label="Search"
-          placeholder="Search"
-          leftSection={<Search size={16} />}
           value={filter}
-          onChange={(event) => setFilter(event.currentTarget.value)}
+          onChange={setFilter}
         />
         <FileButton accept={ENDINGS} onChange={(file) => file !== null && offerFile(file)}>
           {(props) => (

@@ -1,13 +1,4 @@
-import {
-  Button,
-  Checkbox,
-  Group,
-  NumberInput,
-  Select,
-  SimpleGrid,
-  Stack,
-  Text,
-} from "@mantine/core";
+import { Button, Checkbox, NumberInput, Select, SimpleGrid, Stack, Text } from "@mantine/core";
 import { ArrowLeft, Play } from "lucide-react";
 import { useEffect, useState } from "react";
 import {
@@ -21,6 +12,7 @@ import { succeeds } from "../../state/notices.ts";
 import { useWhyNotOpen } from "../../state/rights.ts";
 import { closeWindow } from "../../state/windows.ts";
 import { sensorSetsOf } from "./sensorSets.ts";
+import { SubmitRow } from "./SubmitRow.tsx";
 
 const MOST_UAVS = 10_000;
 
@@ -90,7 +82,7 @@ export function Start({ card, back }: { card: ScenarioCard; back: () => void }) 
             onChange={(sensors) => change({ sensors })}
           />
         )}
-        <Group justify="space-between" mt="xs">
+        <SubmitRow whyNot={whyNot} justify="space-between">
           <Button variant="subtle" leftSection={<ArrowLeft size={16} />} onClick={back}>
             All scenarios
           </Button>
@@ -103,12 +95,7 @@ export function Start({ card, back }: { card: ScenarioCard; back: () => void }) 
           >
             Start
           </Button>
-        </Group>
-        {whyNot !== null && (
-          <Text size="xs" c="dimmed" ta="right">
-            {whyNot}
-          </Text>
-        )}
+        </SubmitRow>
       </Stack>
     </form>
   );

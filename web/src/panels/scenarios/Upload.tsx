@@ -6,6 +6,7 @@ import { openPanel } from "../../state/layout.ts";
 import { reasonOf, tellSuccess } from "../../state/notices.ts";
 import { useWhyNotOpen } from "../../state/rights.ts";
 import { closeWindow, offerFile, offerScenario, useWindows } from "../../state/windows.ts";
+import { SubmitRow } from "./SubmitRow.tsx";
 
 const KINDS: { kind: FileKind; label: string; description: string }[] = [
   {
@@ -86,7 +87,7 @@ export default function Upload() {
             <span className="reason">{trouble}</span>
           </Alert>
         )}
-        <Group justify="end">
+        <SubmitRow whyNot={whyNot} justify="end">
           <Button
             loading={busy}
             disabled={file === null || kind === null || whyNot !== null}
@@ -94,12 +95,7 @@ export default function Upload() {
           >
             Upload
           </Button>
-        </Group>
-        {whyNot !== null && (
-          <Text size="xs" c="dimmed" ta="right">
-            {whyNot}
-          </Text>
-        )}
+        </SubmitRow>
       </Stack>
     </Modal>
   );

@@ -1,7 +1,8 @@
-import { NavLink, ScrollArea, Text, TextInput } from "@mantine/core";
-import { Search } from "lucide-react";
+import { NavLink, ScrollArea, Text } from "@mantine/core";
 import { useState } from "react";
+import { matcher } from "../../lib/filter.ts";
 import { serviceNames } from "../../link/commands.ts";
+import { FilterInput } from "../shared/FilterInput.tsx";
 import { Reason } from "../shared/Reason.tsx";
 import { useAsked } from "../shared/useAsked.ts";
 import { ServiceCall } from "./ServiceCall.tsx";
@@ -14,22 +15,19 @@ const MOST_SHOWN = 300;
 /** Every service; a form made of its description calls it. */
 export default function Services() {
   const { value: all, reason } = useAsked(serviceNames, NONE, ASK_MS);
-  const [sought, setSought] = useState("");
+  const [filter, setFilter] = useState("");
   const [chosen, setChosen] = useState("");
-  const words = sought.toLowerCase().split(/\s+/);
-  const fitting = all.filter((name) => words.every((word) => name.toLowerCase().includes(word)));
+  const fitting = all.filter(matcher(filter));
   return (
     <div className={classes.panel} data-chosen={chosen !== "" || undefined}>
       <div className={classes.names}>
-        <TextInput
-          size="xs"
+        <FilterInput
+          label="Filter services"
+          placeholder={`Filter ${all.length} services`}
           mx="xs"
           mb={4}
-          leftSection={<Search size={14} />}
-          placeholder={`Filter ${all.length} services`}
-          aria-label="Filter services"
-          value={sought}
-          onChange={(event) => setSought(event.currentTarget.value)}
+          value={filter}
+          onChange={setFilter}
         />
         <Reason>{reason}</Reason>
         <ScrollArea flex={1} mih={0}>

@@ -1,7 +1,8 @@
-import { Button, Group, ScrollArea, Text, TextInput } from "@mantine/core";
-import { Search } from "lucide-react";
+import { Button, Group, ScrollArea, Text } from "@mantine/core";
 import { useState } from "react";
+import { matcher } from "../../lib/filter.ts";
 import { useTopics } from "../../state/topics.ts";
+import { FilterInput } from "../shared/FilterInput.tsx";
 import { TopicRow } from "./TopicRow.tsx";
 import classes from "./Topics.module.css";
 
@@ -10,24 +11,19 @@ const PAGE = 150;
 /** Every topic; one that is ticked or unfolded is received, and its true rate and size told. */
 export default function Topics() {
   const all = useTopics(({ list }) => list);
-  const [sought, setSought] = useState("");
+  const [filter, setFilter] = useState("");
   const [shown, setShown] = useState(PAGE);
-  const words = sought.toLowerCase().split(/\s+/);
-  const fitting = all.filter(({ name, type }) => {
-    const text = `${name} ${type}`.toLowerCase();
-    return words.every((word) => text.includes(word));
-  });
+  const matches = matcher(filter);
+  const fitting = all.filter(({ name, type }) => matches(`${name} ${type}`));
   return (
     <div className={classes.panel}>
       <Group gap="xs" px="sm" pb={6}>
-        <TextInput
-          size="xs"
-          w={260}
-          leftSection={<Search size={14} />}
+        <FilterInput
+          label="Filter topics"
           placeholder="Filter by name or type"
-          aria-label="Filter topics"
-          value={sought}
-          onChange={(event) => setSought(event.currentTarget.value)}
+          w={260}
+          value={filter}
+          onChange={setFilter}
         />
         <Text size="xs" c="dimmed">
           {fitting.length} of {all.length}

@@ -1,10 +1,11 @@
-import { ActionIcon, Group, Text, TextInput, Tooltip } from "@mantine/core";
-import { Plus, Search } from "lucide-react";
+import { ActionIcon, Group, Text, Tooltip } from "@mantine/core";
+import { Plus } from "lucide-react";
 import { useState } from "react";
 import { counted } from "../../lib/counted.ts";
 import { openPanel } from "../../state/layout.ts";
 import { useConnection } from "../../state/connection.ts";
 import { select, useVehicles } from "../../state/vehicles.ts";
+import { FilterInput } from "../shared/FilterInput.tsx";
 import { Rows } from "./Rows.tsx";
 import { Spawn } from "./Spawn.tsx";
 
@@ -41,15 +42,13 @@ export default function Vehicles() {
       </Group>
       {spawning && <Spawn close={() => setSpawning(false)} />}
       {list.length >= SEARCH_FROM && (
-        <TextInput
+        <FilterInput
+          label="Search UAVs"
+          placeholder="Search"
           mx="sm"
           mb={6}
-          size="xs"
-          aria-label="Search UAVs"
-          placeholder="Search"
-          leftSection={<Search size={14} />}
           value={filter}
-          onChange={(event) => setFilter(event.currentTarget.value)}
+          onChange={setFilter}
         />
       )}
       <Rows list={shown} selected={selected} choose={select} open={inspect} />

@@ -1,16 +1,8 @@
-import {
-  BufferAttribute,
-  InstancedBufferGeometry,
-  InstancedBufferAttribute,
-  Mesh,
-  ShaderMaterial,
-  UniformsLib,
-  UniformsUtils,
-  Vector3,
-} from "three";
+import { Vector3 } from "three";
 import type { Moment, Part } from "../stage/part.ts";
 import type { Air } from "./air.ts";
 import { FADE } from "./fog.ts";
+import { disposeParticles, particleMesh, type ParticleMesh } from "./particleMesh.ts";
 
 /** Drops and flakes fill a box of this side around the camera, m. */
 const BOX_M = 24;
@@ -57,7 +49,7 @@ void main() {
 
 /** Rain or snow around the camera. */
 export class Falling implements Part {
-  readonly object: Mesh<InstancedBufferGeometry, ShaderMaterial>;
+  readonly object: ParticleMesh;
   private readonly offset = new Vector3();
 
   constructor(
@@ -65,32 +57,23 @@ export class Falling implements Part {
     private readonly air: Air,
     most: number,
   ) {
-    const geometry = new InstancedBufferGeometry();
-    const corners = new Float32Array([-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0]);
-    geometry.setAttribute("position", new BufferAttribute(corners, 3));
-    geometry.setIndex([0, 1, 2, 0, 2, 3]);
-    const places = Float32Array.from({ length: 3 * most }, Math.random);
-    geometry.setAttribute("place", new InstancedBufferAttribute(places, 3));
     const vector = () => ({ value: new Vector3() });
-    const own = {
-      eye: vector(),
-      offset: vector(),
-      streak: vector(),
-      light: vector(),
-      thick: { value: kind === "rain" ? 0.006 : 0.022 },
-      snowing: { value: kind === "snow" ? 1 : 0 },
-    };
-    const material = new ShaderMaterial({
+    this.object = particleMesh({
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
-      uniforms: UniformsUtils.merge([UniformsLib.fog, own]),
-      transparent: true,
-      depthWrite: false,
-      fog: true,
+      uniforms: {
+        eye: vector(),
+        offset: vector(),
+        streak: vector(),
+        light: vector(),
+        thick: { value: kind === "rain" ? 0.006 : 0.022 },
+        snowing: { value: kind === "snow" ? 1 : 0 },
+      },
+      attributes: {
+        place: { size: 3, values: Float32Array.from({ length: 3 * most }, Math.random) },
+      },
+      renderOrder: 2000,
     });
-    this.object = new Mesh(geometry, material);
-    this.object.frustumCulled = false;
-    this.object.renderOrder = 2000;
   }
 
   update({ camera, stepS, quality }: Moment): void {
@@ -117,7 +100,6 @@ export class Falling implements Part {
   }
 
   dispose(): void {
-    this.object.geometry.dispose();
-    this.object.material.dispose();
+    disposeParticles(this.object);
   }
 }

@@ -4,8 +4,8 @@ import type { Air } from "../air/air.ts";
 import { Falling } from "../air/Falling.ts";
 import { Sky } from "../air/Sky.ts";
 import { Sun } from "../air/Sun.ts";
-import { OccupancyMaps } from "../maps/OccupancyMaps.ts";
-import { Voxels } from "../maps/Voxels.ts";
+import { occupancyMaps } from "../maps/occupancyMaps.ts";
+import { voxels } from "../maps/voxels.ts";
 import { Markers } from "../markers/Markers.ts";
 import { Frusta } from "../sensing/Frusta.ts";
 import { Returns } from "../sensing/Returns.ts";
@@ -55,8 +55,8 @@ export function makeParts(
     ["paths", new Paths()],
     ["returns", new Returns()],
     ["frusta", new Frusta()],
-    ["voxels", new Voxels()],
-    ["maps", new OccupancyMaps()],
+    ["voxels", voxels()],
+    ["maps", occupancyMaps()],
     ["markers", new Markers()],
     ["axes", new Axes()],
     ["sky", new Sky(air)],

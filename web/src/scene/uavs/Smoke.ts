@@ -1,17 +1,8 @@
-import {
-  BufferAttribute,
-  InstancedBufferAttribute,
-  InstancedBufferGeometry,
-  Mesh,
-  ShaderMaterial,
-  UniformsLib,
-  UniformsUtils,
-  Vector2,
-  Vector3,
-} from "three";
+import { type InstancedBufferAttribute, Vector2, Vector3 } from "three";
 import { POSE } from "../../link/protocol.ts";
 import type { Air } from "../air/air.ts";
 import { FADE } from "../air/fog.ts";
+import { disposeParticles, particleMesh, type ParticleMesh } from "../air/particleMesh.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { shown } from "../stage/shown.ts";
 import { fleet } from "./fleet.ts";
@@ -22,33 +13,27 @@ const RISE_S = 4;
 
 /** Smoke over UAVs that have crashed. */
 export class Smoke implements Part {
-  readonly object: Mesh<InstancedBufferGeometry, ShaderMaterial>;
+  readonly object: ParticleMesh;
 
   constructor(private readonly air: Air) {
-    const geometry = new InstancedBufferGeometry();
-    const corners = new Float32Array([-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0]);
-    geometry.setAttribute("position", new BufferAttribute(corners, 3));
-    geometry.setIndex([0, 1, 2, 0, 2, 3]);
     const count = PUFFS * MOST_WRECKS;
-    geometry.setAttribute("place", new InstancedBufferAttribute(new Float32Array(3 * count), 3));
-    const phases = Float32Array.from({ length: count }, (_, i) => (i % PUFFS) / PUFFS);
-    geometry.setAttribute("phase", new InstancedBufferAttribute(phases, 1));
-    const own = {
-      timeS: { value: 0 },
-      wind: { value: new Vector2() },
-      light: { value: new Vector3() },
-    };
-    const material = new ShaderMaterial({
+    this.object = particleMesh({
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
-      uniforms: UniformsUtils.merge([UniformsLib.fog, own]),
-      transparent: true,
-      depthWrite: false,
-      fog: true,
+      uniforms: {
+        timeS: { value: 0 },
+        wind: { value: new Vector2() },
+        light: { value: new Vector3() },
+      },
+      attributes: {
+        place: { size: 3, values: new Float32Array(3 * count) },
+        phase: {
+          size: 1,
+          values: Float32Array.from({ length: count }, (_, i) => (i % PUFFS) / PUFFS),
+        },
+      },
+      renderOrder: 1450,
     });
-    this.object = new Mesh(geometry, material);
-    this.object.frustumCulled = false;
-    this.object.renderOrder = 1450;
   }
 
   update({ nowMs }: Moment): void {
@@ -72,8 +57,7 @@ export class Smoke implements Part {
   }
 
   dispose(): void {
-    this.object.geometry.dispose();
-    this.object.material.dispose();
+    disposeParticles(this.object);
   }
 }
 
