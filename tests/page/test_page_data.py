@@ -112,7 +112,7 @@ def test_a_service_is_called_by_a_form_of_its_own(page, served):
 
 def test_a_fault_is_injected_and_told_in_the_log(page, served):
     panel = open_panel(page, "Faults")
-    panel.get_by_label("What fails").click()
+    panel.get_by_label("Fault type").click()
     page.get_by_role("option", name="Displacement").click()
     for axis, metres in (("east", "3"), ("north", "0"), ("up", "1")):
         panel.get_by_label(f"Offset, m, {axis}").fill(metres)
@@ -135,7 +135,7 @@ def test_a_wrong_fault_tells_why(page):
     panel = open_panel(page, "Faults")
     panel.get_by_label("Rotor", exact=True).fill("99")
     panel.get_by_role("button", name="Inject").click()
-    page.get_by_text("The fault was refused").wait_for()
+    page.get_by_text("Fault injection failed").wait_for()
 
 
 @pytest.mark.parametrize("name", ["from_the_page.mcap", "from_the_page.bag"])
@@ -186,7 +186,7 @@ def test_a_recording_is_played_with_a_slider_and_left_again(page, served, shared
     page.wait_for_timeout(2000)
     panel.get_by_role("button", name="Stop").click()
     panel.get_by_role("button", name="Play to_be_played.mcap").click()
-    player = page.get_by_role("group", name="Player")
+    player = page.get_by_role("group", name="Playback")
     player.wait_for()
     until(lambda: player.get_by_role("button", name="Play the recording").is_visible())  # its end
     slider = player.get_by_role("slider")

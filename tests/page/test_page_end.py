@@ -21,7 +21,7 @@ def served(chromium):
 @pytest.fixture
 def banner(browsing, served):
     page = browsing.open(served.url + LOOK, viewport=SMALL)
-    banner = page.get_by_role("status").filter(has_text="The scenario ended")
+    banner = page.get_by_role("status").filter(has_text="Scenario ended")
     banner.wait_for(timeout=120_000)
     return banner
 
@@ -40,7 +40,7 @@ def test_a_reset_flies_again_and_fly_on_passes_the_end(banner, served):
     assert time_s(served) < END_S
     banner.wait_for(state="detached", timeout=60_000)
     banner.wait_for(timeout=120_000)
-    banner.get_by_role("button", name="Fly on").click()
+    banner.get_by_role("button", name="Continue").click()
     banner.wait_for(state="detached", timeout=60_000)
     until(lambda: time_s(served) > END_S + 1.0, 60)
     assert served.status()["state"] == "flying"

@@ -41,7 +41,7 @@ def test_silence_is_told_at_once_and_ends_by_itself(browsing, served):
     wait_for_clock(page, lambda s: s > 0)
     os.kill(served.pid, signal.SIGSTOP)
     try:
-        banner = page.get_by_role("alert").filter(has_text="Nothing comes from the simulation")
+        banner = page.get_by_role("alert").filter(has_text="No data from the simulation")
         banner.wait_for()
         keep_picture(page, "silent")
         assert "Since" in banner.inner_text()

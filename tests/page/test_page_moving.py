@@ -183,7 +183,7 @@ def test_the_map_circles_the_selected_uav_and_a_click_sends_it(page, served):
     for uav, circle in circles.items():
         east, north = np.subtract(HOMES[uav], HOMES["uav1"])[:2]
         assert circle - circles["uav1"] == pytest.approx([scale * east, -scale * north], abs=3.0)
-    page.get_by_role("button", name="A click sends the selected UAV there").click()
+    page.get_by_role("button", name="Send the selected UAV by click").click()
     x, y = circles["uav1"] + scale * np.array([6.0, 4.0])  # 6 m east, 4 m south
     map_canvas(page).click(position={"x": float(x), "y": float(y)})
     arrives(served, "uav1", 6.0, -4.0)
@@ -199,15 +199,15 @@ def test_the_map_circles_the_selected_uav_and_a_click_sends_it(page, served):
 def test_a_click_on_the_ground_sends_the_selected_uav(page, served):
     panel = inspect(page, "uav1")
     wait_for_frames(page, 3)
-    panel.get_by_role("button", name="Go to a place that is clicked").click()
-    page.get_by_text("click on the ground or on the map").wait_for()
+    panel.get_by_role("button", name="Go to a clicked position").click()
+    page.get_by_text("click the ground or the map").wait_for()
     page.mouse.click(*project(page, (3.0, -2.0, 0.0)))
     arrives(served, "uav1", 3.0, -2.0)
 
 
 def test_new_uavs_stand_where_one_clicks(page, served):
     page.get_by_role("button", name="Add UAVs").click()
-    page.get_by_role("group", name="Add UAVs").get_by_role("button", name="By click").click()
+    page.get_by_role("group", name="Add UAVs").get_by_role("button", name="Click position").click()
     page.mouse.click(*project(page, (2.0, 3.0, 0.0)))
     vehicle(served, "uav4")
     assert near(place(served, "uav4"), (2.0, 3.0), 1.0)
@@ -274,7 +274,7 @@ def test_smoke_rises_from_a_crash(page, served):
 def test_a_crashed_uav_is_repaired(page, served):
     served.call("/uav3/stop", "std_srvs/srv/Trigger")
     vehicle(served, "uav3", lambda uav: uav["crashed"])
-    repair = inspect(page, "uav3").get_by_role("button", name="Repair: back to its start")
+    repair = inspect(page, "uav3").get_by_role("button", name="Repair and return to start")
     repair.click()
     vehicle(served, "uav3", lambda uav: not uav["crashed"])
     repair.wait_for(state="detached")

@@ -121,7 +121,7 @@ def test_a_uav_that_returns_to_its_start_leaves_no_trail(page, served):
 
 
 def test_the_window_of_scenarios_takes_every_file(page):
-    page.get_by_label("choose another one").click()
+    page.get_by_label("choose another scenario").click()
     with page.expect_file_chooser() as chosen:
         page.get_by_role("button", name="Upload a file").click()
     chosen.value.set_files({"name": "flight.mcap", "mimeType": "", "buffer": b"\x89MCAP0\r\n"})

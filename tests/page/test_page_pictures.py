@@ -166,7 +166,7 @@ def test_tiles_are_dragged_resized_and_closed(page):
     tile(page, depth).get_by_text(depth, exact=True).click(position={"x": 3, "y": 3})
     page.get_by_role("button", name=f"Close {depth}").click()
     tile(page, depth).wait_for(state="detached")
-    page.get_by_role("button", name="Which pictures").click()
+    page.get_by_role("button", name="Select cameras").click()
     page.get_by_role("menuitemcheckbox", name=depth, exact=True).click()
     tile(page, depth).wait_for()
 

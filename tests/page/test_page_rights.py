@@ -16,7 +16,7 @@ from working import WIDE, inspect, open_panel
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 PILOTS, VIEWERS = "pilots-secret-token", "viewers-secret-token"
-WHY_NOT = "You are looking on: the pilots' token is needed to steer"
+WHY_NOT = "View-only access: commands require an operator token"
 LOOK = "#view=fly&camera=-9_0_6_0_-0.3_0&uav=uav1"
 ASK = """
 (order) => new Promise((resolve, reject) => {
@@ -47,14 +47,14 @@ def enter(browsing, served, token):
 def test_without_a_token_the_page_asks_for_one(browsing, served):
     browsing.expected += ["401", "403", "WebSocket connection"]
     page = browsing.open(served.url, viewport=WIDE)
-    page.get_by_text("This server asks for a token").wait_for()
+    page.get_by_text("This server requires a token").wait_for()
     assert page.get_by_role("option", name="uav1").count() == 0
     keep_picture(page, "token")
     page.get_by_label("Token").fill("wrong")
-    page.get_by_role("button", name="Enter").click()
-    page.get_by_text("This is not a token of this server").wait_for()
+    page.get_by_role("button", name="Connect").click()
+    page.get_by_text("The server does not accept this token").wait_for()
     page.get_by_label("Token").fill(PILOTS)
-    page.get_by_role("button", name="Enter").click()
+    page.get_by_role("button", name="Connect").click()
     page.get_by_role("option", name="uav1").wait_for()
     assert "token" not in page.url
     with pytest.raises(urllib.error.HTTPError, match=r"HTTP Error 40[13]"):
@@ -69,15 +69,15 @@ def test_a_viewer_sees_all_and_every_control_is_off(browsing, served):
     orders = panel.get_by_role("group", name="Commands")
     for name in ("Take off", "Land", "Hold", "Return", "Arm", "Kill"):
         assert orders.get_by_role("button", name=name, exact=True).is_disabled()
-    for name in ("Go", "Go to a place that is clicked", "Take control", "Remove uav1"):
+    for name in ("Go", "Go to a clicked position", "Take control", "Remove uav1"):
         assert panel.get_by_role("button", name=name, exact=True).is_disabled()
     for name in ("Pause", "Reset", "Manual control"):
         assert page.get_by_role("button", name=name, exact=True).is_disabled()
     open_panel(page, "Environment").get_by_text(WHY_NOT).wait_for()
-    assert page.get_by_role("button", name="Blow a gust").is_disabled()
+    assert page.get_by_role("button", name="Add a gust").is_disabled()
     assert page.get_by_role("slider").count() == 0  # none has a thumb
     assert open_panel(page, "Faults").get_by_role("button", name="Inject").is_disabled()
-    assert page.get_by_role("button", name="A click sends the selected UAV there").is_disabled()
+    assert page.get_by_role("button", name="Send the selected UAV by click").is_disabled()
     keep_picture(page, "viewer")
     # What moves, moves for him too.
     z = on_screen(page, "uav1")["position"][2]
@@ -120,7 +120,7 @@ def test_two_pilots_and_a_hand_over(browsing, served):
     annas.get_by_label("Your name").fill("Anna")
     annas.get_by_role("button", name="Take control").click()
     vehicle(served, "uav1", lambda uav: uav["holder"] == "Anna")
-    bens.get_by_text("Anna has it: your commands are refused.").wait_for()
+    bens.get_by_text("Anna controls this UAV: the server refuses your commands.").wait_for()
     # Ben takes the other one, by which Anna's page knows him.
     inspect(ben, "uav2").get_by_label("Your name").fill("Ben")
     bens.get_by_role("button", name="Take control").click()
@@ -129,19 +129,19 @@ def test_two_pilots_and_a_hand_over(browsing, served):
     ben.get_by_role("alert").filter(has_text="held by Anna").first.wait_for()
     assert vehicle(served, "uav1")["mode"] != "LAND"
     ben.keyboard.press("c")
-    ben.get_by_role("group", name="Manual control").get_by_text("Anna has the control").wait_for()
+    ben.get_by_role("group", name="Manual control").get_by_text("Anna controls uav1").wait_for()
     ben.keyboard.down("KeyW")
     ben.wait_for_timeout(1000)
     ben.keyboard.up("KeyW")
     assert vehicle(served, "uav1")["mode"] != "VELOCITY"
     ben.keyboard.press("Escape")
     keep_picture(ben, "held_by_another")
-    annas.get_by_label("Pilot to hand it to").fill("Ben")
+    annas.get_by_label("New operator").fill("Ben")
     anna.keyboard.press("Escape")  # the list of names
     annas.get_by_role("button", name="Hand over").click()
     vehicle(served, "uav1", lambda uav: uav["holder"] == "Ben")
-    annas.get_by_text("Ben has it: your commands are refused.").wait_for()
-    bens.get_by_text("You have it, as Ben.").wait_for()
+    annas.get_by_text("Ben controls this UAV: the server refuses your commands.").wait_for()
+    bens.get_by_text("You control this UAV as Ben.").wait_for()
     x = place(served, "uav1")[0]
     ben.keyboard.press("c")
     ben.keyboard.down("KeyW")

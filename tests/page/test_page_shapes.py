@@ -106,11 +106,11 @@ def test_labels_are_whole_and_the_prompt_lies_free(browsing, served):
     assert clipped(page) == []
     page.keyboard.press("Escape")
     page.get_by_role("button", name="Add UAVs").click()
-    page.get_by_role("button", name="By click").wait_for()
+    page.get_by_role("button", name="Click position").wait_for()
     assert clipped(page) == []
     panel_button(page, "Inspector").click()
-    page.get_by_label("Go to a place that is clicked").click()
-    prompt = page.get_by_role("status").filter(has_text="uav1 flies there")
+    page.get_by_label("Go to a clicked position").click()
+    prompt = page.get_by_role("status").filter(has_text="Goal of uav1")
     prompt.wait_for()
     assert clipped(page) == []
     assert is_on_top(page, prompt)

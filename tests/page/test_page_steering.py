@@ -40,7 +40,7 @@ def test_pause_step_and_play(page, served):
     stepped = status(served, lambda told: told["stamp"] != paused["stamp"])
     ns = [stamp_ns(told) for told in (paused, stepped)]
     assert 0 < ns[1] - ns[0] <= 4_000_000  # one physics step
-    page.get_by_role("button", name="Many steps").click()
+    page.get_by_role("button", name="Multiple steps").click()
     page.get_by_label("Physics steps").fill("500")
     page.get_by_role("dialog").get_by_role("button", name="Step", exact=True).click()
     status(served, lambda told: stamp_ns(told) == ns[1] + 500 * (ns[1] - ns[0]))
@@ -62,16 +62,16 @@ def test_the_speed_slider_goes_from_slow_to_unbounded(page, served):
 def test_a_snapshot_is_taken_returned_to_and_forgotten(page, served):
     page.get_by_role("button", name="Snapshots").click()
     page.get_by_label("Name of the snapshot").fill("before")
-    page.get_by_role("button", name="Take", exact=True).click()
-    page.get_by_role("button", name="Return to before").wait_for()
+    page.get_by_role("button", name="Save", exact=True).click()
+    page.get_by_role("button", name="Restore before").wait_for()
     listed = served.call("/volery/list_snapshots", "volery_interfaces/srv/ListSnapshots")
     assert listed["names"] == ["before"]
     kept_s = listed["stamps"][0]["sec"]
     status(served, lambda told: told["stamp"]["sec"] >= kept_s + 3)
-    page.get_by_role("button", name="Return to before").click()
+    page.get_by_role("button", name="Restore before").click()
     status(served, lambda told: told["stamp"]["sec"] <= kept_s + 2)
-    page.get_by_role("button", name="Forget before").click()
-    page.get_by_text("No snapshot yet").wait_for()
+    page.get_by_role("button", name="Delete before").click()
+    page.get_by_text("No snapshots.").wait_for()
 
 
 def test_a_reset_goes_back_to_the_start(page, served):
@@ -112,9 +112,9 @@ def test_a_kill_is_asked_twice(page, served):
     panel = inspect(page, "uav3")
     vehicle(served, "uav3", lambda uav: uav["airborne"])
     panel.get_by_role("button", name="Kill", exact=True).click()
-    panel.get_by_role("button", name="Do not kill").click()
+    panel.get_by_role("button", name="Cancel kill").click()
     panel.get_by_role("button", name="Kill", exact=True).click()
-    panel.get_by_role("button", name="Rotors off").click()
+    panel.get_by_role("button", name="Stop rotors").click()
     vehicle(served, "uav3", lambda uav: not uav["airborne"])
 
 
@@ -184,7 +184,7 @@ def test_uavs_come_and_go(page, served):
     group = page.get_by_role("group", name="Add UAVs")
     group.get_by_label("Airframe or type").click()
     page.get_by_role("option", name="crazyflie", exact=True).click()
-    group.get_by_label("How many").fill("2")
+    group.get_by_label("Count", exact=True).fill("2")
     group.get_by_role("button", name="Add", exact=True).click()
     came = vehicle(served, "uav5", lambda uav: True)
     assert came["airframe"] == "crazyflie"
@@ -204,7 +204,7 @@ def test_control_is_taken_and_let_go(page, served):
     vehicle(served, "uav1", lambda uav: uav["holder"] == "Anna")
     with pytest.raises(roslibpy.core.ServiceException, match="held by Anna"):
         served.call("/uav1/hold", "std_srvs/srv/Trigger")
-    panel.get_by_text("You have it, as Anna.").wait_for()
+    panel.get_by_text("You control this UAV as Anna.").wait_for()
     panel.get_by_role("button", name="Release control").click()
     vehicle(served, "uav1", lambda uav: uav["holder"] == "")
 
@@ -228,5 +228,5 @@ def test_weather_follows_its_sliders(page, served):
     set_slider(page, "Wind", "ArrowRight", 6)
     told = weather(served, lambda told: told["wind"]["y"] == pytest.approx(-3.0))  # from the north
     assert told["rain"] == pytest.approx(8.0)
-    page.get_by_role("button", name="Calm and clear").click()
+    page.get_by_role("button", name="Clear weather").click()
     weather(served, lambda told: told["rain"] == told["fog_visibility"] == 0.0)

@@ -49,7 +49,7 @@ def middle(element):
 
 def test_two_thumbs_fly_a_uav(page, served):
     hands = page.get_by_role("group", name="Manual control")
-    left = page.get_by_role("application", name="Climb and turn")
+    left = page.get_by_role("application", name="Climb / yaw")
     right = page.get_by_role("application", name="Forward / lateral")
     left.wait_for()
     panel = hands.bounding_box()
@@ -79,5 +79,5 @@ def test_two_thumbs_fly_a_uav(page, served):
     assert flown[0] > x + 1.0
     assert flown[2] > z + 0.5
     wait_until(page, lambda page: on_screen(page, "uav1")["position"][2] > z + 0.5)
-    page.get_by_label("Give the controls back").tap()
+    page.get_by_label("Release the controls").tap()
     right.wait_for(state="detached")

@@ -137,7 +137,7 @@ def page(opened, shared, served):
 def bring(page, name, kind, content):
     """Choose the file and what it is, and send it."""
     if page.get_by_role("dialog").count() == 0:
-        page.get_by_role("button", name=re.compile("choose another one")).click()
+        page.get_by_role("button", name=re.compile("choose another scenario")).click()
     page.get_by_role("dialog").locator("input[type=file]").or_(
         page.locator("input[type=file]")
     ).first.set_input_files(
@@ -202,7 +202,7 @@ def test_wrong_files_are_refused_with_the_reason_and_nothing_is_lost(page, serve
     before = status(served)["stamp"]["sec"]
     for name, (kind, content, why) in WRONG.items():
         bring(page, name, kind, content)
-        refused = page.get_by_role("alert").filter(has_text="cannot be flown")
+        refused = page.get_by_role("alert").filter(has_text="Cannot make a scenario")
         refused.filter(has_text=re.compile(re.escape(why))).wait_for()
     keep_picture(page, "wrong_upload")
     assert json.loads(served.ask("scenarios")) == known

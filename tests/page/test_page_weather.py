@@ -23,7 +23,7 @@ def opened(module_browsing, served):
 @pytest.fixture
 def page(opened, shared, served):
     page = opened
-    open_panel(page, "Environment").get_by_role("button", name="Calm and clear").click()
+    open_panel(page, "Environment").get_by_role("button", name="Clear weather").click()
     weather(served, lambda told: told["rain"] == told["snow"] == told["fog_visibility"] == 0.0)
     set_slider(page, "Hour of day", "Home")
     set_slider(page, "Hour of day", "ArrowRight", 47)  # noon
@@ -84,13 +84,13 @@ def test_what_falls_is_seen_to_fall(page, served, kind):
 def test_wind_and_gusts_move_a_uav(page, served):
     vehicle(served, "uav1", lambda uav: uav["mode"] == "HOLD" and uav["airborne"])
     before = place(served, "uav1")
-    set_slider(page, "Wind comes from", "Home")
-    set_slider(page, "Wind comes from", "ArrowRight", 18)  # 90 degrees: from the east
+    set_slider(page, "Wind from", "Home")
+    set_slider(page, "Wind from", "ArrowRight", 18)  # 90 degrees: from the east
     set_slider(page, "Wind", "ArrowRight", 12)
     weather(served, lambda told: told["wind"]["x"] == pytest.approx(-6.0))
     vehicle(served, "uav1", lambda uav: uav["position"]["x"] < before[0] - 0.05)
-    page.get_by_role("button", name="Calm and clear").click()
+    page.get_by_role("button", name="Clear weather").click()
     weather(served, lambda told: told["wind"]["x"] == 0.0)
     vehicle(served, "uav1", lambda uav: abs(uav["velocity"]["x"]) < 0.05)
-    page.get_by_role("button", name="Blow a gust").click()
+    page.get_by_role("button", name="Add a gust").click()
     vehicle(served, "uav1", lambda uav: abs(uav["velocity"]["x"]) > 0.1)

@@ -74,7 +74,7 @@ def page(opened, shared, served):
 def start(page, served, name, work=lambda dialog: None):
     """Choose the card, set up how it is flown, start it and wait until it flies."""
     before = served.status()["world"]
-    page.get_by_role("button", name=re.compile("choose another one")).click()
+    page.get_by_role("button", name=re.compile("choose another scenario")).click()
     page.get_by_label("Search", exact=True).fill(name)
     card = page.get_by_role("button", name=re.compile(f"^{name}: "))
     card.wait_for()
@@ -115,7 +115,7 @@ def test_a_card_is_chosen_with_uavs_airframe_and_sensors(page, served):
         dialog.get_by_role("checkbox", name="lidar").check()
         dialog.get_by_role("checkbox", name="sonar").uncheck()
 
-    page.get_by_role("button", name=re.compile("choose another one")).click()
+    page.get_by_role("button", name=re.compile("choose another scenario")).click()
     card = page.get_by_role("button", name=re.compile("^hover: "))
     for told in ("1 UAV: f450", "sonar, IMU", "open ground"):
         card.get_by_text(told).wait_for()
@@ -141,7 +141,7 @@ def test_a_card_is_chosen_with_uavs_airframe_and_sensors(page, served):
 def start_anew(page, served, work):
     """The same world once more: its id may stay."""
     vehicle(served, "uav1")
-    page.get_by_role("button", name=re.compile("choose another one")).click()
+    page.get_by_role("button", name=re.compile("choose another scenario")).click()
     page.get_by_role("button", name=re.compile("^hover: ")).click()
     dialog = page.get_by_role("dialog", name="hover")
     work(dialog)
@@ -159,7 +159,7 @@ def test_more_trees_a_hectare_are_built_and_seen(page, served):
     few = standing(page)
     panel = open_panel(page, "Environment")
     panel.get_by_label("Trees per hectare").fill("500")
-    panel.get_by_role("button", name="Build").click()
+    panel.get_by_role("button", name="Rebuild").click()
     until(lambda: served.status()["state"] == "flying" and trees(served) > 60, 120)
     assert trees(served) == pytest.approx(80, abs=1)  # 0.16 ha
     wait_until(page, lambda page: standing(page) > 1.3 * few)
@@ -183,7 +183,7 @@ def test_blocks_grow_by_their_sliders(page, served):
     wait_until(page, lambda page: standing(page) > 2.0 * low)
     wait_for_frames(page, 3)
     high = standing(page)
-    set_slider(page, "Size of a cell", "ArrowRight", 8)
+    set_slider(page, "Cell size", "ArrowRight", 8)
     until(lambda: blocks(served)["cell_size"] == pytest.approx(4.0))
     wait_until(page, lambda page: standing(page) > 1.3 * high)
     keep_picture(page, "blocks")

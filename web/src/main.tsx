@@ -37,7 +37,7 @@ followGoals();
 followRestarts();
 followSilence();
 followTopics();
-link.onComplaint = (text) => tellFailure("The simulation refuses", text);
+link.onComplaint = (text) => tellFailure("The simulation refused a message", text);
 
 createRoot(document.getElementById("root")!).render(
   <MantineProvider theme={theme} defaultColorScheme="auto">

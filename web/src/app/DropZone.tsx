@@ -41,7 +41,7 @@ export function DropZone() {
     <div className="drop-zone">
       <Upload size={48} />
       <Text size="lg" fw={600}>
-        Drop a map or a scenario to fly it, or a log to play it
+        Drop a map or a scenario to fly, or a log to play back
       </Text>
       <Text c="dimmed">{UPLOAD_HINT}</Text>
     </div>

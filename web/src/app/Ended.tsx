@@ -17,7 +17,7 @@ export function Ended() {
       variant="filled"
       icon={<Flag size={18} />}
       role="status"
-      title={`The scenario ended at ${clockText(seconds)}`}
+      title={`Scenario ended at ${clockText(seconds)}`}
     >
       <Group gap="xs">
         <Button
@@ -32,9 +32,9 @@ export function Ended() {
           size="compact-sm"
           variant="white"
           disabled={whyNot !== null}
-          onClick={() => void succeeds("Fly on", continueRun())}
+          onClick={() => void succeeds("Continue", continueRun())}
         >
-          Fly on
+          Continue
         </Button>
         {whyNot}
       </Group>

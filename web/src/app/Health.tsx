@@ -15,7 +15,10 @@ export function Health() {
   return (
     <Popover width={300} position="bottom-end" shadow="md" withArrow>
       <Popover.Target>
-        <UnstyledButton className={classes.meter} aria-label={`Health: ${ageText(ageP95Ms)} old`}>
+        <UnstyledButton
+          className={classes.meter}
+          aria-label={`Health: display latency ${ageText(ageP95Ms)}`}
+        >
           <span className={classes.lamp} data-state={stateOf(ageP95Ms)} />
           <span>{ageText(ageP95Ms)}</span>
           <span className={classes.frames}>{framesPerS.toFixed(0)} fps</span>
@@ -32,16 +35,16 @@ function Details() {
   const health = useHealth();
   const status = useSimulation((simulation) => simulation.status);
   const rows: [string, string][] = [
-    ["Age of what is shown, half of it below", ageText(health.ageP50Ms)],
-    ["95 % of it below", ageText(health.ageP95Ms)],
+    ["Display latency, median", ageText(health.ageP50Ms)],
+    ["Display latency, 95th percentile", ageText(health.ageP95Ms)],
     [
       "Frames",
-      `${health.framesPerS.toFixed(0)} a second, ${(100 * health.late).toFixed(0)} % late`,
+      `${health.framesPerS.toFixed(0)} per second, ${(100 * health.late).toFixed(0)} % late`,
     ],
     ["Received", `${bytesText(health.bytesPerS)}/s, ${rateText(health.messagesPerS)}`],
     ["Messages dropped for slow clients", String(health.dropped)],
-    ["Memory of the page", bytesText(health.heapBytes)],
-    ["Memory of the simulation", bytesText(1e6 * (status?.memory ?? NaN))],
+    ["Page memory", bytesText(health.heapBytes)],
+    ["Simulation memory", bytesText(1e6 * (status?.memory ?? NaN))],
     ["Clients", String(status?.clients ?? "–")],
   ];
   return (
@@ -68,7 +71,7 @@ function Load({ stages, load }: { stages: string[]; load: number[] }) {
   return (
     <div>
       <Text size="xs" c="dimmed">
-        Computing for a simulated second
+        Computation per simulated second
       </Text>
       {stages.map((stage, i) => (
         <div key={stage} className={classes.stage}>

@@ -5,7 +5,7 @@ import { closeWindow } from "../state/windows.ts";
 /** All keys. */
 export default function Help() {
   return (
-    <Modal opened onClose={closeWindow} title="Keys" size="xl">
+    <Modal opened onClose={closeWindow} title="Keyboard shortcuts" size="xl">
       <div className="keys">
         {HOTKEYS.map(({ title, keys }) => (
           <Stack key={title} gap={6} mb="lg" className="keys-group">

@@ -7,7 +7,7 @@ export function Picking() {
   if (asking === null) return null;
   return (
     <Paper className="picking" shadow="md" withBorder px="md" py={6} role="status">
-      <Text size="sm">{asking}: click on the ground or on the map</Text>
+      <Text size="sm">{asking}: click the ground or the map</Text>
       <Button size="compact-xs" variant="subtle" onClick={() => givePlace(null)}>
         Cancel (Esc)
       </Button>

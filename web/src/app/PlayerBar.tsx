@@ -20,12 +20,12 @@ export function PlayerBar() {
   if (player === null) return null;
   const playing = player.state === PLAYING;
   return (
-    <Paper className={classes.bar} withBorder shadow="md" role="group" aria-label="Player">
+    <Paper className={classes.bar} withBorder shadow="md" role="group" aria-label="Playback">
       <ActionIcon
         size="lg"
         variant="light"
         aria-label={playing ? "Pause the recording" : "Play the recording"}
-        onClick={() => void succeeds("The player refused", setPlaying(!playing))}
+        onClick={() => void succeeds("Playback command failed", setPlaying(!playing))}
       >
         {playing ? <Pause size={18} /> : <Play size={18} />}
       </ActionIcon>
@@ -38,7 +38,7 @@ export function PlayerBar() {
         max={Math.max(player.end, player.start + STEP_S)}
         step={STEP_S}
         value={dragged ?? player.position}
-        thumbLabel="Time in the recording"
+        thumbLabel="Playback time"
         label={(time) => clockText(time - player.start)}
         onChange={(time) => {
           setDragged(time);
@@ -53,31 +53,31 @@ export function PlayerBar() {
         <Select
           size="xs"
           w={82}
-          aria-label="Speed of the recording"
+          aria-label="Playback speed"
           data={SPEEDS.map((speed) => ({ value: String(speed), label: speedText(speed) }))}
           value={String(player.speed)}
           allowDeselect={false}
           comboboxProps={{ position: "top" }}
-          onChange={(speed) => void succeeds("The player refused", setSpeed(Number(speed)))}
+          onChange={(speed) => void succeeds("Playback command failed", setSpeed(Number(speed)))}
         />
-        <Tooltip label="Begin again at the end">
+        <Tooltip label="Loop">
           <ActionIcon
             size="lg"
             variant={player.loop ? "light" : "subtle"}
-            aria-label="Begin again at the end"
+            aria-label="Loop"
             aria-pressed={player.loop}
-            onClick={() => void succeeds("The player refused", setLoop(!player.loop))}
+            onClick={() => void succeeds("Playback command failed", setLoop(!player.loop))}
           >
             <Repeat size={17} />
           </ActionIcon>
         </Tooltip>
         {player.can_close && (
-          <Tooltip label="Close the recording and fly again">
+          <Tooltip label="Close the recording and return to the simulation">
             <ActionIcon
               size="lg"
               variant="subtle"
               aria-label="Close the recording"
-              onClick={() => void succeeds("The player refused", closeRecording())}
+              onClick={() => void succeeds("Playback command failed", closeRecording())}
             >
               <X size={17} />
             </ActionIcon>

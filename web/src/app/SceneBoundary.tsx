@@ -18,9 +18,9 @@ export class SceneBoundary extends Component<Props, { reason: string }> {
     if (reason === "") return this.props.children;
     return (
       <Paper className="situation" withBorder p="lg" role="alert">
-        <Title order={4}>The scene cannot be drawn</Title>
+        <Title order={4}>This browser cannot draw the scene</Title>
         <Text size="sm" mt="xs">
-          Has this browser WebGL 2? It says: “{reason}” All panels work without it.
+          The scene needs WebGL 2; all panels work without it. Browser error: {reason}
         </Text>
       </Paper>
     );

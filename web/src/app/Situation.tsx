@@ -53,7 +53,7 @@ function Failed() {
     <Paper className="situation" shadow="lg" withBorder p="lg" role="alert">
       <Group>
         <TriangleAlert size={20} color="var(--mantine-color-red-6)" />
-        <Title order={4}>{server?.scenario || "The scenario"} could not be flown</Title>
+        <Title order={4}>Cannot start {server?.scenario || "the scenario"}</Title>
       </Group>
       <Text size="sm" my="sm" className="reason">
         {server?.message}
@@ -67,21 +67,21 @@ function Lobby() {
   const message = useSimulation(({ server }) => server?.message);
   return (
     <Paper className="situation" shadow="lg" withBorder p="lg">
-      <Title order={4}>Nothing flies</Title>
+      <Title order={4}>No scenario is running</Title>
       <Text size="sm" c="dimmed" my="sm">
-        {message || "Choose a scenario, or drop a map of your own on this page."}
+        {message || "Choose a scenario, or drop a map file on this page."}
       </Text>
       <Button onClick={() => openWindow("scenarios")}>Choose a scenario</Button>
     </Paper>
   );
 }
 
-const WRONG_TOKEN = "This is not a token of this server";
+const WRONG_TOKEN = "The server does not accept this token";
 
 function TokenNeeded() {
   const reason = useConnection((connection) => connection.reason);
   const [refused, setRefused] = useState("");
-  const wrong = hadToken ? "The token in the address is not one of this server's" : "";
+  const wrong = hadToken ? "The server does not accept the token in the address" : "";
   return (
     <Paper className="situation" shadow="lg" withBorder p="lg">
       <form
@@ -90,12 +90,12 @@ function TokenNeeded() {
           const token = String(new FormData(event.currentTarget).get("token"));
           showToken(token).then(
             (isRight) => (isRight ? location.reload() : setRefused(WRONG_TOKEN)),
-            () => setRefused("The server does not answer"),
+            () => setRefused("The server does not respond"),
           );
         }}
       >
         <Stack gap="sm">
-          <Title order={4}>This server asks for a token</Title>
+          <Title order={4}>This server requires a token</Title>
           {reason !== "" && (
             <Text size="sm" c="dimmed">
               {reason}
@@ -108,7 +108,7 @@ function TokenNeeded() {
             autoComplete="current-password"
             error={refused || wrong}
           />
-          <Button type="submit">Enter</Button>
+          <Button type="submit">Connect</Button>
         </Stack>
       </form>
     </Paper>

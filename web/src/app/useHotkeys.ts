@@ -52,7 +52,7 @@ export function useHotkeys(): void {
       event.preventDefault();
       const whyNot = key in COMMANDS ? whyNotNow() : null;
       if (whyNot === null) run();
-      else tellFailure("Not now", whyNot);
+      else tellFailure("Command unavailable", whyNot);
     };
     window.addEventListener("keydown", press);
     return () => window.removeEventListener("keydown", press);

@@ -59,6 +59,6 @@ describe("pictures", () => {
 
   it("that are not understood say why", () => {
     expect(() => pixelsOf(image("bayer_rggb8", new Uint8Array(2)))).toThrow("bayer_rggb8");
-    expect(() => pixelsOf(image("rgb8", new Uint8Array(2), 2, 3))).toThrow("lacks bytes");
+    expect(() => pixelsOf(image("rgb8", new Uint8Array(2), 2, 3))).toThrow("too short");
   });
 });

@@ -38,7 +38,7 @@ const UNKNOWN = [40, 40, 46, 255] as const;
 export function pixelsOf(image: RawImage, topic = ""): Pixels {
   const { encoding, width, height } = image;
   if (image.data.byteLength < image.step * height) {
-    throw new Error(`${width} x ${height} ${encoding} lacks bytes`);
+    throw new Error(`the data of the ${width} x ${height} ${encoding} image is too short`);
   }
   if (/label/.test(topic)) return labelled(image);
   const channels = BYTES[encoding];
@@ -46,7 +46,7 @@ export function pixelsOf(image: RawImage, topic = ""): Pixels {
   if (encoding === "32FC1" || encoding === "16UC1") return ofDepth(image);
   if (encoding === "mono16") return grey(image);
   if (encoding === "32SC1") return labelled(image);
-  throw new Error(`encoding ${encoding} cannot be shown`);
+  throw new Error(`unsupported encoding: ${encoding}`);
 }
 
 function coloured(image: RawImage, [bytes, r, g, b, a]: readonly number[]): Pixels {
@@ -128,7 +128,7 @@ function numbersOf(image: RawImage): Float32Array {
     "8UC1": [1, (at) => view.getUint8(at)],
   };
   const reader = read[encoding];
-  if (reader === undefined) throw new Error(`encoding ${encoding} cannot be shown`);
+  if (reader === undefined) throw new Error(`unsupported encoding: ${encoding}`);
   const [bytes, at] = reader;
   const numbers = new Float32Array(width * height);
   for (let row = 0, i = 0; row < height; row++) {

@@ -114,7 +114,7 @@ function lose(event: CloseEvent): void {
   outgoing.clear();
   streams.drop();
   frameTopics.length = 0;
-  for (const fail of waiting.values()) fail("the connection was lost");
+  for (const fail of waiting.values()) fail("connection lost");
   waiting.clear();
   const refused = event.code === POLICY_VIOLATION;
   const reason = event.reason || (refused ? "the server refused the connection" : "");
@@ -151,7 +151,7 @@ function call(order: Extract<ToWorker, { kind: "call" }>): void {
     tell(answer);
   };
   const fail = (reason: string) => done({ kind: "answer", id, ok: false, reason });
-  const timer = setTimeout(() => fail(`${service} did not answer`), timeoutS * 1000);
+  const timer = setTimeout(() => fail(`${service} timed out`), timeoutS * 1000);
   waiting.set(id, fail);
   if (!ros?.isConnected) {
     fail("not connected");

@@ -22,32 +22,35 @@ export const HOTKEYS: readonly HotkeyGroup[] = [
   {
     title: "UAVs",
     keys: [
-      { keys: ["[", "]"], text: "Select the one before, the next" },
+      { keys: ["[", "]"], text: "Select the previous, the next UAV" },
       { keys: ["T"], text: "Take off" },
-      { keys: ["H"], text: "Hold its position" },
+      { keys: ["H"], text: "Hold position" },
       { keys: ["L"], text: "Land" },
       { keys: ["B"], text: "Return home" },
-      { keys: ["G"], text: "Go to a position: click on it" },
+      { keys: ["G"], text: "Go to a clicked position" },
       { keys: ["V"], text: "Move by dragging, on and off" },
     ],
   },
   {
     title: "Manual control",
     keys: [
-      { keys: ["C"], text: "Take the controls, give them back" },
+      { keys: ["C"], text: "Start, stop manual control" },
       { keys: ["W", "S"], text: "Forward, back" },
       { keys: ["A", "D"], text: "Left, right" },
       { keys: ["R", "F"], text: "Up, down (also page up, page down)" },
-      { keys: ["Q", "E"], text: "Turn left, right (also arrows)" },
+      { keys: ["Q", "E"], text: "Yaw left, right (also arrows)" },
       { keys: ["Shift"], text: "Twice as fast" },
-      { keys: ["Gamepad"], text: "Left stick: climb, turn; right stick: forward, lateral" },
+      { keys: ["Gamepad"], text: "Left stick: climb, yaw; right stick: forward, lateral" },
     ],
   },
   {
     title: "Views",
     keys: [
       { keys: ["1", "…", "5"], text: "Orbit, walk, fly, chase, on board" },
-      { keys: ["W", "A", "S", "D"], text: "Walk and fly through, while no controls are taken" },
+      {
+        keys: ["W", "A", "S", "D"],
+        text: "Move in the views walk and fly through, outside manual control",
+      },
     ],
   },
   {
@@ -55,8 +58,8 @@ export const HOTKEYS: readonly HotkeyGroup[] = [
     keys: [
       { keys: ["M"], text: "Map" },
       { keys: ["P"], text: "Cameras" },
-      { keys: ["?"], text: "These keys" },
-      { keys: ["Esc"], text: "Give the controls back, cancel, close" },
+      { keys: ["?"], text: "Keyboard shortcuts" },
+      { keys: ["Esc"], text: "Stop manual control, cancel, close" },
     ],
   },
 ];

@@ -49,6 +49,6 @@ export async function sendAbove(uav: string, ground: { x: number; y: number }): 
 /** Let the user click on where a UAV is to fly. */
 export async function goByClick(uav: string): Promise<void> {
   if (uav === "") return;
-  const place = await attempt("Go to", pickPlace(`${uav} flies there`));
+  const place = await attempt("Go to", pickPlace(`Goal of ${uav}`));
   if (place !== null) await sendAbove(uav, place);
 }

@@ -31,9 +31,9 @@ function whyNot(
   replaying: boolean,
   playback: boolean,
 ): string | null {
-  if (!open) return "There is no connection";
-  if (role === "viewer") return "You are looking on: the pilots' token is needed to steer";
-  if (replaying) return "A recorded flight is repeated";
-  if (playback) return "A recording is played: close it to fly";
+  if (!open) return "Not connected";
+  if (role === "viewer") return "View-only access: commands require an operator token";
+  if (replaying) return "A command replay is running";
+  if (playback) return "A recording is playing: close it to send commands";
   return null;
 }

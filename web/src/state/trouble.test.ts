@@ -17,7 +17,7 @@ describe("trouble", () => {
 
   it("tells silence of a link that stands", () => {
     const told = troubleOf("open", "", "ws://robot:9090", true);
-    expect(told).toMatchObject({ what: "Nothing comes from ws://robot:9090", linked: true });
+    expect(told).toMatchObject({ what: "No data from ws://robot:9090", linked: true });
   });
 });
 

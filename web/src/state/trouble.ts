@@ -40,10 +40,10 @@ export function troubleOf(
 ): Told | null {
   if (state !== "open") {
     const why = reason === "" ? "" : `: ${reason}`;
-    const does = "What is shown is the last that came. Trying again by itself.";
+    const does = "The page shows the last data received and reconnects automatically.";
     return { what: `No connection to ${other}${why}`, does, linked: false };
   }
   if (!silent) return null;
-  const does = "What is shown is the last that came. It goes on by itself.";
-  return { what: `Nothing comes from ${other}`, does, linked: true };
+  const does = "The page shows the last data received and resumes automatically.";
+  return { what: `No data from ${other}`, does, linked: true };
 }

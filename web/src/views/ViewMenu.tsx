@@ -49,7 +49,7 @@ const TITLES: Record<Layer, string> = {
   trails: "Trails",
   paths: "Paths and goals",
   lidar: "LIDAR returns",
-  frusta: "What cameras see",
+  frusta: "Camera frusta",
   pictures: "Camera images in the scene",
   voxels: "OctoMap voxels",
   maps: "Occupancy maps",

@@ -40,7 +40,7 @@ function Controls({ uav }: { uav: string }) {
             </Text>
             {connected() !== undefined && <Badge size="xs">gamepad</Badge>}
           </Group>
-          <CloseButton size="sm" aria-label="Give the controls back" onClick={releaseControls} />
+          <CloseButton size="sm" aria-label="Release the controls" onClick={releaseControls} />
         </Group>
         <Hindrance uav={uav} />
         {!touch && <PressedKeys wish={wish} />}
@@ -48,7 +48,7 @@ function Controls({ uav }: { uav: string }) {
       </Paper>
       {touch && (
         <div className="sticks">
-          <Stick label="Climb and turn" onMove={(x, y) => (sticks.current.left = [x, y])} />
+          <Stick label="Climb / yaw" onMove={(x, y) => (sticks.current.left = [x, y])} />
           <Stick label="Forward / lateral" onMove={(x, y) => (sticks.current.right = [x, y])} />
         </div>
       )}
@@ -83,7 +83,7 @@ function Hindrance({ uav }: { uav: string }) {
   if (stranger !== "") {
     return (
       <Text size="sm" c="red" role="alert">
-        {stranger} has the control of {uav}: your commands are refused.
+        {stranger} controls {uav}: the server refuses your commands.
       </Text>
     );
   }
@@ -101,7 +101,7 @@ function Hindrance({ uav }: { uav: string }) {
   };
   return (
     <Group gap="xs" my={4}>
-      <Text size="sm">It stands on the ground.</Text>
+      <Text size="sm">The UAV is on the ground.</Text>
       <Button
         size="compact-sm"
         leftSection={<PlaneTakeoff size={14} />}
@@ -150,9 +150,9 @@ function PressedKeys({ wish }: { wish: Wish }) {
 function SpeedFields() {
   const speeds = useFlying((flying) => flying.speeds);
   const fields: [keyof Speeds, string, string, number][] = [
-    ["level", "Level", "m/s", 20],
+    ["level", "Horizontal", "m/s", 20],
     ["climb", "Climb", "m/s", 10],
-    ["turn", "Turn", "rad/s", 4],
+    ["turn", "Yaw", "rad/s", 4],
   ];
   return (
     <Group gap={6} wrap="nowrap" mt={6}>

@@ -2,10 +2,10 @@ import { ActionIcon, Tooltip, useMantineColorScheme } from "@mantine/core";
 import { Moon, Sun, SunMoon } from "lucide-react";
 
 const NEXT = { auto: "light", light: "dark", dark: "auto" } as const;
-const NAMES = { auto: "as the system", light: "light", dark: "dark" };
+const NAMES = { auto: "system", light: "light", dark: "dark" };
 const ICONS = { auto: SunMoon, light: Sun, dark: Moon };
 
-/** Light, dark, or as the system has it. */
+/** Light, dark, or system has it. */
 export function ColourScheme() {
   const { colorScheme, setColorScheme } = useMantineColorScheme();
   const Icon = ICONS[colorScheme];

@@ -50,7 +50,8 @@ export function KeptStates() {
           <NewState taken={states.map(({ name }) => name)} onKept={() => void refresh()} />
           {states.length === 0 ? (
             <Text size="sm" c="dimmed">
-              No snapshot yet. One holds everything: UAVs, weather, noise, and what nodes remember.
+              No snapshots. A snapshot holds the whole simulation: UAVs, weather, noise and node
+              states.
             </Text>
           ) : (
             <ScrollArea.Autosize mah={280}>
@@ -93,7 +94,7 @@ function NewState({ taken, onKept }: { taken: string[]; onKept: () => void }) {
           onChange={(event) => setName(event.currentTarget.value)}
         />
         <Button type="submit" disabled={whyNot !== null}>
-          Take
+          Save
         </Button>
       </Group>
     </form>
@@ -109,7 +110,8 @@ function State({
 }) {
   const whyNot = useWhyNot();
   const goBack = async () => {
-    if (await succeeds("Snapshot", returnTo(name))) tellSuccess(`Back at ${clockText(timeS)}`);
+    if (await succeeds("Snapshot", returnTo(name)))
+      tellSuccess(`Restored the state at ${clockText(timeS)}`);
   };
   return (
     <Group component="li" gap="xs" wrap="nowrap" style={{ listStyle: "none" }}>
@@ -121,7 +123,7 @@ function State({
         disabled={whyNot !== null}
         leftSection={<Undo2 size={16} />}
         rightSection={<Text ff="monospace">{clockText(timeS)}</Text>}
-        aria-label={`Return to ${name}`}
+        aria-label={`Restore ${name}`}
         onClick={() => void goBack()}
       >
         {name}
@@ -129,7 +131,7 @@ function State({
       <ActionIcon
         variant="subtle"
         color="gray"
-        aria-label={`Forget ${name}`}
+        aria-label={`Delete ${name}`}
         disabled={whyNot !== null}
         onClick={() => void succeeds("Snapshot", forgetState(name)).then(onForgotten)}
       >
@@ -141,6 +143,6 @@ function State({
 
 function freeName(taken: readonly string[]): string {
   let number = 1;
-  while (taken.includes(`state ${number}`)) number++;
-  return `state ${number}`;
+  while (taken.includes(`snapshot ${number}`)) number++;
+  return `snapshot ${number}`;
 }

@@ -41,10 +41,10 @@ export function Layouts() {
             .split("\n")
             .map((name) => name !== "" && <Saved key={name} {...{ name, restore }} />)}
           <Button variant="subtle" size="compact-sm" onClick={resetLayout}>
-            Usual layout
+            Default layout
           </Button>
           <Text size="xs" c="dimmed">
-            Panels, sizes, tiles and plots; this browser keeps them.
+            This browser stores panels, sizes, tiles and plots.
           </Text>
         </Stack>
       </Popover.Dropdown>

@@ -29,7 +29,7 @@ export function Reset() {
   return (
     <Popover opened={opened} onChange={setOpened} position="bottom" withArrow trapFocus>
       <Popover.Target>
-        <Tooltip label={whyNot ?? "Back to the start"} disabled={opened}>
+        <Tooltip label={whyNot ?? "Reset the simulation"} disabled={opened}>
           <ActionIcon
             variant="default"
             size="lg"
@@ -43,9 +43,11 @@ export function Reset() {
       </Popover.Target>
       <Popover.Dropdown w={290}>
         <Stack gap="xs">
-          <Button onClick={() => void run(reset(), "Back at the start")}>Reset, same seed</Button>
+          <Button onClick={() => void run(reset(), "The simulation is reset")}>
+            Reset, same seed
+          </Button>
           <Text size="xs" c="dimmed">
-            The same flight to the last bit; UAVs that were added go.
+            Repeats the same flight bit for bit and removes added UAVs.
           </Text>
           <Divider />
           <Group align="end" gap="xs" wrap="nowrap">
@@ -61,14 +63,14 @@ export function Reset() {
               variant="default"
               disabled={!scenario}
               onClick={() =>
-                void run(loadScenario(scenario!, { seed }), `Begins anew with seed ${seed}`)
+                void run(loadScenario(scenario!, { seed }), `Restarted with seed ${seed}`)
               }
             >
               New seed
             </Button>
           </Group>
           <Text size="xs" c="dimmed">
-            The scenario as it is written, with other noise and another procedural world.
+            Loads the scenario as written, with different noise and a different procedural world.
           </Text>
         </Stack>
       </Popover.Dropdown>

@@ -26,7 +26,7 @@ export function Speed() {
           <Text inherit span fw={600}>
             {speedText(wanted)}
           </Text>
-          <Tooltip label="Real-time factor that is reached">
+          <Tooltip label="Measured real-time factor">
             <Text
               span
               ff="monospace"

@@ -21,7 +21,7 @@ export function Steps() {
   const [steps, setSteps] = useState<number>(1000);
   const [busy, setBusy] = useState(false);
   const nothing = useWhyNot();
-  const whyNot = nothing ?? (playing ? "Steps are made while paused" : null);
+  const whyNot = nothing ?? (playing ? "Pause the simulation to step it" : null);
   const make = async (number: number) => {
     setBusy(true);
     await attempt("Steps", step(number));
@@ -43,7 +43,7 @@ export function Steps() {
       </Tooltip>
       <Popover position="bottom" withArrow trapFocus>
         <Popover.Target>
-          <ActionIcon variant="default" size="lg" w={18} miw={18} aria-label="Many steps">
+          <ActionIcon variant="default" size="lg" w={18} miw={18} aria-label="Multiple steps">
             <ChevronDown size={14} />
           </ActionIcon>
         </Popover.Target>

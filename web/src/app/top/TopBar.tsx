@@ -29,12 +29,12 @@ export function TopBar() {
         <OverlayButton overlay="pictures" label="Cameras (P)" icon={<Images size={18} />} />
         <Layouts />
         <ColourScheme />
-        <Tooltip label="Keys (?)">
+        <Tooltip label="Keyboard shortcuts (?)">
           <ActionIcon
             variant="subtle"
             size="lg"
             visibleFrom="xs"
-            aria-label="Keys"
+            aria-label="Keyboard shortcuts"
             onClick={() => openWindow("help")}
           >
             <Keyboard size={18} />
@@ -57,7 +57,7 @@ function ScenarioButton() {
         className="top-scenario"
         rightSection={<ChevronDown size={16} />}
         onClick={() => openWindow("scenarios")}
-        aria-label={`Scenario ${named}: choose another one`}
+        aria-label={`Scenario ${named}: choose another scenario`}
       >
         <Text truncate inherit>
           {named || "Choose a scenario"}

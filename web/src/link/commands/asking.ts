@@ -41,7 +41,7 @@ export async function order(
   timeoutS?: number,
 ): Promise<unknown> {
   const answer = (await link.call(service, type, request, timeoutS)) as Plain;
-  if (!answer.success) throw new RefusedError(answer.message || `${service} was refused`);
+  if (!answer.success) throw new RefusedError(answer.message || `${service} failed`);
   return answer;
 }
 
@@ -55,7 +55,7 @@ export async function ask<N extends Named>(
   const answer = await link.call(service, type, request, timeoutS);
   const { result } = answer as Standard;
   if (result.result !== RESULT_OK) {
-    throw new RefusedError(result.error_message || `${service} was refused`);
+    throw new RefusedError(result.error_message || `${service} failed`);
   }
   return answer;
 }

@@ -6,5 +6,5 @@ import { RefusedError } from "./asking.ts";
 export async function read(answer: Response): Promise<unknown> {
   const told = (await answer.json().catch(() => null)) as { error?: string } | null;
   if (answer.ok && told !== null) return told;
-  throw new RefusedError(told?.error ?? `the server answered ${answer.status}`);
+  throw new RefusedError(told?.error ?? `the server returned status ${answer.status}`);
 }

@@ -22,7 +22,7 @@ const FIELDS: readonly DialField<"block_height" | "cell_size">[] = [
   },
   {
     key: "cell_size",
-    name: "Size of a cell",
+    name: "Cell size",
     min: 0.5,
     max: 10,
     step: 0.25,
@@ -41,7 +41,7 @@ export function Blocks() {
   const sender = useMemo(
     () =>
       new Latest<Parameters<typeof setGridMap>[0]>(async (change) => {
-        await succeeds("Blocks", setGridMap(change));
+        await succeeds("Obstacles", setGridMap(change));
         await refresh();
       }, SEND_MS),
     [refresh],

@@ -37,11 +37,11 @@ export function Trees() {
           disabled={whyNot !== null || density === ""}
           onClick={() => void build()}
         >
-          Build
+          Rebuild
         </Button>
       </Group>
       <Text size="xs" c="dimmed">
-        The world is built anew, and the flight begins from its start.
+        Rebuilds the world and restarts the flight.
       </Text>
     </Section>
   );

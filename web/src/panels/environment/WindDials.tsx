@@ -42,7 +42,7 @@ export function WindDials({ weather, change, disabled }: WindProps) {
         onChange={(speed) => blow(speed, direction)}
       />
       <Dial
-        name="Wind comes from"
+        name="Wind from"
         min={0}
         max={355}
         step={5}
@@ -60,7 +60,7 @@ export function WindDials({ weather, change, disabled }: WindProps) {
           disabled={disabled}
           onClick={gust}
         >
-          Blow a gust
+          Add a gust
         </Button>
         <Button
           size="compact-sm"
@@ -69,7 +69,7 @@ export function WindDials({ weather, change, disabled }: WindProps) {
           disabled={disabled}
           onClick={() => void attempt("Weather", clearWeather())}
         >
-          Calm and clear
+          Clear weather
         </Button>
       </Group>
     </Section>

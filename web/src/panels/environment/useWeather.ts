@@ -30,7 +30,7 @@ export function useWeather() {
         setConfirmed(told);
         setTrouble("");
       })
-      .catch((error: unknown) => setTrouble(`No weather here: ${reasonOf(error)}`));
+      .catch((error: unknown) => setTrouble(`Weather is unavailable: ${reasonOf(error)}`));
     return link.subscribe("/weather", "volery_interfaces/msg/Weather", ({ message }) =>
       setConfirmed(message),
     );

@@ -15,7 +15,7 @@ export const LIGHT: readonly Field[] = [
     min: 0.25,
     max: 24,
     step: 0.25,
-    text: (hour) => (hour === 0 ? "as the scenario says" : hourText(hour)),
+    text: (hour) => (hour === 0 ? "from the scenario" : hourText(hour)),
   },
 ];
 
@@ -26,7 +26,7 @@ export const TURBULENCE: readonly Field[] = [
     min: 0,
     max: 25,
     step: 0.5,
-    text: (w20) => (w20 === 0 ? "none" : `as of ${w20.toFixed(1)} m/s at 6 m`),
+    text: (w20) => (w20 === 0 ? "none" : `mean wind ${w20.toFixed(1)} m/s at 6 m`),
   },
 ];
 
@@ -45,7 +45,7 @@ export const PRECIPITATION: readonly Field[] = [
     min: 0,
     max: 20,
     step: 0.5,
-    text: (snow) => (snow === 0 ? "none" : `${snow.toFixed(1)} mm/h of water`),
+    text: (snow) => (snow === 0 ? "none" : `${snow.toFixed(1)} mm/h water equivalent`),
   },
 ];
 

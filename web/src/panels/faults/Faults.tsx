@@ -23,7 +23,7 @@ export default function Faults() {
 
   const inject = async () => {
     const fault = faultOf({ ...form, uav }, simulatedS());
-    const done = await attempt("The fault was refused", injectFault(fault));
+    const done = await attempt("Fault injection failed", injectFault(fault));
     if (done !== null) tellSuccess(`${labelOf(form.kind)} fault injected`);
   };
 
@@ -33,7 +33,7 @@ export default function Faults() {
         <Group gap="xs" grow>
           <Select
             size="xs"
-            label="What fails"
+            label="Fault type"
             data={KINDS}
             value={form.kind}
             allowDeselect={false}
@@ -75,7 +75,7 @@ export default function Faults() {
             Inject
           </Button>
           <Text size="xs" c="dimmed">
-            {whyNot ?? "The fault begins at once, appears in the log, and ends with a reset."}
+            {whyNot ?? "The fault starts at once, appears in the log, and ends at a reset."}
           </Text>
         </Group>
       </Stack>
@@ -97,19 +97,22 @@ function Details({ form, change }: DetailsProps) {
           <NumberInput
             size="xs"
             label="Rotor"
-            description="From 0, as in the airframe's file"
+            description="Index from 0, as in the airframe file"
             min={0}
             allowDecimal={false}
             value={form.rotor}
             onChange={(rotor) => change({ rotor: Number(rotor) })}
           />
-          <Input.Wrapper size="xs" label={`Thrust left: ${(100 * form.thrustFactor).toFixed(0)} %`}>
+          <Input.Wrapper
+            size="xs"
+            label={`Remaining thrust: ${(100 * form.thrustFactor).toFixed(0)} %`}
+          >
             <Slider
               min={0}
               max={1}
               step={0.05}
               label={null}
-              thumbLabel="Thrust left"
+              thumbLabel="Remaining thrust"
               value={form.thrustFactor}
               onChange={(thrustFactor) => change({ thrustFactor })}
             />
@@ -154,7 +157,7 @@ function Details({ form, change }: DetailsProps) {
           />
           <NumberInput
             size="xs"
-            label="Rises in"
+            label="Rise time"
             suffix=" s"
             min={0.01}
             value={form.riseS}
@@ -162,7 +165,7 @@ function Details({ form, change }: DetailsProps) {
           />
           <NumberInput
             size="xs"
-            label="Holds for"
+            label="Hold time"
             suffix=" s"
             min={0}
             value={form.holdS}

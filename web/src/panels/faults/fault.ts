@@ -3,16 +3,16 @@
 export const KINDS = [
   { value: "motor", label: "Rotor" },
   { value: "sensor", label: "Sensor" },
-  { value: "gnss_loss", label: "No satellites" },
-  { value: "radio", label: "No radio" },
+  { value: "gnss_loss", label: "GNSS loss" },
+  { value: "radio", label: "Radio loss" },
   { value: "gust", label: "Gust" },
   { value: "displacement", label: "Displacement" },
 ] as const;
 export type FaultKind = (typeof KINDS)[number]["value"];
 
 export const EFFECTS = [
-  { value: "dropped", label: "Silent" },
-  { value: "stuck", label: "Repeats itself" },
+  { value: "dropped", label: "Dropped" },
+  { value: "stuck", label: "Stuck" },
   { value: "biased", label: "Biased" },
 ];
 

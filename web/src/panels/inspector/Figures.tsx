@@ -30,7 +30,7 @@ export function Figures() {
       <Heading name={vehicle.name} />
       <Battery vehicle={vehicle} />
       <Figure name="Last command" unit="">
-        {vehicle.command_age < 0 ? "none from outside" : `${spanText(vehicle.command_age)} ago`}
+        {vehicle.command_age < 0 ? "none from clients" : `${spanText(vehicle.command_age)} ago`}
       </Figure>
       <Figure name="Airframe" unit="">
         {vehicle.airframe}

@@ -34,7 +34,7 @@ export function GoTo({ uav }: { uav: string }) {
               onChange={(value) => setPlace({ ...place, [axis]: Number(value) })}
             />
           ))}
-          <Tooltip label={whyNot ?? "Fly there"}>
+          <Tooltip label={whyNot ?? "Fly to this position"}>
             <Button
               type="submit"
               size="xs"
@@ -46,11 +46,11 @@ export function GoTo({ uav }: { uav: string }) {
               <Navigation size={15} />
             </Button>
           </Tooltip>
-          <Tooltip label={whyNot ?? "Click on the place (G)"}>
+          <Tooltip label={whyNot ?? "Click a position (G)"}>
             <ActionIcon
               size={30}
               variant="default"
-              aria-label="Go to a place that is clicked"
+              aria-label="Go to a clicked position"
               disabled={whyNot !== null}
               onClick={() => void goByClick(uav)}
             >

@@ -18,18 +18,33 @@ const BUTTONS: { order: Order; label: string; hint: string; icon: ReactNode }[] 
   {
     order: "take_off",
     label: "Take off",
-    hint: "Climb to its take-off altitude (T)",
+    hint: "Climb to the take-off altitude (T)",
     icon: <PlaneTakeoff size={16} />,
   },
-  { order: "land", label: "Land", hint: "Land where it is (L)", icon: <PlaneLanding size={16} /> },
-  { order: "hold", label: "Hold", hint: "Stay where it is (H)", icon: <CirclePause size={16} /> },
+  {
+    order: "land",
+    label: "Land",
+    hint: "Land at the current position (L)",
+    icon: <PlaneLanding size={16} />,
+  },
+  {
+    order: "hold",
+    label: "Hold",
+    hint: "Hold the current position (H)",
+    icon: <CirclePause size={16} />,
+  },
   {
     order: "return_home",
     label: "Return",
     hint: "Fly home and land (B)",
     icon: <House size={16} />,
   },
-  { order: "arm", label: "Arm", hint: "Ask whether it is ready", icon: <CircleCheck size={16} /> },
+  {
+    order: "arm",
+    label: "Arm",
+    hint: "Check whether the UAV is ready",
+    icon: <CircleCheck size={16} />,
+  },
 ];
 
 /** What a UAV can be told by one press. */
@@ -80,7 +95,7 @@ function Kill({ uav, disabled, give }: KillProps) {
   }, [asked]);
   if (!asked) {
     return (
-      <Tooltip label="Rotors off at once: it falls">
+      <Tooltip label="Stop all rotors: the UAV falls">
         <Button
           color="red"
           variant="light"
@@ -109,14 +124,14 @@ function Kill({ uav, disabled, give }: KillProps) {
           give();
         }}
       >
-        Rotors off
+        Stop rotors
       </Button>
       <Button
         variant="default"
         size="compact-md"
         h={34}
         px={8}
-        aria-label="Do not kill"
+        aria-label="Cancel kill"
         onClick={() => setAsked(false)}
       >
         <Text size="sm">No</Text>

@@ -18,10 +18,10 @@ export function Pilots({ uav }: { uav: string }) {
     <Section title="Control">
       <Text size="sm" aria-label="Operator" c={stranger === "" ? "bright" : "orange"}>
         {holder === ""
-          ? "No operator has taken it: every pilot may command it."
+          ? "No operator: every authorized client may command this UAV."
           : stranger === ""
-            ? `You have it, as ${holder}.`
-            : `${holder} has it: your commands are refused.`}
+            ? `You control this UAV as ${holder}.`
+            : `${holder} controls this UAV: the server refuses your commands.`}
       </Text>
       {holder === "" && <Take uav={uav} />}
       {holder !== "" && stranger === "" && <Held uav={uav} />}
@@ -75,8 +75,8 @@ function Held({ uav }: { uav: string }) {
         <Autocomplete
           size="xs"
           flex={1}
-          aria-label="Pilot to hand it to"
-          placeholder="Another pilot's name"
+          aria-label="New operator"
+          placeholder="Name of the new operator"
           data={known}
           value={to}
           onChange={setTo}

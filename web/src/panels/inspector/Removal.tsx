@@ -10,13 +10,13 @@ import { useVehicles } from "../../state/vehicles.ts";
 export function Removal({ uav }: { uav: string }) {
   const alone = useVehicles(({ list }) => list.length < 2);
   const volery = useConnection((connection) => connection.volery);
-  const whyNot = useWhyNot() ?? (alone ? "A world has at least one UAV" : null);
+  const whyNot = useWhyNot() ?? (alone ? "A simulation needs at least one UAV" : null);
   if (!volery) return null;
   const take = async () => {
-    if (await succeeds(`Remove ${uav}`, remove(uav))) tellSuccess(`${uav} is gone`);
+    if (await succeeds(`Remove ${uav}`, remove(uav))) tellSuccess(`Removed ${uav}`);
   };
   return (
-    <Tooltip label={whyNot ?? "Take it out of the world"}>
+    <Tooltip label={whyNot ?? "Remove this UAV from the simulation"}>
       <Button
         variant="subtle"
         color="red"

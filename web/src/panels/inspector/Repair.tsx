@@ -18,11 +18,13 @@ export function Repair({ uav }: { uav: string }) {
   if (!volery || !crashed) return null;
   const repair = async () => {
     setBusy(true);
-    if (await succeeds(`Repair ${uav}`, resetUav(uav))) tellSuccess(`${uav} is back at its start`);
+    if (await succeeds(`Repair ${uav}`, resetUav(uav))) tellSuccess(`Repaired ${uav}`);
     setBusy(false);
   };
   return (
-    <Tooltip label={whyNot ?? "Repaired and charged, with new sensors; the others fly on"}>
+    <Tooltip
+      label={whyNot ?? "Repairs and charges the UAV and resets its sensors; other UAVs continue"}
+    >
       <Button
         color="orange"
         leftSection={<Wrench size={16} />}
@@ -30,7 +32,7 @@ export function Repair({ uav }: { uav: string }) {
         loading={busy}
         onClick={() => void repair()}
       >
-        Repair: back to its start
+        Repair and return to start
       </Button>
     </Tooltip>
   );

@@ -31,7 +31,7 @@ export function Sensors({ uav }: { uav: string }) {
     <Section title="Sensors and topics">
       {own.length === 0 && (
         <Text size="sm" c="dimmed">
-          It publishes nothing.
+          This UAV publishes no topics.
         </Text>
       )}
       <table className="sensors">

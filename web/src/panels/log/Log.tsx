@@ -11,7 +11,7 @@ import classes from "./Log.module.css";
 
 const SORTS = [
   { value: "all", label: "All" },
-  { value: "trouble", label: "Trouble" },
+  { value: "trouble", label: "Problems" },
   { value: "event", label: "Events" },
   { value: "command", label: "Commands" },
 ];
@@ -33,7 +33,7 @@ export default function Log() {
       <Group gap="xs" px="sm" pb={4}>
         <SegmentedControl
           size="xs"
-          aria-label="What to show"
+          aria-label="Kind of entry"
           data={SORTS}
           value={sort}
           onChange={setSort}

@@ -21,7 +21,7 @@ export function MapButtons({
   const whyNot = useWhyNot();
   const buttons = [
     {
-      label: "A click sends the selected UAV there",
+      label: "Send the selected UAV by click",
       icon: <Navigation size={15} />,
       pressed: clickSends,
       disabled: whyNot !== null,

@@ -42,8 +42,8 @@ function Chooser({ cameras, chosen }: { cameras: CameraTopic[]; chosen: string[]
   return (
     <Menu position="top-end" closeOnItemClick={false} withinPortal>
       <Menu.Target>
-        <Tooltip label="Which pictures" position="left">
-          <ActionIcon className="picture-chooser" size="lg" aria-label="Which pictures">
+        <Tooltip label="Select cameras" position="left">
+          <ActionIcon className="picture-chooser" size="lg" aria-label="Select cameras">
             <Images size={18} />
           </ActionIcon>
         </Tooltip>
@@ -53,7 +53,7 @@ function Chooser({ cameras, chosen }: { cameras: CameraTopic[]; chosen: string[]
         {cameras.length === 0 ? (
           <Paper p="xs">
             <Text size="sm" c="dimmed">
-              No camera is here. Choose a scenario with cameras, or add them when you start one.
+              No cameras. Choose a scenario with cameras, or add cameras when you start one.
             </Text>
           </Paper>
         ) : (

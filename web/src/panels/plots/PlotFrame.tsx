@@ -45,8 +45,8 @@ export function PlotFrame({ plot, drawn, legend, hint, actions, children }: Plot
           <ActionIcon
             size="sm"
             variant="subtle"
-            aria-label="Show the newest again"
-            title="Show the newest again (double click)"
+            aria-label="Show the newest data"
+            title="Show the newest data (double click)"
             onClick={drawn.showNewest}
           >
             <Maximize2 size={14} />

@@ -25,7 +25,7 @@ export default function Plots() {
           leftSection={paused ? <Play size={13} /> : <Pause size={13} />}
           onClick={() => setPaused(!paused)}
         >
-          {paused ? "Go on" : "Hold plots"}
+          {paused ? "Resume plots" : "Freeze plots"}
         </Button>
         <Select
           size="xs"
@@ -51,7 +51,7 @@ export default function Plots() {
           size="compact-xs"
           variant="default"
           leftSection={<Plus size={13} />}
-          title="One field over another one; begins with the path of the selected UAV from above"
+          title="One field against another; starts with the ground track of the selected UAV"
           onClick={beginXYPlot}
         >
           x-y plot

@@ -32,7 +32,7 @@ export function TimePlotView({ plot, paused }: { plot: TimePlot; paused: boolean
     <PlotFrame
       plot={plot}
       drawn={useDrawing(make, paused)}
-      hint="Choose a topic below and one of its fields to draw a line."
+      hint="Choose a topic and a field below to add a line."
       legend={lines.map((line, i) => ({
         name: nameOf(line),
         colour: colourOf(i),

@@ -51,7 +51,7 @@ export function XYPlotView({ plot, paused }: { plot: XYPlot; paused: boolean }) 
     <PlotFrame
       plot={plot}
       drawn={useDrawing(make, paused)}
-      hint="Add a curve: one field over another one."
+      hint="Add a curve: one field against another."
       legend={curves.map((curve, i) => ({
         name: curveName(curve),
         title: `x: ${nameOf(curve.x)}, y: ${nameOf(curve.y)}`,

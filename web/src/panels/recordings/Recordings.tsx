@@ -39,12 +39,12 @@ export default function Recordings() {
   const whyNotOpen = useWhyNotOpen();
 
   const open = async (name: string) => {
-    await attempt("The recording cannot be played", playRecording(name));
+    await attempt("Playback failed", playRecording(name));
   };
   const send = async (file: File | null) => {
     if (file === null) return;
-    const name = await attempt("The recording was not taken", uploadRecording(file));
-    if (name !== null) tellSuccess(`${name} is among the recordings`);
+    const name = await attempt("Upload failed", uploadRecording(file));
+    if (name !== null) tellSuccess(`Uploaded ${name}`);
     again();
   };
 
@@ -69,14 +69,14 @@ export default function Recordings() {
       </Group>
       {list.length === 0 ? (
         <Text size="sm" c="dimmed" px="sm">
-          No recording yet.
+          No recordings.
         </Text>
       ) : (
         <Table verticalSpacing={2} fz="sm" aria-label="Recordings" highlightOnHover>
           <Table.Thead>
             <Table.Tr>
               <Table.Th>Name</Table.Th>
-              <Table.Th>Length</Table.Th>
+              <Table.Th>Duration</Table.Th>
               <Table.Th>Size</Table.Th>
               <Table.Th />
             </Table.Tr>
@@ -134,13 +134,13 @@ function Recorder({ onChange, whyNot }: RecorderProps) {
 
   const start = async () => {
     const path = name.trim() === "" ? usualName() : name.trim();
-    const told = await attempt("Recording was refused", startRecording(withSuffix(path)));
+    const told = await attempt("Recording failed", startRecording(withSuffix(path)));
     if (told !== null) setName("");
     onChange();
   };
   const stop = async () => {
-    const told = await attempt("Recording was refused", stopRecording());
-    if (told !== null) tellSuccess(`${counted(told.messages, "message")} recorded`);
+    const told = await attempt("Recording failed", stopRecording());
+    if (told !== null) tellSuccess(`Recorded ${counted(told.messages, "message")}`);
     onChange();
   };
 

@@ -35,10 +35,10 @@ export function Card({ card, present, choose }: CardProps) {
           <Text fw={600} size="sm" truncate>
             {name}
           </Text>
-          {present && <Badge size="xs">flies</Badge>}
+          {present && <Badge size="xs">running</Badge>}
           {uploaded && (
             <Badge size="xs" variant="light">
-              yours
+              uploaded
             </Badge>
           )}
         </Group>

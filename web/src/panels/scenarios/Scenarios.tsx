@@ -94,7 +94,7 @@ function Gallery({ cards, choose }: { cards: ScenarioCard[]; choose: (name: stri
           />
         ))}
       </SimpleGrid>
-      {shown.length === 0 && <Text c="dimmed">Nothing has all of these words.</Text>}
+      {shown.length === 0 && <Text c="dimmed">No scenario matches all of these words.</Text>}
     </Stack>
   );
 }

@@ -111,7 +111,7 @@ function SensorSets({ offered, value, onChange }: SensorSetsProps) {
   return (
     <Checkbox.Group
       label="Sensors of every UAV"
-      description="IMU, odometry and ground truth are always there."
+      description="Every UAV also has an IMU, odometry and ground truth."
       value={value}
       onChange={onChange}
     >

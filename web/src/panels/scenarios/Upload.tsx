@@ -14,15 +14,15 @@ const KINDS: { kind: FileKind; label: string; description: string }[] = [
     label: "Grid map",
     description: "A matrix of 0 and 1: CSV, PNG (dark is blocked) or MovingAI .map",
   },
-  { kind: "city", label: "City", description: "Outlines of buildings: GeoJSON" },
+  { kind: "city", label: "City", description: "Building outlines: GeoJSON" },
   { kind: "mesh", label: "Mesh", description: "Any geometry: glTF (.glb), OBJ, STL" },
-  { kind: "forest", label: "Forest", description: "An inventory of trees: CSV" },
+  { kind: "forest", label: "Forest", description: "Tree inventory: CSV" },
   {
     kind: "scenario",
     label: "Scenario",
-    description: "A whole scenario: TOML, with models and nodes that ship with Volery",
+    description: "Complete scenario: TOML, with models and nodes included in Volery",
   },
-  { kind: "log", label: "Log", description: "A recorded flight to play: MCAP, or bag of ROS 1" },
+  { kind: "log", label: "Log", description: "Recorded flight to play back: MCAP or ROS 1 bag" },
 ];
 const PEEK_BYTES = 4096;
 
@@ -62,13 +62,13 @@ export default function Upload() {
           <FileButton accept={ENDINGS} onChange={(next) => next !== null && offerFile(next)}>
             {(props) => (
               <Button variant="default" size="compact-md" {...props}>
-                {file === null ? "Choose a file" : "Another file"}
+                {file === null ? "Choose a file" : "Choose another file"}
               </Button>
             )}
           </FileButton>
         </Group>
         <Radio.Group
-          label="What is it?"
+          label="File type"
           value={kind ?? ""}
           onChange={(value) => setKind(value as FileKind)}
         >
@@ -82,7 +82,9 @@ export default function Upload() {
           <Alert
             color="red"
             role="alert"
-            title={kind === "log" ? "The log cannot be played" : "The file cannot be flown"}
+            title={
+              kind === "log" ? "Cannot upload the log" : "Cannot make a scenario from the file"
+            }
           >
             <span className="reason">{trouble}</span>
           </Alert>
@@ -102,7 +104,7 @@ export default function Upload() {
 }
 
 async function sendLog(file: File): Promise<void> {
-  tellSuccess(`${await uploadRecording(file)} is among the recordings`);
+  tellSuccess(`Uploaded ${await uploadRecording(file)}`);
   closeWindow();
   openPanel("bottom", "recordings");
 }

@@ -82,7 +82,7 @@ export function ServiceCall({ service }: { service: string }) {
           <div aria-label="Response" role="region">
             <Group gap={6}>
               <Text size="xs" c="dimmed">
-                Answered in {answered.tookMs.toFixed(0)} ms
+                Response after {answered.tookMs.toFixed(0)} ms
               </Text>
             </Group>
             <Reason>{answered.reason}</Reason>

@@ -34,7 +34,7 @@ export function TopicDetails({ topic, type, followed }: TopicDetailsProps) {
           leftSection={held === undefined ? <Pause size={13} /> : <Play size={13} />}
           onClick={() => setHeld(held === undefined ? followed.message : undefined)}
         >
-          {held === undefined ? "Hold values" : "Go on"}
+          {held === undefined ? "Freeze values" : "Resume values"}
         </Button>
         <Button
           size="compact-xs"
@@ -49,7 +49,7 @@ export function TopicDetails({ topic, type, followed }: TopicDetailsProps) {
       {publishing && <PublishForm topic={topic} type={type} />}
       {shown === undefined ? (
         <Text size="sm" c="dimmed">
-          {open ? "No message has come yet." : "Not connected."}
+          {open ? "No message received." : "Not connected."}
         </Text>
       ) : (
         <ValueTree value={shown} onPlot={plot} />

@@ -31,7 +31,7 @@ export function Spawn({ close }: { close: () => void }) {
     const came = await attempt("Add UAVs", spawnAround(uri!, count, around));
     setBusy(false);
     if (came === null) return;
-    tellSuccess(came.length === 1 ? `${came[0]} is here` : `${came.length} UAVs are here`);
+    tellSuccess(came.length === 1 ? `Added ${came[0]}` : `Added ${came.length} UAVs`);
     select(came[0]!);
     close();
   };
@@ -55,7 +55,7 @@ export function Spawn({ close }: { close: () => void }) {
           {offered.find((each) => each.uri === uri)?.description}
         </Text>
         <NumberInput
-          label="How many"
+          label="Count"
           min={1}
           max={256}
           allowDecimal={false}
@@ -70,14 +70,15 @@ export function Spawn({ close }: { close: () => void }) {
             leftSection={<MousePointerClick size={16} />}
             onClick={() => void byClick()}
           >
-            By click
+            Click position
           </Button>
           <Button disabled={disabled} loading={busy} onClick={() => void add(nearFleet())}>
             Add
           </Button>
         </Group>
         <Text size="xs" c="dimmed">
-          {whyNot ?? "They stand where there is room, near the selected UAV or the click."}
+          {whyNot ??
+            "New UAVs start at free positions near the selected UAV or the clicked position."}
         </Text>
       </Stack>
     </Paper>

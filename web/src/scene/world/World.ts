@@ -81,7 +81,7 @@ export class World implements Part {
         if (!signal.aborted) this.show(content);
       })
       .catch((error: unknown) => {
-        if (!signal.aborted) console.error("the world could not be shown:", error);
+        if (!signal.aborted) console.error("cannot show the world:", error);
       });
   }
 
