@@ -12,10 +12,10 @@ import { connectAsAddressed, useConnection } from "./state/connection.ts";
 import { followHealth } from "./state/health.ts";
 import { followJournal } from "./state/journal.ts";
 import { followEpoch } from "./state/epoch.ts";
-import { followGoals } from "./state/orders.ts";
+import { followGoals } from "./state/goals.ts";
 import { followPlayer } from "./state/player.ts";
-import { tellFailure } from "./state/notices.ts";
-import { followLeaving, usePilot } from "./state/pilots.ts";
+import { showFailure } from "./state/notices.ts";
+import { followDisconnection, useOperator } from "./state/operator.ts";
 import { followRestarts } from "./state/restarts.ts";
 import { followSilence } from "./state/silence.ts";
 import { followSimulation } from "./state/simulation.ts";
@@ -25,8 +25,8 @@ import { followVehicles } from "./state/vehicles.ts";
 
 hideToken(location, history);
 followAddress();
-connectAsAddressed(location, usePilot.getState().wished);
-followLeaving();
+connectAsAddressed(location, useOperator.getState().wished);
+followDisconnection();
 followSimulation(useConnection.getState().volery);
 followVehicles(useConnection.getState().volery);
 followHealth();
@@ -37,7 +37,7 @@ followGoals();
 followRestarts();
 followSilence();
 followTopics();
-link.onComplaint = (text) => tellFailure("The simulation refused a message", text);
+link.onComplaint = (text) => showFailure("The simulation refused a message", text);
 
 createRoot(document.getElementById("root")!).render(
   <MantineProvider theme={theme} defaultColorScheme="auto">

@@ -5,7 +5,7 @@ import { useLayout } from "../state/layout.ts";
 import { useWindows } from "../state/windows.ts";
 import { BottomArea, DockArea } from "./DockArea.tsx";
 import { DropZone } from "./DropZone.tsx";
-import { HandControls } from "./hands/HandControls.tsx";
+import { ManualControl } from "./manual/ManualControl.tsx";
 import { Picking } from "./Picking.tsx";
 import { Rail } from "./Rail.tsx";
 import { SceneBoundary } from "./SceneBoundary.tsx";
@@ -14,7 +14,7 @@ import { TopBar } from "./top/TopBar.tsx";
 import { useHotkeys } from "./useHotkeys.ts";
 
 const MiniMap = lazy(() => import("../panels/map/MiniMap.tsx"));
-const Pictures = lazy(() => import("../panels/pictures/Pictures.tsx"));
+const Cameras = lazy(() => import("../panels/cameras/Cameras.tsx"));
 const Help = lazy(() => import("./Help.tsx"));
 const Scenarios = lazy(() => import("../panels/scenarios/Scenarios.tsx"));
 const Upload = lazy(() => import("../panels/scenarios/Upload.tsx"));
@@ -50,10 +50,10 @@ function Overlays() {
     <div className="overlays">
       <Suspense>
         {shown.map && <MiniMap />}
-        {shown.pictures && <Pictures />}
+        {shown.pictures && <Cameras />}
       </Suspense>
       <Picking />
-      <HandControls />
+      <ManualControl />
     </div>
   );
 }

@@ -2,25 +2,25 @@ import { Alert } from "@mantine/core";
 import { CloudOff, Hourglass } from "lucide-react";
 import { useEffect, useState } from "react";
 import { nowMs } from "../lib/time.ts";
-import { useTrouble } from "../state/trouble.ts";
+import { useProblem } from "../state/problem.ts";
 
 const COUNT_MS = 500;
 
-/** Says at once when what is shown is no longer live, and goes away by itself. */
+/** Shows a problem of the connection while it lasts. */
 export function Banner() {
-  const trouble = useTrouble();
-  if (trouble === null) return null;
+  const problem = useProblem();
+  if (problem === null) return null;
   return (
     <Alert
       className="banner"
       color="yellow"
       variant="filled"
       autoContrast
-      icon={trouble.linked ? <Hourglass size={18} /> : <CloudOff size={18} />}
+      icon={problem.linked ? <Hourglass size={18} /> : <CloudOff size={18} />}
       role="alert"
-      title={trouble.what}
+      title={problem.what}
     >
-      <Since sinceMs={trouble.sinceMs} /> {trouble.does}
+      <Since sinceMs={problem.sinceMs} /> {problem.does}
     </Alert>
   );
 }

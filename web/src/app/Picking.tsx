@@ -1,5 +1,5 @@
 import { Button, Paper, Text } from "@mantine/core";
-import { givePlace, useTool } from "../state/tool.ts";
+import { givePosition, useTool } from "../state/tool.ts";
 
 /** Says that a click is being waited for. */
 export function Picking() {
@@ -8,7 +8,7 @@ export function Picking() {
   return (
     <Paper className="picking" shadow="md" withBorder px="md" py={6} role="status">
       <Text size="sm">{asking}: click the ground or the map</Text>
-      <Button size="compact-xs" variant="subtle" onClick={() => givePlace(null)}>
+      <Button size="compact-xs" variant="subtle" onClick={() => givePosition(null)}>
         Cancel (Esc)
       </Button>
     </Paper>

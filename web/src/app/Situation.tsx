@@ -26,7 +26,7 @@ export function Situation() {
   if (server?.token_needed === true || link === "refused") return <TokenNeeded />;
   if (server?.state === "building") return <Building />;
   if (server?.state === "failed") return <Failed />;
-  if (server?.state === "lobby") return <Lobby />;
+  if (server?.state === "lobby") return <NoWorld />;
   if (link === "open" && ended) return <Ended />;
   return <Banner />;
 }
@@ -63,7 +63,7 @@ function Failed() {
   );
 }
 
-function Lobby() {
+function NoWorld() {
   const message = useSimulation(({ server }) => server?.message);
   return (
     <Paper className="situation" shadow="lg" withBorder p="lg">

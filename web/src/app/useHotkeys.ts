@@ -1,13 +1,20 @@
 import { useEffect } from "react";
 import { nextMark } from "../lib/speed.ts";
-import { PLAYING, setPlaying, setSpeed, step, tell, type Order } from "../link/commands.ts";
+import {
+  PLAYING,
+  setPlaying,
+  setSpeed,
+  step,
+  sendCommand,
+  type FlightCommand,
+} from "../link/commands.ts";
 import { toggleControls } from "../state/flying.ts";
 import { toggleOverlay } from "../state/layout.ts";
-import { attempt, tellFailure } from "../state/notices.ts";
-import { goByClick } from "../state/orders.ts";
+import { attempt, showFailure } from "../state/notices.ts";
+import { goByClick } from "../state/goals.ts";
 import { whyNotNow } from "../state/rights.ts";
 import { useSimulation } from "../state/simulation.ts";
-import { givePlace, setMoving, useTool } from "../state/tool.ts";
+import { givePosition, setMoving, useTool } from "../state/tool.ts";
 import { select, useVehicles } from "../state/vehicles.ts";
 import { openWindow, useWindows } from "../state/windows.ts";
 
@@ -33,12 +40,12 @@ const PAGE: Readonly<Record<string, () => void>> = {
   p: () => toggleOverlay("pictures"),
   "?": () => openWindow("help"),
   Escape: () => {
-    if (useTool.getState().asking !== null) givePlace(null);
+    if (useTool.getState().asking !== null) givePosition(null);
     else setMoving(false);
   },
 };
 
-/** The page's keys; flight keys are in `hands/keys.ts`, those of views in `views/`. */
+/** The page's keys; flight keys are in `manual/keys.ts`, those of views in `views/`. */
 export function useHotkeys(): void {
   useEffect(() => {
     const press = (event: KeyboardEvent) => {
@@ -52,7 +59,7 @@ export function useHotkeys(): void {
       event.preventDefault();
       const whyNot = key in COMMANDS ? whyNotNow() : null;
       if (whyNot === null) run();
-      else tellFailure("Command unavailable", whyNot);
+      else showFailure("Command unavailable", whyNot);
     };
     window.addEventListener("keydown", press);
     return () => window.removeEventListener("keydown", press);
@@ -72,9 +79,9 @@ function command(what: string, asked: Promise<unknown>): void {
   void attempt(what, asked);
 }
 
-function order(what: Order): void {
+function order(what: FlightCommand): void {
   const { selected } = useVehicles.getState();
-  if (selected !== "") command(selected, tell(selected, what));
+  if (selected !== "") command(selected, sendCommand(selected, what));
 }
 
 function pace(up: boolean): void {

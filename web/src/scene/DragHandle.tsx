@@ -3,7 +3,7 @@ import { useEffect, useMemo, useRef, useState } from "react";
 import { Group, Raycaster, Vector2, type Object3D } from "three";
 import { onLevel, onUpright, type Ray } from "../lib/dragging.ts";
 import { Latest } from "../lib/latest.ts";
-import { putAt, type Place } from "../link/commands.ts";
+import { putAt, type Position } from "../link/commands.ts";
 import { link } from "../link/link.ts";
 import { succeeds } from "../state/notices.ts";
 import { useWhyNot } from "../state/rights.ts";
@@ -30,7 +30,7 @@ export function DragHandle() {
 
 function Handle({ uav }: { uav: string }) {
   const group = useRef<Group>(null);
-  const wished = useRef<Place | null>(null);
+  const wished = useRef<Position | null>(null);
   const [held, setHeld] = useState<Grip | null>(null);
   useFollowing(group, uav, wished);
   useDragging(group, uav, wished, setHeld);
@@ -86,7 +86,7 @@ function HandleMaterial({ color, held }: { color: string; held: boolean }) {
 function useFollowing(
   group: React.RefObject<Group | null>,
   uav: string,
-  wished: React.RefObject<Place | null>,
+  wished: React.RefObject<Position | null>,
 ): void {
   useFrame(({ camera }) => {
     const handle = group.current;
@@ -107,19 +107,19 @@ function useFollowing(
 function useDragging(
   group: React.RefObject<Group | null>,
   uav: string,
-  wished: React.RefObject<Place | null>,
+  wished: React.RefObject<Position | null>,
   setHeld: (grip: Grip | null) => void,
 ): void {
   const { camera, gl } = useThree();
   const caster = useMemo(() => new Raycaster(), []);
   useEffect(() => {
     const canvas = gl.domElement;
-    const sender = new Latest<Place>(async (place) => {
+    const sender = new Latest<Position>(async (place) => {
       const pose = link.frames.pose(baseFrame(uav));
       const [, , , x = 0, y = 0, z = 0, w = 1] = pose ?? [];
       await succeeds(`Move ${uav}`, putAt(uav, place, { x, y, z, w }));
     }, SEND_MS);
-    let drag: { grip: Grip; from: Place; offset: [number, number, number] } | null = null;
+    let drag: { grip: Grip; from: Position; offset: [number, number, number] } | null = null;
     const ray = (event: PointerEvent) => rayAt(canvas, camera, event.clientX, event.clientY);
     const down = (event: PointerEvent) => {
       if (event.target !== canvas || event.button !== 0 || group.current === null) return;
@@ -166,9 +166,9 @@ function useDragging(
 }
 
 function placeOf(
-  drag: { grip: Grip; from: Place; offset: [number, number, number] },
+  drag: { grip: Grip; from: Position; offset: [number, number, number] },
   ray: Ray,
-): Place | null {
+): Position | null {
   const { grip, from, offset } = drag;
   if (grip === "level") {
     const at = onLevel(ray, from.z);

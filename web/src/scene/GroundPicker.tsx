@@ -1,7 +1,7 @@
 import { useThree } from "@react-three/fiber";
 import { useEffect } from "react";
 import { meetGround } from "../lib/heights.ts";
-import { givePlace, useTool } from "../state/tool.ts";
+import { givePosition, useTool } from "../state/tool.ts";
 import { heightAt } from "../state/worldPlan.ts";
 import { rayAt } from "./rayAt.ts";
 
@@ -27,7 +27,7 @@ export function GroundPicker() {
       const place = meetGround(heightAt, origin, direction);
       if (place === null) return;
       event.stopPropagation();
-      givePlace({ x: place[0], y: place[1], z: place[2] });
+      givePosition({ x: place[0], y: place[1], z: place[2] });
     };
     canvas.style.cursor = "crosshair";
     canvas.addEventListener("pointerdown", down);

@@ -26,7 +26,7 @@ export function Scene() {
         tabIndex={0}
         aria-label="Scene"
       >
-        <Pictures />
+        <Cameras />
         <DragHandle />
         <EyeProbe />
         <GroundPicker />
@@ -37,7 +37,7 @@ export function Scene() {
 }
 
 /** Runs the stage; it draws by itself, once a frame. */
-function Pictures() {
+function Cameras() {
   const { scene, camera, gl, setDpr } = useThree();
   const stage = useRef<Stage | null>(null);
   useEffect(() => {

@@ -7,7 +7,7 @@ vi.mock("./notices.ts", () => ({ succeeds: (_what: string, done: Promise<void>) 
 vi.mock("./vehicles.ts", () => ({ baseFrame: (uav: string) => uav }));
 
 const { followEpoch } = await import("./epoch.ts");
-const { followGoals, sendTo, useGoals } = await import("./orders.ts");
+const { followGoals, sendTo, useGoals } = await import("./goals.ts");
 const { useSimulation } = await import("./simulation.ts");
 
 followEpoch();

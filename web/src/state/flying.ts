@@ -2,7 +2,7 @@
 
 import { create } from "zustand";
 import { fly, stopFlying } from "../link/commands/flight.ts";
-import { keep, readKept } from "../lib/kept.ts";
+import { keep, readStored } from "../lib/storage.ts";
 import { AT_REST, isAtRest, sum, twistOf, type Speeds, type Wish } from "../lib/twist.ts";
 import { useVehicles } from "./vehicles.ts";
 
@@ -21,7 +21,7 @@ const USUAL: Speeds = { level: 3, climb: 1.5, turn: 1.2 };
 export const useFlying = create<Flying>(() => ({
   uav: "",
   wish: AT_REST,
-  speeds: readKept(KEY, USUAL),
+  speeds: readStored(KEY, USUAL),
 }));
 
 let haste = () => 1;

@@ -4,7 +4,7 @@ import { create } from "zustand";
 import { secondsOf } from "../lib/time.ts";
 import { link } from "../link/link.ts";
 
-export type EntrySort = "event" | "trouble" | "command";
+export type EntrySort = "event" | "problem" | "command";
 
 export interface Entry {
   number: number;
@@ -40,7 +40,7 @@ export interface Command {
 export const COMMAND_DEPTH = 1000;
 const MOST = 5000;
 const SHOW_MS = 200;
-const TROUBLES = new Set(["impact", "collision", "fault", "battery"]);
+const PROBLEMS = new Set(["impact", "collision", "fault", "battery"]);
 
 /** The newest entries, the oldest first; told a few times a second. */
 export const useJournal = create<{ entries: Entry[] }>(() => ({ entries: [] }));
@@ -83,7 +83,7 @@ export function entryOfEvent(text: string): Omit<Entry, "number"> | null {
   if (typeof event?.time_ns !== "number") return null;
   return {
     timeS: event.time_ns * 1e-9,
-    sort: TROUBLES.has(event.kind) ? "trouble" : "event",
+    sort: PROBLEMS.has(event.kind) ? "problem" : "event",
     kind: event.kind,
     who: event.uav,
     text: textOf(event),

@@ -1,5 +1,5 @@
 import { create } from "zustand";
-import { keep, readKept } from "../lib/kept.ts";
+import { keep, readStored } from "../lib/storage.ts";
 import { sheetOf } from "../lib/sheet.ts";
 
 export type Dock = "left" | "right" | "bottom";
@@ -55,7 +55,7 @@ const USUAL: Layout = {
 const NO_PANELS: Record<Slot, string> = { left: "", right: "", bottom: "", second: "" };
 
 export const useLayout = create<Layout>(() => {
-  const layout = readKept(KEY, USUAL);
+  const layout = readStored(KEY, USUAL);
   // On a phone a panel takes half of the page: it begins without one.
   if (!isNarrow()) return layout;
   return { ...layout, ...NO_PANELS, shown: { map: false, pictures: false } };

@@ -1,5 +1,5 @@
 import { create } from "zustand";
-import { keep, readKept } from "../lib/kept.ts";
+import { keep, readStored } from "../lib/storage.ts";
 import { isLength, shortOf } from "../lib/units.ts";
 import type { Curve, Line } from "../lib/usualCurves.ts";
 
@@ -32,7 +32,7 @@ interface Plots {
 const KEY = "volery.plots";
 
 export const usePlots = create<Plots>(() =>
-  readKept(KEY, { plots: [{ id: 1, lines: [] }], windowS: 20 }),
+  readStored(KEY, { plots: [{ id: 1, lines: [] }], windowS: 20 }),
 );
 usePlots.subscribe((plots) => keep(KEY, plots));
 

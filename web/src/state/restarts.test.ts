@@ -12,7 +12,7 @@ vi.mock("../link/commands/flight.ts", () => ({ goTo: () => Promise.resolve() }))
 vi.mock("./worldPlan.ts", () => ({ heightAt: () => 0 }));
 vi.mock("./notices.ts", () => ({ succeeds: (_what: string, done: Promise<void>) => done }));
 
-const { followGoals, sendTo, useGoals } = await import("./orders.ts");
+const { followGoals, sendTo, useGoals } = await import("./goals.ts");
 const { followRestarts, isRestarting, restartedBy } = await import("./restarts.ts");
 const { useVehicles } = await import("./vehicles.ts");
 

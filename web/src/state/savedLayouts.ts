@@ -1,7 +1,7 @@
 // Arrangements of the page under names: panels, sizes, tiles and plots.
 
 import { create } from "zustand";
-import { keep, readKept } from "../lib/kept.ts";
+import { keep, readStored } from "../lib/storage.ts";
 import { useLayout } from "./layout.ts";
 import { usePlots } from "./plots.ts";
 
@@ -14,7 +14,7 @@ const KEY = "volery.layouts";
 
 /** Saved layouts by name. */
 export const useSavedLayouts = create<{ saved: Record<string, SavedLayout> }>(() =>
-  readKept(KEY, { saved: {} }),
+  readStored(KEY, { saved: {} }),
 );
 useSavedLayouts.subscribe((layouts) => keep(KEY, layouts));
 

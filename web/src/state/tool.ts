@@ -1,5 +1,5 @@
 import { create } from "zustand";
-import type { Place } from "../link/commands/flight.ts";
+import type { Position } from "../link/commands/flight.ts";
 
 /** What a click in the scene or on the map means now, besides looking around. */
 interface Tool {
@@ -11,19 +11,19 @@ interface Tool {
 
 export const useTool = create<Tool>(() => ({ asking: null, moving: false }));
 
-let answer: ((place: Place | null) => void) | null = null;
+let answer: ((place: Position | null) => void) | null = null;
 
-/** Let the user click on a place of the ground; null: he thought better of it. */
-export function pickPlace(what: string): Promise<Place | null> {
-  givePlace(null);
+/** Lets the user click a position on the ground; null: the user cancels. */
+export function pickPosition(what: string): Promise<Position | null> {
+  givePosition(null);
   return new Promise((resolve) => {
     answer = resolve;
     useTool.setState({ asking: what });
   });
 }
 
-/** A place that was clicked; null ends the question. */
-export function givePlace(place: Place | null): void {
+/** Ends the request with a clicked position; null cancels it. */
+export function givePosition(place: Position | null): void {
   const waiting = answer;
   answer = null;
   useTool.setState({ asking: null });

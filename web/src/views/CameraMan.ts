@@ -7,7 +7,7 @@ import { shown } from "../scene/stage/shown.ts";
 import { cameraOfUav } from "../scene/sensing/cameras.ts";
 import { shapeOf } from "../scene/uavs/airframeGeometry.ts";
 import { fleet } from "../scene/uavs/fleet.ts";
-import { standing } from "../scene/world/standing.ts";
+import { currentWorld } from "../scene/world/currentWorld.ts";
 import { useTool } from "../state/tool.ts";
 import { select, useVehicles } from "../state/vehicles.ts";
 import { look, putCamera, useView, VIEWS, type ViewName } from "../state/view.ts";
@@ -73,10 +73,10 @@ export class CameraMan implements Part {
     element: HTMLElement,
   ) {
     this.around = {
-      heightAt: (x, y) => standing.ground.heightAt(x, y),
+      heightAt: (x, y) => currentWorld.ground.heightAt(x, y),
       walk: (from, to) => {
-        const ground = standing.ground.heightAt(...from);
-        return standing.obstacles.walk(from, to, BODY_M, ground + KNEES_M, ground + HEAD_M);
+        const ground = currentWorld.ground.heightAt(...from);
+        return currentWorld.obstacles.walk(from, to, BODY_M, ground + KNEES_M, ground + HEAD_M);
       },
       uav: null,
       uavCamera: null,
@@ -149,8 +149,8 @@ export class CameraMan implements Part {
         this.blend.begin(this.eye);
       this.selected = selected;
     }
-    if (standing.version !== this.standingVersion) {
-      this.standingVersion = standing.version;
+    if (currentWorld.version !== this.standingVersion) {
+      this.standingVersion = currentWorld.version;
       if (this.entered === "walk")
         this.rigs.walk.enter(this.eye, this.around, this.rigs.walk.pose());
     }

@@ -12,7 +12,7 @@ import {
 import { RotateCcw } from "lucide-react";
 import { useState } from "react";
 import { loadScenario, reset } from "../../link/commands.ts";
-import { succeeds, tellSuccess } from "../../state/notices.ts";
+import { succeeds, showSuccess } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { useSimulation } from "../../state/simulation.ts";
 
@@ -24,7 +24,7 @@ export function Reset() {
   const whyNot = useWhyNot();
   const run = async (what: Promise<void>, done: string) => {
     setOpened(false);
-    if (await succeeds("Reset", what)) tellSuccess(done);
+    if (await succeeds("Reset", what)) showSuccess(done);
   };
   return (
     <Popover opened={opened} onChange={setOpened} position="bottom" withArrow trapFocus>

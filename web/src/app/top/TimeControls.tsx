@@ -5,7 +5,7 @@ import { PLAYING, setPlaying } from "../../link/commands.ts";
 import { attempt } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { useSimulation } from "../../state/simulation.ts";
-import { KeptStates } from "./KeptStates.tsx";
+import { Snapshots } from "./Snapshots.tsx";
 import { Reset } from "./Reset.tsx";
 import { Speed } from "./Speed.tsx";
 import { Steps } from "./Steps.tsx";
@@ -21,7 +21,7 @@ export function TimeControls() {
       <Clock />
       <Speed />
       <Reset />
-      <KeptStates />
+      <Snapshots />
     </Group>
   );
 }

@@ -1,7 +1,7 @@
 // UAVs that come, go and are put somewhere.
 
-import { RefusedError, ask, order } from "./asking.ts";
-import type { Place } from "./flight.ts";
+import { RefusedError, ask, order } from "./requests.ts";
+import type { Position } from "./flight.ts";
 import { link } from "../link.ts";
 
 export interface Spawnable {
@@ -22,7 +22,7 @@ export async function spawnables(): Promise<Spawnable[]> {
 }
 
 /** New UAVs, one at each place; names of those that came. Rejects where none did. */
-export async function spawn(uri: string, places: readonly Place[]): Promise<string[]> {
+export async function spawn(uri: string, places: readonly Position[]): Promise<string[]> {
   const answer = await link.call<"simulation_interfaces/srv/SpawnEntities">(
     "/spawn_entities",
     "simulation_interfaces/srv/SpawnEntities",
@@ -56,7 +56,7 @@ export async function resetUav(name: string): Promise<void> {
 /** Put a UAV or a thing somewhere; pose in the map. It stands still there. */
 export async function putAt(
   entity: string,
-  position: Place,
+  position: Position,
   orientation: { x: number; y: number; z: number; w: number },
 ): Promise<void> {
   await ask("/set_entity_state", "simulation_interfaces/srv/SetEntityState", {

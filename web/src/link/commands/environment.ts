@@ -4,7 +4,7 @@ import type {
   volery_interfaces_GetGridMap_Response,
   volery_interfaces_GetWeather_Response,
 } from "../../messages/generated.ts";
-import { order } from "./asking.ts";
+import { order } from "./requests.ts";
 
 /** What of the weather can be set; see `volery_interfaces/srv/SetWeather` for units. */
 export interface Weather {

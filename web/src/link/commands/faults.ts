@@ -1,4 +1,4 @@
-import { order } from "./asking.ts";
+import { order } from "./requests.ts";
 
 /** Make something fail; `fault` as in a scenario. */
 export async function injectFault(fault: Record<string, unknown>): Promise<void> {

@@ -1,20 +1,20 @@
-// What one UAV is told to do.
+// Flight commands of one UAV.
 
 import { link } from "../link.ts";
-import { order } from "./asking.ts";
+import { order } from "./requests.ts";
 
-export interface Place {
+export interface Position {
   x: number;
   y: number;
   z: number;
 }
 
 /** Plain services of a UAV, all of `std_srvs/srv/Trigger`. */
-export const ORDERS = ["arm", "take_off", "hold", "land", "return_home", "stop"] as const;
-export type Order = (typeof ORDERS)[number];
+export const FLIGHT_COMMANDS = ["arm", "take_off", "hold", "land", "return_home", "stop"] as const;
+export type FlightCommand = (typeof FLIGHT_COMMANDS)[number];
 
-/** Answers what the UAV says to it. */
-export async function tell(uav: string, what: Order): Promise<string> {
+/** Returns the UAV's response message. */
+export async function sendCommand(uav: string, what: FlightCommand): Promise<string> {
   const { message } = await order(`/${uav}/${what}`, "std_srvs/srv/Trigger", {});
   return message;
 }
@@ -23,14 +23,14 @@ export async function takeOffTo(uav: string, altitude: number): Promise<void> {
   await order(`/${uav}/take_off_to`, "volery_interfaces/srv/TakeOffTo", { altitude });
 }
 
-/** Fly to a place of the map; `yaw` in rad, null: as it is. */
-export async function goTo(uav: string, position: Place, yaw: number | null): Promise<void> {
+/** Flies to a position in the map, m; `yaw` in rad, null: the present one. */
+export async function goTo(uav: string, position: Position, yaw: number | null): Promise<void> {
   const request = { position, yaw: yaw ?? 0, keep_heading: yaw === null };
   await order(`/${uav}/go_to`, "volery_interfaces/srv/GoTo", request);
 }
 
-/** For robots without that service: the goal of the navigation stacks. */
-export function publishGoal(uav: string, position: Place, yaw: number): void {
+/** Publishes the goal of a navigation stack, for robots without that service. */
+export function publishGoal(uav: string, position: Position, yaw: number): void {
   link.publish(`/${uav}/goal_pose`, "geometry_msgs/msg/PoseStamped", {
     header: { frame_id: "map" },
     pose: {
@@ -41,18 +41,18 @@ export function publishGoal(uav: string, position: Place, yaw: number): void {
 }
 
 export interface Twist {
-  linear: Place;
-  angular: Place;
+  linear: Position;
+  angular: Position;
 }
 
 const STILL: Twist = { linear: { x: 0, y: 0, z: 0 }, angular: { x: 0, y: 0, z: 0 } };
 
-/** A velocity in the level heading frame, to be told again many times a second until `stopFlying`. */
+/** Publishes a velocity in the level heading frame, many times per second until `stopFlying`. */
 export function fly(uav: string, twist: Twist): void {
   link.stream(`/${uav}/cmd_vel`, "geometry_msgs/msg/Twist", twist, STILL);
 }
 
-/** No velocity any more; said once, if there was one. */
+/** Publishes a velocity of zero once, if there was another one. */
 export function stopFlying(uav: string): void {
   link.endStream(`/${uav}/cmd_vel`);
 }

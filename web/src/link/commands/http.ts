@@ -1,6 +1,6 @@
 // Answers of the server's own pages.
 
-import { RefusedError } from "./asking.ts";
+import { RefusedError } from "./requests.ts";
 
 /** JSON of an answer; a refusal's reason is its `error`. */
 export async function read(answer: Response): Promise<unknown> {

@@ -1,6 +1,6 @@
 // Logs: record, list, fetch, bring, open, play.
 
-import { order } from "./asking.ts";
+import { order } from "./requests.ts";
 import { read } from "./http.ts";
 
 export interface Recording {

@@ -1,6 +1,6 @@
 // Which scenario flies, and with what; uploads. What is not on the graph is asked for over HTTP.
 
-import { order } from "./asking.ts";
+import { order } from "./requests.ts";
 import { read } from "./http.ts";
 
 export interface ScenarioCard {

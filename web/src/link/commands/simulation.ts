@@ -1,7 +1,7 @@
 // Time: play, pause, steps, speed, reset, and states to return to.
 
 import { secondsOf } from "../../lib/time.ts";
-import { ask, order } from "./asking.ts";
+import { ask, order } from "./requests.ts";
 
 /** `simulation_interfaces/msg/SimulationState`. */
 export const STOPPED = 0;
@@ -40,26 +40,26 @@ export async function reset(): Promise<void> {
   await ask("/reset_simulation", type, { scope: 0 }, RESTORE_TIMEOUT_S);
 }
 
-export interface KeptState {
+export interface Snapshot {
   name: string;
   /** Simulated time that it returns to, s. */
   timeS: number;
 }
 
-export async function keptStates(): Promise<KeptState[]> {
+export async function listSnapshots(): Promise<Snapshot[]> {
   const type = "volery_interfaces/srv/ListSnapshots";
   const { names, stamps } = await order("/volery/list_snapshots", type, {});
   return names.map((name, i) => ({ name, timeS: secondsOf(stamps[i]!) }));
 }
 
-export async function keepState(name: string): Promise<void> {
+export async function saveSnapshot(name: string): Promise<void> {
   await order("/volery/snapshot", "volery_interfaces/srv/ByName", { name }, RESTORE_TIMEOUT_S);
 }
 
-export async function returnTo(name: string): Promise<void> {
+export async function restoreSnapshot(name: string): Promise<void> {
   await order("/volery/restore", "volery_interfaces/srv/ByName", { name }, RESTORE_TIMEOUT_S);
 }
 
-export async function forgetState(name: string): Promise<void> {
+export async function deleteSnapshot(name: string): Promise<void> {
   await order("/volery/forget_snapshot", "volery_interfaces/srv/ByName", { name });
 }

@@ -3,7 +3,7 @@ import { Stack, TextInput, Input, ScrollArea } from "@mantine/core";
 import { Zap } from "lucide-react";
 import { useState } from "react";
 import { injectFault } from "../../link/commands.ts";
-import { attempt, tellSuccess } from "../../state/notices.ts";
+import { attempt, showSuccess } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { simulatedS } from "../../state/simulation.ts";
 import { useVehicles } from "../../state/vehicles.ts";
@@ -24,7 +24,7 @@ export default function Faults() {
   const inject = async () => {
     const fault = faultOf({ ...form, uav }, simulatedS());
     const done = await attempt("Fault injection failed", injectFault(fault));
-    if (done !== null) tellSuccess(`${labelOf(form.kind)} fault injected`);
+    if (done !== null) showSuccess(`${labelOf(form.kind)} fault injected`);
   };
 
   return (

@@ -2,7 +2,7 @@ import { ActionIcon, Button, Group, NumberInput, Tooltip } from "@mantine/core";
 import { MousePointerClick, Navigation } from "lucide-react";
 import { useState } from "react";
 import { link } from "../../link/link.ts";
-import { goByClick, sendTo } from "../../state/orders.ts";
+import { goByClick, sendTo } from "../../state/goals.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { baseFrame } from "../../state/vehicles.ts";
 import { Section } from "./Section.tsx";

@@ -4,13 +4,13 @@ import { colourOf, modeText } from "../vehicles/modes.ts";
 import { Attitude } from "./Attitude.tsx";
 import { Figures } from "./Figures.tsx";
 import { GoTo } from "./GoTo.tsx";
-import { Orders } from "./Orders.tsx";
-import { Pilots } from "./Pilots.tsx";
+import { FlightCommands } from "./FlightCommands.tsx";
+import { ControlAuthority } from "./ControlAuthority.tsx";
 import { Removal } from "./Removal.tsx";
 import { Repair } from "./Repair.tsx";
 import { Sensors } from "./Sensors.tsx";
 
-/** All of the selected UAV: how it is, what it measures, what it can be told. */
+/** The selected UAV: state, sensors and commands. */
 export default function Inspector() {
   const names = useVehicles(({ list }) => list.map(({ name }) => name).join(" "));
   const selected = useVehicles((vehicles) => vehicles.selected);
@@ -38,11 +38,11 @@ export default function Inspector() {
           <Mode />
         </Group>
         <Repair key={`repair ${selected}`} uav={selected} />
-        <Orders key={`orders ${selected}`} uav={selected} />
+        <FlightCommands key={`commands ${selected}`} uav={selected} />
         <Attitude key={`attitude ${selected}`} uav={selected} />
         <Figures />
         <GoTo key={selected} uav={selected} />
-        <Pilots uav={selected} />
+        <ControlAuthority uav={selected} />
         <Sensors key={`sensors ${selected}`} uav={selected} />
         <Removal uav={selected} />
       </Stack>

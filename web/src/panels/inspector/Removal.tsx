@@ -1,7 +1,7 @@
 import { Button, Tooltip } from "@mantine/core";
 import { Trash2 } from "lucide-react";
 import { remove } from "../../link/commands.ts";
-import { succeeds, tellSuccess } from "../../state/notices.ts";
+import { succeeds, showSuccess } from "../../state/notices.ts";
 import { useConnection } from "../../state/connection.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { useVehicles } from "../../state/vehicles.ts";
@@ -13,7 +13,7 @@ export function Removal({ uav }: { uav: string }) {
   const whyNot = useWhyNot() ?? (alone ? "A simulation needs at least one UAV" : null);
   if (!volery) return null;
   const take = async () => {
-    if (await succeeds(`Remove ${uav}`, remove(uav))) tellSuccess(`Removed ${uav}`);
+    if (await succeeds(`Remove ${uav}`, remove(uav))) showSuccess(`Removed ${uav}`);
   };
   return (
     <Tooltip label={whyNot ?? "Remove this UAV from the simulation"}>

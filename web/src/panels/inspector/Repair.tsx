@@ -3,7 +3,7 @@ import { Wrench } from "lucide-react";
 import { useState } from "react";
 import { resetUav } from "../../link/commands.ts";
 import { useConnection } from "../../state/connection.ts";
-import { succeeds, tellSuccess } from "../../state/notices.ts";
+import { succeeds, showSuccess } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { useVehicles } from "../../state/vehicles.ts";
 
@@ -18,7 +18,7 @@ export function Repair({ uav }: { uav: string }) {
   if (!volery || !crashed) return null;
   const repair = async () => {
     setBusy(true);
-    if (await succeeds(`Repair ${uav}`, resetUav(uav))) tellSuccess(`Repaired ${uav}`);
+    if (await succeeds(`Repair ${uav}`, resetUav(uav))) showSuccess(`Repaired ${uav}`);
     setBusy(false);
   };
   return (

@@ -11,11 +11,11 @@ import classes from "./Log.module.css";
 
 const SORTS = [
   { value: "all", label: "All" },
-  { value: "trouble", label: "Problems" },
+  { value: "problem", label: "Problems" },
   { value: "event", label: "Events" },
   { value: "command", label: "Commands" },
 ];
-const COLOURS: Record<EntrySort, string> = { trouble: "red", event: "gray", command: "cyan" };
+const COLOURS: Record<EntrySort, string> = { problem: "red", event: "gray", command: "cyan" };
 const MOST_SHOWN = 300;
 
 /** What happened and what was commanded, the newest first. */

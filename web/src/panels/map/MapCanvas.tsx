@@ -9,8 +9,8 @@ import {
 } from "../../lib/mapProjection.ts";
 import { link } from "../../link/link.ts";
 import { POSE } from "../../link/protocol.ts";
-import { sendAbove } from "../../state/orders.ts";
-import { givePlace, useTool } from "../../state/tool.ts";
+import { sendAbove } from "../../state/goals.ts";
+import { givePosition, useTool } from "../../state/tool.ts";
 import { baseFrame, select, useVehicles } from "../../state/vehicles.ts";
 import { heightAt } from "../../state/worldPlan.ts";
 
@@ -99,7 +99,7 @@ export function MapCanvas({ canvas, shown, move, stopFollowing, clickSends }: Ma
 /** A UAV that is clicked is selected; elsewhere the place is taken. */
 function click(view: MapView, size: Size, px: number, py: number, sends: boolean): void {
   const [x, y] = placeOf(view, size, px, py);
-  if (useTool.getState().asking !== null) return givePlace({ x, y, z: heightAt(x, y) });
+  if (useTool.getState().asking !== null) return givePosition({ x, y, z: heightAt(x, y) });
   const { selected, list } = useVehicles.getState();
   const hit = list.find(({ name }) => {
     const row = link.frames.row(baseFrame(name));

@@ -2,7 +2,7 @@ import { useComputedColorScheme } from "@mantine/core";
 import { useEffect, useMemo, useRef, useState, type RefObject } from "react";
 import { AutoFit, pixelOf, type MapView, type Point, type Size } from "../../lib/mapProjection.ts";
 import { link } from "../../link/link.ts";
-import { useGoals } from "../../state/orders.ts";
+import { useGoals } from "../../state/goals.ts";
 import { baseFrame, useVehicles } from "../../state/vehicles.ts";
 import { useNarrow } from "../../state/useNarrow.ts";
 import { useWorldPlan, type WorldPlan } from "../../state/worldPlan.ts";

@@ -1,7 +1,7 @@
 import { useCallback } from "react";
 import { fieldsOf, numericPaths } from "../../lib/typeDefinitions.ts";
 import { messageDefinitions } from "../../link/commands.ts";
-import { useAsked } from "../shared/useAsked.ts";
+import { useRequest } from "../shared/useRequest.ts";
 
 const NO_PATHS: string[] = [];
 
@@ -12,6 +12,6 @@ export function usePaths(type: string): { paths: string[]; reason: string } {
       type === "" ? NO_PATHS : [...new Set(numericPaths(fieldsOf(await messageDefinitions(type))))],
     [type],
   );
-  const { value: paths, reason } = useAsked(describe, NO_PATHS);
+  const { value: paths, reason } = useRequest(describe, NO_PATHS);
   return { paths, reason };
 }

@@ -23,18 +23,18 @@ import {
   uploadRecording,
   type Recording,
 } from "../../link/commands.ts";
-import { attempt, tellSuccess } from "../../state/notices.ts";
+import { attempt, showSuccess } from "../../state/notices.ts";
 import { useWhyNot, useWhyNotOpen } from "../../state/rights.ts";
 import { useSimulation } from "../../state/simulation.ts";
 import { Reason } from "../shared/Reason.tsx";
-import { useAsked } from "../shared/useAsked.ts";
+import { useRequest } from "../shared/useRequest.ts";
 
 const NONE: Recording[] = [];
 const ASK_MS = 2000;
 
 /** Record, and see what was recorded again. */
 export default function Recordings() {
-  const { value: list, reason, again } = useAsked(recordings, NONE, ASK_MS);
+  const { value: list, reason, again } = useRequest(recordings, NONE, ASK_MS);
   const whyNot = useWhyNot();
   const whyNotOpen = useWhyNotOpen();
 
@@ -44,7 +44,7 @@ export default function Recordings() {
   const send = async (file: File | null) => {
     if (file === null) return;
     const name = await attempt("Upload failed", uploadRecording(file));
-    if (name !== null) tellSuccess(`Uploaded ${name}`);
+    if (name !== null) showSuccess(`Uploaded ${name}`);
     again();
   };
 
@@ -140,7 +140,7 @@ function Recorder({ onChange, whyNot }: RecorderProps) {
   };
   const stop = async () => {
     const told = await attempt("Recording failed", stopRecording());
-    if (told !== null) tellSuccess(`Recorded ${counted(told.messages, "message")}`);
+    if (told !== null) showSuccess(`Recorded ${counted(told.messages, "message")}`);
     onChange();
   };
 

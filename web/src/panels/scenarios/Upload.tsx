@@ -3,7 +3,7 @@ import { useEffect, useState } from "react";
 import { ENDINGS, kindOf, type FileKind } from "../../lib/fileKinds.ts";
 import { upload, uploadRecording } from "../../link/commands.ts";
 import { openPanel } from "../../state/layout.ts";
-import { reasonOf, tellSuccess } from "../../state/notices.ts";
+import { reasonOf, showSuccess } from "../../state/notices.ts";
 import { useWhyNotOpen } from "../../state/rights.ts";
 import { closeWindow, offerFile, offerScenario, useWindows } from "../../state/windows.ts";
 import { SubmitRow } from "./SubmitRow.tsx";
@@ -104,7 +104,7 @@ export default function Upload() {
 }
 
 async function sendLog(file: File): Promise<void> {
-  tellSuccess(`Uploaded ${await uploadRecording(file)}`);
+  showSuccess(`Uploaded ${await uploadRecording(file)}`);
   closeWindow();
   openPanel("bottom", "recordings");
 }

@@ -5,7 +5,7 @@ import { requestDefinitions, serviceType } from "../../link/commands.ts";
 import { link } from "../../link/link.ts";
 import { MessageForm } from "../shared/MessageForm.tsx";
 import { Reason } from "../shared/Reason.tsx";
-import { useAsked } from "../shared/useAsked.ts";
+import { useRequest } from "../shared/useRequest.ts";
 import { ValueTree } from "../shared/ValueTree.tsx";
 import classes from "./Services.module.css";
 
@@ -29,7 +29,7 @@ export function ServiceCall({ service }: { service: string }) {
     const type = await serviceType(service);
     return { type, fields: fieldsOf(await requestDefinitions(type)) };
   }, [service]);
-  const { value: described, reason } = useAsked(describe, UNKNOWN);
+  const { value: described, reason } = useRequest(describe, UNKNOWN);
   const [request, setRequest] = useState<Record<string, unknown>>({});
   const [answered, setAnswered] = useState<Answered | null>(null);
   const [waiting, setWaiting] = useState(false);

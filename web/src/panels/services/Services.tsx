@@ -4,7 +4,7 @@ import { matcher } from "../../lib/filter.ts";
 import { serviceNames } from "../../link/commands.ts";
 import { FilterInput } from "../shared/FilterInput.tsx";
 import { Reason } from "../shared/Reason.tsx";
-import { useAsked } from "../shared/useAsked.ts";
+import { useRequest } from "../shared/useRequest.ts";
 import { ServiceCall } from "./ServiceCall.tsx";
 import classes from "./Services.module.css";
 
@@ -14,7 +14,7 @@ const MOST_SHOWN = 300;
 
 /** Every service; a form made of its description calls it. */
 export default function Services() {
-  const { value: all, reason } = useAsked(serviceNames, NONE, ASK_MS);
+  const { value: all, reason } = useRequest(serviceNames, NONE, ASK_MS);
   const [filter, setFilter] = useState("");
   const [chosen, setChosen] = useState("");
   const fitting = all.filter(matcher(filter));

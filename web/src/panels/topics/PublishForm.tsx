@@ -5,14 +5,14 @@ import { messageDefinitions } from "../../link/commands.ts";
 import { link } from "../../link/link.ts";
 import { MessageForm } from "../shared/MessageForm.tsx";
 import { Reason } from "../shared/Reason.tsx";
-import { useAsked } from "../shared/useAsked.ts";
+import { useRequest } from "../shared/useRequest.ts";
 
 const NONE: Field[] = [];
 
 /** Write a message and publish it. */
 export function PublishForm({ topic, type }: { topic: string; type: string }) {
   const describe = useCallback(async () => fieldsOf(await messageDefinitions(type)), [type]);
-  const { value: fields, reason } = useAsked(describe, NONE);
+  const { value: fields, reason } = useRequest(describe, NONE);
   const [message, setMessage] = useState<Record<string, unknown>>({});
   useEffect(() => setMessage(emptyOf(fields)), [fields]);
   return (

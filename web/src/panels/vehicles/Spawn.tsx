@@ -1,10 +1,10 @@
 import { Button, Group, NumberInput, Paper, Select, Stack, Text } from "@mantine/core";
 import { MousePointerClick } from "lucide-react";
 import { useEffect, useState } from "react";
-import { spawn, spawnables, type Place, type Spawnable } from "../../link/commands.ts";
-import { attempt, tellSuccess } from "../../state/notices.ts";
+import { spawn, spawnables, type Position, type Spawnable } from "../../link/commands.ts";
+import { attempt, showSuccess } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
-import { pickPlace } from "../../state/tool.ts";
+import { pickPosition } from "../../state/tool.ts";
 import { select, useVehicles } from "../../state/vehicles.ts";
 import { heightAt } from "../../state/worldPlan.ts";
 import { spiral } from "./spiral.ts";
@@ -31,12 +31,12 @@ export function Spawn({ close }: { close: () => void }) {
     const came = await attempt("Add UAVs", spawnAround(uri!, count, around));
     setBusy(false);
     if (came === null) return;
-    tellSuccess(came.length === 1 ? `Added ${came[0]}` : `Added ${came.length} UAVs`);
+    showSuccess(came.length === 1 ? `Added ${came[0]}` : `Added ${came.length} UAVs`);
     select(came[0]!);
     close();
   };
   const byClick = async () => {
-    const place = await pickPlace(count === 1 ? "New UAV" : `${count} new UAVs`);
+    const place = await pickPosition(count === 1 ? "New UAV" : `${count} new UAVs`);
     if (place !== null) await add(place);
   };
   const disabled = whyNot !== null || uri === null || busy;
@@ -87,7 +87,7 @@ export function Spawn({ close }: { close: () => void }) {
 
 /** Try places ever farther away until all have come; what came, else the last reason. */
 async function spawnAround(uri: string, count: number, around: { x: number; y: number }) {
-  const places = spiral(count * TRIES, SPACING_M).map(([dx, dy]): Place => {
+  const places = spiral(count * TRIES, SPACING_M).map(([dx, dy]): Position => {
     const [x, y] = [around.x + dx, around.y + dy];
     return { x, y, z: heightAt(x, y) };
   });

@@ -10,7 +10,7 @@ import { compose, type Pose } from "../../lib/pose.ts";
 import type { nav_msgs_OccupancyGrid } from "../../messages/generated.ts";
 import { frameOf } from "../stage/frames.ts";
 import type { Part } from "../stage/part.ts";
-import { standing } from "../world/standing.ts";
+import { currentWorld } from "../world/currentWorld.ts";
 import { picturesOfGrid } from "./occupancy.ts";
 import { TopicMeshes } from "./TopicMeshes.ts";
 
@@ -56,7 +56,7 @@ function mapMesh({ header, info, data }: nav_msgs_OccupancyGrid, below: number):
   const origin: Pose = [p.x, p.y, p.z, q.x, q.y, q.z, q.w];
   const [x, y, z, ...turn] = compose(frameOf(header.frame_id) as Pose, origin);
   const lift = LIFT_M + STEP_M * below;
-  const ground = standing.ground.heightAt(x + 0.5 * wide, y + 0.5 * high);
+  const ground = currentWorld.ground.heightAt(x + 0.5 * wide, y + 0.5 * high);
   mesh.position.set(x, y, Math.max(z, ground) + lift);
   mesh.quaternion.fromArray(turn);
   mesh.renderOrder = 1200;

@@ -5,7 +5,7 @@ import type {
   octomap_msgs_OctomapWithPose,
 } from "../../messages/generated.ts";
 import { frameOf } from "../stage/frames.ts";
-import { toMap } from "../stage/placing.ts";
+import { toMap } from "../stage/mapFrame.ts";
 import type { Part } from "../stage/part.ts";
 import { putMatrix, rotationOf } from "../stage/poses.ts";
 import { occupiedCubes, type Voxels as Cubes } from "./octomap.ts";

@@ -2,7 +2,7 @@
 
 import type { geometry_msgs_Point, visualization_msgs_Marker } from "../../messages/generated.ts";
 import { compose, type Pose } from "../../lib/pose.ts";
-import { toMap } from "../stage/placing.ts";
+import { toMap } from "../stage/mapFrame.ts";
 
 export type Rgba = readonly [number, number, number, number];
 export type Shape = "cube" | "sphere" | "cylinder" | "cone";

@@ -14,7 +14,7 @@ import type { sensor_msgs_CameraInfo, sensor_msgs_Image } from "../../messages/g
 import { useVehicles } from "../../state/vehicles.ts";
 import { useView } from "../../state/view.ts";
 import { SegmentLines } from "../lines/SegmentLines.ts";
-import { toMap } from "../stage/placing.ts";
+import { toMap } from "../stage/mapFrame.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { followTopics, isKnown, type Follower } from "../stage/topics.ts";
 import { SELECTED } from "../uavs/colours.ts";

@@ -16,13 +16,13 @@ import { useVehicles } from "../../state/vehicles.ts";
 import { useView } from "../../state/view.ts";
 import { FADE } from "../air/fog.ts";
 import { frameOf } from "../stage/frames.ts";
-import { toMap } from "../stage/placing.ts";
+import { toMap } from "../stage/mapFrame.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { LEVELS } from "../stage/quality.ts";
 import { shown } from "../stage/shown.ts";
 import { followTopics, isKnown, type Follower } from "../stage/topics.ts";
 import { fleet } from "../uavs/fleet.ts";
-import { standing } from "../world/standing.ts";
+import { currentWorld } from "../world/currentWorld.ts";
 import { heightColour, LEVEL, NODDING } from "./returnColours.ts";
 import { pointsOfCloud, pointsOfScan } from "./pointClouds.ts";
 
@@ -156,7 +156,7 @@ export class Returns implements Part {
       : /horizontal|level|scan/i.test(topic)
         ? LEVEL
         : null;
-    const ground = standing.ground.heightAt(pose[0], pose[1]);
+    const ground = currentWorld.ground.heightAt(pose[0], pose[1]);
     const from = this.next;
     for (let i = 0; i + 2 < points.length; i += 3) {
       const [x, y, z] = toMap(pose, points[i]!, points[i + 1]!, points[i + 2]!);

@@ -3,7 +3,7 @@ import { link } from "../../link/link.ts";
 import { useView } from "../../state/view.ts";
 import { SegmentLines } from "../lines/SegmentLines.ts";
 import { frameOf } from "./frames.ts";
-import { toMap } from "./placing.ts";
+import { toMap } from "./mapFrame.ts";
 import type { Moment, Part } from "./part.ts";
 
 const MOST = 600;

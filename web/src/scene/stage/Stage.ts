@@ -8,7 +8,7 @@ import { Air } from "../air/air.ts";
 import { makeFog } from "../air/fog.ts";
 import { fleet } from "../uavs/fleet.ts";
 import { prepareMaterials } from "../world/materials.ts";
-import { standing } from "../world/standing.ts";
+import { currentWorld } from "../world/currentWorld.ts";
 import { debugging, noteFrame, onScreen } from "./debugging.ts";
 import type { Moment } from "./part.ts";
 import { Fence } from "./Fence.ts";
@@ -50,7 +50,7 @@ export class Stage {
     this.moment = { nowMs: 0, stepS: 0, camera, width: 1, height: 1, renderer, quality };
     this.take(quality);
     debugging.uavs = () => this.uavsOnScreen();
-    debugging.groundAt = (x, y) => standing.ground.heightAt(x, y);
+    debugging.groundAt = (x, y) => currentWorld.ground.heightAt(x, y);
     window.volery = debugging;
   }
 

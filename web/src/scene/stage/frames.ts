@@ -1,6 +1,6 @@
 import { link } from "../../link/link.ts";
 import type { Pose } from "../../lib/pose.ts";
-import { toMap } from "./placing.ts";
+import { toMap } from "./mapFrame.ts";
 
 const AT_MAP: Readonly<Pose> = [0, 0, 0, 0, 0, 0, 1];
 

@@ -1,7 +1,7 @@
 import type { PerspectiveCamera, Scene, WebGLRenderer } from "three";
 import { CameraMan } from "../../views/CameraMan.ts";
 import type { Air } from "../air/air.ts";
-import { Falling } from "../air/Falling.ts";
+import { Precipitation } from "../air/Precipitation.ts";
 import { Sky } from "../air/Sky.ts";
 import { Sun } from "../air/Sun.ts";
 import { occupancyMaps } from "../maps/occupancyMaps.ts";
@@ -9,7 +9,7 @@ import { voxels } from "../maps/voxels.ts";
 import { Markers } from "../markers/Markers.ts";
 import { Frusta } from "../sensing/Frusta.ts";
 import { Returns } from "../sensing/Returns.ts";
-import { Things } from "../things/Things.ts";
+import { Actors } from "../actors/Actors.ts";
 import { Airframes } from "../uavs/Airframes.ts";
 import { Labels } from "../uavs/Labels.ts";
 import { Lamps } from "../uavs/Lamps.ts";
@@ -18,7 +18,7 @@ import { Paths } from "../uavs/Paths.ts";
 import { Sensors } from "../uavs/Sensors.ts";
 import { Smoke } from "../uavs/Smoke.ts";
 import { Trails } from "../uavs/Trails.ts";
-import { standing } from "../world/standing.ts";
+import { currentWorld } from "../world/currentWorld.ts";
 import { World } from "../world/World.ts";
 import { Axes } from "./Axes.ts";
 import type { Part } from "./part.ts";
@@ -41,13 +41,13 @@ export function makeParts(
   const most = LEVELS.at(-1)!.particles;
   const fixedUrl = new URLSearchParams(location.search).get("world");
   const world = new World(air, renderer, fixedUrl);
-  const sun = new Sun(air, (x, y) => standing.ground.heightAt(x, y));
+  const sun = new Sun(air, (x, y) => currentWorld.ground.heightAt(x, y));
   const all: Parts["all"] = [
     ["view", new CameraMan(camera, renderer.domElement)],
     ["world", world],
     ["uavs", new Airframes()],
     ["sensors", new Sensors()],
-    ["things", new Things()],
+    ["actors", new Actors()],
     ["lamps", new Lamps(air)],
     ["smoke", new Smoke(air)],
     ["marks", new Marks()],
@@ -60,8 +60,8 @@ export function makeParts(
     ["markers", new Markers()],
     ["axes", new Axes()],
     ["sky", new Sky(air)],
-    ["rain", new Falling("rain", air, most)],
-    ["snow", new Falling("snow", air, most)],
+    ["rain", new Precipitation("rain", air, most)],
+    ["snow", new Precipitation("snow", air, most)],
     ["sun", sun],
     ["labels", new Labels()],
   ];

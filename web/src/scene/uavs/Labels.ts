@@ -17,7 +17,7 @@ import { useView } from "../../state/view.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { shown } from "../stage/shown.ts";
 import { fleet, type ShownUav } from "./fleet.ts";
-import { chooseLabels, type Box } from "./labelPlaces.ts";
+import { chooseLabels, type Box } from "./labelPositions.ts";
 
 /** Pixels of one name in the picture of all names. */
 const CELL = { width: 192, height: 32 };

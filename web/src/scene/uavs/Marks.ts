@@ -5,7 +5,7 @@ import { useView } from "../../state/view.ts";
 import { SegmentLines } from "../lines/SegmentLines.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { shown } from "../stage/shown.ts";
-import { standing } from "../world/standing.ts";
+import { currentWorld } from "../world/currentWorld.ts";
 import { shapeOf } from "./airframeGeometry.ts";
 import { CRASHED, SELECTED } from "./colours.ts";
 import { fleet, type ShownUav } from "./fleet.ts";
@@ -50,7 +50,7 @@ export class Marks implements Part {
     const [x, y, z] = [shown.poses[at]!, shown.poses[at + 1]!, shown.poses[at + 2]!];
     const { rotors, rotorRadius } = shapeOf(airframe);
     const radius = 1.25 * (rotorRadius + Math.hypot(rotors[0]![0]!, rotors[0]![1]!));
-    const ground = standing.ground.heightAt(x, y) + 0.02;
+    const ground = currentWorld.ground.heightAt(x, y) + 0.02;
     let [ax, ay] = [x + radius, y];
     for (let i = 1; i <= SIDES; i++) {
       const turn = (2 * Math.PI * i) / SIDES;

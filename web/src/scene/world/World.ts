@@ -19,7 +19,7 @@ import { worldMaterial, worldUniforms } from "./materials.ts";
 import { obstaclesOf } from "./obstaclesOf.ts";
 import type { Solid, WorldContent } from "./readWorld.ts";
 import { merged } from "./shapes.ts";
-import { stand } from "./standing.ts";
+import { setCurrentWorld } from "./currentWorld.ts";
 import { Obstacles } from "./obstacles.ts";
 
 /** Ground, trees and buildings, as the server has them; a grid where there is no world. */
@@ -96,7 +96,7 @@ export class World implements Part {
     const ground = content.solids.filter(({ material }) => isGround(material));
     this.grid.visible = content.solids.length === 0 && content.models.length === 0;
     const surfaces = ground.map(({ geometry, place }) => geometry.clone().applyMatrix4(place));
-    stand(new Ground(surfaces), obstaclesOf(content, isGround));
+    setCurrentWorld(new Ground(surfaces), obstaclesOf(content, isGround));
     const own = ground.findIndex(({ material }) => material === "ground");
     if (own >= 0) this.surround(cornersOf([surfaces[own]!]), ground[own]!.colour);
     planWorld(content);
@@ -120,7 +120,7 @@ export class World implements Part {
       }
     }
     this.grid.visible = true;
-    stand(new Ground([]), new Obstacles());
+    setCurrentWorld(new Ground([]), new Obstacles());
     planWorld(null);
     this.version++;
   }

@@ -1,11 +1,11 @@
-// Bodies of what moves, after `volery.world.things.shapes`: the origin of people and cars is on the
+// Bodies of actors, after `volery.world.things.shapes`: the origin of people and cars is on the
 // ground below their middle, that of a bird in its middle; x is forward. Metres.
 
 import { BufferGeometry, SphereGeometry } from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import { bar, box, cylinder, painted } from "../uavs/airframeGeometry.ts";
 import { Vector3 } from "three";
-import type { ThingKind } from "./kinds.ts";
+import type { ActorKind } from "./kinds.ts";
 
 const CLOTHES = "#2f4f8f";
 const TROUSERS = "#2a2d36";
@@ -14,11 +14,11 @@ const PAINT = "#1f4e8c";
 const GLASS = "#10141a";
 const TYRE = "#0b0b0c";
 
-export function bodyOfThing(kind: ThingKind): BufferGeometry {
+export function bodyOfActor(kind: ActorKind): BufferGeometry {
   return mergeGeometries(PIECES[kind]());
 }
 
-const PIECES: Record<ThingKind, () => BufferGeometry[]> = {
+const PIECES: Record<ActorKind, () => BufferGeometry[]> = {
   person: () => [
     limb(0.06, 0.1, 0.85, -0.06, 0.1, 0.05, 0.13, TROUSERS),
     limb(-0.02, -0.1, 0.85, 0.1, -0.1, 0.05, 0.13, TROUSERS),

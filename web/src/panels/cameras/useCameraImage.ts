@@ -7,7 +7,7 @@ import { useSimulation } from "../../state/simulation.ts";
 import type { CameraTopic } from "./cameraTopics.ts";
 import { decode } from "./decoding.ts";
 
-export interface PictureState {
+export interface CameraImageState {
   /** Width over height. */
   aspect: number;
   /** True rate, by the pictures' stamps. */
@@ -18,7 +18,7 @@ export interface PictureState {
   trouble: string;
 }
 
-const NOTHING: PictureState = { aspect: 4 / 3, hz: NaN, ageS: NaN, range: null, trouble: "" };
+const NOTHING: CameraImageState = { aspect: 4 / 3, hz: NaN, ageS: NaN, range: null, trouble: "" };
 
 /** Small tiles are content with fewer pictures. */
 const LARGE_MS = 50;
@@ -28,11 +28,11 @@ const TELL_MS = 500;
 type Picture = sensor_msgs_Image | sensor_msgs_CompressedImage;
 
 /** Receive a camera's pictures while the canvas is seen, and draw them there. */
-export function usePicture(
+export function useCameraImage(
   camera: CameraTopic,
   canvas: HTMLCanvasElement | null,
   large: boolean,
-): PictureState {
+): CameraImageState {
   const [state, setState] = useState(NOTHING);
   const { name, type } = camera;
   useEffect(() => {
@@ -49,7 +49,7 @@ function receive(
   type: string,
   canvas: HTMLCanvasElement,
   throttleMs: number,
-  setState: (update: (state: PictureState) => PictureState) => void,
+  setState: (update: (state: CameraImageState) => CameraImageState) => void,
 ): () => void {
   const meter = new RateMeter();
   let [busy, stampS, arrivedMs] = [false, NaN, NaN];

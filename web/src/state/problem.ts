@@ -1,4 +1,4 @@
-// Why what is shown is not live.
+// Problems of the connection: why the data on the screen is not live.
 
 import { useRef } from "react";
 import { nowMs } from "../lib/time.ts";
@@ -6,38 +6,38 @@ import type { LinkState } from "../link/protocol.ts";
 import { useConnection } from "./connection.ts";
 import { useSilence } from "./silence.ts";
 
-export interface Told {
+export interface Problem {
   what: string;
-  /** What the page does about it. */
+  /** The reaction of the page. */
   does: string;
-  /** Whether the link stands. */
+  /** Whether the page is connected. */
   linked: boolean;
 }
 
-export interface Trouble extends Told {
+export interface CurrentProblem extends Problem {
   sinceMs: number;
 }
 
-/** What is wrong now, and since when; null: nothing. */
-export function useTrouble(): Trouble | null {
+/** Returns the present problem and its start; null: none. */
+export function useProblem(): CurrentProblem | null {
   const { state, reason, url, volery } = useConnection();
   const silentMs = useSilence(({ sinceMs }) => sinceMs);
   const begun = useRef(0);
-  const told = troubleOf(state, reason, volery ? "the simulation" : url, silentMs > 0);
-  if (told === null) {
+  const problem = problemOf(state, reason, volery ? "the simulation" : url, silentMs > 0);
+  if (problem === null) {
     begun.current = 0;
     return null;
   }
   begun.current ||= silentMs || nowMs();
-  return { ...told, sinceMs: begun.current };
+  return { ...problem, sinceMs: begun.current };
 }
 
-export function troubleOf(
+export function problemOf(
   state: LinkState,
   reason: string,
   other: string,
   silent: boolean,
-): Told | null {
+): Problem | null {
   if (state !== "open") {
     const why = reason === "" ? "" : `: ${reason}`;
     const does = "The page shows the last data received and reconnects automatically.";

@@ -1,6 +1,6 @@
-// Orders to a UAV that need more than one call, wherever on the page they are given.
+// Goals of UAVs: flight commands that need more than one call.
 
-import { goTo, publishGoal, type Place } from "../link/commands/flight.ts";
+import { goTo, publishGoal, type Position } from "../link/commands/flight.ts";
 import { create } from "zustand";
 import { link } from "../link/link.ts";
 import { eulerOf } from "../lib/pose.ts";
@@ -8,12 +8,12 @@ import { useConnection } from "./connection.ts";
 import { useEpoch } from "./epoch.ts";
 import { attempt, succeeds } from "./notices.ts";
 import { useRestart } from "./restarts.ts";
-import { pickPlace } from "./tool.ts";
+import { pickPosition } from "./tool.ts";
 import { baseFrame } from "./vehicles.ts";
 import { heightAt } from "./worldPlan.ts";
 
 /** Places that UAVs were last sent to from this page. */
-export const useGoals = create<Record<string, Place>>(() => ({}));
+export const useGoals = create<Record<string, Position>>(() => ({}));
 
 /** Forget the goals of a flight that is over, and of a UAV that is put back to its start. */
 export function followGoals(): void {
@@ -28,7 +28,7 @@ export function followGoals(): void {
 const LEAST_HEIGHT_M = 1.5;
 
 /** Fly there, as the UAV looks now; a robot without the service gets a goal of its navigation. */
-export async function sendTo(uav: string, place: Place): Promise<void> {
+export async function sendTo(uav: string, place: Position): Promise<void> {
   useGoals.setState({ [uav]: place });
   if (useConnection.getState().volery) {
     await succeeds(`${uav}: go to`, goTo(uav, place, null));
@@ -49,6 +49,6 @@ export async function sendAbove(uav: string, ground: { x: number; y: number }): 
 /** Let the user click on where a UAV is to fly. */
 export async function goByClick(uav: string): Promise<void> {
   if (uav === "") return;
-  const place = await attempt("Go to", pickPlace(`Goal of ${uav}`));
+  const place = await attempt("Go to", pickPosition(`Goal of ${uav}`));
   if (place !== null) await sendAbove(uav, place);
 }

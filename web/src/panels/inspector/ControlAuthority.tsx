@@ -3,34 +3,34 @@ import { useState } from "react";
 import { handOver, releaseControl } from "../../link/commands.ts";
 import { useConnection } from "../../state/connection.ts";
 import { succeeds } from "../../state/notices.ts";
-import { callMe, take, usePilot, useStranger } from "../../state/pilots.ts";
+import { setOperatorName, take, useOperator, useOtherOperator } from "../../state/operator.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { useVehicles } from "../../state/vehicles.ts";
 import { Section } from "./Section.tsx";
 
-/** Who steers this UAV: take it, let it go, hand it to another pilot. */
-export function Pilots({ uav }: { uav: string }) {
+/** The operator of this UAV: take control, release it, hand it over. */
+export function ControlAuthority({ uav }: { uav: string }) {
   const holder = useVehicles(({ list }) => list.find(({ name }) => name === uav)?.holder ?? "");
-  const stranger = useStranger(uav);
+  const other = useOtherOperator(uav);
   const volery = useConnection((connection) => connection.volery);
   if (!volery) return null;
   return (
     <Section title="Control">
-      <Text size="sm" aria-label="Operator" c={stranger === "" ? "bright" : "orange"}>
+      <Text size="sm" aria-label="Operator" c={other === "" ? "bright" : "orange"}>
         {holder === ""
           ? "No operator: every authorized client may command this UAV."
-          : stranger === ""
+          : other === ""
             ? `You control this UAV as ${holder}.`
             : `${holder} controls this UAV: the server refuses your commands.`}
       </Text>
       {holder === "" && <Take uav={uav} />}
-      {holder !== "" && stranger === "" && <Held uav={uav} />}
+      {holder !== "" && other === "" && <Held uav={uav} />}
     </Section>
   );
 }
 
 function Take({ uav }: { uav: string }) {
-  const wished = usePilot((pilot) => pilot.wished);
+  const wished = useOperator((operator) => operator.wished);
   const whyNot = useWhyNot();
   return (
     <Group gap={6} wrap="nowrap">
@@ -41,7 +41,7 @@ function Take({ uav }: { uav: string }) {
         placeholder="Your name"
         maxLength={40}
         value={wished}
-        onChange={(event) => callMe(event.currentTarget.value)}
+        onChange={(event) => setOperatorName(event.currentTarget.value)}
       />
       <Button
         size="xs"
@@ -57,7 +57,7 @@ function Take({ uav }: { uav: string }) {
 
 function Held({ uav }: { uav: string }) {
   const others = useVehicles(({ list }) => list.map(({ holder }) => holder).join("\n"));
-  const own = usePilot(({ name }) => name);
+  const own = useOperator(({ name }) => name);
   const whyNot = useWhyNot();
   const [to, setTo] = useState("");
   const known = [...new Set(others.split("\n"))].filter((name) => name !== "" && name !== own);

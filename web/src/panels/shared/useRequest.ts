@@ -1,15 +1,15 @@
 import { useCallback, useEffect, useState } from "react";
 import { useConnection } from "../../state/connection.ts";
 
-export interface Asked<T> {
+export interface Requested<T> {
   value: T;
-  /** Why it could not be had; empty: it could. */
+  /** Why the request failed; empty: it succeeded. */
   reason: string;
   again: () => void;
 }
 
-/** What the server answers, asked anew with each connection, and every `everyMs` if that is not 0. */
-export function useAsked<T>(ask: () => Promise<T>, first: T, everyMs = 0): Asked<T> {
+/** Returns the response of a request, sent with each connection, and every `everyMs` if that is not 0. */
+export function useRequest<T>(ask: () => Promise<T>, first: T, everyMs = 0): Requested<T> {
   const [value, setValue] = useState(first);
   const [reason, setReason] = useState("");
   const open = useConnection(({ state }) => state === "open");

@@ -1,22 +1,22 @@
 import { describe, expect, it, vi } from "vitest";
 
 vi.mock("../link/link.ts", () => ({ link: {} }));
-const { troubleOf } = await import("./trouble.ts");
+const { problemOf } = await import("./problem.ts");
 const { entryOfEvent } = await import("./journal.ts");
 
-describe("trouble", () => {
+describe("problem", () => {
   it("is nothing while all is well", () => {
-    expect(troubleOf("open", "", "the simulation", false)).toBeNull();
+    expect(problemOf("open", "", "the simulation", false)).toBeNull();
   });
 
   it("tells a lost link, and why", () => {
-    const told = troubleOf("lost", "the world changes", "the simulation", false);
+    const told = problemOf("lost", "the world changes", "the simulation", false);
     expect(told?.what).toBe("No connection to the simulation: the world changes");
     expect(told?.linked).toBe(false);
   });
 
   it("tells silence of a link that stands", () => {
-    const told = troubleOf("open", "", "ws://robot:9090", true);
+    const told = problemOf("open", "", "ws://robot:9090", true);
     expect(told).toMatchObject({ what: "No data from ws://robot:9090", linked: true });
   });
 });
@@ -34,7 +34,7 @@ describe("an entry of the log", () => {
 
   it("says what was hit, how fast and where", () => {
     const entry = entryOfEvent(JSON.stringify(EVENT));
-    expect(entry).toMatchObject({ timeS: 2.5, sort: "trouble", who: "uav1" });
+    expect(entry).toMatchObject({ timeS: 2.5, sort: "problem", who: "uav1" });
     expect(entry?.text).toBe("hit tree 7 at 1.25 m/s at (1.0, 2.0, 3.0) m");
   });
 

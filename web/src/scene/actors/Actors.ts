@@ -5,19 +5,19 @@ import { useConnection } from "../../state/connection.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { putMatrix, rotationOf } from "../stage/poses.ts";
 import { shown } from "../stage/shown.ts";
-import { bodyOfThing } from "./bodies.ts";
-import { kindOf, KINDS, kindsVersion, type ThingKind } from "./kinds.ts";
+import { bodyOfActor } from "./bodies.ts";
+import { kindOf, KINDS, kindsVersion, type ActorKind } from "./kinds.ts";
 
 /** Wings beat: the whole bird is tilted a little to and fro. */
 const BEAT_RAD_S = 9;
 const rotation = new Float64Array(9);
 
-/** People, cars and birds: frames of the simulation's own that belong to no UAV. */
-export class Things implements Part {
+/** Actors (people, cars and birds): frames of the simulation's own that belong to no UAV. */
+export class Actors implements Part {
   readonly object = new Group();
   private version = "";
   private readonly material = new MeshStandardMaterial({ vertexColors: true, roughness: 0.7 });
-  private kinds: { mesh: InstancedMesh; rows: number[]; kind: ThingKind }[] = [];
+  private kinds: { mesh: InstancedMesh; rows: number[]; kind: ActorKind }[] = [];
 
   update({ nowMs }: Moment): void {
     const version = `${link.frames.version} ${kindsVersion} ${useConnection.getState().volery}`;
@@ -44,14 +44,14 @@ export class Things implements Part {
   private rebuild(): void {
     this.dispose();
     if (!useConnection.getState().volery) return; // a robot's frames are parts of itself
-    const rows = new Map<ThingKind, number[]>(KINDS.map((kind) => [kind, []]));
+    const rows = new Map<ActorKind, number[]>(KINDS.map((kind) => [kind, []]));
     link.frames.names.forEach((name, row) => {
       if (!name.includes("/") && name !== "map" && name !== "base_link")
         rows.get(kindOf(name))!.push(row);
     });
     for (const [kind, those] of rows) {
       if (those.length === 0) continue;
-      const mesh = new InstancedMesh(bodyOfThing(kind), this.material, those.length);
+      const mesh = new InstancedMesh(bodyOfActor(kind), this.material, those.length);
       mesh.instanceMatrix.setUsage(DynamicDrawUsage);
       mesh.castShadow = mesh.receiveShadow = true;
       mesh.frustumCulled = false;

@@ -2,17 +2,17 @@ import { Badge, Button, CloseButton, Group, NumberInput, Paper, Text } from "@ma
 import { Gamepad2, PlaneTakeoff } from "lucide-react";
 import { useEffect, useRef, useState } from "react";
 import { wishOfSticks, type Speeds, type Wish } from "../../lib/twist.ts";
-import { tell } from "../../link/commands.ts";
+import { sendCommand } from "../../link/commands.ts";
 import { addSource, releaseControls, setHaste, setSpeeds, useFlying } from "../../state/flying.ts";
 import { attempt } from "../../state/notices.ts";
-import { useStranger } from "../../state/pilots.ts";
+import { useOtherOperator } from "../../state/operator.ts";
 import { useVehicles } from "../../state/vehicles.ts";
 import { connected, wishOfGamepad } from "./gamepad.ts";
 import { listenToKeys } from "./keys.ts";
 import { Stick } from "./Stick.tsx";
 
-/** Flight by hand: what is pressed, how fast it flies, and sticks on a touch screen. */
-export function HandControls() {
+/** Manual control: pressed keys, speeds, and sticks on a touch screen. */
+export function ManualControl() {
   const uav = useFlying((flying) => flying.uav);
   return uav === "" ? null : <Controls uav={uav} />;
 }
@@ -42,7 +42,7 @@ function Controls({ uav }: { uav: string }) {
           </Group>
           <CloseButton size="sm" aria-label="Release the controls" onClick={releaseControls} />
         </Group>
-        <Hindrance uav={uav} />
+        <Obstruction uav={uav} />
         {!touch && <PressedKeys wish={wish} />}
         <SpeedFields />
       </Paper>
@@ -56,7 +56,7 @@ function Controls({ uav }: { uav: string }) {
   );
 }
 
-/** Keys, gamepad and the sticks on the screen ask for velocities while this is shown. */
+/** Keys, gamepad and on-screen sticks command velocities while this is shown. */
 function useSources() {
   const sticks = useRef({ left: [0, 0] as [number, number], right: [0, 0] as [number, number] });
   useEffect(() => {
@@ -75,15 +75,15 @@ function useSources() {
   return sticks;
 }
 
-/** Why nothing happens, where that is so. */
-function Hindrance({ uav }: { uav: string }) {
+/** Why the UAV does not respond, if it does not. */
+function Obstruction({ uav }: { uav: string }) {
   const vehicle = useVehicles(({ list }) => list.find(({ name }) => name === uav));
-  const stranger = useStranger(uav);
+  const other = useOtherOperator(uav);
   const [busy, setBusy] = useState(false);
-  if (stranger !== "") {
+  if (other !== "") {
     return (
       <Text size="sm" c="red" role="alert">
-        {stranger} controls {uav}: the server refuses your commands.
+        {other} controls {uav}: the server refuses your commands.
       </Text>
     );
   }
@@ -96,7 +96,7 @@ function Hindrance({ uav }: { uav: string }) {
   if (vehicle?.mode !== "LANDED") return null;
   const takeOff = async () => {
     setBusy(true);
-    await attempt(`${uav}: take off`, tell(uav, "take_off"));
+    await attempt(`${uav}: take off`, sendCommand(uav, "take_off"));
     setBusy(false);
   };
   return (

@@ -5,12 +5,12 @@ import { showPicture, useLayout, type Tile } from "../../state/layout.ts";
 import { useTopics } from "../../state/topics.ts";
 import { useVehicles } from "../../state/vehicles.ts";
 import { cameraTopics, colourFirst, type CameraTopic } from "./cameraTopics.ts";
-import { PictureTile } from "./PictureTile.tsx";
+import { CameraTile } from "./CameraTile.tsx";
 
 const FIRST_TILES = 2;
 
 /** Tiles with what cameras see, over the scene. */
-export default function Pictures() {
+export default function Cameras() {
   const cameras = cameraTopics(useTopics((topics) => topics.list));
   const chosen = useLayout((layout) => layout.pictures);
   const selected = useVehicles((vehicles) => vehicles.selected);
@@ -26,7 +26,7 @@ export default function Pictures() {
   return (
     <>
       {shown.map((camera, i) => (
-        <PictureTile key={camera.name} camera={camera} usual={usualPlace(i)} />
+        <CameraTile key={camera.name} camera={camera} usual={usualPlace(i)} />
       ))}
       <Chooser cameras={cameras} chosen={chosen} />
     </>

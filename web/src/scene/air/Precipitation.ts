@@ -48,7 +48,7 @@ void main() {
 `;
 
 /** Rain or snow around the camera. */
-export class Falling implements Part {
+export class Precipitation implements Part {
   readonly object: ParticleMesh;
   private readonly offset = new Vector3();
 

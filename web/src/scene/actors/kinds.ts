@@ -1,27 +1,27 @@
-// What moves besides UAVs, and what it is: from its tags (simulation_interfaces), else its name.
+// The kind of an actor: from its tags (simulation_interfaces), else its name.
 
 import { link } from "../../link/link.ts";
 
 export const KINDS = ["person", "car", "bird", "thing"] as const;
-export type ThingKind = (typeof KINDS)[number];
+export type ActorKind = (typeof KINDS)[number];
 
-const NAMES: readonly (readonly [ThingKind, RegExp])[] = [
+const NAMES: readonly (readonly [ActorKind, RegExp])[] = [
   ["person", /person|people|pedestrian|walker|hiker|\bman\b|woman|child/i],
   ["car", /car|vehicle|truck|van|bus|jeep/i],
   ["bird", /bird|gull|crow|pigeon|hawk|eagle/i],
 ];
 
-const told = new Map<string, ThingKind>();
+const received = new Map<string, ActorKind>();
 const asked = new Set<string>();
 
-export function kindOf(name: string): ThingKind {
-  const known = told.get(name);
+export function kindOf(name: string): ActorKind {
+  const known = received.get(name);
   if (known !== undefined) return known;
   ask(name);
   return NAMES.find(([, pattern]) => pattern.test(name))?.[0] ?? "thing";
 }
 
-/** Grows when a kind has been told. */
+/** Grows with each received kind. */
 export let kindsVersion = 0;
 
 function ask(name: string): void {
@@ -32,7 +32,7 @@ function ask(name: string): void {
     .then(({ info }) => {
       const kind = KINDS.find((kind) => info.tags.includes(kind));
       if (kind === undefined) return;
-      told.set(name, kind);
+      received.set(name, kind);
       kindsVersion++;
     })
     .catch(() => undefined); // other graphs have no such service: the name must do

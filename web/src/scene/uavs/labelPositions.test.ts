@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { chooseLabels, type Box } from "./labelPlaces.ts";
+import { chooseLabels, type Box } from "./labelPositions.ts";
 
 function box(id: number, left: number, rank: number): Box {
   return { id, left, top: 0, width: 40, height: 16, rank };

@@ -8,13 +8,13 @@ import {
   PlaneTakeoff,
 } from "lucide-react";
 import { useEffect, useState, type ReactNode } from "react";
-import { tell, type Order } from "../../link/commands.ts";
-import { attempt, tellSuccess } from "../../state/notices.ts";
+import { sendCommand, type FlightCommand } from "../../link/commands.ts";
+import { attempt, showSuccess } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 
 const KILL_ASKED_MS = 4000;
 
-const BUTTONS: { order: Order; label: string; hint: string; icon: ReactNode }[] = [
+const BUTTONS: { order: FlightCommand; label: string; hint: string; icon: ReactNode }[] = [
   {
     order: "take_off",
     label: "Take off",
@@ -47,15 +47,15 @@ const BUTTONS: { order: Order; label: string; hint: string; icon: ReactNode }[] 
   },
 ];
 
-/** What a UAV can be told by one press. */
-export function Orders({ uav }: { uav: string }) {
+/** Flight commands of one press each. */
+export function FlightCommands({ uav }: { uav: string }) {
   const whyNot = useWhyNot();
-  const [busy, setBusy] = useState<Order | null>(null);
-  const give = async (order: Order, label: string) => {
+  const [busy, setBusy] = useState<FlightCommand | null>(null);
+  const give = async (order: FlightCommand, label: string) => {
     setBusy(order);
-    const said = await attempt(`${uav}: ${label.toLowerCase()}`, tell(uav, order));
+    const said = await attempt(`${uav}: ${label.toLowerCase()}`, sendCommand(uav, order));
     setBusy(null);
-    if (order === "arm" && said) tellSuccess(said);
+    if (order === "arm" && said) showSuccess(said);
   };
   return (
     <SimpleGrid cols={2} spacing={6} role="group" aria-label="Commands">
@@ -85,7 +85,7 @@ interface KillProps {
   give: () => void;
 }
 
-/** Rotors off: pressed twice, for what flies falls. */
+/** Stops the rotors; needs two presses, because the UAV falls. */
 function Kill({ uav, disabled, give }: KillProps) {
   const [asked, setAsked] = useState(false);
   useEffect(() => {

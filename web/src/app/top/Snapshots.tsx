@@ -13,20 +13,20 @@ import { Bookmark, Trash2, Undo2 } from "lucide-react";
 import { useState } from "react";
 import { clockText } from "../../lib/time.ts";
 import {
-  forgetState,
-  keepState,
-  keptStates,
-  returnTo,
-  type KeptState,
+  deleteSnapshot,
+  saveSnapshot,
+  listSnapshots,
+  restoreSnapshot,
+  type Snapshot,
 } from "../../link/commands.ts";
-import { attempt, succeeds, tellSuccess } from "../../state/notices.ts";
+import { attempt, succeeds, showSuccess } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 
 /** States of the whole simulation to return to. */
-export function KeptStates() {
+export function Snapshots() {
   const [opened, setOpened] = useState(false);
-  const [states, setStates] = useState<KeptState[]>([]);
-  const refresh = async () => setStates((await attempt("Snapshots", keptStates())) ?? []);
+  const [states, setStates] = useState<Snapshot[]>([]);
+  const refresh = async () => setStates((await attempt("Snapshots", listSnapshots())) ?? []);
   const open = (next: boolean) => {
     setOpened(next);
     if (next) void refresh();
@@ -73,7 +73,7 @@ function NewState({ taken, onKept }: { taken: string[]; onKept: () => void }) {
   const whyNot = useWhyNot();
   const take = async () => {
     const wished = name.trim() || freeName(taken);
-    if (!(await succeeds("Snapshot", keepState(wished)))) return;
+    if (!(await succeeds("Snapshot", saveSnapshot(wished)))) return;
     setName("");
     onKept();
   };
@@ -105,13 +105,13 @@ function State({
   state: { name, timeS },
   onForgotten,
 }: {
-  state: KeptState;
+  state: Snapshot;
   onForgotten: () => void;
 }) {
   const whyNot = useWhyNot();
   const goBack = async () => {
-    if (await succeeds("Snapshot", returnTo(name)))
-      tellSuccess(`Restored the state at ${clockText(timeS)}`);
+    if (await succeeds("Snapshot", restoreSnapshot(name)))
+      showSuccess(`Restored the state at ${clockText(timeS)}`);
   };
   return (
     <Group component="li" gap="xs" wrap="nowrap" style={{ listStyle: "none" }}>
@@ -133,7 +133,7 @@ function State({
         color="gray"
         aria-label={`Delete ${name}`}
         disabled={whyNot !== null}
-        onClick={() => void succeeds("Snapshot", forgetState(name)).then(onForgotten)}
+        onClick={() => void succeeds("Snapshot", deleteSnapshot(name)).then(onForgotten)}
       >
         <Trash2 size={16} />
       </ActionIcon>

@@ -1,8 +1,8 @@
-// Who steers which UAV, where several pilots are there.
+// Control authority: which operator controls which UAV.
 
-import { order } from "./asking.ts";
+import { order } from "./requests.ts";
 
-/** Take a UAV; answers what this pilot is called from now on. Empty: as the server calls it. */
+/** Takes control of a UAV; returns the operator's name. An empty name: the server chooses one. */
 export async function takeControl(uav: string, pilot: string): Promise<string> {
   const type = "volery_interfaces/srv/TakeControl";
   const { message } = await order("/volery/take_control", type, { uav, pilot });

@@ -1,5 +1,5 @@
 /** What a browser keeps for the next visit; private windows and full stores keep nothing. */
-export function readKept<T extends object>(key: string, usual: T): T {
+export function readStored<T extends object>(key: string, usual: T): T {
   try {
     const kept: unknown = JSON.parse(localStorage.getItem(key) ?? "null");
     return kept !== null && typeof kept === "object" ? { ...usual, ...kept } : usual;

@@ -5,17 +5,17 @@ import { spanText } from "../../lib/time.ts";
 import { showPicture, useLayout, type Tile } from "../../state/layout.ts";
 import { FloatingTile } from "../FloatingTile.tsx";
 import type { CameraTopic } from "./cameraTopics.ts";
-import { usePicture } from "./usePicture.ts";
+import { useCameraImage } from "./useCameraImage.ts";
 
 const LARGE_PX = 360;
 /** Tiles side by side leave one another room in narrow scenes. */
 const MOST_SHARE = 0.25;
 
 /** What one camera sees, how old it is and how often it comes. */
-export function PictureTile({ camera, usual }: { camera: CameraTopic; usual: Tile }) {
+export function CameraTile({ camera, usual }: { camera: CameraTopic; usual: Tile }) {
   const [canvas, setCanvas] = useState<HTMLCanvasElement | null>(null);
   const width = useLayout((layout) => layout.tiles[camera.name]?.width ?? usual.width);
-  const { aspect, hz, ageS, range, trouble } = usePicture(camera, canvas, width >= LARGE_PX);
+  const { aspect, hz, ageS, range, trouble } = useCameraImage(camera, canvas, width >= LARGE_PX);
   return (
     <FloatingTile
       name={camera.name}

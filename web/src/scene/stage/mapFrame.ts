@@ -1,6 +1,6 @@
 import { rotate, type Pose } from "../../lib/pose.ts";
 
-/** A place given in a frame, in the map. */
+/** Returns a position in the map that is given in a frame. */
 export function toMap(
   [px, py, pz, qx, qy, qz, qw]: Readonly<Pose>,
   x: number,
