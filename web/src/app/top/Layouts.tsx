@@ -1,4 +1,4 @@
-import { ActionIcon, Button, Group, Popover, Stack, Text, TextInput, Tooltip } from "@mantine/core";
+import { ActionIcon, Button, Group, Text, TextInput } from "@mantine/core";
 import { LayoutPanelLeft, Trash2 } from "lucide-react";
 import { useState } from "react";
 import { resetLayout } from "../../state/layout.ts";
@@ -8,6 +8,7 @@ import {
   saveLayout,
   useSavedLayouts,
 } from "../../state/savedLayouts.ts";
+import { TopPopover } from "./TopPopover.tsx";
 
 const MAX_CHARACTERS = 40;
 
@@ -20,35 +21,25 @@ export function Layouts() {
     setOpened(false);
   };
   return (
-    <Popover opened={opened} onChange={setOpened} position="bottom-end" withArrow trapFocus>
-      <Popover.Target>
-        <Tooltip label="Layouts" disabled={opened}>
-          <ActionIcon
-            variant="subtle"
-            size="lg"
-            visibleFrom="sm"
-            aria-label="Layouts"
-            onClick={() => setOpened(!opened)}
-          >
-            <LayoutPanelLeft size={18} />
-          </ActionIcon>
-        </Tooltip>
-      </Popover.Target>
-      <Popover.Dropdown w={290}>
-        <Stack gap="xs">
-          <NewLayout />
-          {names
-            .split("\n")
-            .map((name) => name !== "" && <Saved key={name} {...{ name, restore }} />)}
-          <Button variant="subtle" size="compact-sm" onClick={resetLayout}>
-            Default layout
-          </Button>
-          <Text size="xs" c="dimmed">
-            This browser stores panels, sizes, tiles and plots.
-          </Text>
-        </Stack>
-      </Popover.Dropdown>
-    </Popover>
+    <TopPopover
+      label="Layouts"
+      icon={<LayoutPanelLeft size={18} />}
+      position="bottom-end"
+      width={290}
+      opened={opened}
+      onChange={setOpened}
+      variant="subtle"
+      visibleFrom="sm"
+    >
+      <NewLayout />
+      {names.split("\n").map((name) => name !== "" && <Saved key={name} {...{ name, restore }} />)}
+      <Button variant="subtle" size="compact-sm" onClick={resetLayout}>
+        Default layout
+      </Button>
+      <Text size="xs" c="dimmed">
+        This browser stores panels, sizes, tiles and plots.
+      </Text>
+    </TopPopover>
   );
 }
 

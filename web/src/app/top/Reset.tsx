@@ -1,20 +1,11 @@
-import {
-  ActionIcon,
-  Button,
-  Divider,
-  Group,
-  NumberInput,
-  Popover,
-  Stack,
-  Text,
-  Tooltip,
-} from "@mantine/core";
+import { Button, Divider, Group, NumberInput, Text } from "@mantine/core";
 import { RotateCcw } from "lucide-react";
 import { useState } from "react";
 import { loadScenario, reset } from "../../link/commands.ts";
 import { succeeds, showSuccess } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { useSimulation } from "../../state/simulation.ts";
+import { TopPopover } from "./TopPopover.tsx";
 
 /** Back to the start: the same flight once more, or one with another seed. */
 export function Reset() {
@@ -27,53 +18,41 @@ export function Reset() {
     if (await succeeds("Reset", what)) showSuccess(done);
   };
   return (
-    <Popover opened={opened} onChange={setOpened} position="bottom" withArrow trapFocus>
-      <Popover.Target>
-        <Tooltip label={whyNot ?? "Reset the simulation"} disabled={opened}>
-          <ActionIcon
-            variant="default"
-            size="lg"
-            aria-label="Reset"
-            disabled={whyNot !== null}
-            onClick={() => setOpened(!opened)}
-          >
-            <RotateCcw size={18} />
-          </ActionIcon>
-        </Tooltip>
-      </Popover.Target>
-      <Popover.Dropdown w={290}>
-        <Stack gap="xs">
-          <Button onClick={() => void run(reset(), "The simulation is reset")}>
-            Reset, same seed
-          </Button>
-          <Text size="xs" c="dimmed">
-            Repeats the same flight bit for bit and removes added UAVs.
-          </Text>
-          <Divider />
-          <Group align="end" gap="xs" wrap="nowrap">
-            <NumberInput
-              label="Seed"
-              min={0}
-              max={Number.MAX_SAFE_INTEGER}
-              allowDecimal={false}
-              value={seed}
-              onChange={(value) => setSeed(Number(value))}
-            />
-            <Button
-              variant="default"
-              disabled={!scenario}
-              onClick={() =>
-                void run(loadScenario(scenario!, { seed }), `Restarted with seed ${seed}`)
-              }
-            >
-              New seed
-            </Button>
-          </Group>
-          <Text size="xs" c="dimmed">
-            Loads the scenario as written, with different noise and a different procedural world.
-          </Text>
-        </Stack>
-      </Popover.Dropdown>
-    </Popover>
+    <TopPopover
+      label="Reset"
+      hint={whyNot ?? "Reset the simulation"}
+      icon={<RotateCcw size={18} />}
+      position="bottom"
+      width={290}
+      opened={opened}
+      onChange={setOpened}
+      disabled={whyNot !== null}
+    >
+      <Button onClick={() => void run(reset(), "The simulation is reset")}>Reset, same seed</Button>
+      <Text size="xs" c="dimmed">
+        Repeats the same flight bit for bit and removes added UAVs.
+      </Text>
+      <Divider />
+      <Group align="end" gap="xs" wrap="nowrap">
+        <NumberInput
+          label="Seed"
+          min={0}
+          max={Number.MAX_SAFE_INTEGER}
+          allowDecimal={false}
+          value={seed}
+          onChange={(value) => setSeed(Number(value))}
+        />
+        <Button
+          variant="default"
+          disabled={!scenario}
+          onClick={() => void run(loadScenario(scenario!, { seed }), `Restarted with seed ${seed}`)}
+        >
+          New seed
+        </Button>
+      </Group>
+      <Text size="xs" c="dimmed">
+        Loads the scenario as written, with different noise and a different procedural world.
+      </Text>
+    </TopPopover>
   );
 }

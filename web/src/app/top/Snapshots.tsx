@@ -1,14 +1,4 @@
-import {
-  ActionIcon,
-  Button,
-  Group,
-  Popover,
-  ScrollArea,
-  Stack,
-  Text,
-  TextInput,
-  Tooltip,
-} from "@mantine/core";
+import { ActionIcon, Button, Group, ScrollArea, Stack, Text, TextInput } from "@mantine/core";
 import { Bookmark, Trash2, Undo2 } from "lucide-react";
 import { useState } from "react";
 import { clockText } from "../../lib/time.ts";
@@ -21,6 +11,7 @@ import {
 } from "../../link/commands.ts";
 import { attempt, succeeds, showSuccess } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
+import { TopPopover } from "./TopPopover.tsx";
 
 /** States of the whole simulation to return to. */
 export function Snapshots() {
@@ -32,39 +23,29 @@ export function Snapshots() {
     if (next) void refresh();
   };
   return (
-    <Popover opened={opened} onChange={open} position="bottom-end" withArrow trapFocus>
-      <Popover.Target>
-        <Tooltip label="Snapshots" disabled={opened}>
-          <ActionIcon
-            variant="default"
-            size="lg"
-            aria-label="Snapshots"
-            onClick={() => open(!opened)}
-          >
-            <Bookmark size={18} />
-          </ActionIcon>
-        </Tooltip>
-      </Popover.Target>
-      <Popover.Dropdown w={310}>
-        <Stack gap="xs">
-          <NewState taken={states.map(({ name }) => name)} onKept={() => void refresh()} />
-          {states.length === 0 ? (
-            <Text size="sm" c="dimmed">
-              No snapshots. A snapshot holds the whole simulation: UAVs, weather, noise and node
-              states.
-            </Text>
-          ) : (
-            <ScrollArea.Autosize mah={280}>
-              <Stack gap={2} component="ul" p={0} m={0} aria-label="Snapshots">
-                {states.map((state) => (
-                  <State key={state.name} state={state} onForgotten={() => void refresh()} />
-                ))}
-              </Stack>
-            </ScrollArea.Autosize>
-          )}
-        </Stack>
-      </Popover.Dropdown>
-    </Popover>
+    <TopPopover
+      label="Snapshots"
+      icon={<Bookmark size={18} />}
+      position="bottom-end"
+      width={310}
+      opened={opened}
+      onChange={open}
+    >
+      <NewState taken={states.map(({ name }) => name)} onKept={() => void refresh()} />
+      {states.length === 0 ? (
+        <Text size="sm" c="dimmed">
+          No snapshots. A snapshot holds the whole simulation: UAVs, weather, noise and node states.
+        </Text>
+      ) : (
+        <ScrollArea.Autosize mah={280}>
+          <Stack gap={2} component="ul" p={0} m={0} aria-label="Snapshots">
+            {states.map((state) => (
+              <State key={state.name} state={state} onForgotten={() => void refresh()} />
+            ))}
+          </Stack>
+        </ScrollArea.Autosize>
+      )}
+    </TopPopover>
   );
 }
 
