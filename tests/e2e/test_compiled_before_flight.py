@@ -27,7 +27,7 @@ with Simulation(load_scenario(sys.argv[1])) as simulation:
     simulation.run(float(sys.argv[2]))
 print(json.dumps([before, watch.compiled[before:], told]))
 """
-_REASON = "a `warm_ups` of a node, or `runtime.warmup`, lacks what compiles these"
+_REASON = "a `warmup_tasks` of a node, or `runtime.warmup`, lacks what compiles these"
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from volery.autonomy.task_manager import TaskManager
+from volery.autonomy.team.task_manager import TaskManager
 from volery.engine.events import EventKind
 from volery.graph.node import Node
 from volery.runtime import Simulation

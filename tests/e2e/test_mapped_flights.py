@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from volery.autonomy.mapping.octomap_stream import decode_binary
-from volery.autonomy.planning.exploring_node import POLYGON
+from volery.autonomy.planning.exploration_node import POLYGON
 from volery.engine.events import EventKind
 from volery.graph.messages import header, message_type
 from volery.runtime.build.worlds import build_forest, build_terrain

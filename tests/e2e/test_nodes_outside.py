@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import pytest
 
 from volery import Simulation
-from volery.autonomy.gap_following import GapFollowing
+from volery.autonomy.avoidance.gap_following import GapFollowing
 from volery.bridges.doors import Doors
 from volery.bridges.nodes.host import NodeHost
 from volery.bridges.ros_tcp.client import RosTcpClient

@@ -168,7 +168,9 @@ def test_programs_of_volery_are_no_nodes(trap: Trap, node: str) -> None:
         Simulation(load_scenario(trap.file), threads=1)
 
 
-@pytest.mark.parametrize("node", ["json:JSONDecoder", "volery.autonomy.gaps:Gap", "os:system"])
+@pytest.mark.parametrize(
+    "node", ["json:JSONDecoder", "volery.autonomy.avoidance.gaps:Gap", "os:system"]
+)
 def test_only_nodes_are_started(trap: Trap, node: str) -> None:
     trap.file.write_text(TOML.format(node=node))
     with pytest.raises(ScenarioError, match=r"is no subclass|has no class"):
@@ -347,7 +349,7 @@ def test_what_is_remembered_is_of_one_file_and_its_modules(
         with pytest.raises(VoleryError, match="give --trust"):
             may_run_local_nodes(trap.file, [trap.node], access)
     assert not may_run_local_nodes(trap.file, ["not_there_at_all:X"], access)
-    assert not is_local("volery.autonomy.gaps", access)
+    assert not is_local("volery.autonomy.avoidance.gaps", access)
     assert not trap.has_run
 
 
@@ -363,7 +365,7 @@ def test_helper_processes_import_nothing_from_the_working_folder(
     (trap.folder / f"{module}.py").write_text(EVIL.format(mark=str(trap.mark)))
     environment = {**os.environ, "VOLERY_CACHE_DIR": str(tmp_path / "cache")}
     script = (
-        "from volery.autonomy.warm_up import scan_returns\n"
+        "from volery.autonomy.perception.warmup import scan_returns\n"
         "from volery.runtime.warmup.parallel_compilation import compile_all\n"
         "compile_all([scan_returns])\n"
     )

@@ -1,10 +1,11 @@
 """Avoidance by depth camera in fields of randomly placed obstacles, two ways side by side.
 
-`region`: the machine of four states on the mean depth of one region (`autonomy.avoidance_fsm`).
-`whole`: every pixel, remembered (`autonomy.depth_avoidance`). Both cross the same fields with the
-same camera, speed and course of 66 m: `trees` are dead trees (the scenario `obstacle_field` with
-other seeds), `blocks` are blocks of 1 m x 1 m x 5 m. A flight ends where the UAV has landed,
-touched something or used up two minutes; distances and times are medians over those that arrived.
+`region`: `autonomy.avoidance.region_avoidance`, a machine of four states on the mean depth of one
+region. `whole`: `autonomy.avoidance.depth_avoidance`, every pixel, remembered. Both cross the same
+fields with the same camera, speed and course of 66 m: `trees` are dead trees (the scenario
+`obstacle_field` with other seeds), `blocks` are blocks of 1 m x 1 m x 5 m. A flight ends where the
+UAV has landed, touched something or used up two minutes; distances and times are medians over those
+that arrived.
 """
 
 from __future__ import annotations

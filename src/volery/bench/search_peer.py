@@ -15,8 +15,8 @@ import threading
 import time
 from typing import Any
 
-from volery.autonomy.cooperative_search import CooperativeSearch
 from volery.autonomy.search.calls import JOIN
+from volery.autonomy.search.cooperative_search import CooperativeSearch
 from volery.bridges.nodes.host import NodeHost
 from volery.graph.client import Future
 from volery.graph.link import Link

@@ -75,7 +75,8 @@ def run_node(options: NodeOptions) -> None:
         context = host.context(absolute_names(profile.remap, namespace))
         node = start_node(entry, context, namespace, "volery node", access)
         try:
-            compile_all(node.warm_ups())  # before the graph, or a clock in lock step, waits for it
+            # before the graph, or a clock in lock step, waits for it
+            compile_all(node.warmup_tasks())
             link = join_late(late, host)
             if options.lock_step_s is not None:
                 host.join_lock_step(node.get_name(), options.lock_step_s)

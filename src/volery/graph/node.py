@@ -109,7 +109,7 @@ class Node(ParameterMethods):
     # ------------------------------------------------------------------------------ the contract
 
     @classmethod
-    def warm_ups(cls) -> Sequence[Callable[[], None]]:
+    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
         """Functions that let the numba code compile that the node calls, each some of it.
 
         A node with such code overrides it. The functions are a module's, not made on the spot, and

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.fixed_joints import FixedJoints
+from volery.autonomy.perception.static_transforms import FixedJoints
 from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.logs.flights import Origin
 from volery.bridges.logs.records import LogRecord, LogWalk

@@ -2,7 +2,7 @@
 
 The level scan shows what stands out at flight height: trunks, but also crowns of saplings, and the
 ground where it rises or the UAV leans. The nodding LIDAR tells them apart: see
-`autonomy.mapping.columns`.
+`autonomy.mapping.vertical_structures`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.fixed_joints import FixedJoints, Mount
-from volery.autonomy.mapping.columns import Columns
+from volery.autonomy.mapping.vertical_structures import Columns
+from volery.autonomy.perception.static_transforms import FixedJoints, Mount
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.graph.messages import stamp_of

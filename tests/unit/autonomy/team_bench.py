@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.autonomy.task_manager import TaskManager
+from volery.autonomy.team.task_manager import TaskManager
 from volery.core import rng
 from volery.core.errors import GraphError
 from volery.graph.graph import Graph

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volery.autonomy.cooperative_search import CooperativeSearch
 from volery.autonomy.search.calls import JOIN
-from volery.autonomy.search.places import Area, check_room, places_around, random_waypoint
-from volery.autonomy.search.team import Phase
+from volery.autonomy.search.cooperative_search import CooperativeSearch
+from volery.autonomy.search.search_positions import Area, check_room, places_around, random_waypoint
+from volery.autonomy.search.teammates import Phase
 from volery.core import rng
 from volery.core.errors import GraphError
 from volery.graph.graph import Graph

@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from volery.autonomy.depth_view import DepthProjector, depth_of, mean_depth, region_of
-from volery.autonomy.scan_points import Pose
+from volery.autonomy.perception.depth_projection import (
+    DepthProjector,
+    depth_of,
+    mean_depth,
+    region_of,
+)
+from volery.autonomy.perception.scan_points import Pose
 from volery.core import rotations
 from volery.core.errors import GraphError
 from volery.graph.messages import CameraInfo, Image, header

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volery.autonomy.gaps import SECTOR_ANGLES, choose_heading, free_distances
+from volery.autonomy.avoidance.gaps import SECTOR_ANGLES, choose_heading, free_distances
 
 
 def test_nothing_around_is_free_everywhere():

@@ -7,16 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from volery.autonomy.planning.choice import judge
+from volery.autonomy.perception.scan_rays import Rays
 from volery.autonomy.planning.clearance import clearance_of
 from volery.autonomy.planning.cost_to_go import Prices, cost_to_go
 from volery.autonomy.planning.distances import squared_distances
 from volery.autonomy.planning.local_grid import UNKNOWN, LocalGrid
-from volery.autonomy.planning.local_planning import Doing, LocalPlanning, Policy, Sight
+from volery.autonomy.planning.path_lookahead import WayAhead
+from volery.autonomy.planning.primitive_selection import judge
 from volery.autonomy.planning.primitives import Limits, Path, State, braking, changed, fan
+from volery.autonomy.planning.receding_horizon import Doing, LocalPlanning, Policy, Sight
 from volery.autonomy.planning.surface import Surface
-from volery.autonomy.planning.way_ahead import WayAhead
-from volery.autonomy.scan_rays import Rays
 
 LIMITS = Limits(3.0, 2.5, 1.5, 1.5, 1.4)
 CELL = 0.25

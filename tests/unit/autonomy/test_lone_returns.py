@@ -4,7 +4,7 @@ import copy
 
 import numpy as np
 
-from volery.autonomy.lone_returns import LoneReturns
+from volery.autonomy.perception.speckle_filter import LoneReturns
 from volery.graph.messages import LaserScan
 from volery.graph.zero import zero_message
 

@@ -9,11 +9,11 @@ from node_bench import NodeBench, nod, odometry, scan
 
 from volery.autonomy.mapping.mapping_node import Mapping
 from volery.autonomy.mapping.merging_node import MapMerging
+from volery.autonomy.mapping.messages import octomap_message
 from volery.autonomy.mapping.octomap_stream import decode_binary
-from volery.autonomy.mapping.reports import octomap_message
-from volery.autonomy.motion_history import MotionHistory, NodHistory
-from volery.autonomy.scan_points import Pose
-from volery.autonomy.scan_rays import Beams, RayMaker
+from volery.autonomy.perception.motion_history import MotionHistory, NodHistory
+from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_rays import Beams, RayMaker
 from volery.core import rotations
 from volery.core.errors import GraphError, NodeError
 from volery.graph.messages import (

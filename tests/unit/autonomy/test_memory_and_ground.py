@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from volery.autonomy.ground_plane import GroundPlane
-from volery.autonomy.obstacle_memory import ObstacleMemory
+from volery.autonomy.avoidance.obstacle_memory import ObstacleMemory
+from volery.autonomy.perception.ground_plane import GroundPlane
 
 S = 1_000_000_000
 

@@ -5,13 +5,13 @@ import math
 import pytest
 from node_bench import NodeBench
 
-from volery.autonomy.gap_following import GapFollowing
+from volery.autonomy.avoidance.gap_following import GapFollowing
 from volery.autonomy.mapping.mapping_node import Mapping
 from volery.autonomy.mapping.merging_node import MapMerging
-from volery.autonomy.planning.exploring_node import Exploring
-from volery.autonomy.planning.follower import TrajectoryFollower
+from volery.autonomy.planning.exploration_node import Exploring
 from volery.autonomy.planning.global_planner import GlobalPlanner
 from volery.autonomy.planning.local_planner import LocalPlanner
+from volery.autonomy.planning.trajectory_follower import TrajectoryFollower
 from volery.autonomy.slam.planar_node import PlanarSlam
 from volery.autonomy.slam.slam_node import Slam
 from volery.core.errors import GraphError, NodeError

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from volery.autonomy.mapping.level_grid import UNKNOWN, LevelGrid, Slab, occupancy
 from volery.autonomy.mapping.map_files import MapLimits, node_count, read_map, write_map
 from volery.autonomy.mapping.merging import PlacedMap, encode_cells, merged, morton_codes
 from volery.autonomy.mapping.octomap_stream import (
@@ -17,8 +16,9 @@ from volery.autonomy.mapping.octomap_stream import (
     decode_full,
 )
 from volery.autonomy.mapping.octree import Octree, new_tree
-from volery.autonomy.motion_history import Placement
-from volery.autonomy.scan_rays import Rays
+from volery.autonomy.mapping.projected_grid import UNKNOWN, LevelGrid, Slab, occupancy
+from volery.autonomy.perception.motion_history import Placement
+from volery.autonomy.perception.scan_rays import Rays
 from volery.core import rotations
 from volery.core.errors import DataFileError, PlanError
 

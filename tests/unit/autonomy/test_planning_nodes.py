@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from node_bench import NodeBench, nod, odometry, scan
 
-from volery.autonomy.map_frame import MapFrame
 from volery.autonomy.mapping.merging import PlacedMap, merged
+from volery.autonomy.mapping.messages import grid_values_message, octomap_message
 from volery.autonomy.mapping.octomap_stream import Voxels
-from volery.autonomy.mapping.reports import grid_values_message, octomap_message
-from volery.autonomy.planning.exploring_node import POLYGON, Exploring
-from volery.autonomy.planning.follower import TrajectoryFollower
+from volery.autonomy.perception.map_frame import MapFrame
+from volery.autonomy.planning.exploration_node import POLYGON, Exploring
 from volery.autonomy.planning.global_planner import GlobalPlanner
 from volery.autonomy.planning.local_planner import LocalPlanner
 from volery.autonomy.planning.neighbours import Neighbours
 from volery.autonomy.planning.primitives import Path, State
-from volery.autonomy.planning.trajectory_form import samples_of, trajectory_message
+from volery.autonomy.planning.trajectory_follower import TrajectoryFollower
+from volery.autonomy.planning.trajectory_messages import samples_of, trajectory_message
 from volery.graph.messages import (
     PathMessage,
     Point,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volery.autonomy.scan_points import Pose
+from volery.autonomy.perception.scan_points import Pose
 from volery.autonomy.search.colour_blob import ColourRange, colour_mask, largest_blob, pixels_of
 from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
 from volery.core import rotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from volery.autonomy.slam.sight import Sight
+from volery.autonomy.slam.kidnapping_detection import Sight
 
 RATE_HZ = 20
 PERIOD_NS = 1_000_000_000 // RATE_HZ

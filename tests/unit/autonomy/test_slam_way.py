@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from volery.autonomy.slam.keyframe_graph import Way
 from volery.autonomy.slam.keyframes import Keyframe
-from volery.autonomy.slam.loop_closing import Closure
+from volery.autonomy.slam.loop_closure import Closure
 from volery.autonomy.slam.pose_graph import Edge
-from volery.autonomy.slam.relocation import Guess, chosen
+from volery.autonomy.slam.relocalization import Guess, chosen
 from volery.autonomy.slam.settings import Matching
 from volery.autonomy.slam.tracker import Tracker
-from volery.autonomy.slam.way import Way
 
 S = 1_000_000_000
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])

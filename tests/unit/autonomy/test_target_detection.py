@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from team_bench import Clockwork, S
 
-from volery.autonomy.scan_points import Pose
+from volery.autonomy.perception.scan_points import Pose
 from volery.autonomy.search.ground_view import GroundView, Intrinsics
-from volery.autonomy.target_detection import TargetDetection
-from volery.autonomy.team.sightings import Doubt, Tracks, sighting_of
+from volery.autonomy.team.observations import Doubt, Tracks, sighting_of
+from volery.autonomy.team.target_detection import TargetDetection
 from volery.core import rotations
 from volery.graph.graph import Graph
 from volery.graph.messages import (

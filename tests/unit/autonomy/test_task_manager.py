@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from team_bench import AREA, TeamBench
 
-from volery.autonomy.map_frame import UNKNOWN_PLACE
-from volery.autonomy.search.places import Area
+from volery.autonomy.perception.map_frame import UNKNOWN_PLACE
+from volery.autonomy.search.search_positions import Area
 from volery.autonomy.team.assignment import Claim, Worker, assign, must_yield
 from volery.autonomy.team.mission_messages import goal_at
 from volery.autonomy.team.sectors import Coverage, Sectors, from_bits, to_bits

@@ -13,8 +13,11 @@ GAPS = "gap_following"
     ("words", "told"),
     [
         (["no_such_module:Node"], "cannot be imported"),
-        (["volery.autonomy.gap_following:Nobody"], "has no class 'Nobody'"),
-        (["volery.autonomy.gap_following:Phase"], "is no subclass of volery.graph.node.Node"),
+        (["volery.autonomy.avoidance.gap_following:Nobody"], "has no class 'Nobody'"),
+        (
+            ["volery.autonomy.avoidance.gap_following:Phase"],
+            "is no subclass of volery.graph.node.Node",
+        ),
         ([GAPS, "--lock-step", "0"], "lock-step"),
         ([GAPS, "--lock-step", "-1"], "lock-step"),
         ([GAPS, "--lock-step", "nan"], "lock-step"),

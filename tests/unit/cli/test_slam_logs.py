@@ -8,7 +8,7 @@ from PIL import Image
 from planar_bench import Carried, storey
 from typer.testing import CliRunner
 
-from volery.autonomy.fixed_joints import LEVEL
+from volery.autonomy.perception.static_transforms import LEVEL
 from volery.cli.app import app
 from volery.cli.slam import _advise
 from volery.runtime.replay.slam.offline_slam import Outcome, SlamRun

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from post_scans import HEIGHT_M, TRUNK, nods_message, scan_message, seen_from
 
-from volery.autonomy.mapping.columns import Columns
+from volery.autonomy.mapping.vertical_structures import Columns
 from volery.core import rotations
 from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
 from volery.report.ways import Way

@@ -58,7 +58,7 @@ def test_missing_files_name_the_places_looked_at(simulate, flat_data):
 @pytest.mark.parametrize(
     ("node", "parameters", "words"),
     [
-        ("volery.autonomy.gap_following:Gap", {}, "has no class"),
+        ("volery.autonomy.avoidance.gap_following:Gap", {}, "has no class"),
         ("volery.no_such:Gap", {}, "cannot be imported"),
         ("volery.core.clock:Schedule", {}, "no subclass"),
         ("gap_following", {"rout": []}, "no parameter rout"),

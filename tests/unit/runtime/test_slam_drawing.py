@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 from post_scans import CROWN, HEIGHT_M, TRUNK, scan_message, seen_from
 
-from volery.autonomy.fixed_joints import LEVEL
 from volery.autonomy.mapping.log_odds import OCCUPIED
+from volery.autonomy.perception.static_transforms import LEVEL
 from volery.core import rotations
 from volery.runtime.replay.slam.map_rendering import draw_map
 from volery.runtime.replay.slam.offline_slam import Outcome

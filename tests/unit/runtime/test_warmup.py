@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from volery.autonomy import warm_up as seeing
-from volery.autonomy.mapping import warm_up as mapping
+from volery.autonomy.mapping import warmup as mapping
+from volery.autonomy.perception import warmup as seeing
 from volery.core.errors import NodeError, ScenarioError
 from volery.graph.node import Node
 from volery.runtime.warmup import core_tasks, parallel_compilation, tasks
@@ -67,7 +67,7 @@ def compile_mine():
 
 class Mine(Node):
     @classmethod
-    def warm_ups(cls):
+    def warmup_tasks(cls):
         return (compile_mine,)
 """
 
@@ -95,12 +95,12 @@ def fail():
 
 class Fails(Node):
     @classmethod
-    def warm_ups(cls):
+    def warmup_tasks(cls):
         return (fail,)
 
 class Names(Node):
     @classmethod
-    def warm_ups(cls):
+    def warmup_tasks(cls):
         return (not_there,)
 """
 
@@ -114,7 +114,7 @@ def test_a_users_warm_up_that_fails_is_told_of(
     with pytest.raises(NodeError, match="broken_warm_ups:fail: ValueError: no array"):
         parallel_compilation.compile_all(needs_of(parse_scenario(flat_data))[2:])
     flat_data["nodes"] = [{"node": "broken_warm_ups:Names"}]
-    with pytest.raises(ScenarioError, match="Names': warm_ups: NameError"):
+    with pytest.raises(ScenarioError, match="Names': warmup_tasks: NameError"):
         needs_of(parse_scenario(flat_data))
 
 
@@ -127,7 +127,7 @@ def test_functions_are_found_by_their_names() -> None:
 SHARED = """
 import os, sys
 from numba.core import event
-from volery.autonomy import warm_up
+from volery.autonomy.perception import warmup
 from volery.runtime.warmup import tasks
 from volery.runtime.warmup import parallel_compilation
 from volery.core.compiled import cache_dir
@@ -141,7 +141,7 @@ counting = Counting()
 event.register("numba:compile", counting)
 if "alone" in sys.argv:
     sys.executable = "/bin/false"
-wanted = [warm_up.scan_returns, warm_up.scan_repeats]
+wanted = [warmup.scan_returns, warmup.scan_repeats]
 with parallel_compilation.compiled(wanted):
     pass
 first = counting.count
@@ -181,7 +181,9 @@ for module in pkgutil.walk_packages(volery.autonomy.__path__, "volery.autonomy."
 
 
 def test_all_kernels_that_nodes_call_are_compiled_by_a_warm_up() -> None:
-    assert told(UNCALLED) == "", "of a node that calls these, `warm_ups` names nothing that does"
+    assert told(UNCALLED) == "", (
+        "of a node that calls these, `warmup_tasks` names nothing that does"
+    )
 
 
 def test_a_node_without_a_library_says_so_when_it_starts(
@@ -193,7 +195,7 @@ def test_a_node_without_a_library_says_so_when_it_starts(
 
 
 def test_a_plain_node_needs_nothing() -> None:
-    assert Node.warm_ups() == ()
+    assert Node.warmup_tasks() == ()
     assert seeing.scan_points in all_needs()
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.coverage import reports
+from volery.autonomy.coverage import messages
 from volery.autonomy.coverage.cells import Cells, Mask
 from volery.autonomy.coverage.field import Field
 from volery.autonomy.coverage.flight import Flight, Phase
@@ -62,11 +62,11 @@ class CoveragePlanner(Node):
     """
 
     @classmethod
-    def warm_ups(cls) -> Sequence[Callable[[], None]]:
-        """What compiles its kernels."""
-        from volery.autonomy.coverage import warm_up
+    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
+        """Returns the tasks that compile its kernels."""
+        from volery.autonomy.coverage import warmup
 
-        return (warm_up.coverage_plans,)
+        return (warmup.coverage_plans,)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("coverage", **options)
@@ -206,8 +206,8 @@ class CoveragePlanner(Node):
             if flight.phase is Phase.DONE:
                 flight.phase = Phase.GROUND
             assert flight.waypoints is not None
-            self._paths[number].publish(reports.path_message(flight.waypoints, now))
-        self._areas.publish(reports.areas_message(self._field, owner, now))
+            self._paths[number].publish(messages.path_message(flight.waypoints, now))
+        self._areas.publish(messages.areas_message(self._field, owner, now))
         self._tell_status()
 
     def _refuse(self, reason: str) -> None:
@@ -255,7 +255,7 @@ class CoveragePlanner(Node):
                 self._tell_status()
             elif flight.following != flight.told or self._ticks % _REPEAT == 0:
                 flight.told = flight.following
-                self._goals[number].publish(reports.goal_message(goal, now))
+                self._goals[number].publish(messages.goal_message(goal, now))
 
     def _ask_to_take_off(self, number: int, flight: Flight) -> None:
         def on_answer(answer: Future) -> None:
@@ -291,11 +291,11 @@ class CoveragePlanner(Node):
         if count != self._told_covered:
             self._told_covered = count
             now = self.get_clock().now_ns()
-            self._covered_map.publish(reports.covered_message(self._field, self._covered, now))
+            self._covered_map.publish(messages.covered_message(self._field, self._covered, now))
             self._tell_status()
 
     def _tell_status(self) -> None:
         share = 0.0 if self._field is None else self._share
         self._status.publish(
-            reports.status_message(self._flights, self._plan, share, self._refused)
+            messages.status_message(self._flights, self._plan, share, self._refused)
         )

@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.ground_plane import GroundPlane
-from volery.autonomy.map_frame import MAP, UNKNOWN_PLACE, MapFrame
-from volery.autonomy.mapping import reports
-from volery.autonomy.mapping.level_grid import LevelGrid, Slab
+from volery.autonomy.mapping import messages
 from volery.autonomy.mapping.map_files import MapLimits, node_count, read_map, write_map
 from volery.autonomy.mapping.octree import Octree
-from volery.autonomy.mapping.scan_intake import ScanIntake
-from volery.autonomy.motion_history import MotionHistory, NodHistory
-from volery.autonomy.number_lists import declare_mount
-from volery.autonomy.odometry_topics import subscribe_odometry
-from volery.autonomy.scan_points import Pose
-from volery.autonomy.scan_rays import Beams, RayMaker, Rays
+from volery.autonomy.mapping.projected_grid import LevelGrid, Slab
+from volery.autonomy.mapping.scan_buffer import ScanIntake
+from volery.autonomy.perception.ground_plane import GroundPlane
+from volery.autonomy.perception.list_parameters import declare_mount
+from volery.autonomy.perception.map_frame import MAP, UNKNOWN_PLACE, MapFrame
+from volery.autonomy.perception.motion_history import MotionHistory, NodHistory
+from volery.autonomy.perception.odometry_topics import subscribe_odometry
+from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_rays import Beams, RayMaker, Rays
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, NodeError
@@ -74,14 +74,14 @@ class Mapping(Node):
     """
 
     @classmethod
-    def warm_ups(cls) -> Sequence[Callable[[], None]]:
-        """What compiles its kernels."""
-        from volery.autonomy import warm_up as seeing
-        from volery.autonomy.mapping import warm_up
+    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
+        """Returns the tasks that compile its kernels."""
+        from volery.autonomy.mapping import warmup
+        from volery.autonomy.perception import warmup as seeing
 
         return (
-            warm_up.growing_map,
-            warm_up.read_maps,
+            warmup.growing_map,
+            warmup.read_maps,
             seeing.scan_returns,
             seeing.scan_repeats,
             seeing.scan_rays,
@@ -122,7 +122,7 @@ class Mapping(Node):
     def _open(self) -> None:
         voxels_s = float(self.declare_parameter("voxels_period_s", 10.0, least=0.01).value)
         grid_s = float(self.declare_parameter("grid_period_s", 1.0, least=0.01).value)
-        self._voxels = self.create_publisher(reports.OCTOMAP, "octomap_binary", 1, latched=True)
+        self._voxels = self.create_publisher(messages.OCTOMAP, "octomap_binary", 1, latched=True)
         self._level = self.create_publisher(OccupancyGrid, "projected_map", 1, latched=True)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)
         subscribe_odometry(self, self._frame, self._on_odometry, depth=5)
@@ -204,12 +204,12 @@ class Mapping(Node):
 
     def _message(self) -> Any:
         data, now = self._octree.binary(), self.get_clock().now_ns()
-        return reports.octomap_message(data, self._resolution, MAP, now)
+        return messages.octomap_message(data, self._resolution, MAP, now)
 
     def _tell_grid(self) -> None:
         if self._level.wanted and self._grid.origin is not None:
             now = self.get_clock().now_ns()
-            self._level.publish(reports.grid_message(self._grid, self._slab_z, MAP, now))
+            self._level.publish(messages.grid_message(self._grid, self._slab_z, MAP, now))
 
     def _tell_status(self) -> None:
         problems = self._problems()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.mapping.octomap_stream import DEPTH, Voxels
-from volery.autonomy.motion_history import Placement
+from volery.autonomy.perception.motion_history import Placement
 from volery.core import rotations
 from volery.core.compiled import kernel
 from volery.core.errors import PlanError

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from volery.autonomy.map_frame import MAP
 from volery.autonomy.mapping.merging import PlacedMap, merged
-from volery.autonomy.mapping.reports import OCTOMAP, octomap_message, voxels_of
-from volery.autonomy.motion_history import Placement
+from volery.autonomy.mapping.messages import OCTOMAP, octomap_message, voxels_of
+from volery.autonomy.perception.map_frame import MAP
+from volery.autonomy.perception.motion_history import Placement
 from volery.autonomy.status import publish_status
 from volery.core.errors import DataFileError, PlanError
 from volery.core.kept import keep, put_back
@@ -37,11 +37,11 @@ class MapMerging(Node):
     """
 
     @classmethod
-    def warm_ups(cls) -> Sequence[Callable[[], None]]:
-        """What compiles its kernels."""
-        from volery.autonomy.mapping import warm_up
+    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
+        """Returns the tasks that compile its kernels."""
+        from volery.autonomy.mapping import warmup
 
-        return warm_up.read_maps, warm_up.merged_maps
+        return warmup.read_maps, warmup.merged_maps
 
     def __init__(self, **options: Any) -> None:
         super().__init__("map_merging", **options)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.mapping.octomap_stream import Voxels, binary_from_full, decode_full
 from volery.autonomy.mapping.octomap_trimming import trimmed
-from volery.autonomy.scan_rays import Rays
+from volery.autonomy.perception.scan_rays import Rays
 from volery.core.compiled import brief_kernel
 from volery.core.errors import NodeError
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.map_frame import MAP, MapFrame
-from volery.autonomy.mapping.reports import OCTOMAP, voxels_of
-from volery.autonomy.number_lists import declare_numbers
-from volery.autonomy.odometry_topics import subscribe_odometry
+from volery.autonomy.mapping.messages import OCTOMAP, voxels_of
+from volery.autonomy.perception.list_parameters import declare_numbers
+from volery.autonomy.perception.map_frame import MAP, MapFrame
+from volery.autonomy.perception.odometry_topics import subscribe_odometry
+from volery.autonomy.perception.scan_points import Pose as Motion
 from volery.autonomy.planning.global_path import Search, plan_way
 from volery.autonomy.planning.voxel_space import Solid, VoxelSpace
-from volery.autonomy.scan_points import Pose as Motion
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, NodeError, PlanError
@@ -63,12 +63,12 @@ class GlobalPlanner(Node):
     """
 
     @classmethod
-    def warm_ups(cls) -> Sequence[Callable[[], None]]:
-        """What compiles its kernels."""
-        from volery.autonomy.mapping import warm_up as mapping
-        from volery.autonomy.planning import warm_up
+    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
+        """Returns the tasks that compile its kernels."""
+        from volery.autonomy.mapping import warmup as mapping
+        from volery.autonomy.planning import warmup
 
-        return warm_up.ways, mapping.read_maps
+        return warmup.ways, mapping.read_maps
 
     def __init__(self, **options: Any) -> None:
         super().__init__("global_planner", **options)

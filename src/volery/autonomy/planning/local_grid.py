@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.scan_rays import Rays
+from volery.autonomy.perception.scan_rays import Rays
 from volery.core.compiled import kernel
 from volery.core.kept import keep, put_back
 

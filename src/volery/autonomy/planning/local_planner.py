@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.map_frame import MAP, UNKNOWN_PLACE, MapFrame
-from volery.autonomy.number_lists import declare_mount
-from volery.autonomy.odometry_topics import subscribe_odometry
-from volery.autonomy.planning.local_planning import Doing, LocalPlanning, Policy, Sight
+from volery.autonomy.perception.list_parameters import declare_mount
+from volery.autonomy.perception.map_frame import MAP, UNKNOWN_PLACE, MapFrame
+from volery.autonomy.perception.odometry_topics import subscribe_odometry
+from volery.autonomy.perception.scan_points import Pose
 from volery.autonomy.planning.neighbours import Neighbours
+from volery.autonomy.planning.path_lookahead import WayAhead
 from volery.autonomy.planning.primitives import Limits, Path, State
+from volery.autonomy.planning.receding_horizon import Doing, LocalPlanning, Policy, Sight
 from volery.autonomy.planning.reciprocal_avoidance import Separation, half_planes
-from volery.autonomy.planning.sight import Surroundings
-from volery.autonomy.planning.trajectory_form import trajectory_message
-from volery.autonomy.planning.way_ahead import WayAhead
-from volery.autonomy.scan_points import Pose
+from volery.autonomy.planning.surroundings import Surroundings
+from volery.autonomy.planning.trajectory_messages import trajectory_message
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.kept import keep, put_back
 from volery.graph.messages import (
@@ -72,12 +72,12 @@ class LocalPlanner(Node):
     """
 
     @classmethod
-    def warm_ups(cls) -> Sequence[Callable[[], None]]:
-        """What compiles its kernels."""
-        from volery.autonomy import warm_up as seeing
-        from volery.autonomy.planning import warm_up
+    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
+        """Returns the tasks that compile its kernels."""
+        from volery.autonomy.perception import warmup as seeing
+        from volery.autonomy.planning import warmup
 
-        return warm_up.plans, seeing.scan_repeats, seeing.scan_rays, seeing.ground
+        return warmup.plans, seeing.scan_repeats, seeing.scan_rays, seeing.ground
 
     def __init__(self, **options: Any) -> None:
         super().__init__("local_planner", **options)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.autonomy.map_frame import MapFrame
+from volery.autonomy.perception.map_frame import MapFrame
 from volery.autonomy.planning.reciprocal_avoidance import Neighbour
 from volery.core.clock import NS_PER_S
 from volery.graph.messages import stamp_of

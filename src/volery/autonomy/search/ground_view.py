@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.scan_points import Pose
+from volery.autonomy.perception.scan_points import Pose
 from volery.core import rotations
 from volery.core.errors import GraphError
 from volery.core.vectors import norm

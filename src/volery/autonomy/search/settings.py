@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from volery.autonomy.search.colour_blob import ColourRange
-from volery.autonomy.search.places import Area
+from volery.autonomy.search.search_positions import Area
 from volery.core.errors import GraphError
 from volery.graph.node import Node
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.scan_points import Pose
+from volery.autonomy.perception.scan_points import Pose
 from volery.core.vectors import norm
 from volery.graph.messages import Twist, Vector3
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.scan_points import Pose
+from volery.autonomy.perception.scan_points import Pose
 from volery.autonomy.search.settings import Settings
 from volery.autonomy.search.steering import is_at, towards
-from volery.autonomy.search.team import ALOFT, GOING_HOME, RISING, UNDER_WAY, Phase, Teammate
+from volery.autonomy.search.teammates import ALOFT, GOING_HOME, RISING, UNDER_WAY, Phase, Teammate
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
 from volery.core.kept import keep, put_back

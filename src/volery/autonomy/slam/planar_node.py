@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.fixed_joints import LEVEL, FixedJoints, Mount
-from volery.autonomy.number_lists import declare_numbers
-from volery.autonomy.scan_rays import is_usable
-from volery.autonomy.slam import reports
-from volery.autonomy.slam.planar.follower import Follower
+from volery.autonomy.perception.list_parameters import declare_numbers
+from volery.autonomy.perception.scan_rays import is_usable
+from volery.autonomy.perception.static_transforms import LEVEL, FixedJoints, Mount
+from volery.autonomy.slam import messages
 from volery.autonomy.slam.planar.health import Watched, judged
+from volery.autonomy.slam.planar.keyframe_graph import PlanarWay
 from volery.autonomy.slam.planar.odometry import WheelOdometry, step_between
 from volery.autonomy.slam.planar.scans import returns
 from volery.autonomy.slam.planar.settings import PlanarSettings, Returns
-from volery.autonomy.slam.planar.way import PlanarWay
+from volery.autonomy.slam.planar.tracker import Follower
 from volery.autonomy.status import publish_status
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
@@ -70,11 +70,11 @@ class PlanarSlam(Node):
     )
 
     @classmethod
-    def warm_ups(cls) -> Sequence[Callable[[], None]]:
-        """What compiles its kernels."""
-        from volery.autonomy.slam.planar import warm_up
+    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
+        """Returns the tasks that compile its kernels."""
+        from volery.autonomy.slam.planar import warmup
 
-        return warm_up.walls, warm_up.told_places
+        return warmup.walls, warmup.told_places
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)
@@ -114,7 +114,7 @@ class PlanarSlam(Node):
 
     def _open(self) -> None:
         self._odom = self.create_publisher(Odometry, "slam/odom", 5)
-        self._pose = self.create_publisher(reports.POSE, "slam/pose", 5)
+        self._pose = self.create_publisher(messages.POSE, "slam/pose", 5)
         self._path = self.create_publisher(PathMessage, "slam/path", 1, latched=True)
         self._status = self.create_publisher(String, "slam/status", 1, latched=True)
         self._tf = self.create_publisher(TFMessage, "/tf", 10)
@@ -213,18 +213,18 @@ class PlanarSlam(Node):
         covariance = np.zeros((9, 9))
         rows = [0, 1, 8, 3, 4]
         covariance[np.ix_(rows, rows)] = motion.covariance[:5, :5]
-        self._odom.publish(reports.odometry(time_ns, self._uav, state, covariance))
+        self._odom.publish(messages.odometry(time_ns, self._uav, state, covariance))
         x, y, yaw = self._way.pose(pose)
         z = float(self._start[2])
         spread = self._way.covariance + motion.covariance[:3, :3]
         known = np.sqrt(np.maximum(np.diag(spread), 0.0))
         sigmas = np.array([known[0], known[1], 0.0, 0.0, 0.0, known[2]])
         turn = rotations.from_rpy(0.0, 0.0, float(yaw))
-        self._pose.publish(reports.pose_in_map(time_ns, np.array([x, y, z]), turn, sigmas))
+        self._pose.publish(messages.pose_in_map(time_ns, np.array([x, y, z]), turn, sigmas))
         at = self._way.correction
         turn = rotations.from_rpy(0.0, 0.0, float(at[2]))
         place = np.array([at[0], at[1], z])
-        self._tf.publish(reports.map_from_odom(time_ns, self._uav, place, turn))
+        self._tf.publish(messages.map_from_odom(time_ns, self._uav, place, turn))
 
     def _tell_status(self) -> None:
         follower, way = self._follower, self._way
@@ -261,7 +261,7 @@ class PlanarSlam(Node):
         z = float(self._start[2])
         poses = [np.array([x, y, z, yaw]) for x, y, yaw in way.poses]
         times = [frame.time_ns for frame in way.frames]
-        self._path.publish(reports.path(self._taken_ns or times[-1], times, poses))
+        self._path.publish(messages.path(self._taken_ns or times[-1], times, poses))
 
     def _odometry_heard_ns(self) -> int | None:
         """When the odometry was last told, by the node's clock as far as stamps follow it."""

@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.motion_history import NodHistory
-from volery.autonomy.number_lists import declare_mount, declare_numbers
-from volery.autonomy.scan_rays import has_return, is_usable, scan_times
-from volery.autonomy.slam import reports
+from volery.autonomy.perception.list_parameters import declare_mount, declare_numbers
+from volery.autonomy.perception.motion_history import NodHistory
+from volery.autonomy.perception.scan_rays import has_return, is_usable, scan_times
+from volery.autonomy.slam import messages
 from volery.autonomy.slam.health import Health
 from volery.autonomy.slam.inertial_kernels import BG, G, V
+from volery.autonomy.slam.keyframe_graph import Way
 from volery.autonomy.slam.keyframes import levelling
 from volery.autonomy.slam.level_odometry import LevelOdometry
 from volery.autonomy.slam.settings import ImuNoise, Matching
 from volery.autonomy.slam.sweep import Sweep
 from volery.autonomy.slam.tracker import Tracker
-from volery.autonomy.slam.way import Way
 from volery.autonomy.status import publish_status
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
@@ -75,16 +75,16 @@ class Slam(Node):
     _PLAIN = ("_nod", "_omega", "_told", "_taken_ns", "_odom_ns", "_refused", "_resets", "_shown")
 
     @classmethod
-    def warm_ups(cls) -> Sequence[Callable[[], None]]:
-        """What compiles its kernels."""
-        from volery.autonomy import warm_up as seeing
-        from volery.autonomy.slam import warm_up
+    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
+        """Returns the tasks that compile its kernels."""
+        from volery.autonomy.perception import warmup as seeing
+        from volery.autonomy.slam import warmup
 
         return (
-            warm_up.motion,
-            warm_up.known_places,
-            warm_up.lost_motion,
-            warm_up.sight,
+            warmup.motion,
+            warmup.known_places,
+            warmup.lost_motion,
+            warmup.sight,
             seeing.scan_returns,
         )
 
@@ -130,7 +130,7 @@ class Slam(Node):
 
     def _open(self, pose_period_s: float) -> None:
         self._odom = self.create_publisher(Odometry, "slam/odom", 5)
-        self._pose = self.create_publisher(reports.POSE, "slam/pose", 5)
+        self._pose = self.create_publisher(messages.POSE, "slam/pose", 5)
         self._path = self.create_publisher(PathMessage, "slam/path", 1, latched=True)
         self._status = self.create_publisher(String, "slam/status", 1, latched=True)
         self._tf = self.create_publisher(TFMessage, "/tf", 10)
@@ -227,7 +227,7 @@ class Slam(Node):
         position, attitude = self._level.follow(t.state)
         velocity = rotations.rotate(levelling(t.state[G : G + 3]), t.state[V : V + 3])
         parts = (position, attitude, velocity, self._omega)
-        self._odom.publish(reports.odometry(time_ns, self._uav, parts, t.covariance[:9, :9]))
+        self._odom.publish(messages.odometry(time_ns, self._uav, parts, t.covariance[:9, :9]))
 
     def _tell_pose(self) -> None:
         t = self._tracker
@@ -238,11 +238,11 @@ class Slam(Node):
         own = np.sqrt(np.diag(t.covariance)[[0, 1, 2, 8]])
         x, y, z, yaw = np.hypot(four, own)
         sigmas = np.array([x, y, z, tilt[0], tilt[1], yaw])
-        self._pose.publish(reports.pose_in_map(t.time_ns, position, attitude, sigmas))
+        self._pose.publish(messages.pose_in_map(t.time_ns, position, attitude, sigmas))
         here, own = self._level.follow(t.state)
         turn = rotations.multiply(attitude, rotations.conjugate(own))
         place = position - rotations.rotate(turn, here)
-        self._tf.publish(reports.map_from_odom(t.time_ns, self._uav, place, turn))
+        self._tf.publish(messages.map_from_odom(t.time_ns, self._uav, place, turn))
 
     def _tell_status(self) -> None:
         t, way, now = self._tracker, self._way, self.get_clock().now_ns()
@@ -265,7 +265,7 @@ class Slam(Node):
         if shown != self._shown and way.frames:
             self._shown = shown
             times = [frame.time_ns for frame in way.frames]
-            self._path.publish(reports.path(t.time_ns, times, way.poses))
+            self._path.publish(messages.path(t.time_ns, times, way.poses))
 
     def _lose(
         self, speed_sigma: float, turn_sigma: float, wrong_since_ns: int | None = None

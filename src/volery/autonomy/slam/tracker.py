@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import STATE_NUMBERS, STATES, P, Q, V, move, remember
+from volery.autonomy.slam.kidnapping_detection import Sight
 from volery.autonomy.slam.local_maps import Maps
 from volery.autonomy.slam.match import Match, judged
 from volery.autonomy.slam.matching_kernels import (
@@ -27,8 +28,7 @@ from volery.autonomy.slam.matching_kernels import (
 )
 from volery.autonomy.slam.recovery import GAP_S, Recovery
 from volery.autonomy.slam.settings import ImuNoise, Matching
-from volery.autonomy.slam.sight import Sight
-from volery.autonomy.slam.standing import Rest, first_covariance, first_state, hold_still
+from volery.autonomy.slam.stationarity import Rest, first_covariance, first_state, hold_still
 from volery.autonomy.slam.sweep import Seen, Sweep
 from volery.core import rotations
 from volery.core.clock import NS_PER_S

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.map_frame import UNKNOWN_PLACE, MapFrame
-from volery.autonomy.scan_points import Pose
-from volery.autonomy.stuck_sensors import is_stuck
+from volery.autonomy.perception.map_frame import UNKNOWN_PLACE, MapFrame
+from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.stuck_sensors import is_stuck
 from volery.autonomy.team.assignment import Worker
-from volery.autonomy.team.reports import TYPE as REPORT_TYPE
-from volery.autonomy.team.reports import Phase, Team
 from volery.autonomy.team.sectors import Coverage, from_bits, to_bits
 from volery.autonomy.team.settings import Settings
 from volery.autonomy.team.target_list import Find, TargetList
+from volery.autonomy.team.team_state import TYPE as REPORT_TYPE
+from volery.autonomy.team.team_state import Phase, Team
 from volery.core.clock import NS_PER_S
 from volery.core.kept import keep, put_back
 from volery.graph.messages import (

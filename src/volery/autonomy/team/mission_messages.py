@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.search.places import Area
+from volery.autonomy.search.search_positions import Area
 from volery.graph.messages import (
     Point,
     Point32,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.search.places import Area
+from volery.autonomy.search.search_positions import Area
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

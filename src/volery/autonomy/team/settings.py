@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from volery.autonomy.search.places import Area
+from volery.autonomy.search.search_positions import Area
 from volery.autonomy.team.sectors import Sectors
 from volery.core.errors import GraphError
 from volery.graph.node import Node

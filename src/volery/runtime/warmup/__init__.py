@@ -8,6 +8,6 @@ nothing is left to do.
 
 compiles all that ships ahead of time, as before parallel test workers.
 
-Each room knows its own kernels: a node's are named by `Node.warm_ups`, those of the simulation
+Each room knows its own kernels: a node's are named by `Node.warmup_tasks`, those of the simulation
 itself by `parts`; `needs` tells which of them a scenario needs.
 """

@@ -38,11 +38,11 @@ def needs_of(scenario: Scenario, *, nodes: bool = True) -> list[Task]:
 
 def all_needs() -> list[Task]:
     """What compiles everything that ships."""
-    from volery.autonomy.mapping.warm_up import drawn_scans
+    from volery.autonomy.mapping.warmup import drawn_scans
 
     found: list[Task] = [*core_tasks.ALWAYS, *core_tasks.SOMETIMES, drawn_scans]
     for node in shipped_nodes():
-        found += node.warm_ups()
+        found += node.warmup_tasks()
     return list(dict.fromkeys(found))
 
 
@@ -85,7 +85,7 @@ def _of_node(entry: NodeEntry, scenario: Scenario) -> Iterator[Task]:
     except ScenarioError:
         return  # who starts the node tells of it
     try:
-        yield from node.warm_ups()
+        yield from node.warmup_tasks()
     except Exception as error:
         where = f"{scenario.name}: node '{entry.node}'"
-        raise ScenarioError(f"{where}: warm_ups: {type(error).__name__}: {error}") from error
+        raise ScenarioError(f"{where}: warmup_tasks: {type(error).__name__}: {error}") from error

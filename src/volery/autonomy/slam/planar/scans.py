@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.fixed_joints import Mount
+from volery.autonomy.perception.static_transforms import Mount
 from volery.autonomy.slam.planar.settings import Returns
 from volery.core import rotations
 from volery.core.compiled import kernel

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from volery.autonomy.fixed_joints import FixedJoints, Mount
+from volery.autonomy.perception.static_transforms import FixedJoints, Mount
 from volery.bridges.logs.flights import ORIGIN_TOPIC, Origin
 from volery.core import rotations
 from volery.core.errors import RecordingError, ScenarioError

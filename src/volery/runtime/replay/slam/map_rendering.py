@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.fixed_joints import Mount
-from volery.autonomy.mapping.columns import Columns
 from volery.autonomy.mapping.log_odds import LogOddsGrid
+from volery.autonomy.mapping.vertical_structures import Columns
+from volery.autonomy.perception.static_transforms import Mount
 from volery.core import rotations
 from volery.core.errors import RecordingError
 from volery.graph.messages import LaserScan, stamp_of

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.fixed_joints import FixedJoints, Mount
+from volery.autonomy.perception.static_transforms import FixedJoints, Mount
 from volery.core.clock import NS_PER_S
 from volery.core.errors import RecordingError
 from volery.graph.messages import LaserScan, stamp_of
@@ -160,14 +160,14 @@ class SlamRun:
         if not self.channels.has_imu:
             from volery.autonomy.slam.planar_node import PlanarSlam
 
-            compile_all(PlanarSlam.warm_ups())
+            compile_all(PlanarSlam.warmup_tasks())
             if level is not None:
                 parameters["mount"] = [*level, 0.0, 0.0, 0.0]
             PlanarSlam(**options, parameter_overrides=parameters)
             return
         from volery.autonomy.slam.slam_node import Slam
 
-        compile_all(Slam.warm_ups())
+        compile_all(Slam.warmup_tasks())
         self._find_mounts()
         for name, frame in self._frames.items():
             parameters[f"{name}_mount"] = [float(v) for v in self._mount(frame).position]

@@ -1,0 +1,1 @@
+"""Nodes that avoid obstacles without a map: by gaps, by regions, by depth images."""

@@ -1,0 +1,127 @@
+"""Fly a route through a forest by what two LIDARs, a sonar and odometry tell; see `gap_flight`."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.avoidance.gap_flight import GapFlight
+from volery.autonomy.perception.list_parameters import declare_points
+from volery.autonomy.perception.scan_points import Pose
+from volery.graph.messages import String
+
+Array = NDArray[np.float64]
+
+_PERIOD_S = 0.05
+_LEAST_CLIMB_M = 1.0
+
+
+class Phase(StrEnum):
+    """Where in its mission the node is."""
+
+    START = "start"
+    CLIMB = "climb"
+    FLY = "fly"
+    SETTLE = "settle"
+    LAND = "land"
+
+
+class GapFollowing(GapFlight):
+    """Takes off, visits `route`, lands.
+
+    Parameters
+    ----------
+    route: list of [x, y] waypoints, m, relative to where the UAV took off.
+
+    The others are those of `GapFlight`.
+
+    """
+
+    STATE = ("_phase", "_home", "_next_waypoint", "_settle_at", *GapFlight.STATE)
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("gap_following", **options)
+        route = declare_points(self, "route", [[50.0, 0.0]])
+        self._route = [np.array(point, dtype=np.float64) for point in route]
+        self._phase = Phase.START
+        self._home = np.zeros(3)
+        self._next_waypoint = 0
+        self._settle_at: Array | None = None
+        self._status = self.create_publisher(String, "~/phase", 1)
+        self._take_off = self.create_client("std_srvs/srv/Trigger", "take_off")
+        self._land = self.create_client("std_srvs/srv/Trigger", "land")
+        self.create_timer(_PERIOD_S, self._on_timer)
+
+    def _on_timer(self) -> None:
+        if self._pose is None:
+            return
+        step = {
+            Phase.START: self._start,
+            Phase.CLIMB: self._climb,
+            Phase.FLY: self._fly,
+            Phase.SETTLE: self._settle,
+            Phase.LAND: self._wait,
+        }[self._phase]
+        step(self._pose)
+        if self._status.wanted:
+            self._status.publish(String(str(self._phase)))
+
+    def _start(self, pose: Pose) -> None:
+        if self._take_off.service_is_ready() and self._take_off.call().success:
+            self._home = pose.position.copy()
+            self._ground.height = float(pose.position[2])
+            self._ground.anchor = pose.position[:2].copy()
+            self._phase = Phase.CLIMB
+
+    def _climb(self, pose: Pose) -> None:
+        self._refit_ground(pose)
+        climbed = float(pose.position[2] - self._home[2])
+        has_stopped = climbed > _LEAST_CLIMB_M and abs(pose.velocity[2]) < 0.1
+        if has_stopped or climbed > self._height - 0.5:
+            self._phase = Phase.FLY
+
+    def _fly(self, pose: Pose) -> None:
+        self._refit_ground(pose)
+        to_goal = self._home[:2] + self._route[self._next_waypoint] - pose.position[:2]
+        distance, now = float(np.hypot(*to_goal)), self.get_clock().now_ns()
+        if distance < 2.0 or (distance < 6.0 and self._steering.is_stuck(distance, now)):
+            self._next_waypoint += 1
+            self._steering.begin_leg(now)
+            if self._next_waypoint == len(self._route):
+                self._phase = Phase.SETTLE
+                self._settle_at = self._landing_place(pose)
+            return
+        self._go_towards(pose, to_goal)
+
+    def _settle(self, pose: Pose) -> None:
+        """Move to a place without low growth, then land there."""
+        self._refit_ground(pose)
+        assert self._settle_at is not None
+        to_place = self._settle_at - pose.position[:2]
+        distance = float(np.hypot(*to_place))
+        if distance < 0.6 or self._steering.is_stuck(distance, self.get_clock().now_ns()):
+            if self._land.call().success:
+                self._phase = Phase.LAND
+            return
+        self._go_towards(pose, to_place)
+
+    def _wait(self, pose: Pose) -> None:
+        """The flight mode lands by itself."""
+
+    def _landing_place(self, pose: Pose) -> Array:
+        """Nearest place within 8 m that has no growth within 1 m."""
+        now = self.get_clock().now_ns()
+        growth = self._low_obstacles.around(pose.position[:2], now, 10.0)
+        best, best_cost = np.zeros(2), math.inf
+        for radius in np.arange(0.0, 8.1, 1.0):
+            for angle in np.arange(0.0, 2.0 * math.pi, math.pi / 8.0):
+                place = radius * np.array([math.cos(angle), math.sin(angle)])
+                gap = float(np.hypot(*(growth - place).T).min()) if len(growth) else math.inf
+                cost = float(radius) + 20.0 * max(0.0, 1.2 - gap)
+                if cost < best_cost:
+                    best, best_cost = place, cost
+        return np.asarray(pose.position[:2] + best)

@@ -1,0 +1,108 @@
+"""Flying towards a goal through the gaps between obstacles, at a speed from which one can stop.
+
+What nodes of different sensors share: they remember obstacles, this says which velocity and turn
+bring the UAV on.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.avoidance.gaps import choose_heading, free_distances, wrap
+from volery.autonomy.avoidance.obstacle_memory import ObstacleMemory
+from volery.autonomy.perception.scan_points import Pose
+
+Array = NDArray[np.float64]
+
+REACH_M = 14.0
+"""Obstacles farther away do not matter yet."""
+_STUCK_AFTER_S = 8.0
+_STUCK_PROGRESS_M = 2.0
+_DETOUR_S = 5.0
+
+
+@dataclass(frozen=True)
+class Caution:
+    """How a UAV keeps off obstacles."""
+
+    safe_radius_m: float = 1.1
+    """Distance to keep between its centre and them."""
+    deceleration_m_s2: float = 2.0
+    """Braking that the speed counts on."""
+    aside_rad: float = math.radians(50.0)
+    """A way that lies farther aside is looked at before it is flown ..."""
+    aside_m_s: float = 0.5
+    """... at no more than this speed."""
+
+
+class GapSteering:
+    """Velocity and turn towards a goal, see `steer`; tries detours where there is no progress."""
+
+    def __init__(self, caution: Caution) -> None:
+        self._caution = caution
+        self._last_heading: float | None = None
+        self._progress: tuple[int, float] = (0, math.inf)
+        self._detour: tuple[int, float] | None = None
+        self._detours = 0
+
+    def begin_leg(self, now: int) -> None:
+        """There is a new goal."""
+        self._progress = (now, math.inf)
+
+    def steer(
+        self, pose: Pose, to_goal: Array, memory: ObstacleMemory, now: int, top_speed: float
+    ) -> tuple[Array, float]:
+        """Level velocity (2,) m/s in the odometry frame, and yaw rate, rad/s.
+
+        to_goal: (2,) m from the UAV, odometry frame. now: ns.
+        """
+        distance = float(np.hypot(*to_goal))
+        goal_angle = self._detoured(math.atan2(to_goal[1], to_goal[0]), distance, now)
+        obstacles = memory.around(pose.position[:2], now, REACH_M)
+        free = free_distances(obstacles, self._caution.safe_radius_m, REACH_M)
+        heading = choose_heading(free, goal_angle, distance, self._last_heading)
+        if heading is None:
+            self._last_heading = None
+            return np.zeros(2), 0.6
+        self._last_heading = heading.angle
+        speed = self._speed_limit(heading.free_m, distance, obstacles, top_speed)
+        aside = float(wrap(np.array(heading.angle - pose.yaw)))
+        if abs(aside) > self._caution.aside_rad:
+            speed = min(speed, self._caution.aside_m_s)
+        direction = np.array([math.cos(heading.angle), math.sin(heading.angle)])
+        return speed * direction, max(-1.2, min(1.2, 1.8 * aside))
+
+    def is_stuck(self, distance: float, now: int) -> bool:
+        """Whether the goal, `distance` m away, has come no nearer for a while."""
+        since, best = self._progress
+        if distance < best - _STUCK_PROGRESS_M:
+            self._progress = (now, distance)
+            return False
+        return now - since > _STUCK_AFTER_S * 1e9
+
+    def _speed_limit(
+        self, free_m: float, goal_m: float, obstacles: Array, top_speed: float
+    ) -> float:
+        stop_within = max(min(free_m - 0.3, goal_m), 0.05)
+        speed = min(top_speed, math.sqrt(2.0 * self._caution.deceleration_m_s2 * stop_within))
+        if len(obstacles):
+            nearest = float(np.hypot(obstacles[:, 0], obstacles[:, 1]).min())
+            speed = min(speed, max(0.4, 2.0 * (nearest - 0.4)))
+        return speed
+
+    def _detoured(self, goal_angle: float, distance: float, now: int) -> float:
+        """Turn aside for a while, left and right in turn, when there is no progress."""
+        if self._detour is not None and now < self._detour[0]:
+            return goal_angle + self._detour[1]
+        if self._detour is not None:
+            self._detour = None
+            self._progress = (now, distance)
+        if self.is_stuck(distance, now):
+            self._detours += 1
+            side = 1.0 if self._detours % 2 else -1.0
+            self._detour = (now + round(_DETOUR_S * 1e9), side * math.radians(100.0))
+        return goal_angle

@@ -1,0 +1,128 @@
+"""Avoidance by the mean depth of one region of the picture, a machine of four states.
+
+As the ROS + Unity3D platform of 2025 describes it: fly FORWARD until the mean depth of the region
+of interest falls below a threshold, be STOPPED, AVOID until the way is free, RETURN to the course.
+Its example threshold, .03, is of normalised depth, and its far plane is not told. Here depth is
+normalised by `far_m`; the defaults are those of five with which it fared best, see
+docs/avoidance.md.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.avoidance.depth_course import DepthCourse
+from volery.autonomy.avoidance.gaps import wrap
+from volery.autonomy.perception.depth_projection import depth_of, mean_depth, region_of
+from volery.autonomy.perception.list_parameters import declare_numbers
+from volery.autonomy.perception.scan_points import Pose
+from volery.core.errors import NodeError
+from volery.graph.messages import CameraInfo, Image
+
+Array = NDArray[np.float64]
+
+_STILL_M_S = 0.2
+_BACK_M = 0.3
+"""So near to the course it has returned."""
+_GIVE_UP_S = 15.0
+"""After so long on one side it tries the other."""
+
+
+class State(StrEnum):
+    """The states of the machine."""
+
+    FORWARD = "forward"
+    STOPPED = "stopped"
+    AVOID = "avoid"
+    RETURN = "return"
+
+
+class RegionAvoidance(DepthCourse):
+    """Flies a course (see `DepthCourse`); sidesteps what the region of interest shows.
+
+    Parameters
+    ----------
+    far_m: depth that counts 1, m; what is farther counts 1 too.
+    threshold: mean of the region, as a share of `far_m`, below which something is in the way.
+    region: [width, height] of the region of interest, shares of the picture, in its middle.
+    sidestep_m_s: speed aside.
+    margin_s: how long it goes on aside after the way is free.
+
+    """
+
+    STATE = ("_state", "_mean", "_sides", "_side", "_since_ns", "_free_ns")
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("region_avoidance", **options)
+        self._far = float(self.declare_parameter("far_m", 10.0, least=0.1, most=1e4).value)
+        self._threshold = float(self.declare_parameter("threshold", 0.6, least=0.0, most=1.0).value)
+        self._region = declare_numbers(self, "region", [0.3, 0.2], "[width, height]")
+        if not all(0.0 < share <= 1.0 for share in self._region):
+            raise NodeError(f"region is [width, height], above 0 to 1, not {self._region}")
+        self._sidestep = float(
+            self.declare_parameter("sidestep_m_s", 0.8, least=0.0, most=100.0).value
+        )
+        self._margin_ns = round(
+            1e9 * self.declare_parameter("margin_s", 1.0, least=0.0, most=1e4).value
+        )
+        self._state = State.FORWARD
+        self._mean = 1.0
+        self._sides = (1.0, 1.0)
+        self._side = 1.0
+        self._since_ns = 0
+        self._free_ns = 0
+
+    @property
+    def doing(self) -> str:
+        """The machine's state."""
+        return str(self._state)
+
+    def look(self, image: Image, info: CameraInfo, pose: Pose) -> None:  # noqa: ARG002
+        """Take the means of the region, and of the halves of the picture."""
+        depth = depth_of(image)
+        width, height = self._region
+        self._mean = mean_depth(region_of(depth, width, height), self._far)
+        left, right = region_of(depth, 0.5, height, -0.25), region_of(depth, 0.5, height, 0.25)
+        self._sides = mean_depth(left, self._far), mean_depth(right, self._far)
+
+    def steer(self, pose: Pose) -> tuple[Array, float]:
+        """One turn of the machine."""
+        blocked = self._mean < self._threshold
+        self._change(blocked, pose)
+        aside = self.aside(pose)
+        ahead, left = {
+            State.FORWARD: (self.speed, 0.0),
+            State.STOPPED: (0.0, 0.0),
+            State.AVOID: (0.0, self._side * self._sidestep),
+            State.RETURN: (self.speed, -math.copysign(min(abs(aside), self._sidestep), aside)),
+        }[self._state]
+        c, s = math.cos(self.course), math.sin(self.course)
+        turn = float(wrap(np.array(self.course - pose.yaw)))
+        return np.array([c * ahead - s * left, s * ahead + c * left]), max(-1.0, min(1.0, turn))
+
+    def _change(self, blocked: bool, pose: Pose) -> None:
+        now = self.now_ns
+        if self._state in (State.FORWARD, State.RETURN):
+            if blocked:
+                self._enter(State.STOPPED)
+            elif abs(self.aside(pose)) < _BACK_M:
+                self._state = State.FORWARD
+        elif self._state is State.STOPPED:
+            if float(np.hypot(*pose.velocity[:2])) < _STILL_M_S:
+                self._side = 1.0 if self._sides[0] >= self._sides[1] else -1.0
+                self._enter(State.AVOID)
+        elif blocked:
+            self._free_ns = now
+            if now - self._since_ns > _GIVE_UP_S * 1e9:
+                self._side = -self._side
+                self._since_ns = now
+        elif now - self._free_ns > self._margin_ns:
+            self._enter(State.RETURN)
+
+    def _enter(self, state: State) -> None:
+        self._state, self._since_ns, self._free_ns = state, self.now_ns, self.now_ns

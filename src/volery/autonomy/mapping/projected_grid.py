@@ -1,0 +1,150 @@
+"""What is free and what is occupied at the height of flight, as a grid seen from above.
+
+A slab parallel to the ground through the vehicle: where a ray runs in it, cells are free; where it
+ends in it, the cell is occupied. Cells count the scans that saw them occupied against those that
+saw them free; within one scan a hit beats all rays that pass, so that thin trunks stay.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.perception.scan_rays import Rays
+from volery.core.compiled import kernel
+from volery.core.kept import keep, put_back
+
+Array = NDArray[np.float64]
+Scores = NDArray[np.int8]
+
+UNKNOWN = -128
+_HIT, _MISS, _LEAST, _MOST = 3, 1, -6, 12
+"""Score of a scan's hit and miss, and bounds: a trunk that moved away is forgotten after 12 scans
+(modelling choices)."""
+
+
+class Slab(NamedTuple):
+    """Heights z = height + slope . (x, y) within `half_m`."""
+
+    height: float
+    slope: Array
+    half_m: float
+
+
+class LevelGrid:
+    """A square grid of bounded extent around the place where it began."""
+
+    def __init__(self, cell_m: float, extent_m: float) -> None:
+        self.cell_m = cell_m
+        cells = math.ceil(extent_m / cell_m)
+        self.score: Scores = np.full((cells, cells), UNKNOWN, np.int8)
+        """Rows along y, columns along x; above 0 is occupied."""
+        self._scan = np.zeros((cells, cells), np.int32)
+        self._number = 0
+        self.origin: NDArray[np.int64] | None = None
+        """Column and row of the lower left cell, counted from the map's origin."""
+        self.outside = 0
+        """Hits that lay beyond the grid."""
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return keep(self, ("score", "_scan", "_number", "origin", "outside"))
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self, state)
+
+    def begin_at(self, place: Array) -> None:
+        """Lie around `place` (2+,) m, if it lies nowhere yet."""
+        if self.origin is None:
+            middle = np.floor(place[:2] / self.cell_m).astype(np.int64)
+            self.origin = middle - len(self.score) // 2
+
+    def add(self, rays: Rays, slab: Slab) -> None:
+        """Take in the rays of one scan, m in the map."""
+        assert self.origin is not None
+        self._number += 2
+        self.outside += _draw(
+            rays.starts,
+            rays.ends,
+            rays.hits,
+            slab.height,
+            slab.slope,
+            slab.half_m,
+            self.cell_m,
+            self.origin,
+            self._number,
+            self.score,
+            self._scan,
+        )
+
+    def known_box(self) -> tuple[slice, slice] | None:
+        """Rows and columns that hold all known cells; None where nothing is known."""
+        known = self.score != UNKNOWN
+        rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+        if len(rows) == 0:
+            return None
+        return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def occupancy(score: Scores) -> NDArray[np.int8]:
+    """Values of nav_msgs/OccupancyGrid: -1 unknown, 0 free, 100 occupied."""
+    values = np.where(score > 0, np.int8(100), np.int8(0))
+    values[score == UNKNOWN] = -1
+    return values
+
+
+@kernel
+def _draw(
+    starts: Array,
+    ends: Array,
+    hits: NDArray[np.bool_],
+    height: float,
+    slope: Array,
+    half: float,
+    cell: float,
+    origin: NDArray[np.int64],
+    number: int,
+    score: Scores,
+    scan: NDArray[np.int32],
+) -> int:
+    """Hits first, stamped with `number`; then misses, with `number` - 1, once a cell and scan."""
+    rows, columns = score.shape
+    outside = 0
+    for k in range(len(hits)):
+        if not hits[k]:
+            continue
+        x, y = ends[k, 0], ends[k, 1]
+        if abs(ends[k, 2] - height - slope[0] * x - slope[1] * y) > half:
+            continue
+        i, j = math.floor(y / cell) - origin[1], math.floor(x / cell) - origin[0]
+        if not (0 <= i < rows and 0 <= j < columns):
+            outside += 1
+        elif scan[i, j] != number:
+            scan[i, j] = number
+            before = 0 if score[i, j] == UNKNOWN else score[i, j]
+            score[i, j] = min(before + _HIT, _MOST)
+    for k in range(len(hits)):
+        x, y, z = starts[k, 0], starts[k, 1], starts[k, 2]
+        dx, dy, dz = ends[k, 0] - x, ends[k, 1] - y, ends[k, 2] - z
+        steps = math.ceil(2.0 * max(abs(dx), abs(dy)) / cell)
+        if steps == 0:
+            continue
+        for step in range(steps + (0 if hits[k] else 1)):
+            share = step / steps
+            px, py = x + share * dx, y + share * dy
+            if abs(z + share * dz - height - slope[0] * px - slope[1] * py) > half:
+                if step > 0:
+                    break  # a straight ray that has left the slab does not come back
+                continue
+            i, j = math.floor(py / cell) - origin[1], math.floor(px / cell) - origin[0]
+            if not (0 <= i < rows and 0 <= j < columns):
+                break
+            if scan[i, j] < number - 1:
+                scan[i, j] = number - 1
+                before = 0 if score[i, j] == UNKNOWN else score[i, j]
+                score[i, j] = max(before - _MISS, _LEAST)
+    return outside

@@ -1,0 +1,44 @@
+"""Compiles the kernels of the maps; see `volery.autonomy.perception.warmup`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from volery.autonomy.mapping.log_odds import LogOddsGrid
+from volery.autonomy.mapping.merging import PlacedMap, merged
+from volery.autonomy.mapping.octomap_stream import Voxels, decode_binary, decode_full
+from volery.autonomy.mapping.octree import Octree
+from volery.autonomy.mapping.projected_grid import LevelGrid, Slab
+from volery.autonomy.perception.warmup import fixed, some_rays
+
+_REACH_M = 15.0
+
+
+def growing_map() -> None:
+    """Kernels of a map that grows until something of it must be forgotten."""
+    rays = some_rays()
+    tree = Octree(0.2, max_nodes=1)
+    tree.insert(rays, _REACH_M)
+    tree.binary()
+    grid = LevelGrid(0.4, 4.0)
+    grid.begin_at(np.zeros(3))
+    grid.add(rays, Slab(0.0, np.zeros(2), 0.6))
+
+
+def read_maps() -> None:
+    """Kernels that read what another node has published."""
+    empty = fixed(np.zeros(0, np.uint8))
+    decode_binary(empty)
+    decode_full(empty)
+
+
+def merged_maps() -> None:
+    """The kernel that writes the map of several."""
+    cell = np.zeros((1, 3), np.int32), np.ones(1, np.int32), np.ones(1, np.bool_)
+    merged([PlacedMap(Voxels(*cell))], 0.2, 8)
+
+
+def drawn_scans() -> None:
+    """The kernel of the grids that reports draw."""
+    grid = LogOddsGrid(np.zeros(2), np.ones(2), 0.1)
+    grid.add(np.zeros((1, 2)), np.ones((1, 2)), np.ones(1, np.bool_))

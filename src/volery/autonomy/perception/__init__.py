@@ -1,0 +1,1 @@
+"""What nodes make of their sensors' messages: points, rays, motion, frames."""

@@ -1,0 +1,128 @@
+"""Where a vehicle and its nodding mount were lately, so that each beam can be cast from there."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.stuck_sensors import is_stuck
+from volery.core import rotations
+from volery.core.clock import NS_PER_S
+from volery.core.vectors import norm
+
+Array = NDArray[np.float64]
+
+_KEPT = 64
+"""Poses and angles that are remembered: more than a second of each."""
+_JUMP_BACK_NS = NS_PER_S // 2
+"""A stamp so far before the newest one is a clock that was set back; a smaller step is disorder."""
+
+
+class Placement(NamedTuple):
+    """Where a body is: position (3,) m, attitude (4,) x y z w."""
+
+    position: Array
+    attitude: Array
+
+
+class MotionHistory:
+    """Poses by time. What is not finite, old, repeated or stuck is `refused`, and counted."""
+
+    def __init__(self) -> None:
+        self._times: list[int] = []
+        self._poses: list[Pose] = []
+        self.refused = 0
+
+    @property
+    def newest(self) -> Pose | None:
+        """The pose with the latest stamp."""
+        return self._poses[-1] if self._poses else None
+
+    def add(self, pose: Pose) -> bool:
+        """Remember a pose; False where it cannot be used. A clock set back starts anew."""
+        values = (pose.position, pose.attitude, pose.velocity, pose.omega_body)
+        finite = all(np.isfinite(value).all() for value in values)
+        if not finite or abs(norm(pose.attitude) - 1.0) > 0.01:
+            self.refused += 1
+            return False
+        if self._times and pose.time_ns < self._times[-1] - _JUMP_BACK_NS:
+            self._times, self._poses = [], []
+        if self._times and (pose.time_ns <= self._times[-1] or is_stuck(pose, self._poses[-1])):
+            self.refused += 1
+            return False
+        self._times.append(pose.time_ns)
+        self._poses.append(pose)
+        del self._times[:-_KEPT], self._poses[:-_KEPT]
+        return True
+
+    def at(self, time_ns: int, ahead_s: float = 0.25, gap_s: float = 0.5) -> Placement | None:
+        """Where it was at `time_ns`; None where nothing near is known.
+
+        Between two poses at most `gap_s` apart it is interpolated, after the newest one carried on
+        by its velocities for `ahead_s` at most.
+        """
+        row = bisect_right(self._times, time_ns) - 1
+        if row < 0:
+            return None
+        before = self._poses[row]
+        since = (time_ns - before.time_ns) / NS_PER_S
+        if row + 1 == len(self._poses):
+            return _carried_on(before, since) if since <= ahead_s else None
+        after = self._poses[row + 1]
+        between = (after.time_ns - before.time_ns) / NS_PER_S
+        if between > gap_s:
+            return None
+        share = since / between
+        turned = after.attitude * (1.0 if before.attitude @ after.attitude >= 0.0 else -1.0)
+        return Placement(
+            before.position + share * (after.position - before.position),
+            rotations.normalize(before.attitude + share * (turned - before.attitude)),
+        )
+
+
+def _carried_on(pose: Pose, seconds: float) -> Placement:
+    turn = rotations.exponential(pose.omega_body * seconds)
+    return Placement(
+        pose.position + pose.velocity * seconds,
+        rotations.normalize(rotations.multiply(pose.attitude, turn)),
+    )
+
+
+class NodHistory:
+    """Angles (rad, positive down) of a nodding mount by time, with their rates (rad/s)."""
+
+    def __init__(self) -> None:
+        self._times: list[int] = []
+        self._angles: list[tuple[float, float]] = []
+        self.refused = 0
+
+    def add(self, time_ns: int, angle: float, rate: float) -> bool:
+        """Remember an angle; False where it is not finite, or not newer than the newest."""
+        if not (np.isfinite(angle) and np.isfinite(rate)):
+            self.refused += 1
+            return False
+        if self._times and time_ns < self._times[-1] - _JUMP_BACK_NS:
+            self._times, self._angles = [], []
+        if self._times and time_ns <= self._times[-1]:
+            self.refused += 1
+            return False
+        self._times.append(time_ns)
+        self._angles.append((angle, rate))
+        del self._times[:-_KEPT], self._angles[:-_KEPT]
+        return True
+
+    def at(self, time_ns: int, ahead_s: float = 0.25) -> float | None:
+        """Angle at `time_ns`: interpolated, or carried on by the rate for `ahead_s` at most."""
+        row = bisect_right(self._times, time_ns) - 1
+        if row < 0:
+            return None
+        angle, rate = self._angles[row]
+        since = (time_ns - self._times[row]) / NS_PER_S
+        if row + 1 < len(self._times):
+            between = (self._times[row + 1] - self._times[row]) / NS_PER_S
+            return angle + since / between * (self._angles[row + 1][0] - angle)
+        return angle + since * rate if since <= ahead_s else None

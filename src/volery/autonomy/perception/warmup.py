@@ -1,0 +1,93 @@
+"""Warmup tasks for the kernels of scans, depth images and the ground.
+
+Nodes list the tasks they need in `warmup_tasks`. A kernel compiles again for each array type, so
+the tasks pass the same types as the nodes do: arrays of messages are read-only.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.perception.depth_projection import DepthProjector
+from volery.autonomy.perception.ground_plane import GroundPlane
+from volery.autonomy.perception.motion_history import MotionHistory
+from volery.autonomy.perception.scan_points import Pose, ScanProjector
+from volery.autonomy.perception.scan_rays import Beams, RayMaker, Rays, has_return
+from volery.autonomy.perception.speckle_filter import LoneReturns
+from volery.autonomy.perception.stuck_sensors import ScanRepeats
+from volery.core import rotations
+from volery.core.clock import NS_PER_S
+from volery.graph.messages import CameraInfo, Image, LaserScan
+from volery.graph.zero import zero_message
+
+
+def scan_returns() -> None:
+    """The kernel that tells whether a scan has met anything."""
+    has_return(a_scan())
+
+
+def scan_repeats() -> None:
+    """The kernel that tells whether a scan has come before."""
+    repeats = ScanRepeats()
+    for _ in range(2):
+        repeats.are_told_by(a_scan())
+
+
+def scan_rays() -> None:
+    """The kernel that turns scans into rays."""
+    some_rays()
+
+
+def ground() -> None:
+    """Kernels of `ground_plane`."""
+    plane = GroundPlane()
+    plane.add(np.zeros((1, 3)), 0)
+    plane.fit(np.zeros(3), None, 0)
+
+
+def scan_points() -> None:
+    """The kernel that turns scans into points, lone returns left out."""
+    ScanProjector([0.0, 0.0, 0.0]).points(LoneReturns().left_out(a_scan()), a_pose(0))
+
+
+def depth_points() -> None:
+    """The kernel that turns depth pictures into points."""
+    image, info = zero_message("sensor_msgs/msg/Image"), zero_message("sensor_msgs/msg/CameraInfo")
+    image.height = image.width = 1
+    image.encoding, image.data = "32FC1", fixed(np.zeros(4, np.uint8))
+    info.k = fixed(np.ones(9))
+    told: tuple[Image, CameraInfo] = image, info
+    DepthProjector([0.0, 0.0, 0.0]).points(*told, a_pose(0))
+
+
+def fixed(array: NDArray[Any]) -> NDArray[Any]:
+    """The array, read-only as those of messages."""
+    array.flags.writeable = False
+    return array
+
+
+def a_scan() -> LaserScan:
+    """Three beams at time 0, of which two have met something."""
+    scan: Any = zero_message("sensor_msgs/msg/LaserScan")
+    scan.ranges = fixed(np.array([1.0, 2.0, np.inf], np.float32))
+    scan.angle_increment, scan.range_max = 0.1, 10.0
+    told: LaserScan = scan
+    return told
+
+
+def a_pose(time_ns: int) -> Pose:
+    """Level, at rest at the origin."""
+    return Pose(time_ns, np.zeros(3), rotations.IDENTITY.copy(), np.zeros(3), np.zeros(3))
+
+
+def some_rays() -> Rays:
+    """Those of `a_scan`, through the kernel that makes them."""
+    motion = MotionHistory()
+    for time_ns in (0, NS_PER_S // 10):
+        motion.add(a_pose(time_ns))
+    rays = RayMaker([0.0, 0.0, 0.0], Beams()).rays(a_scan(), motion, None)
+    assert rays is not None
+    return rays

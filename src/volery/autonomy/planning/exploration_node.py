@@ -1,0 +1,282 @@
+"""Searches an area: goes from place to place until all of it has been looked at."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.mapping.messages import grid_values_message
+from volery.autonomy.perception.map_frame import MAP, MapFrame
+from volery.autonomy.perception.odometry_topics import subscribe_odometry
+from volery.autonomy.perception.scan_points import Pose as Motion
+from volery.autonomy.planning.search_area import SearchArea
+from volery.autonomy.planning.viewpoints import Viewpoint, next_viewpoint
+from volery.autonomy.status import publish_status
+from volery.core.clock import NS_PER_S
+from volery.core.counting import counted
+from volery.core.errors import PlanError
+from volery.core.kept import keep, put_back
+from volery.graph.messages import (
+    Float32,
+    OccupancyGrid,
+    Odometry,
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    String,
+    header,
+    message_type,
+    single,
+)
+from volery.graph.node import Node
+
+Array = NDArray[np.float64]
+
+POLYGON: type[Any] = message_type("geometry_msgs/msg/PolygonStamped")
+_LEVEL = Quaternion(0.0, 0.0, 0.0, 1.0)
+_PERIOD_S = 0.5
+_NEAR = 0.3
+"""Share of the sight's radius at which a goal counts as reached: the flight does not stop there."""
+_STALE = 0.15
+"""A goal is given up when only this share of what it promised is still new."""
+_BLOCKED_S = 8.0
+"""Without coming nearer to a goal for so long it is given up."""
+_NEARER_M = 1.0
+_STATE = (
+    "_motion",
+    "_area",
+    "_grid",
+    "_goal",
+    "_since_ns",
+    "_best_m",
+    "_refused",
+    "_visited",
+    "_state",
+    "_reason",
+    "_told",
+    "_sent",
+)
+
+
+class Searching(StrEnum):
+    """How far the search is."""
+
+    WAITING = "waiting"
+    SEARCHING = "searching"
+    DONE = "done"
+    BLOCKED = "blocked"
+
+
+class Exploring(Node):
+    """Takes a `search_area`, sends `planning/goal`; tells `exploration/status` and `/covered`.
+
+    `search_area` is geometry_msgs/PolygonStamped in the map; another one replaces it, an empty one
+    ends the search. The status is JSON: state (waiting, searching, done, blocked), reason, covered
+    (share), area_m2, searched_m2, goal, given_up. `exploration/covered` is std_msgs/Float32, the
+    share; `exploration/searched` nav_msgs/OccupancyGrid: 0 to be looked at, 100 looked at, -1
+    outside.
+
+    Parameters
+    ----------
+    odometry: topic of the pose; `corrected`: whether `/tf` tells where its frame lies in the map.
+    view_m: how far around the vehicle counts as looked at.
+    cell_m: of the area.
+
+    """
+
+    @classmethod
+    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
+        """Returns the tasks that compile its kernels."""
+        from volery.autonomy.planning import warmup
+
+        return (warmup.searched_area,)
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("exploration", **options)
+        self._view = float(self.declare_parameter("view_m", 10.0, least=0.1).value)
+        self._cell = float(self.declare_parameter("cell_m", 1.0, least=0.05).value)
+        self._frame = MapFrame()
+        self._motion: Motion | None = None
+        self._area: SearchArea | None = None
+        self._grid: tuple[NDArray[np.int8], Array, float] | None = None
+        """Values of the map at flight height, its lower left corner, its cells' width."""
+        self._goal: Viewpoint | None = None
+        self._since_ns = 0
+        self._best_m = math.inf
+        self._refused: list[Array] = []
+        self._visited: list[Array] = []
+        """Places that could not be reached, and those that have been looked from."""
+        self._state, self._reason = Searching.WAITING, "no area"
+        self._told = ""
+        self._sent = 0
+        self._open()
+
+    def _open(self) -> None:
+        self._goals = self.create_publisher(PoseStamped, "planning/goal", 1)
+        self._status = self.create_publisher(String, "exploration/status", 1, latched=True)
+        self._covered = self.create_publisher(Float32, "exploration/covered", 1)
+        self._searched = self.create_publisher(
+            OccupancyGrid, "exploration/searched", 1, latched=True
+        )
+        subscribe_odometry(self, self._frame, self._on_odometry, depth=1)
+        self.create_subscription(POLYGON, "search_area", self._on_area, 1)
+        self.create_subscription(OccupancyGrid, "projected_map", self._on_grid, 1)
+        self.create_subscription(String, "planning/goal_status", self._on_goal_status, 5)
+        self.create_timer(_PERIOD_S, self._on_timer)
+        self.create_timer(2.0, self._tell_searched)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {"frame": self._frame.get_state(), **keep(self, _STATE)}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._frame.set_state(state["frame"])
+        put_back(self, {name: state[name] for name in _STATE})
+
+    # ------------------------------------------------------------------------------ what it hears
+
+    def _on_odometry(self, message: Odometry) -> None:
+        self._frame.hear(message)
+        motion = Motion.from_odometry(message)
+        if np.isfinite(motion.position).all() and np.isfinite(motion.velocity).all():
+            self._motion = motion
+
+    def _on_area(self, message: Any) -> None:
+        corners = np.array([[p.x, p.y] for p in message.polygon.points], dtype=np.float64)
+        self._goal, self._refused, self._visited = None, [], []
+        if message.header.frame_id not in ("", MAP):
+            self._area = None
+            self._become(Searching.WAITING, f"areas are in 'map', not '{message.header.frame_id}'")
+            return
+        if len(corners) == 0:
+            self._area = None
+            self._become(Searching.WAITING, "no area")
+            return
+        try:
+            area = SearchArea(corners, self._cell)
+        except PlanError as error:
+            self._area = None
+            self._become(Searching.WAITING, str(error))
+            return
+        self._area = area
+        self._become(Searching.SEARCHING, "")
+
+    def _on_grid(self, message: OccupancyGrid) -> None:
+        info = message.info
+        values = np.asarray(message.data, np.int8)
+        if info.resolution <= 0.0 or values.size != info.height * info.width:
+            self._reason = "the map's size does not fit its data"
+            return
+        corner = np.array([info.origin.position.x, info.origin.position.y])
+        self._grid = (values.reshape(info.height, info.width), corner, float(info.resolution))
+
+    def _on_goal_status(self, message: String) -> None:
+        """The planner cannot come to the goal: try another one."""
+        try:
+            told = json.loads(message.data)
+            state, goal = told["state"], told["goal"]
+        except (ValueError, TypeError, KeyError):
+            return
+        if self._goal is None or state not in ("refused", "unreachable"):
+            return
+        if goal is not None and np.hypot(*(self._goal.place - goal[:2])) < 0.1:
+            self._give_up()
+
+    # ------------------------------------------------------------------------------- what it does
+
+    def _on_timer(self) -> None:
+        if self._area is None or self._motion is None or self._grid is None:
+            self._tell()
+            return
+        if self._frame.is_lost:
+            self._since_ns = self.get_clock().now_ns()  # no goal is blocked by that
+            return
+        place = self._frame.to_map(self._motion.position)
+        self._area.look(place, *self._grid, self._view)
+        if self._state is Searching.SEARCHING:
+            self._search(self._area, place)
+        self._covered.publish(Float32(single(self._area.share)))
+        self._tell()
+
+    def _search(self, area: SearchArea, place: Array) -> None:
+        now = self.get_clock().now_ns()
+        if self._goal is not None:
+            away = float(np.hypot(*(self._goal.place - place[:2])))
+            gain = float(area.gains(self._goal.place[None], self._view)[0][0])
+            if away < _NEAR * self._view:
+                self._visited.append(self._goal.place)
+                self._goal = None
+            elif gain < _STALE * self._goal.gain_m2:
+                self._goal = None
+            elif away < self._best_m - _NEARER_M:
+                self._best_m, self._since_ns = away, now
+            elif now - self._since_ns > _BLOCKED_S * NS_PER_S:
+                self._give_up()
+        if self._goal is None:
+            self._choose(area, place, now)
+
+    def _choose(self, area: SearchArea, place: Array, now: int) -> None:
+        assert self._motion is not None
+        moving = self._frame.to_map(self._motion.position + self._motion.velocity) - place
+        speed = float(np.hypot(*moving[:2]))
+        heading = math.atan2(moving[1], moving[0]) if speed > 0.5 else self._motion.yaw
+        left_out = [*self._refused, *self._visited]
+        self._goal = next_viewpoint(area, place[:2], heading, self._view, left_out)
+        if self._goal is not None:
+            self._best_m, self._since_ns = math.inf, now
+            self._send(np.array([*self._goal.place, place[2]]))
+            return
+        if next_viewpoint(area, place[:2], heading, self._view, self._visited) is not None:
+            self._become(
+                Searching.BLOCKED, f"{counted(len(self._refused), 'place')} cannot be reached"
+            )
+        else:
+            self._become(Searching.DONE, "")
+        self._send(place)
+
+    def _give_up(self) -> None:
+        assert self._goal is not None
+        self._refused.append(self._goal.place)
+        self._goal = None
+
+    # ------------------------------------------------------------------------------ what it tells
+
+    def _send(self, place: Array) -> None:
+        stamp = header(self.get_clock().now_ns(), MAP)
+        self._goals.publish(PoseStamped(stamp, Pose(Point(*place.tolist()), _LEVEL)))
+        self._sent += 1
+
+    def _become(self, state: Searching, reason: str) -> None:
+        self._state, self._reason = state, reason
+
+    def _tell(self) -> None:
+        area, goal = self._area, self._goal
+        told = {
+            "state": str(self._state),
+            "reason": self._reason,
+            "covered": 0.0 if area is None else round(area.share, 3),
+            "area_m2": 0.0 if area is None else area.size_m2,
+            "searched_m2": 0.0 if area is None else area.seen_m2,
+            "goal": None if goal is None else [round(v, 2) for v in goal.place.tolist()],
+            "given_up": len(self._refused),
+        }
+        self._told = publish_status(self._status, told, self._told)
+
+    def _tell_searched(self) -> None:
+        if self._area is None or not self._searched.wanted:
+            return
+        area = self._area
+        values = np.where(area.inside, np.where(area.seen, 100, 0), -1).astype(np.int8).T
+        corner = (float(area.low[0]), float(area.low[1]), 0.0)
+        now = self.get_clock().now_ns()
+        self._searched.publish(
+            grid_values_message(np.ascontiguousarray(values), area.cell_m, corner, MAP, now)
+        )

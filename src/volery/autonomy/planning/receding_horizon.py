@@ -1,0 +1,285 @@
+"""The next seconds of a flight, planned anew several times a second; each plan ends at rest.
+
+A plan is flown on from where it will be when the new one takes over. The new one is taken only if
+it is safe to its end by what is known then, else the old one, which was, is flown to its end. So
+there is always a stop ahead within space that was seen to be free (the plan of last resort of
+T. Schouwenaars, E. Feron, J. How, "Safe receding horizon path planning for autonomous vehicles",
+Allerton 2002).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.planning.clearance import Clearance
+from volery.autonomy.planning.cost_to_go import CostToGo, Prices, cost_to_go
+from volery.autonomy.planning.primitive_selection import Verdicts, judge
+from volery.autonomy.planning.primitives import (
+    Candidates,
+    Limits,
+    Path,
+    State,
+    at_rest,
+    braking,
+    fan,
+)
+from volery.autonomy.planning.reciprocal_avoidance import HalfPlane, violation
+from volery.autonomy.planning.surface import Surface
+from volery.core.clock import NS_PER_S
+from volery.core.kept import keep, put_back
+from volery.core.vectors import norm
+
+Array = NDArray[np.float64]
+
+_DIRECTIONS = np.arange(-math.pi, math.pi, math.pi / 20.0)
+_SPEEDS = np.array([1.0, 0.7, 0.4, 0.15])
+"""Shares of the top speed."""
+_OFFSETS = np.array([0.0, 0.75, -0.75])
+"""Heights over the surface of flight, relative to the wanted one, m."""
+_AHEAD_RAD = math.radians(60.0)
+"""Ways farther aside from the nose are flown slowly ..."""
+_ASIDE_M_S = 0.8
+_PEAK = 1.25
+"""Acceleration may exceed the limit so much where the present one leaves no choice."""
+_KEEP_APART = 8.0
+"""Cost of each m/s outside of what keeps vehicles apart ..."""
+_KEEP_RIGHT = 1.0
+"""... and of each m/s to the left, where the cheapest way comes too near."""
+_LEVEL_COST, _TURN_COST = 0.4, 0.25
+"""Of each m over or under the wanted height; of each m/s that the velocity changes by."""
+_LOST_M = 1.0
+"""Farther away from its plan the vehicle begins anew from where it is."""
+_HARD = 1.7
+"""In need it brakes so much harder than the limit; the F450 can (modelling choice)."""
+_MATTER = 0.05
+"""Improvement of the cost for which it is worth not to stay."""
+
+
+class Doing(StrEnum):
+    """What the planner does."""
+
+    HOLDING = "holding"
+    FLYING = "flying"
+    TURNING = "turning"
+    BLOCKED = "blocked"
+
+
+@dataclass(frozen=True)
+class Policy:
+    """How careful plans are."""
+
+    limits: Limits
+    radius_m: float = 0.6
+    """Least distance to obstacles at rest ..."""
+    radius_s: float = 0.1
+    """... and so much more for each m/s."""
+    soft_m: float = 1.6
+    """Up to this distance farther is better."""
+    near: float = 3.0
+    """What closeness costs a metre."""
+    unknown_stops: bool = True
+    """Whether plans keep out of space that is not known."""
+    unknown_cost: float = 0.6
+    """What a metre of unknown space costs in the guidance, which hopes for a way through."""
+
+
+class Sight(NamedTuple):
+    """What is known at the time of planning."""
+
+    clearance: Clearance
+    surface: Surface
+    planes: list[HalfPlane]
+
+
+class LocalPlanning:
+    """The plan that is in force, and how the next one is found."""
+
+    def __init__(self, policy: Policy) -> None:
+        self.policy = policy
+        self.doing = Doing.HOLDING
+        self._path: Path | None = None
+        self._began_ns = 0
+        self.yaw = 0.0
+        """Where the nose shall point, rad."""
+        self.least_m = math.inf
+        """Distance to obstacles along the plan in force."""
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return keep(self, ("doing", "_path", "_began_ns", "yaw", "least_m"))
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self, state)
+
+    def state_at(self, time_ns: int) -> State | None:
+        """The planned motion; None before the first plan."""
+        if self._path is None:
+            return None
+        return self._path.at((time_ns - self._began_ns) / NS_PER_S)
+
+    def start(self, present: State, yaw: float, now_ns: int, then_ns: int) -> State:
+        """The motion from which to plan: where the plan will be, or where the vehicle is.
+
+        It begins anew, from the present motion, where the vehicle is far from its plan.
+        """
+        planned = self.state_at(now_ns)
+        if planned is None or norm(planned.position - present.position) > _LOST_M:
+            steady = State(present.position, present.velocity, np.zeros(3))
+            self._path, self._began_ns = braking(steady, self.policy.limits), now_ns
+            self.yaw = yaw
+        state = self.state_at(then_ns)
+        assert state is not None
+        return state
+
+    def forget(self) -> None:
+        """There is no plan: somebody else flies."""
+        self._path, self.doing = None, Doing.HOLDING
+
+    def hold(self, start: State, then_ns: int) -> Path:
+        """Stop, by the shortest way."""
+        self.doing = Doing.HOLDING
+        moves = norm(start.velocity) > 0.05
+        return self._commit(
+            braking(start, self.policy.limits) if moves else at_rest(start.position), then_ns
+        )
+
+    def plan(self, start: State, goal: Array, sight: Sight, then_ns: int) -> Path:
+        """The plan from `start` at `then_ns` towards `goal` (2,) m."""
+        policy, surface = self.policy, sight.surface
+        prices = Prices(policy.radius_m, policy.soft_m, policy.near, unknown=policy.unknown_cost)
+        costs = cost_to_go(sight.clearance, surface, _OFFSETS, goal, prices)
+        candidates = self._fan(start, surface)
+        verdicts = judge(candidates, sight.clearance, costs, policy.soft_m, policy.near)
+        safe = self._safe(start, candidates, verdicts, sight.clearance)
+        total = self._total(start, candidates, verdicts, sight.planes)
+        self._turn_nose(start, goal, costs)
+        if not safe.any():
+            return self._last_resort(start, sight, then_ns)
+        best = int(np.argmin(np.where(safe, total, np.inf)))
+        if not np.isfinite(total[best]):
+            best = int(np.flatnonzero(safe)[-1])  # to stay, where that is safe
+        moves = bool(np.hypot(*candidates.velocity[best, :2]) > 0.0)
+        self.doing = Doing.FLYING if moves else Doing.TURNING
+        stays = len(safe) - 1
+        if not moves and best == stays and not np.isfinite(costs.at(start.position[:2])):
+            self.doing = Doing.BLOCKED
+        self.least_m = float(verdicts.nearest_m[best])
+        return self._commit(candidates.path(best), then_ns)
+
+    # ------------------------------------------------------------------------------------ parts
+
+    def _commit(self, path: Path, then_ns: int) -> Path:
+        self._path, self._began_ns = path, then_ns
+        return path
+
+    def _fan(self, start: State, surface: Surface) -> Candidates:
+        limits = self.policy.limits
+        d, s, o = np.meshgrid(_DIRECTIONS, limits.speed * _SPEEDS, _OFFSETS, indexing="ij")
+        way = 0.5 * limits.horizon_s * (s[..., None] * np.stack([np.cos(d), np.sin(d)], axis=-1))
+        end = start.position[:2] + way + 0.5 * limits.horizon_s * start.velocity[:2]
+        wanted = surface.height_at(end) + o
+        rises = (wanted - start.position[2]) / limits.horizon_s
+        found = fan(start, _DIRECTIONS, limits.speed * _SPEEDS, _OFFSETS, rises, limits)
+        # The last one stays where it is in plan, and comes to the wanted height.
+        rise = float(surface.height_at(start.position[:2]) - start.position[2])
+        found.velocity[-1, 2] = float(np.clip(rise, -limits.climb, limits.climb))
+        found.cruise_s[-1] = 0.0 if abs(rise) < 0.1 else 0.3
+        return found
+
+    def _safe(
+        self, start: State, candidates: Candidates, verdicts: Verdicts, clearance: Clearance
+    ) -> NDArray[np.bool_]:
+        """Far enough from obstacles, or no nearer than now; within limits; in known space."""
+        policy = self.policy
+        speed = np.hypot(candidates.velocity[:, 0], candidates.velocity[:, 1])
+        wanted = policy.radius_m + policy.radius_s * speed
+        here = float(clearance.at(start.position[None])[0])
+        safe = verdicts.nearest_m >= np.minimum(wanted, here)
+        safe &= verdicts.most_m_s2 <= _PEAK * policy.limits.acceleration
+        if policy.unknown_stops:
+            safe &= ~verdicts.unknown
+        return safe
+
+    def _total(
+        self, start: State, candidates: Candidates, verdicts: Verdicts, planes: list[HalfPlane]
+    ) -> Array:
+        velocity = candidates.velocity
+        change = np.hypot(*(velocity[:, :2] - start.velocity[:2]).T)
+        total = verdicts.cost + _LEVEL_COST * np.abs(candidates.offset) + _TURN_COST * change
+        total[:-1] += _MATTER
+        speed = np.hypot(velocity[:, 0], velocity[:, 1])
+        aside = np.arctan2(velocity[:, 1], velocity[:, 0]) - self.yaw
+        aside = np.abs((aside + math.pi) % (2.0 * math.pi) - math.pi)
+        total[(aside > _AHEAD_RAD) & (speed > _ASIDE_M_S)] = np.inf
+        if planes:
+            total = self._apart(total, velocity[:, :2], planes)
+        return np.asarray(total)
+
+    @staticmethod
+    def _apart(total: Array, velocity: Array, planes: list[HalfPlane]) -> Array:
+        """Price what comes too near to others; where the cheapest does, ways to the right of it.
+
+        Without a side that all prefer, those who meet head-on could come to a stand together.
+        """
+        crowded = violation(planes, velocity)
+        cheapest = int(np.argmin(total))
+        total = total + _KEEP_APART * crowded
+        if crowded[cheapest] > 0.0:
+            x, y = velocity[cheapest] / max(float(np.hypot(*velocity[cheapest])), 0.1)
+            total = total + _KEEP_RIGHT * np.maximum(velocity @ np.array([-y, x]), 0.0)
+        return np.asarray(total)
+
+    def _last_resort(self, start: State, sight: Sight, then_ns: int) -> Path:
+        """Fly the plan in force to its end if that is still clear, else stop: hard, if need be."""
+        assert self._path is not None
+        self.doing = Doing.BLOCKED
+        limits, radius = self.policy.limits, self.policy.radius_m
+        hard = limits._replace(acceleration=_HARD * limits.acceleration)
+        since = (then_ns - self._began_ns) / NS_PER_S
+        ways = [
+            (self._path, self._began_ns, since),
+            (braking(start, limits), then_ns, 0.0),
+            (braking(start, hard), then_ns, 0.0),
+        ]
+        least = [_least(path, begin_s, sight.clearance) for path, _, begin_s in ways]
+        enough = [distance >= radius for distance in least]
+        best = enough.index(True) if any(enough) else int(np.argmax(least))
+        self.least_m = least[best]
+        path, self._began_ns, _ = ways[best]
+        self._path = path
+        return path
+
+    def _turn_nose(self, start: State, goal: Array, costs: CostToGo) -> None:
+        """Towards where it flies, or shall fly."""
+        if float(np.hypot(*start.velocity[:2])) > 0.7:
+            self.yaw = math.atan2(start.velocity[1], start.velocity[0])
+            descent = costs.descent(start.position[:2])
+            if descent is not None:
+                off = math.remainder(descent - self.yaw, 2.0 * math.pi)
+                self.yaw += 0.5 * max(-0.8, min(0.8, off))
+            return
+        descent = costs.descent(start.position[:2])
+        if descent is not None:
+            self.yaw = descent
+            return
+        to_goal = goal - start.position[:2]
+        if float(np.hypot(*to_goal)) > 0.5:
+            self.yaw = math.atan2(to_goal[1], to_goal[0])
+
+    @property
+    def began_ns(self) -> int:
+        """When the plan in force begins."""
+        return self._began_ns
+
+
+def _least(path: Path, begin_s: float, clearance: Clearance) -> float:
+    """Least distance (m) to obstacles from `begin_s` to the end of a path."""
+    times = np.append(np.arange(begin_s, path.duration_s, 0.1), max(path.duration_s, begin_s))
+    return float(clearance.at(np.array([path.at(t).position for t in times])).min())

@@ -1,0 +1,167 @@
+"""What a vehicle sees of its surroundings: the local grid and the ground, from its sensors."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.perception.ground_plane import GroundPlane
+from volery.autonomy.perception.motion_history import MotionHistory, NodHistory
+from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_rays import Beams, RayMaker
+from volery.autonomy.perception.stuck_sensors import RangeRepeats, ScanRepeats
+from volery.autonomy.planning.clearance import Clearance, clearance_of
+from volery.autonomy.planning.local_grid import LocalGrid
+from volery.autonomy.planning.surface import Surface
+from volery.core.clock import NS_PER_S
+from volery.core.kept import keep, put_back
+from volery.graph.messages import JointState, LaserScan, Range, stamp_of
+
+Array = NDArray[np.float64]
+
+_SHAPE = (128, 128, 32)
+_WINDOW = (96, 96, 24)
+"""Cells that are remembered, and cells that are planned in: 32 m and 24 m wide at 0.25 m."""
+_BUBBLE_M = 0.9
+"""What is not known so near to the vehicle is free: it is there itself."""
+_SONAR_MEMORY_S = 0.5
+_SILENT_S = 0.5
+_JUMP_BACK_NS = NS_PER_S // 2
+
+
+class Surroundings:
+    """Takes in scans, joint angles and ranges, in the frame of the odometry."""
+
+    def __init__(self, mounts: dict[str, Any], cell_m: float, scan_rate_hz: float) -> None:
+        self.motion, self._nod = MotionHistory(), NodHistory()
+        self._grid = LocalGrid(cell_m, _SHAPE)
+        self._makers = {name: RayMaker(mount, Beams()) for name, mount in mounts.items()}
+        self._period_ns = round(NS_PER_S / scan_rate_hz)
+        self._repeats = {name: ScanRepeats() for name in mounts}
+        self._stuck: set[str] = set()
+        """LIDARs that repeat themselves."""
+        self._heard_ns: dict[str, int] = {}
+        """When the newest scan came that was none before."""
+        self._taken_ns: dict[str, int] = {}
+        self._seen_ns: dict[str, int] = {}
+        self._ground = GroundPlane()
+        self._range: tuple[int, float] | None = None
+        self._range_repeats = RangeRepeats()
+        self._is_sonar_stuck = False
+        self._upright_cells = math.ceil(0.75 / cell_m)
+
+    _PLAIN = (
+        "motion",
+        "_nod",
+        "_repeats",
+        "_stuck",
+        "_heard_ns",
+        "_taken_ns",
+        "_seen_ns",
+        "_ground",
+        "_range",
+        "_range_repeats",
+        "_is_sonar_stuck",
+    )
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {"grid": self._grid.get_state(), **keep(self, self._PLAIN)}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._grid.set_state(state["grid"])
+        put_back(self, {name: state[name] for name in self._PLAIN})
+
+    def on_joint(self, message: JointState) -> None:
+        """Angle of the nodding mount."""
+        if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
+            angle, rate = float(message.position[0]), float(message.velocity[0])
+            self._nod.add(stamp_of(message), angle, rate)
+
+    def on_range(self, message: Range, now_ns: int) -> None:
+        """Range to the ground below."""
+        if not math.isfinite(message.range):
+            return
+        self._is_sonar_stuck = self._range_repeats.are_told_by(float(message.range))
+        self._range = None if self._is_sonar_stuck else (now_ns, float(message.range))
+
+    def on_scan(self, name: str, scan: LaserScan, now_ns: int) -> None:
+        """A scan of LIDAR `name`."""
+        stamp = stamp_of(scan)
+        heard = self._heard_ns.get(name)
+        if heard is not None and heard - _JUMP_BACK_NS <= stamp <= heard:
+            return  # it has come before
+        if self._repeats[name].are_told_by(scan):
+            self._stuck.add(name)
+            return
+        self._stuck.discard(name)
+        self._heard_ns[name] = stamp
+        taken = self._taken_ns.get(name)
+        due = 0 if taken is None else taken + self._period_ns - NS_PER_S // 200
+        is_due = taken is None or not taken <= stamp < due
+        if not is_due and name != "nodding":
+            return
+        newest = self.motion.newest
+        if newest is None:
+            return
+        if is_due:
+            self._taken_ns[name] = stamp
+        rays = self._makers[name].rays(scan, self.motion, self._nod if name == "nodding" else None)
+        if rays is None or len(rays.hits) == 0:
+            return
+        if rays.hits.any():
+            self._seen_ns[name] = stamp
+        self._grid.move_to(newest.position)
+        # What is thin is seen in few of a nodding LIDAR's scans: the hits of all count.
+        self._grid.add(rays, clears=is_due)
+        self._ground.add(rays.ends, now_ns, rays.hits)
+
+    def problems(self, now_ns: int) -> list[str]:
+        """Why nothing can be planned, in words; none where all is well."""
+        found = []
+        newest = self.motion.newest
+        if newest is None or not self._is_fresh(newest.time_ns, now_ns):
+            found.append("no odometry")
+        for name in self._makers:
+            if not self._is_fresh(self._heard_ns.get(name), now_ns):
+                what = "repeats itself" if name in self._stuck else "is silent"
+                found.append(f"the {name} LIDAR {what}")
+        if not any(self._is_fresh(self._seen_ns.get(name), now_ns) for name in self._makers):
+            found.append("no LIDAR sees anything")
+        return found
+
+    def warnings(self) -> list[str]:
+        """What is wrong but hinders nothing: without a sonar the LIDARs tell where ground is."""
+        return ["the sonar repeats itself"] if self._is_sonar_stuck else []
+
+    def height_above_ground(self, pose: Pose, now_ns: int) -> float:
+        """m, by the sonar and by what the LIDARs see of the ground."""
+        below = None
+        if self._range is not None and self._is_fresh(self._range[0], now_ns):
+            below = float(pose.position[2]) - self._range[1]
+        self._ground.fit(pose.position, below, now_ns)
+        return float(pose.position[2]) - float(self._ground.height_at(pose.position[:2]))
+
+    def surface(self, height_m: float) -> Surface:
+        """The surface `height_m` over the ground as it was fitted last."""
+        ground = self._ground
+        level = ground.height - float(ground.slope @ ground.anchor) + height_m
+        return Surface(level, ground.slope.copy())
+
+    def clearance(self, place: Array) -> Clearance:
+        """Distances to obstacles around `place` (3,)."""
+        self._grid.move_to(place)
+        self._grid.clear_around(place, _BUBBLE_M)
+        scores, low = self._grid.window(place, _WINDOW)
+        return clearance_of(scores, low, self._grid.cell_m, self._upright_cells)
+
+    @staticmethod
+    def _is_fresh(time_ns: int | None, now_ns: int) -> bool:
+        return (
+            time_ns is not None
+            and -_SILENT_S * NS_PER_S <= now_ns - time_ns <= _SILENT_S * NS_PER_S
+        )

@@ -1,0 +1,146 @@
+"""Flies what the local planner plans, by velocities: it needs no pose but the plan's own."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.stuck_sensors import is_stuck
+from volery.autonomy.planning.trajectory_messages import Samples, samples_of
+from volery.autonomy.status import publish_status
+from volery.core.clock import NS_PER_S, ns_from_s
+from volery.core.kept import keep, put_back
+from volery.core.vectors import norm
+from volery.graph.messages import (
+    Bool,
+    MultiDOFJointTrajectory,
+    Odometry,
+    String,
+    Twist,
+    Vector3,
+)
+from volery.graph.node import Node
+
+Array = NDArray[np.float64]
+
+_PERIOD_S = 0.04
+_STALE_S = 0.5
+"""Without a pose for so long it stops."""
+_CARRIED_S = 0.1
+"""A pose is carried on along its velocity for so long at most: stamps of another clock may err."""
+_TURN_GAIN, _TURN_RAD_S = 1.8, 1.2
+_OFF_M = 2.0
+"""Farther from its plan it stops and waits for another one."""
+_STATE = ("_pose", "_heard_ns", "_frame", "_plan", "_next", "_told", "_paused")
+
+
+class TrajectoryFollower(Node):
+    """Commands `cmd_vel` so that `planning/trajectory` is flown; tells `~/status`.
+
+    Velocities rather than places are commanded: places would be those of whoever flies the vehicle,
+    and without GNSS nobody knows where the map of the one lies in that of the other. At the end of
+    a plan, and without odometry, the command is to stand still. While `planning/pause`
+    (std_msgs/Bool) says so it commands nothing and forgets its plan.
+
+    Parameters
+    ----------
+    odometry: topic of the pose, in whose frame plans are made.
+    gain: m/s for each m off the plan.
+    lead_s: so much ahead is the velocity that is commanded, for the vehicle's lag.
+
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("follower", **options)
+        odometry = str(self.declare_parameter("odometry", "odom").value)
+        self._gain = float(self.declare_parameter("gain", 1.2, least=0.0).value)
+        self._lead_ns = ns_from_s(
+            float(self.declare_parameter("lead_s", 0.25, least=0.0, most=10.0).value)
+        )
+        self._pose: Pose | None = None
+        self._heard_ns = 0
+        self._frame = ""
+        self._plan: Samples | None = None
+        self._next: Samples | None = None
+        self._told = ""
+        self._paused = False
+        self._command = self.create_publisher(Twist, "cmd_vel", 1)
+        self._status = self.create_publisher(String, "~/status", 1, latched=True)
+        self.create_subscription(Odometry, odometry, self._on_odometry, 5)
+        self.create_subscription(
+            MultiDOFJointTrajectory, "planning/trajectory", self._on_trajectory, 2
+        )
+        self.create_subscription(Bool, "planning/pause", self._on_pause, 1)
+        self.create_timer(_PERIOD_S, self._on_timer)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return keep(self, _STATE)
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self, state)
+
+    def _on_odometry(self, message: Odometry) -> None:
+        pose = Pose.from_odometry(message)
+        values = (pose.position, pose.attitude, pose.velocity)
+        if all(np.isfinite(v).all() for v in values) and not is_stuck(pose, self._pose):
+            self._pose, self._frame = pose, message.header.frame_id
+            self._heard_ns = self.get_clock().now_ns()
+
+    def _on_trajectory(self, message: MultiDOFJointTrajectory) -> None:
+        if message.header.frame_id != self._frame:
+            self._tell("refused", f"plans are in '{self._frame}', not '{message.header.frame_id}'")
+            return
+        samples = samples_of(message)
+        if samples is None:
+            self._tell("refused", "a plan without points, or with numbers that are not finite")
+            return
+        self._next = samples
+
+    def _on_pause(self, message: Bool) -> None:
+        self._paused = bool(message.data)
+        self._plan = self._next = None
+        if self._paused:
+            self._tell("paused", "")
+
+    def _on_timer(self) -> None:
+        if self._paused:
+            return
+        now = self.get_clock().now_ns()
+        if self._next is not None and self._next.time_ns[0] <= now:
+            self._plan, self._next = self._next, None
+        if self._plan is None or self._pose is None:
+            return
+        if not 0 <= now - self._heard_ns <= _STALE_S * NS_PER_S:
+            self._tell("stopped", "no odometry")
+            self._command.publish(Twist(Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)))
+            return
+        self._fly(self._plan, self._pose, now)
+
+    def _fly(self, plan: Samples, pose: Pose, now: int) -> None:
+        age_s = min(max((now - pose.time_ns) / NS_PER_S, 0.0), _CARRIED_S)
+        here = pose.position + pose.velocity * age_s
+        place, _ = plan.at(now)
+        _, velocity = plan.at(now + self._lead_ns)
+        off = place - here
+        if norm(off) > _OFF_M:
+            self._tell("stopped", "too far from the plan")
+            velocity, off = np.zeros(3), np.zeros(3)
+        else:
+            self._tell("flying", "")
+        x, y, z = (velocity + self._gain * off).tolist()
+        c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+        turn = math.remainder(plan.yaw - pose.yaw, 2.0 * math.pi)
+        rate = max(-_TURN_RAD_S, min(_TURN_RAD_S, _TURN_GAIN * turn))
+        self._command.publish(
+            Twist(Vector3(c * x + s * y, c * y - s * x, z), Vector3(0.0, 0.0, rate))
+        )
+
+    def _tell(self, state: str, reason: str) -> None:
+        told = {"state": state, "reason": reason}
+        self._told = publish_status(self._status, told, self._told)

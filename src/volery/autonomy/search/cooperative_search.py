@@ -1,0 +1,306 @@
+"""Cooperative search: a UAV that looks for a colour at random, and calls the others to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.search.calls import JOIN, Calls, Claim
+from volery.autonomy.search.ground_view import Intrinsics
+from volery.autonomy.search.object_detection import place_seen
+from volery.autonomy.search.search_positions import check_room, places_around, random_waypoint
+from volery.autonomy.search.steering import is_at
+from volery.autonomy.search.team_flight import TeamFlight
+from volery.autonomy.search.teammates import CAN_COME, GOING_HOME, ON_THE_WAY, RISING, Phase
+from volery.core import rng
+from volery.core.clock import NS_PER_S
+from volery.core.vectors import norm
+from volery.graph.messages import (
+    CameraInfo,
+    Image,
+    Point,
+    PointStamped,
+    header,
+    stamp_of,
+)
+
+Array = NDArray[np.float64]
+
+_BORDER_M = 1.0
+"""Waypoints and places keep so far inside the area: more than a UAV strays from its way."""
+_NEAR_M = 1.0
+"""So near to a waypoint it turns to the next."""
+_LOOKS, _LOOK_S = 5, 8.0
+"""Pictures at rest over it that make a find, and how long it tries, the way there apart."""
+_REST_M_S = 0.3
+_BLIND_S = 2.0
+"""Without a picture for so long it stops."""
+_SEARCHING = frozenset({Phase.SEARCH, Phase.LOOK})
+"""All modelling choices."""
+
+
+class CooperativeSearch(TeamFlight):
+    """Searches its area by its own camera; calls and is called by `search/come`.
+
+    Parameters
+    ----------
+    team: names of all UAVs of the search, this one included. The order counts: each flies a layer
+        higher than the one before it.
+    area_m: [x_min, y_min, x_max, y_max] in the map; nobody leaves it, nothing beyond it is found.
+    altitude_m, layer_m: z of the lowest UAV, and how much higher each other one flies.
+    speed_m_s: on all ways.
+    apart_m: least distance, in plan, between UAVs at the object, and to it.
+    camera: its topics are `CAMERA/image_raw` and `CAMERA/camera_info`.
+    mount_m, mount_rpy_deg: of the camera in the body, as in a scenario.
+    object_m: z of the middle of what is searched for.
+    hue_deg: [first, last]; saturation, value: least ones; see `search.colour_blob`.
+    share: least share of the picture.
+    gather_s: how long to wait on the ground for teammates that were never heard.
+    patience_s: after so long a silence a teammate is not waited for.
+    hold_s: how long all stay at the object.
+    search_s: how long to search in vain; 0: without an end.
+    seed: of the waypoints; each UAV has a stream of its own.
+
+    """
+
+    STATE = (
+        *TeamFlight.STATE,
+        "claim",
+        "calls",
+        "_intrinsics",
+        "_waypoint",
+        "_began_ns",
+        "_image_ns",
+        "_look_from",
+        "_look_s",
+        "_looks",
+        "_waiting_ns",
+        "_finishing",
+        "_to_tell",
+    )
+
+    @classmethod
+    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
+        """Returns the tasks that compile its kernels."""
+        from volery.autonomy.search import warmup
+
+        return (warmup.colours,)
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        settings = self.settings
+        self._inner = settings.area.without_border(_BORDER_M)
+        self._key = rng.stream_key(settings.seed, f"{settings.name}/search")
+        check_room(*self._spread)
+
+        self.claim: Claim | None = None
+        """What is gone by: found by this UAV or another one."""
+        self.calls = Calls()
+        """Of an own find."""
+        self._intrinsics: Intrinsics | None = None
+        self._waypoint = 0
+        self._began_ns: int | None = None
+        """When the search began."""
+        self._image_ns = 0
+        self._look_from = np.zeros(3)
+        self._look_s = 0.0
+        self._looks: list[Array] = []
+        self._waiting_ns: int | None = None
+        """Since when everybody who comes is there."""
+        self._finishing = False
+        self._to_tell: list[str] = []
+        """Teammates that are still to be told that the search is over."""
+
+        self._found = self.create_publisher(PointStamped, "~/found", 1, latched=True)
+        self._come_clients = {n: self.create_client(JOIN, self._of(n, "come")) for n in self.mates}
+        self._finish_clients = {
+            n: self.create_client("std_srvs/srv/Trigger", self._of(n, "finish")) for n in self.mates
+        }
+        self.create_service(JOIN, "~/come", self.on_call)
+        self.create_service("std_srvs/srv/Trigger", "~/finish", self._on_finish)
+        self.create_subscription(Image, f"{settings.camera}/image_raw", self._on_image, 1)
+        self._listen_for_intrinsics()
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        super().set_state(state)
+        if self._intrinsics is None:
+            self._listen_for_intrinsics()
+
+    @property
+    def mates(self) -> tuple[str, ...]:
+        """Names of the teammates."""
+        return self.settings.teammates
+
+    # --------------------------------------------------------------------------------- what it sees
+
+    def _listen_for_intrinsics(self) -> None:
+        """Until they have come once: for them a camera has to measure depth as well."""
+
+        def on_info(info: CameraInfo) -> None:
+            self._intrinsics = Intrinsics.from_message(info)
+            listening.cancel()
+
+        topic = f"{self.settings.camera}/camera_info"
+        listening = self.create_subscription(CameraInfo, topic, on_info, 1)
+
+    def _on_image(self, image: Image) -> None:
+        self._image_ns = self.now_ns
+        if self.phase not in _SEARCHING or self.pose is None or self._intrinsics is None:
+            return
+        mates = [m.position for m in self.teammates.values() if m.phase is not None]
+        place = place_seen(image, self._intrinsics, self.settings, self.pose, mates)
+        if place is None:
+            return
+        if self.phase is Phase.SEARCH:
+            self._see(stamp_of(image), place)
+        elif is_at(self.pose, self._look_from, _NEAR_M, _REST_M_S):
+            self._looks.append(place)
+
+    def _see(self, stamp_ns: int, place: Array) -> None:
+        """Break off, stop over it and look again: from there its height matters little."""
+        assert self.pose is not None
+        self.claim = Claim(stamp_ns, self.settings.name, _plain(place))
+        low, high = np.reshape(self._inner, (2, 2))
+        self._look_from, self._looks = self.in_layer(np.clip(place[:2], low, high)), []
+        way = norm(self._look_from - self.pose.position)
+        self._look_s = _LOOK_S + way / self.settings.speed_m_s
+        self.enter(Phase.LOOK)
+
+    # --------------------------------------------------------------------------------- what it does
+
+    def act(self, pose: Pose) -> None:
+        """Search, look, come, hold."""
+        if self.phase in CAN_COME - {Phase.READY} and self.team_in(GOING_HOME):
+            self._finish()
+        if self._finishing and self.phase in CAN_COME - RISING:
+            self.enter(Phase.HOME)
+        if self.phase is Phase.SEARCH:
+            self._search(pose)
+        elif self.phase is Phase.LOOK:
+            self._look()
+        elif self.phase in (Phase.COME, Phase.HOLD):
+            arrived = self.fly_to(self._own_place())
+            if arrived and self.phase is Phase.COME:
+                self.enter(Phase.HOLD)
+            self._call_teammates()
+            if self.phase is Phase.HOLD:
+                self._hold()
+        for name in self._to_tell:
+            self.ask(self._finish_clients[name])
+        self._to_tell = []
+
+    def _search(self, pose: Pose) -> None:
+        if self.claim is not None:  # called while it climbed
+            self.enter(Phase.COME)
+            return
+        if self._began_ns is None:
+            self._began_ns = self.now_ns
+        if 0.0 < self.settings.search_s * NS_PER_S < self.now_ns - self._began_ns:
+            self._finish()
+            return
+        if not 0 <= self.now_ns - self._image_ns <= _BLIND_S * NS_PER_S:
+            self.fly_to(pose.position)
+            return
+        goal = self.in_layer(random_waypoint(self._inner, self._key, self._waypoint))
+        self.fly_to(goal)
+        if norm(goal[:2] - pose.position[:2]) < _NEAR_M:
+            self._waypoint += 1
+
+    def _look(self) -> None:
+        assert self.claim is not None
+        self.fly_to(self._look_from)
+        if len(self._looks) >= _LOOKS:
+            place = np.median(self._looks, axis=0)
+            self.claim = self.claim._replace(place=_plain(place))
+            self.calls = Calls.of(self.mates)
+            stamp = header(self.claim.stamp_ns, "map")
+            self._found.publish(PointStamped(stamp, Point(*self.claim.place)))
+            self._begin_to_come()
+        elif self.phase_s > self._look_s:
+            self.claim = None
+            self.enter(Phase.SEARCH)
+
+    def _begin_to_come(self) -> None:
+        self._waiting_ns = None
+        self.enter(Phase.COME)
+
+    @property
+    def _spread(self) -> tuple[int, float, Any]:
+        return len(self.settings.team), self.settings.apart_m, self._inner
+
+    def _own_place(self) -> Array:
+        assert self.claim is not None
+        places = places_around(np.array(self.claim.place), *self._spread)
+        return self.in_layer(places[self.settings.rank])
+
+    def _hold(self) -> None:
+        """Go home when everybody who comes has been there for a while; the finder decides it."""
+        assert self.claim is not None
+        finder = self.teammates.get(self.claim.finder)
+        patience = self.settings.patience_s
+        if finder is not None and finder.is_heard(self.now_ns, patience):
+            waits = finder.phase in CAN_COME
+        else:
+            waits = self.team_in(ON_THE_WAY) or not self.calls.are_settled(self.now_ns)
+        if waits:
+            self._waiting_ns = None
+        elif self._waiting_ns is None:
+            self._waiting_ns = self.now_ns
+        elif self.now_ns - self._waiting_ns > self.settings.hold_s * NS_PER_S:
+            self._finish()
+
+    # ------------------------------------------------------------------------------ what they agree
+
+    def _call_teammates(self) -> None:
+        assert self.claim is not None
+        for name in self.mates:
+            phase = self.teammates[name].phase
+            if phase is not None and phase not in CAN_COME:
+                self.calls.drop(name)
+        for name, call in self.calls.begin_due(self.now_ns):
+            self.ask(self._come_clients[name], self.claim.request(), call.note)
+
+    def on_call(self, request: Any, response: Any) -> Any:
+        """A teammate calls: the earlier of two finds counts, of one instant the first name's."""
+        response.message = self._why_not(Claim.from_request(request))
+        response.accepted = not response.message
+        return response
+
+    def _why_not(self, called: Claim) -> str:
+        """Heed a call; or why not."""
+        name = self.settings.name
+        if called.finder not in self.mates:
+            return f"{called.finder or 'nobody'} is not in the team of {name}"
+        if not self.settings.area.holds(*called.place[:2]):
+            return f"{name} does not leave its area"
+        if self.phase not in CAN_COME or self._finishing:
+            return f"{name} takes no part any more: {self.phase}"
+        if self.claim is not None and self.claim.key < called.key:
+            return f"{self.claim.finder} saw something earlier"
+        if self.claim is None or self.claim.key != called.key:
+            self.claim, self.calls = called, Calls()
+            if self.phase in CAN_COME - RISING - {Phase.ALOFT}:
+                self._begin_to_come()
+        return ""
+
+    def _on_finish(self, _request: Any, response: Any) -> Any:
+        self._finish()
+        response.success, response.message = True, str(self.phase)
+        return response
+
+    def _finish(self) -> None:
+        """Go home, or stay on the ground, and tell the others to: once."""
+        if not self._finishing:
+            self._finishing, self._to_tell = True, list(self.mates)
+            if self.phase is Phase.READY:
+                self.enter(Phase.DONE)
+
+
+def _plain(place: Array) -> tuple[float, float, float]:
+    x, y, z = map(float, place)
+    return x, y, z

@@ -1,0 +1,39 @@
+"""Whether what is searched for is in a picture, and where it is then."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.search.colour_blob import NO_DISCS, colour_mask, largest_blob, pixels_of
+from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
+from volery.autonomy.search.settings import Settings
+from volery.graph.messages import Image, stamp_of
+
+Array = NDArray[np.float64]
+
+_TEAMMATE_M = 0.7
+"""Radius of the ball in which a teammate is, which may be red itself. Modelling choice."""
+
+
+def place_seen(
+    image: Image, intrinsics: Intrinsics, settings: Settings, pose: Pose, teammates: Iterable[Array]
+) -> Array | None:
+    """(3,) the place in the map of the largest patch of the colour, inside the area.
+
+    pose: odometry of about the picture's time. teammates: their places (3,), where nothing counts.
+    None where the patch is too small, lies outside, or no ray to it meets the ground.
+    """
+    pose = pose_at(pose, stamp_of(image))
+    view = GroundView(intrinsics, settings.mount_m, settings.mount_rpy_deg)
+    discs = [view.disc_of(place, _TEAMMATE_M, pose) for place in teammates]
+    hidden = [disc for disc in discs if disc is not None]
+    mask = colour_mask(pixels_of(image), settings.colours, np.array(hidden) if hidden else NO_DISCS)
+    blob = largest_blob(mask)
+    if blob is None or blob.share < settings.least_share:
+        return None
+    place = view.place_of(blob.u, blob.v, pose, settings.object_m)
+    return place if place is not None and settings.area.holds(place[0], place[1]) else None

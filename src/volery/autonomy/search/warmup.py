@@ -1,0 +1,13 @@
+"""Compiles the kernels that look for colours; see `volery.autonomy.perception.warmup`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from volery.autonomy.perception.warmup import fixed
+from volery.autonomy.search.colour_blob import ColourRange, colour_mask, largest_blob
+
+
+def colours() -> None:
+    """All of them."""
+    largest_blob(colour_mask(fixed(np.zeros((2, 2, 3), np.uint8)), ColourRange()))

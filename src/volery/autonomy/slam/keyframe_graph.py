@@ -1,0 +1,259 @@
+"""The way in the map: keyframes, how they follow each other, and what places seen again correct."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.inertial_kernels import G, Q
+from volery.autonomy.slam.keyframes import (
+    Gathering,
+    Keyframe,
+    level_of,
+    step_between,
+    turn_of_heading,
+)
+from volery.autonomy.slam.loop_closure import LoopCloser
+from volery.autonomy.slam.pose_graph import Edge, compose, load_gtsam, optimised
+from volery.autonomy.slam.relocalization import Relocation
+from volery.autonomy.slam.settings import Matching
+from volery.autonomy.slam.sweep import Seen
+from volery.autonomy.slam.tracker import Tracker
+from volery.core import rotations
+from volery.core.clock import NS_PER_S
+from volery.core.kept import keep, put_back
+from volery.core.vectors import norm
+
+Array = NDArray[np.float64]
+
+_STEP_M, _STEP_RAD, _STEP_S = 2.0, 0.6, 10.0
+"""Motion, or time, between keyframes."""
+_LOST_STEP_S = 2.0
+"""Time likewise while it is lost: it may hold still until it is known where in the map it is."""
+_RELEVEL_NS = 25 * NS_PER_S
+"""So long the steps between keyframes follow what is learnt of where down is."""
+_PER_ROOT_M = np.array([0.015, 0.015, 0.015, 0.0006])
+"""How odometry goes astray over sqrt(m): m and rad (measured on recorded flights)."""
+_APART_M = 40.0
+"""Way flown between a keyframe and one that it may be matched with."""
+_NEAR_M = 12.0
+_ASTRAY = np.array([1000.0, 1000.0, 1000.0, 3.0])
+"""Standard deviations of the step over which the motion was lost."""
+
+
+class Placement(NamedTuple):
+    """`map_from_odom`: position (3,) m and attitude (4,)."""
+
+    position: Array
+    attitude: Array
+
+
+class Way:
+    """Keyframes of one vehicle and their graph; `start` (4,) is the first one's pose in the map."""
+
+    _STATE = (
+        "frames", "poses", "edges", "closures", "refused", "session", "is_placed", "correction",
+        "relocation", "_gathering", "_tried", "_settling",
+    )  # fmt: skip
+
+    def __init__(self, matching: Matching, start: Array, has_loops: bool = True) -> None:
+        if has_loops:
+            load_gtsam()
+        self._closer = LoopCloser(matching) if has_loops else None
+        self._start = np.asarray(start, np.float64)
+        self._settling = np.array([0.0, 0.0, 0.0, 1.0])
+        """How the vehicle turned on its feet since it was at the start."""
+        self.frames: list[Keyframe] = []
+        self.poses: list[Array] = []
+        """Of the keyframes in the map, (4,) x, y, z, yaw."""
+        self.edges: list[Edge] = []
+        self.closures = self.refused = 0
+        self.session = 0
+        self.is_placed = True
+        """Whether it is known where in the map the present session is."""
+        self.correction = Placement(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+        self.relocation = Relocation()
+        self._gathering = Gathering()
+        self._tried = -1_000
+
+    def add(self, seen: Seen, tracker: Tracker) -> bool:
+        """Take in a sweep; whether it has led to a new keyframe."""
+        if seen.is_drawn:
+            self._gathering.add(seen.points, seen.kinds)
+        if not self._is_due(tracker):
+            return False
+        state = tracker.state
+        place = state[:3].copy(), state[Q : Q + 4].copy(), state[G : G + 3].copy()
+        frame = self._gathering.keyframe(tracker.time_ns, place, tracker.travelled_m, self.session)
+        if not self.frames:
+            self._settling = tracker.settling.copy()
+        self._append(frame, place[2])
+        self._look_for_known_places()
+        self._correct(place[2])
+        return True
+
+    def begin_anew(self, doubted_since_ns: int | None = None, moved: Array | None = None) -> None:
+        """The motion was lost: from now on nobody knows where in the map the odometry is.
+
+        Keyframes since then may be of another place than they say already, and so are all those of
+        a session that has never found its place. `moved`: (2,) m in the odometry's frame, by how
+        much it seems to have been displaced.
+        """
+        doubted = {
+            k
+            for k, frame in enumerate(self.frames)
+            if frame.session == self.session
+            and (not self.is_placed or _is_since(frame, doubted_since_ns))
+        }
+        hint = None
+        if moved is not None and self.is_placed:
+            hint = rotations.rotate(self.correction.attitude, np.array([*moved, 0.0]))[:2]
+        self.relocation.begin(doubted, hint)
+        self.session += 1
+        self.is_placed = False
+        self._gathering = Gathering()
+
+    def pose(self, tracker: Tracker) -> tuple[Array, Array]:
+        """Present position (3,) and attitude (4,) in the map."""
+        at = self.correction
+        position = rotations.rotate(at.attitude, tracker.state[:3]) + at.position
+        return position, rotations.multiply(at.attitude, tracker.state[Q : Q + 4])
+
+    def sigmas(self, tracker: Tracker) -> Array:
+        """Standard deviations (4,) of x, y, z, yaw in the map: by the way from a known place."""
+        if not self.is_placed:
+            return _ASTRAY
+        known = 0.0
+        for edge in self.edges:
+            if edge.is_closure:
+                # Seen again from where it began, it is as sure as then.
+                known = max(
+                    known, self.frames[edge.to].travelled_m - self.frames[edge.origin].travelled_m
+                )
+        way = max(tracker.travelled_m - known, 0.0)
+        return np.hypot(_PER_ROOT_M * math.sqrt(way), [0.02, 0.02, 0.02, 0.001])
+
+    # -------------------------------------------------------------------------------- keyframes
+
+    def _is_due(self, tracker: Tracker) -> bool:
+        if not self.frames or self.frames[-1].session != self.session:
+            return True
+        last, state = self.frames[-1], tracker.state
+        step_s = _STEP_S if self.is_placed else _LOST_STEP_S
+        turn = rotations.multiply(state[Q : Q + 4], rotations.conjugate(last.attitude))
+        return bool(
+            norm(state[:3] - last.position) > _STEP_M
+            or abs(float(rotations.yaw_of(turn))) > _STEP_RAD
+            or tracker.time_ns - last.time_ns > step_s * NS_PER_S
+        )
+
+    def _append(self, frame: Keyframe, gravity: Array) -> None:
+        if not self.frames:
+            self.frames.append(frame)
+            self.poses.append(self._begin_pose(gravity))
+            return
+        is_new = frame.session != self.frames[-1].session
+        self.frames.append(frame)
+        row = len(self.frames) - 1
+        step = step_between(self.frames[row - 1], frame.position, frame.attitude, gravity)
+        sigmas = _ASTRAY
+        if not is_new:
+            moved = norm(frame.position - self.frames[row - 1].position)
+            sigmas = _PER_ROOT_M * math.sqrt(max(moved, 0.1))
+        self.edges.append(Edge(row - 1, row, step, sigmas))
+        self.poses.append(compose(self.poses[row - 1], step))
+        self._level_again(gravity)
+
+    def _begin_pose(self, gravity: Array) -> Array:
+        """Of the first keyframe in the map, (4,): where it stood, by what is known of gravity."""
+        attitude = self.frames[0].attitude
+        turn = turn_of_heading(level_of(gravity, attitude), attitude, self._settling)
+        return np.add(self._start, [0.0, 0.0, 0.0, turn])
+
+    def _level_again(self, gravity: Array) -> None:
+        """Take what is now known of gravity for the last keyframes, too."""
+        first = len(self.frames) - 1
+        newest = self.frames[-1]
+        while (
+            first > 0
+            and self.frames[first - 1].session == newest.session
+            and newest.time_ns - self.frames[first - 1].time_ns < _RELEVEL_NS
+        ):
+            first -= 1
+        if first == 0:
+            self.poses[0] = self._begin_pose(gravity)
+        for n, edge in enumerate(self.edges):
+            if edge.is_closure or edge.origin < first:
+                continue
+            to = self.frames[edge.to]
+            step = step_between(self.frames[edge.origin], to.position, to.attitude, gravity)
+            self.edges[n] = edge._replace(measured=step)
+            self.poses[edge.to] = compose(self.poses[edge.origin], step)
+
+    # ------------------------------------------------------------------------------ known places
+
+    def _look_for_known_places(self) -> None:
+        if self._closer is None:
+            return
+        newest = len(self.frames) - 1
+        if self.is_placed:
+            found = self._find_near(newest)
+        else:
+            found = self.relocation.find(self._closer, self.frames, self.poses)
+        if found is None:
+            return
+        self.edges.append(found)
+        self.closures += 1
+        self.is_placed = True
+        self.poses[newest] = compose(self.poses[found.origin], found.measured)
+        self.poses = optimised(self.poses, self.edges)
+
+    def _find_near(self, newest: int) -> Edge | None:
+        """The nearest old keyframe, if it fits; at every second keyframe at most."""
+        if newest - self._tried < 2 or self._closer is None:
+            return None
+        here = self.frames[newest]
+        best, row = _NEAR_M, -1
+        for k in range(newest):
+            if here.travelled_m - self.frames[k].travelled_m < _APART_M:
+                break
+            if k in self.relocation.doubted:
+                continue
+            away = float(np.hypot(*(self.poses[k] - self.poses[newest])[:2]))
+            if away < best:
+                best, row = away, k
+        if row < 0:
+            return None
+        self._tried = newest
+        way = here.travelled_m - self.frames[row].travelled_m
+        drift = 3.0 * _PER_ROOT_M * math.sqrt(way)
+        reach = (0.4 + float(drift[0]), 0.01 + float(drift[3]))
+        found = self._closer.match(self.frames, self.poses, newest, row, reach)
+        if found is None:
+            self.refused += 1
+            return None
+        return found.edge
+
+    def _correct(self, gravity: Array) -> None:
+        """Where the odometry's frame lies, by the newest keyframe."""
+        frame, pose = self.frames[-1], self.poses[-1]
+        level = level_of(gravity, frame.attitude)
+        turn = rotations.multiply(
+            rotations.from_rpy(0.0, 0.0, float(pose[3]) - level.yaw), level.attitude
+        )
+        self.correction = Placement(pose[:3] - rotations.rotate(turn, frame.position), turn)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return keep(self, self._STATE)
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self, state)
+
+
+def _is_since(frame: Keyframe, time_ns: int | None) -> bool:
+    return time_ns is not None and frame.time_ns > time_ns

@@ -1,0 +1,219 @@
+"""Seeing places again: sets of keyframes matched with others that were seen before."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.keyframes import Keyframe
+from volery.autonomy.slam.local_maps import Maps
+from volery.autonomy.slam.matching_kernels import UPRIGHT
+from volery.autonomy.slam.pose_graph import Edge, between
+from volery.autonomy.slam.relocalization_kernels import draw, draw_maps, refine, search
+from volery.autonomy.slam.settings import Matching
+
+Array = NDArray[np.float64]
+
+_PICTURE = 400
+_ROUNDS = 8
+_BEFORE, AROUND = 2, 3
+"""Keyframes before the newest one, and on both sides of the older one, that are matched."""
+_LEAST_SHARE, _LEAST_MET = 0.42, 30.0
+"""Share and number of uprights that must be met again, each counted by how well."""
+_LEAST_SHARE_LOST, _LEAST_MET_LOST = 0.2, 80.0
+_LEAST_MARGIN_LOST = 0.05
+"""By how much its place must fit better than all others.
+
+Of 480 pairs of keyframes of flights through the forest, matched within 12 m and 0.2 rad, those that
+lay so near had margins of 0.22 in the median, nine of ten above 0.12, and nine of ten a share of
+0.21; those farther apart, which fitted somewhere all the same, had margins of 0.10 at the most, but
+shares of up to 0.39, in a thicket.
+"""
+_APART_M = 1.5
+"""A place so far from the best one is another one."""
+_LEAST_INFORMATION = 2000.0
+"""1/m^2, of the place in the weakest direction: what three trunks tell, seen ten times each."""
+_FLOOR = np.array([0.06, 0.06, 0.06, 0.004])
+"""Least standard deviation of a closure: what the map's own errors are."""
+
+
+class Closure(NamedTuple):
+    """A place seen again, and how surely."""
+
+    edge: Edge
+    share: float
+    met: float
+    margin: float
+    """By how much it fits better than any other place that was tried."""
+
+
+class _Trial(NamedTuple):
+    """How finely places are tried: cells of a picture, turns, and returns (all but so many)."""
+
+    cell_m: float
+    step_rad: float
+    returns: int
+
+
+_NEARBY, _ANYWHERE, _ANY_HEADING = (
+    _Trial(0.2, 0.0125, 150), _Trial(0.4, 0.035, 150), _Trial(0.4, 0.035, 75)
+)  # fmt: skip
+
+
+class _Pair(NamedTuple):
+    """What is matched: returns (K, 3) in the axes of a keyframe, and their kinds (K,)."""
+
+    query: Array
+    query_kinds: NDArray[np.int8]
+    known: Array
+    known_kinds: NDArray[np.int8]
+
+
+class LoopCloser:
+    """Matches sets of keyframes; `poses` are theirs in the map, (4,) each."""
+
+    def __init__(self, matching: Matching) -> None:
+        self._matching = matching
+        self._maps = Maps()
+        self._picture = np.zeros((_PICTURE, _PICTURE), np.uint8)
+
+    def match(
+        self,
+        frames: Sequence[Keyframe],
+        poses: Sequence[Array],
+        newest: int,
+        older: int,
+        reach: tuple[float, float],
+    ) -> Closure | None:
+        """The newest keyframe as seen from an older one; None where they do not fit.
+
+        `reach`: how far the newest one may be from where it seems to be, m and rad.
+        """
+        pair = _pair(frames, poses, newest, older)
+        if pair is None:
+            return None
+        guess = between(poses[older], poses[newest])
+        span = np.array([reach[0], reach[0], reach[1]])
+        found, margin = self._searched(pair, guess[[0, 1, 3]], span, _NEARBY)
+        pose = np.array([found[0], found[1], guess[2], found[2]])
+        closure = self._refined(pose, pair, (older, newest), margin)
+        fits = closure is not None and closure.share >= _LEAST_SHARE and closure.met >= _LEAST_MET
+        return closure if fits else None
+
+    def find(
+        self,
+        frames: Sequence[Keyframe],
+        poses: Sequence[Array],
+        newest: int,
+        older: int,
+        reach: tuple[float, float],
+    ) -> Closure | None:
+        """The newest keyframe of one that is lost as seen from an older one; maybe only a guess.
+
+        `reach`: how far it may be from the older one, m, and from the heading that it seems to
+        have, rad.
+        """
+        pair = _pair(frames, poses, newest, older)
+        if pair is None:
+            return None
+        seems = np.array([0.0, 0.0, between(poses[older], poses[newest])[3]])
+        span = np.array([reach[0], reach[0], reach[1]])
+        trial = _ANY_HEADING if reach[1] >= math.pi else _ANYWHERE
+        found, margin = self._searched(pair, seems, span, trial)
+        pose = np.array([found[0], found[1], _height(pair), found[2]])
+        closure = self._refined(pose, pair, (older, newest), margin)
+        fits = (
+            closure is not None
+            and closure.share >= _LEAST_SHARE_LOST
+            and closure.met >= _LEAST_MET_LOST
+            and margin >= _LEAST_MARGIN_LOST
+        )
+        return closure if fits else None
+
+    def _searched(
+        self, pair: _Pair, middle: Array, span: Array, trial: _Trial
+    ) -> tuple[Array, float]:
+        """The pose (3,) x, y, yaw that fits best, and by how much better than any other place."""
+        standing = pair.query[pair.query_kinds == UPRIGHT]
+        known = pair.known[pair.known_kinds == UPRIGHT]
+        draw(np.ascontiguousarray(known[:, :2]), trial.cell_m, self._picture)
+        thin = np.ascontiguousarray(standing[:: max(len(standing) // trial.returns, 1), :2])
+        side = 2 * math.ceil(span[0] / trial.cell_m) + 1
+        found, shares = np.zeros(3), np.empty((side, side))
+        best = search(
+            thin, self._picture, trial.cell_m, middle, span, trial.step_rad, found, shares
+        )
+        rows, columns = np.indices(shares.shape)
+        row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)
+        away = trial.cell_m * np.hypot(rows - row, columns - column) > _APART_M
+        return found, best - float(shares[away].max(initial=0.0))
+
+    def _refined(
+        self, pose: Array, pair: _Pair, rows: tuple[int, int], margin: float
+    ) -> Closure | None:
+        maps, m = self._maps, self._matching
+        draw_maps(
+            np.ascontiguousarray(pair.known), pair.known_kinds, maps.upright_keys, maps.cells,
+            maps.ground_keys, maps.sums,
+        )  # fmt: skip
+        information, told = np.zeros((4, 4)), np.zeros(4)
+        done = refine(
+            pose, np.ascontiguousarray(pair.query), pair.query_kinds, maps.upright_keys,
+            maps.cells, maps.ground_keys, maps.sums, m.upright_sigma_m**2, m.ground_sigma_m**2,
+            _ROUNDS, information, told,
+        )  # fmt: skip
+        weakest = float(np.linalg.eigvalsh(information[:2, :2])[0])
+        if not done or weakest < _LEAST_INFORMATION:
+            return None
+        spread = np.linalg.inv(m.trust * information + 1e-3 * np.eye(4))
+        sigmas = np.hypot(np.sqrt(np.maximum(np.diag(spread), 0.0)), _FLOOR)
+        if told[2] < 20.0:
+            sigmas[2] = 10.0  # no ground in common: the height stays open
+        pose[3] = math.remainder(pose[3], math.tau)
+        edge = Edge(rows[0], rows[1], pose.copy(), sigmas, True)
+        return Closure(edge, float(told[0] / max(told[1], 1.0)), float(told[0]), margin)
+
+
+def _pair(
+    frames: Sequence[Keyframe], poses: Sequence[Array], newest: int, older: int
+) -> _Pair | None:
+    """The newest keyframes and those around an older one; None where too little is seen."""
+    query = _around(frames, poses, newest, range(newest - _BEFORE, newest + 1))
+    if np.count_nonzero(query[1] == UPRIGHT) < _LEAST_MET:
+        return None
+    others = range(older - AROUND, min(older + AROUND + 1, newest - _BEFORE))
+    return _Pair(*query, *_around(frames, poses, older, others))
+
+
+def _height(pair: _Pair) -> float:
+    """How much higher the newest frame flew over its ground than the older one over its own."""
+    query = pair.query[pair.query_kinds != UPRIGHT]
+    known = pair.known[pair.known_kinds != UPRIGHT]
+    if not len(known) or not len(query):
+        return 0.0
+    return float(np.median(known[:, 2]) - np.median(query[:, 2]))
+
+
+def _around(
+    frames: Sequence[Keyframe], poses: Sequence[Array], row: int, rows: range
+) -> tuple[Array, NDArray[np.int8]]:
+    """Returns of some keyframes of one session in the axes of one of them."""
+    points, kinds = [], []
+    for k in rows:
+        if not 0 <= k < len(frames) or frames[k].session != frames[row].session:
+            continue
+        step = between(poses[row], poses[k])
+        c, s = math.cos(step[3]), math.sin(step[3])
+        own = frames[k].points
+        turned = np.stack(
+            [c * own[:, 0] - s * own[:, 1], s * own[:, 0] + c * own[:, 1], own[:, 2]], 1
+        )
+        points.append(turned + step[:3])
+        kinds.append(frames[k].kinds)
+    if not points:
+        return np.zeros((0, 3)), np.zeros(0, np.int8)
+    return np.concatenate(points), np.concatenate(kinds)

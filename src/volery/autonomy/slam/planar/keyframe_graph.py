@@ -1,0 +1,231 @@
+"""The way in the map: keyframes, how they follow each other, and what places seen again correct."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.planar.loop_closure import Closer, Closure
+from volery.autonomy.slam.planar.pose_graph import Edge, optimised
+from volery.autonomy.slam.planar.poses import between, compose, grown, turned
+from volery.autonomy.slam.planar.settings import PlanarSettings
+from volery.autonomy.slam.planar.tracker import Kept
+from volery.autonomy.slam.pose_graph import load_gtsam
+from volery.core.kept import keep, put_back
+
+Array = NDArray[np.float64]
+
+_ASTRAY = np.diag([1000.0**2, 1000.0**2, 3.0**2])
+"""Covariance of the step over which the motion was lost."""
+_WIDEST = np.array([8.0, 8.0, 0.8])
+_NARROWEST = np.array([0.25, 0.25, 0.05])
+_ANYWHERE = np.array([6.0, 6.0, math.pi])
+_TRY_EACH = 0.9
+"""Way between two attempts."""
+_TRIES, _LOST_TRIES = 2, 3
+_SPACED_M = 4.0
+"""Between the places that are tried at one keyframe."""
+_AT_ONCE_M, _AT_ONCE_RAD = 0.04, 0.006
+_AT_LAST = 8
+"""Closures that say nothing new wait for so many others before all are made to fit."""
+
+
+class PlanarWay:
+    """Keyframes and their graph; `start` (3,) is the first one's pose in the map."""
+
+    _STATE = (
+        "frames", "poses", "edges", "session", "is_placed", "closures", "tried", "changes",
+        "covariance",
+        "_spread", "_pending", "_tried_at", "_cursor", "_waiting",
+    )  # fmt: skip
+
+    def __init__(self, settings: PlanarSettings, start: Array, *, has_loops: bool = True) -> None:
+        if has_loops:
+            load_gtsam()
+        self._settings = settings
+        self._closer = Closer(settings) if has_loops else None
+        self._start = np.asarray(start, np.float64)
+        self.frames: list[Kept] = []
+        self.poses: list[Array] = []
+        """Of the keyframes in the map, (3,)."""
+        self.edges: list[Edge] = []
+        self.session = 0
+        self.is_placed = True
+        """Whether it is known where in the map the present session is."""
+        self.closures = self.tried = self.changes = 0
+        """`changes` counts keyframes and corrections."""
+        self.covariance = np.zeros((3, 3))
+        """Of the newest keyframe in the map."""
+        self._spread: list[Array] = []
+        """Covariance of each keyframe."""
+        self._pending: Closure | None = None
+        self._tried_at = -1e9
+        self._cursor = 0
+        self._waiting = 0
+
+    def add(self, frame: Kept) -> bool:
+        """Take in a keyframe; whether the map has been corrected."""
+        self._append(frame)
+        if self._closer is None or frame.travelled - self._tried_at < _TRY_EACH:
+            return False
+        newest, found = len(self.frames) - 1, None
+        reach = self._reach() if self.is_placed else _ANYWHERE
+        for row in self._near(newest, reach) if self.is_placed else self._anywhere(newest):
+            self._tried_at = frame.travelled
+            self.tried += 1
+            closure = self._closer.close(self.frames, self.poses, newest, row, reach)
+            if closure is not None and (found is None or closure.fit.met > found.fit.met):
+                found = closure
+        return found is not None and self._weigh(found)
+
+    def finish(self) -> None:
+        """Let all closures count."""
+        if self._waiting:
+            self._fit()
+
+    def pose(self, own: Array) -> Array:
+        """A pose (3,) of the odometry's frame in the map."""
+        if not self.frames:
+            return compose(self._start, own)
+        return compose(self.poses[-1], between(self.frames[-1].pose, own))
+
+    @property
+    def correction(self) -> Array:
+        """The pose (3,) of the odometry's frame in the map."""
+        return self.pose(np.zeros(3))
+
+    # --------------------------------------------------------------------------------- keyframes
+
+    def _append(self, frame: Kept) -> None:
+        if not self.frames:
+            self._put(frame, compose(self._start, frame.pose), np.diag([1e-6] * 3))
+            return
+        step, of_step = frame.step, frame.covariance
+        if frame.session != self.frames[-1].session:
+            step, of_step = between(self.frames[-1].pose, frame.pose), _ASTRAY
+            self.session, self.is_placed, self._pending = frame.session, False, None
+        row, before = len(self.frames), self.poses[-1]
+        yaw = float(step[2])  # gtsam's noise lies in the axes of the step's end
+        information = np.linalg.inv(turned(of_step, -yaw))
+        self.edges.append(Edge(row - 1, row, step, 0.5 * (information + information.T)))
+        spread = grown(self._spread[-1], before, step, of_step)
+        self._put(frame, compose(before, step), spread)
+
+    def _put(self, frame: Kept, pose: Array, spread: Array) -> None:
+        self.changes += 1
+        self.frames.append(frame)
+        self.poses.append(pose)
+        self._spread.append(spread)
+        self.covariance = spread
+
+    # ------------------------------------------------------------------------------ known places
+
+    def _reach(self) -> Array:
+        """How far the newest keyframe may be from where it seems to be."""
+        sigmas = 3.0 * np.sqrt(np.diag(self.covariance))
+        wide = max(float(sigmas[0]), float(sigmas[1]))
+        reach = np.array([wide, wide, float(sigmas[2])])
+        return np.asarray(np.clip(reach, _NARROWEST, _WIDEST))
+
+    def _near(self, newest: int, reach: Array) -> Iterator[int]:
+        """Old keyframes that may be where it is, the nearest first, some way apart."""
+        here, apart = self.frames[newest], self._settings.closing.apart_m
+        last = newest
+        while last > 0 and (
+            self.frames[last - 1].session == here.session
+            and here.travelled - self.frames[last - 1].travelled <= apart
+        ):
+            last -= 1
+        if last == 0:
+            return
+        away = np.hypot(*(np.array(self.poses[:last]) - self.poses[newest])[:, :2].T)
+        wide = float(reach[0]) > 1.0
+        within = float(reach[0]) + 3.0
+        taken: list[int] = []
+        for row in np.argsort(away, kind="stable"):
+            if away[row] > within or len(taken) == (_TRIES if wide else 1):
+                return
+            places = [self.poses[k][:2] for k in taken]
+            if all(float(np.hypot(*(self.poses[row][:2] - p))) > _SPACED_M for p in places):
+                taken.append(int(row))
+                yield int(row)
+
+    def _anywhere(self, newest: int) -> Iterator[int]:
+        """Lost: some of the keyframes of earlier sessions, in turn."""
+        session = self.frames[newest].session
+        old = [k for k, frame in enumerate(self.frames) if frame.session != session]
+        fresh = sum(frame.session == session for frame in self.frames)
+        if not old or fresh < 3:
+            return
+        for _ in range(min(_LOST_TRIES, len(old))):
+            yield old[self._cursor % len(old)]
+            self._cursor += 5  # neighbours look alike
+
+    def _weigh(self, found: Closure) -> bool:
+        """Let a closure count, at once or once another one has agreed with it."""
+        c, away = self._settings.closing, found.away
+        far = math.hypot(away[0], away[1]) > c.far_m or abs(float(away[2])) > c.far_rad
+        if not far and self.is_placed:
+            self._pending = None
+            self._take([found])
+            return self._fit_if_due(away)
+        other, self._pending = self._pending, found
+        if other is None or not self._agree(other, found):
+            return False
+        self._pending = None
+        self._take([other, found])
+        self.is_placed = True
+        self.poses[found.edge.to] = compose(self.poses[found.edge.origin], found.edge.measured)
+        self._fit()
+        return True
+
+    def _agree(self, one: Closure, other: Closure) -> bool:
+        """Whether two closures move the newest keyframes to the same place."""
+        c, first, second = self._settings.closing, one.edge, other.edge
+        a, b = self.frames[first.to], self.frames[second.to]
+        if a.session != b.session or b.travelled - a.travelled > c.again_way_m:
+            return False
+        told = compose(compose(self.poses[first.origin], first.measured), between(a.pose, b.pose))
+        left = between(told, compose(self.poses[second.origin], second.measured))
+        way = b.travelled - a.travelled
+        return bool(
+            math.hypot(left[0], left[1]) < c.again_m + 0.03 * way
+            and abs(float(left[2])) < c.again_rad
+        )
+
+    def _take(self, found: list[Closure]) -> None:
+        for closure in found:
+            self.edges.append(closure.edge)
+            yaw = float(self.poses[closure.edge.to][2])
+            spread = turned(np.asarray(np.linalg.inv(closure.edge.information), np.float64), yaw)
+            known = self._spread[closure.edge.origin] + spread
+            if np.trace(known) < np.trace(self.covariance):
+                self._spread[closure.edge.to] = self.covariance = known
+        self.closures += len(found)
+        self._waiting += len(found)
+
+    def _fit_if_due(self, away: Array) -> bool:
+        at_once = math.hypot(away[0], away[1]) > _AT_ONCE_M or abs(float(away[2])) > _AT_ONCE_RAD
+        if not at_once and self._waiting < _AT_LAST:
+            return False
+        self._fit()
+        return True
+
+    def _fit(self) -> None:
+        before = len(self.edges)
+        self.poses, self.edges = optimised(self.poses, self.edges)
+        self.closures -= before - len(self.edges)
+        self._waiting = 0
+        self.changes += 1
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return keep(self, self._STATE)
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self, state)

@@ -1,0 +1,158 @@
+"""Places seen again: the way just travelled laid onto what older keyframes around it saw."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.planar.local_map import Fit, LocalMap
+from volery.autonomy.slam.planar.pose_graph import Edge
+from volery.autonomy.slam.planar.poses import between, placed
+from volery.autonomy.slam.planar.scans import thinned
+from volery.autonomy.slam.planar.settings import PlanarSettings
+from volery.autonomy.slam.planar.tracker import Kept
+
+Array = NDArray[np.float64]
+
+_LEVELS = 6
+_MOST_FRAMES, _MOST_QUERIES = 24, 12
+_THIN, _FINE = 160, 600
+"""Returns that are searched with, and that are fitted."""
+_ALIKE, _OTHER_M = 0.93, 0.7
+"""A second place this far off that scores so nearly as well makes both doubtful."""
+_ANY_RAD = 3.0
+"""A window so wide is that of who is lost: it lies about the older keyframe."""
+_LEAST_INFORMATION = 400.0
+"""1/m^2 of the place in the weaker direction: less tells only the stronger one."""
+_MARGIN = np.array([0.3, 0.3, 0.1])
+"""What a fit may add to the window of the search."""
+_FLOOR = np.diag([0.02**2, 0.02**2, 0.004**2])
+"""Least covariance of a closure."""
+
+
+class Closure(NamedTuple):
+    """A place seen again, how well, and how far it moves the newest keyframe."""
+
+    edge: Edge
+    fit: Fit
+    away: Array
+    """(3,) from where the newest keyframe seemed to be, in the axes of the older one."""
+
+
+class Closer:
+    """Lays the newest keyframes onto old ones; `poses` are those of all in the map, (3,) each."""
+
+    def __init__(self, settings: PlanarSettings) -> None:
+        self._settings = settings
+        reach = settings.returns.reach_m + settings.closing.around_m
+        self._map = LocalMap(min(reach, 40.0), _LEVELS, settings.fitting)
+
+    def close(
+        self,
+        frames: Sequence[Kept],
+        poses: Sequence[Array],
+        newest: int,
+        older: int,
+        reach: Array,
+    ) -> Closure | None:
+        """The newest keyframe as seen from an older one; None where they do not fit.
+
+        reach: (3,) how far the newest one may be from where it seems to be, m and rad.
+        """
+        known = self._around(frames, poses, newest, older)
+        query = self._query(frames, newest)
+        if len(known) == 0 or len(query) < 2 * self._settings.closing.least_met:
+            return None
+        at = poses[older]
+        drawn = np.concatenate([placed(frames[k].points, between(at, poses[k])) for k in known])
+        self._map.draw(drawn, np.zeros(3))
+        lost = reach[2] >= _ANY_RAD
+        guess = np.zeros(3) if lost else between(at, poses[newest])
+        is_narrow = reach[0] < 0.35 and reach[2] < 0.1
+        start = guess if is_narrow else self._found(query, guess, reach)
+        if start is None:
+            return None
+        fine = np.ascontiguousarray(query[:: max(len(query) // _FINE, 1)])
+        found = self._map.fit(fine, start)
+        away = between(guess, found.pose)
+        if not self._is_believed(found, away, reach, frames[newest].usual):
+            return None
+        information = self._information(found.information, float(found.pose[2]))
+        edge = Edge(older, newest, found.pose, information, is_closure=True)
+        return Closure(edge, found, away)
+
+    def _found(self, query: Array, guess: Array, reach: Array) -> Array | None:
+        """Where it lies best in the window; None where nothing fits, or two places do."""
+        thin = np.ascontiguousarray(query[:: max(len(query) // _THIN, 1)])
+        slope = np.zeros(3) if reach[2] >= _ANY_RAD else 0.04 / reach**2
+        least = 0.45
+        pose, score = self._map.search(thin, guess, reach, slope=slope, least=least)
+        if score <= 0.0:
+            return None
+        shut = np.array([pose[0], pose[1], _OTHER_M])
+        other, second = self._map.search(
+            thin, guess, reach, slope=slope, least=_ALIKE * score, shut=shut
+        )
+        if second > 0.0 and not self._is_along(thin, pose, other):
+            return None
+        return pose
+
+    def _is_along(self, query: Array, pose: Array, other: Array) -> bool:
+        """Whether two places are the same but for the direction that the walls leave open."""
+        found = self._map.fit(query, pose)
+        values, axes = np.linalg.eigh(found.information[:2, :2])
+        if values[0] > _LEAST_INFORMATION:
+            return False
+        across = abs(float(axes[:, 1] @ (other[:2] - pose[:2])))
+        return across < 0.4 and abs(math.remainder(float(other[2] - pose[2]), math.tau)) < 0.1
+
+    def _is_believed(self, found: Fit, away: Array, reach: Array, usual: float) -> bool:
+        c = self._settings.closing
+        share = min(max(c.share * usual, c.least_share), c.most_share)
+        values = np.linalg.eigvalsh(found.information[:2, :2])
+        weak = values[0] < _LEAST_INFORMATION
+        wanted = share + (0.06 if reach[0] > 1.5 else 0.0) + (0.04 if weak else 0.0)
+        if found.share < wanted or found.met < c.least_met or values[1] < _LEAST_INFORMATION:
+            return False
+        if weak and reach[0] > 3.0:
+            return False  # any corridor would do
+        return bool((np.abs(away) <= reach + _MARGIN).all())
+
+    def _information(self, told: Array, yaw: float) -> Array:
+        """What a closure says, in the axes of its measurement."""
+        c, s = math.cos(yaw), math.sin(yaw)
+        axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        own = axes @ told @ axes.T
+        return np.asarray(np.linalg.inv(np.linalg.inv(own + 1e-3 * np.eye(3)) + _FLOOR))
+
+    def _around(
+        self, frames: Sequence[Kept], poses: Sequence[Array], newest: int, older: int
+    ) -> list[int]:
+        """Old keyframes of the older one's surroundings, the nearest ones."""
+        c, here = self._settings.closing, frames[newest]
+        away = {
+            k: float(np.hypot(*(poses[k] - poses[older])[:2]))
+            for k in range(newest)
+            if frames[k].session == frames[older].session
+            and (
+                here.session != frames[k].session
+                or here.travelled - frames[k].travelled > c.apart_m
+            )
+        }
+        near = sorted((k for k in away if away[k] < c.around_m), key=lambda k: away[k])
+        return near[:_MOST_FRAMES]
+
+    def _query(self, frames: Sequence[Kept], newest: int) -> Array:
+        """What the way just travelled saw (K, 2), in the axes of the newest keyframe."""
+        here, parts = frames[newest], []
+        for k in range(newest, max(newest - _MOST_QUERIES, -1), -1):
+            way = here.travelled - frames[k].travelled
+            if frames[k].session != here.session or way > self._settings.closing.query_m:
+                break
+            step = between(here.pose, frames[k].pose)
+            parts.append(placed(thinned(frames[k].points, 0.1, 200), step))
+        return np.concatenate(parts)

@@ -1,0 +1,34 @@
+"""Compiles the kernels of the SLAM in the plane; see `volery.autonomy.perception.warmup`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from volery.autonomy.perception.static_transforms import LEVEL
+from volery.autonomy.perception.warmup import a_scan
+from volery.autonomy.slam import messages
+from volery.autonomy.slam.planar.local_map import LocalMap
+from volery.autonomy.slam.planar.scans import returns, thinned
+from volery.autonomy.slam.planar.settings import Fitting, Returns
+from volery.core import rotations
+
+_LEVELS = 2
+
+
+def walls() -> None:
+    """Kernels that lay a scan onto a map."""
+    points = np.zeros((0, 2))
+    for per_beam_s in (0.0, 0.001):  # beams that were cast at once, or one after the other
+        scan = a_scan()
+        scan.time_increment = per_beam_s
+        points = thinned(returns(scan, LEVEL, np.zeros(3), Returns()), 0.04, 20)
+    known = LocalMap(2.0, _LEVELS, Fitting())
+    known.draw(points, np.zeros(3))
+    known.fit(points, np.zeros(3))
+    known.search(points, np.zeros(3), np.full(3, 0.1))
+
+
+def told_places() -> None:
+    """The kernel that picks what a message tells of the covariance."""
+    nowhere = np.zeros(3), rotations.IDENTITY, np.zeros(3), np.zeros(3)
+    messages.odometry(0, "uav1", nowhere, np.zeros((9, 9)))

@@ -1,0 +1,132 @@
+"""Finding its place in the map again: the newest keyframe of one that is lost, among all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.slam.keyframes import Keyframe
+from volery.autonomy.slam.loop_closure import AROUND, LoopCloser
+from volery.autonomy.slam.pose_graph import Edge, between, compose
+
+Array = NDArray[np.float64]
+
+_REACH_M, _TURN_RAD = 12.0, 0.2
+"""How far it may be from an old keyframe, and from the heading that the gyroscope tells; when all
+keyframes have been tried so, any heading is tried.
+"""
+_TRIES, _LEAP = 6, 3
+"""Keyframes tried at each new one; so many apart, as neighbours look alike."""
+_FRESH = 3
+"""Keyframes since it was lost from which on they are matched."""
+_SAME = np.array([0.5, 0.5, 0.5, 0.05])
+_OTHER, _HINT = 4.0 * _SAME, np.array([1.0, 1.0, 2.0, 0.1])
+"""m and rad within which guesses are of one place, beyond which they contradict each other, and
+within which they are of the place that was hinted."""
+_SURE, _HINTED, _CLEARLY = 0.2, 0.12, 2.0
+"""What the margins of all guesses of a place must sum up to; what a hint of it adds to them; how
+much more that must be than the sum of any other place.
+
+One guess alone may be sure. Where few things stand any of them may be taken for any other, and the
+guesses contradict each other.
+"""
+
+
+class Guess(NamedTuple):
+    """Where a keyframe that fits would put the present session."""
+
+    edge: Edge
+    margin: float
+    moved: Array
+    """(4,) what would move the session there."""
+
+
+class Relocation:
+    """What one that is lost has tried so far, and which keyframes nobody can be found by."""
+
+    def __init__(self) -> None:
+        self.doubted: set[int] = set()
+        """Keyframes of which it is not sure where they are."""
+        self._cursor = 0
+        self._guesses: list[Guess] = []
+        self._hint: Array | None = None
+
+    def begin(self, doubted: set[int], hint: Array | None = None) -> None:
+        """It was lost just now, and so is where some more keyframes are.
+
+        `hint`: (2,) m in the map, by how much it may have been displaced.
+        """
+        self.doubted |= doubted
+        self._cursor = 0
+        self._guesses = []
+        self._hint = hint
+
+    def find(
+        self, closer: LoopCloser, frames: Sequence[Keyframe], poses: Sequence[Array]
+    ) -> Edge | None:
+        """Try some keyframes of earlier sessions, in turn, the latest of them first."""
+        newest = len(frames) - 1
+        session = frames[newest].session
+        old = [
+            k for k in range(newest, -1, -1)
+            if frames[k].session != session and k not in self.doubted
+        ]  # fmt: skip
+        old = [row for first in range(_LEAP) for row in old[first::_LEAP]]
+        if not old or sum(frame.session == session for frame in frames) < _FRESH:
+            return None
+        for _ in range(min(_TRIES, len(old))):
+            row = old[self._cursor % len(old)]
+            turn = _TURN_RAD if self._cursor < len(old) else math.pi
+            self._cursor += 1
+            found = closer.find(frames, poses, newest, row, (_REACH_M, turn))
+            if found is not None:
+                place = compose(poses[row], found.edge.measured)
+                moved = compose(place, between(poses[newest], np.zeros(4)))
+                self._guesses.append(Guess(found.edge, found.margin, moved))
+        return chosen(self._guesses, newest, poses[newest], self._hint)
+
+
+def chosen(
+    guesses: Sequence[Guess], newest: int, pose: Array, hint: Array | None = None
+) -> Edge | None:
+    """The best guess of the newest keyframe, whose pose is (4,), if its place is beyond doubt.
+
+    `hint`: see `Relocation.begin`.
+    """
+    if not guesses:
+        return None
+    places = np.array([compose(guess.moved, pose) for guess in guesses])
+    same = _within(places[:, None], places, _SAME)
+    weights = np.array(
+        [_weight([guesses[k] for k in np.flatnonzero(row).tolist()]) for row in same]
+    )
+    if hint is not None:
+        weights += _HINTED * _within(places, pose + np.append(hint, [0.0, 0.0]), _HINT)
+    best = int(np.argmax(weights))
+    others = weights[~_within(places, places[best], _OTHER)]
+    fresh = [
+        guesses[k] for k in np.flatnonzero(same[best]).tolist() if guesses[k].edge.to == newest
+    ]
+    if not fresh or weights[best] < max(_SURE, _CLEARLY * others.max(initial=0.0)):
+        return None
+    return max(fresh, key=lambda guess: guess.margin).edge
+
+
+def _weight(guesses: Sequence[Guess]) -> float:
+    """The sum of margins of those guesses whose older keyframes have no returns in common."""
+    counted: list[Guess] = []
+    for guess in sorted(guesses, key=lambda guess: -guess.margin):
+        if all(abs(guess.edge.origin - other.edge.origin) > 2 * AROUND for other in counted):
+            counted.append(guess)
+    return sum(guess.margin for guess in counted)
+
+
+def _within(one: Array, other: Array, limits: Array) -> NDArray[np.bool_]:
+    """Whether poses (..., 4) differ by no more than that."""
+    apart = one - other
+    apart[..., 3] = np.remainder(apart[..., 3] + math.pi, math.tau) - math.pi
+    return np.asarray((np.abs(apart) < limits).all(-1))

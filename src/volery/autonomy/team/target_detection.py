@@ -1,0 +1,176 @@
+"""Finding targets of a colour by the camera: where they are, and how well that is known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.autonomy.perception.map_frame import MapFrame
+from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.search.colour_blob import ColourRange, colour_mask, largest_blob, pixels_of
+from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
+from volery.autonomy.team.observations import Doubt, Tracks, sighting_of
+from volery.core import rotations
+from volery.core.clock import NS_PER_S
+from volery.core.kept import keep, put_back
+from volery.graph.messages import (
+    CameraInfo,
+    Image,
+    Odometry,
+    Range,
+    TFMessage,
+    header,
+    message_type,
+    stamp_of,
+)
+from volery.graph.node import Node
+
+Array = NDArray[np.float64]
+
+_TYPE = "volery_interfaces/msg/Targets"
+_MATE_S, _MATE_M = 2.0, 1.0
+"""A teammate heard so lately is within a ball of this radius. Modelling choice."""
+_STALE_S = 0.5
+"""Odometry and range older than this, at the time of a picture, place nothing."""
+
+
+class TargetDetection(Node):
+    """Looks for patches of a colour, places them on the ground, publishes `~/targets`.
+
+    Sees `CAMERA/image_raw`, its `camera_info`, odometry, and `range`, which tells how far below the
+    ground is. A target is published when it has been seen several times and is placed well enough,
+    and again with each sighting that makes it better known. Nothing counts where `radio/team` says
+    that a teammate is.
+
+    Parameters
+    ----------
+    camera: name of the camera.
+    mount_m, mount_rpy_deg: of the camera in the body, as in a scenario.
+    odometry: topic of the pose; corrected: whether `/tf` tells where its frame lies in the map.
+    hue_deg: [first, last]; saturation, value: least ones; see `search.colour_blob`.
+    share: least share of the picture.
+    object_m: height of the targets' middle above the ground.
+    reach_m: how far away a target may be.
+    sightings, spread_m: how often it must be seen, and how well be placed (standard deviation).
+
+    """
+
+    STATE = ("_mates", "_frame", "_pose", "_range", "_intrinsics", "_tracks")
+    """Everything that changes."""
+
+    @classmethod
+    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
+        """Returns the tasks that compile its kernels."""
+        from volery.autonomy.search import warmup
+
+        return (warmup.colours,)
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("target_detection", **options)
+        declare = self.declare_parameter
+        camera = str(declare("camera", "camera").value)
+        self._mount = np.array(declare("mount_m", [0.0, 0.0, 0.0]).value, dtype=np.float64)
+        self._turn = [float(a) for a in declare("mount_rpy_deg", [0.0, 0.0, 0.0]).value]
+        odometry = str(declare("odometry", "odom").value)
+        if declare("corrected", False).value:
+            self.create_subscription(TFMessage, "/tf", self._on_tf, 50)
+        first, last = (float(hue) for hue in declare("hue_deg", list(ColourRange()[:2])).value)
+        self._colours = ColourRange(
+            first, last, float(declare("saturation", 0.5).value), float(declare("value", 0.2).value)
+        )
+        self._share = float(declare("share", 0.0005).value)
+        self._object_m = float(declare("object_m", 0.5).value)
+        self._reach_m = float(declare("reach_m", 20.0).value)
+        self._tracks = Tracks(
+            int(declare("sightings", 4).value), spread_m=float(declare("spread_m", 2.0).value)
+        )
+        self._doubt = Doubt()
+        self._frame = MapFrame()
+        self._mates: dict[str, tuple[int, Array]] = {}
+        """When each was heard, ns, and where it was."""
+        self._pose: Pose | None = None
+        self._range: tuple[int, float] | None = None
+        self._intrinsics: Intrinsics | None = None
+
+        self._type = message_type(_TYPE)
+        self._targets = self.create_publisher(self._type, "~/targets", 1, latched=True)
+        self.create_subscription(Odometry, odometry, self._on_odometry, 5)
+        self.create_subscription(Range, "range", self._on_range, 5)
+        self.create_subscription(CameraInfo, f"{camera}/camera_info", self._on_info, 1)
+        self.create_subscription(Image, f"{camera}/image_raw", self._on_image, 1)
+        report = message_type("volery_interfaces/msg/TeamReport")
+        self.create_subscription(report, "radio/team", self._on_report, 20)
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return keep(self, self.STATE)
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        put_back(self, state)
+
+    def _on_tf(self, message: TFMessage) -> None:
+        self._frame.on_tf(message)
+
+    def _on_odometry(self, message: Odometry) -> None:
+        pose = self._frame.pose_in_map(message)
+        self._pose = None if self._frame.is_lost else pose
+
+    def _on_range(self, message: Range) -> None:
+        if math.isfinite(message.range):
+            self._range = (stamp_of(message), float(message.range))
+
+    def _on_info(self, info: CameraInfo) -> None:
+        self._intrinsics = Intrinsics.from_message(info)
+
+    def _on_report(self, report: Any) -> None:
+        p = report.position
+        place = np.array([p.x, p.y, p.z])
+        if np.isfinite(place).all():
+            self._mates[report.name] = (self.get_clock().now_ns(), place)
+
+    def _on_image(self, image: Image) -> None:
+        taken = stamp_of(image)
+        ground = self._ground_z(taken)
+        if ground is None or self._pose is None or self._intrinsics is None:
+            return
+        pose = pose_at(self._pose, taken)
+        view = GroundView(self._intrinsics, self._mount.tolist(), self._turn)
+        hidden = self._teammates_in(view, pose)
+        blob = largest_blob(colour_mask(pixels_of(image), self._colours, hidden))
+        if blob is None or blob.share < self._share:
+            return
+        place = view.place_of(blob.u, blob.v, pose, ground + self._object_m)
+        if place is None or np.hypot(*(place - pose.position)[:2]) > self._reach_m:
+            return
+        eye = pose.position + rotations.rotate(pose.attitude, self._mount)
+        track = self._tracks.add(sighting_of(taken, eye, place, self._doubt))
+        if track.number:
+            self._tell(taken)
+
+    def _teammates_in(self, view: GroundView, pose: Pose) -> Array:
+        """(K, 3) discs of the picture in which teammates are, who may be of the colour."""
+        since = pose.time_ns - round(_MATE_S * NS_PER_S)
+        near = [place for heard_ns, place in self._mates.values() if heard_ns >= since]
+        discs = [view.disc_of(place, _MATE_M, pose) for place in near]
+        return np.array([disc for disc in discs if disc is not None]).reshape(-1, 3)
+
+    def _ground_z(self, time_ns: int) -> float | None:
+        """Height in the map of the ground below; None where pose or range are not of about now."""
+        if self._pose is None or self._range is None:
+            return None
+        stale = _STALE_S * NS_PER_S
+        range_ns, distance = self._range
+        if abs(time_ns - self._pose.time_ns) > stale or abs(time_ns - range_ns) > stale:
+            return None
+        down = -rotations.rotate(self._pose.attitude, np.array([0.0, 0.0, -1.0]))[2]
+        return float(self._pose.position[2] - distance * down)
+
+    def _tell(self, time_ns: int) -> None:
+        finder = self.get_namespace().strip("/")
+        finds = [find.message() for find in self._tracks.finds(finder)]
+        self._targets.publish(self._type(header(time_ns, "map"), finds))
