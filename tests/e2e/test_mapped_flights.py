@@ -14,7 +14,6 @@ from volery.scenario.load import parse_scenario
 
 MOUNTS = {"level_mount": [0.0, 0.0, 0.18], "nodding_mount": [0.1, 0.0, -0.08]}
 ODOM = {"odometry": "odom", "corrected": False}
-PLANNING = "volery.autonomy.planning."
 NODES = [
     {
         "node": "mapping",
@@ -22,21 +21,21 @@ NODES = [
         "parameters": {**ODOM, **MOUNTS, "voxels_period_s": 5.0},
     },
     {
-        "node": PLANNING + "local_planner:LocalPlanner",
+        "node": "local_planner",
         "latency_s": 0.05,
         "parameters": {**ODOM, **MOUNTS},
     },
     {
-        "node": PLANNING + "follower:TrajectoryFollower",
+        "node": "trajectory_follower",
         "parameters": {"odometry": "odom"},
     },
     {
-        "node": PLANNING + "global_planner:GlobalPlanner",
+        "node": "global_planner",
         "latency_s": 0.2,
         "parameters": ODOM,
     },
     {
-        "node": PLANNING + "exploring_node:Exploring",
+        "node": "exploration",
         "latency_s": 0.1,
         "parameters": ODOM,
     },

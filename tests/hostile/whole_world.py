@@ -30,14 +30,14 @@ COVERAGE = {
     "parameters": {"uavs": ["uav1", "uav2"], "height_m": 2.5, "over_m": 10.0},
 }
 PLANNING = [
-    {"node": f"volery.autonomy.{name}", "parameters": {"odometry": "odom"}}
+    {"node": name, "parameters": {"odometry": "odom"}}
     for name in (
-        "task_manager:TaskManager",
-        "planning.exploring_node:Exploring",
-        "planning.global_planner:GlobalPlanner",
-        "planning.local_planner:LocalPlanner",
-        "planning.follower:TrajectoryFollower",
-        "mapping.mapping_node:Mapping",
+        "task_manager",
+        "exploration",
+        "global_planner",
+        "local_planner",
+        "trajectory_follower",
+        "mapping",
     )
 ]
 

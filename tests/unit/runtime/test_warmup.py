@@ -32,10 +32,10 @@ def test_a_scenario_needs_what_its_nodes_and_sensors_call() -> None:
     found = named(needs_of(load_scenario("forest_search")))
     assert {"runtime.warmup.core_tasks:pictures", "runtime.warmup.core_tasks:estimates"} <= found
     assert {
-        "autonomy.slam.warm_up:motion",
-        "autonomy.slam.warm_up:known_places",
-        "autonomy.planning.warm_up:plans",
-        "autonomy.search.warm_up:colours",
+        "autonomy.slam.warmup:motion",
+        "autonomy.slam.warmup:known_places",
+        "autonomy.planning.warmup:plans",
+        "autonomy.search.warmup:colours",
     } <= found
     assert not {name for name in found if "coverage" in name or "planar" in name}
 

@@ -1,5 +1,5 @@
 """Flying to a goal through what is known and what is seen.
 
-`exploring_node` chooses goals, `global_planner` a way through the map, `local_planner` what is
+`exploration_node` chooses goals, `global_planner` a way through the map, `local_planner` what is
 flown in the next seconds, `follower` flies it.
 """
