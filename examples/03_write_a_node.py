@@ -2,7 +2,7 @@
 
 from volery import Simulation
 from volery.graph.messages import Range, Twist, Vector3
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 from volery.scenario.load import parse_scenario
 
 

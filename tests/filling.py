@@ -8,10 +8,10 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
 
-from volery.graph.definition_files import INTEGER_RANGES
-from volery.graph.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.definition_files import INTEGER_RANGES
+from volery.graph.codecs.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.zero import DTYPES
 from volery.graph.messages import typestore
-from volery.graph.zero import DTYPES
 
 
 def filled(msgtype: str, rng: np.random.Generator) -> Any:

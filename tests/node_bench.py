@@ -20,7 +20,7 @@ from volery.graph.messages import (
     Vector3,
     header,
 )
-from volery.graph.node import Context
+from volery.graph.nodes.node import Context
 
 NOTHING = np.zeros(36)
 

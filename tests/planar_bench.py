@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from volery.graph import messages as m
-from volery.graph.zero import zero_message
+from volery.graph.codecs.zero import zero_message
 
 S = 1_000_000_000
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from volery.graph import messages as m
-from volery.graph.zero import zero_message
+from volery.graph.codecs.zero import zero_message
 
 HEIGHT_M = 3.0
 MIDDLE = (1080 / 2) * math.radians(0.25)

@@ -12,8 +12,8 @@ from ros_tcp_client import until
 from volery.bridges.ros2.environment import Ros2Terms, join_ros2
 from volery.bridges.ros2.middleware import Profile, ServiceSpec, TopicSpec
 from volery.bridges.ros2.names import NodeName
-from volery.graph.cdr import decode_cdr, encode_cdr
-from volery.graph.zero import zero_message
+from volery.graph.codecs.cdr import decode_cdr, encode_cdr
+from volery.graph.codecs.zero import zero_message
 
 _RUNS, _DOMAINS_EACH = 16, 6
 """All their ports lie below those that the system gives away by itself."""

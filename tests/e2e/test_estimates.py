@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from volery.core.errors import ScenarioError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Odometry
-from volery.graph.zero import zero_message
 from volery.scenario.load import parse_scenario
 
 AIDS = [

@@ -9,7 +9,7 @@ import pytest
 
 from volery.autonomy.team.task_manager import TaskManager
 from volery.engine.events import EventKind
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 from volery.runtime import Simulation
 from volery.scenario import overrides
 from volery.scenario.load import load_scenario

@@ -178,7 +178,7 @@ def test_shipped_profiles_start_the_nodes_of_the_scenario(name: str) -> None:
     assert [e.node for e in autonomy] == [e.node for e in flown]
     assert profile.name == name
     with Simulation(scenario_of([], blind=True)) as simulation:
-        from volery.graph.node import Context
+        from volery.graph.nodes.node import Context
 
         context = Context(simulation.graph, simulation._engine, simulation.graph.now_ns)
         for entry in autonomy:

@@ -160,7 +160,7 @@ def test_joining_needs_a_way_to_answer():
     with Simulation(scenario(with_node=False)) as simulation:
         session = simulation.gateway.open("mute")
         from volery.graph.messages import message_type
-        from volery.graph.reply import Reply
+        from volery.graph.service_reply import Reply
 
         kind = message_type("volery_interfaces/srv/JoinLockStep_Request")
         request = kind("mute", 0.001, 1.0, False, False)

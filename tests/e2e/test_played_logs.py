@@ -12,8 +12,8 @@ import pytest
 
 from volery.bridges.logs.bag import open_log
 from volery.bridges.rosbridge.client import RosbridgeClient
-from volery.graph.link import call_and_wait
-from volery.graph.zero import zero_message
+from volery.graph.codecs.zero import zero_message
+from volery.graph.connection import call_and_wait
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario
 

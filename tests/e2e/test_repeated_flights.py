@@ -21,11 +21,11 @@ from volery.bridges.logs.records import LogWalk
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import CommandError, GraphError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.command_records import content_bytes
-from volery.graph.link import call_and_wait
+from volery.graph.connection import call_and_wait
 from volery.graph.messages import Twist, Vector3, message_type
-from volery.graph.reply import Reply
-from volery.graph.zero import zero_message
+from volery.graph.service_reply import Reply
 from volery.runtime import Simulation
 from volery.runtime.replay.command_effects import Weight, weight_of
 from volery.scenario.load import parse_scenario
@@ -170,7 +170,7 @@ def zero_point(x, y, z):
 
 NODES = '''
 from volery.graph.messages import Float32, Imu, Twist
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 class Thinker(Node):
     """Turns what it hears and measures into a number, after a while."""
@@ -452,7 +452,7 @@ def test_a_lock_step_partner_is_met_again(tmp_path):
 
 ASKER = """
 from volery.graph.messages import Float32
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 class Asker(Node):
     def __init__(self, **options):

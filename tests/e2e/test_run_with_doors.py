@@ -20,8 +20,8 @@ from websockets.sync.client import connect
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.cli.run import RunOptions, _Change
 from volery.core.errors import CommandError, GraphError, VoleryError
-from volery.graph.link import call_and_wait
-from volery.graph.zero import zero_message
+from volery.graph.codecs.zero import zero_message
+from volery.graph.connection import call_and_wait
 from volery.scenario.changes import Changes, WorldRequest
 
 pytest.importorskip("roslibpy")
@@ -187,7 +187,7 @@ def test_a_node_runs_beside(run, tmp_path, way):
     name = way.__name__
     (tmp_path / "echoing.py").write_text(
         "from volery.graph.messages import String\n"
-        "from volery.graph.node import Node\n"
+        "from volery.graph.nodes.node import Node\n"
         "class Echo(Node):\n"
         "    def __init__(self, **options):\n"
         "        super().__init__('echo', **options)\n"

@@ -8,7 +8,7 @@ import pytest
 from volery import Simulation, load_scenario
 from volery.core.errors import CommandError, SnapshotError
 from volery.graph.messages import Odometry, String
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 
 class Counting(Node):

@@ -9,8 +9,8 @@ import pytest
 
 from volery.core.errors import CommandError, ScenarioError, SpawnError
 from volery.engine.events import EventKind
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Header, Point, Pose, PoseStamped, Quaternion, time_from_ns
-from volery.graph.zero import zero_message
 from volery.runtime import Copies
 from volery.scenario.load import parse_scenario
 from volery.world.materials import Material

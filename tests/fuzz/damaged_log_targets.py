@@ -26,11 +26,12 @@ from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.records import LogWalk
 from volery.bridges.logs.recover import recover
 from volery.core.errors import GraphError, RecordingError
-from volery.graph import command_records, definition_store
+from volery.graph import command_records
+from volery.graph.codecs import definition_store
+from volery.graph.codecs.ros1 import ros1_codec
+from volery.graph.codecs.zero import zero_message
 from volery.graph.graph import Graph
 from volery.graph.messages import Published, String, typestore
-from volery.graph.ros1 import ros1_codec
-from volery.graph.zero import zero_message
 from volery.runtime.replay.slam.sources import open_source
 
 definition_store.MAX_FOREIGN = 60  # damaged definitions would be learned for ever

@@ -14,9 +14,9 @@ from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.records import LogWalk
 from volery.bridges.logs.recover import recover
 from volery.core.errors import GraphError, RecordingError
-from volery.graph.cdr import encode_cdr
+from volery.graph.codecs.cdr import encode_cdr
+from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import String, Twist, Vector3
-from volery.graph.ros1 import ros1_codec
 
 STRING = "std_msgs/msg/String"
 TWIST = "geometry_msgs/msg/Twist"

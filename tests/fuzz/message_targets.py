@@ -15,15 +15,15 @@ from volery.bridges.topic_patterns import renamer, topic_filter
 from volery.core.errors import GraphError, PatternError
 from volery.core.patterns import posix_search
 from volery.graph import object_count
-from volery.graph.cdr import decode_cdr, encode_cdr
-from volery.graph.definition_files import parse_definition
-from volery.graph.definition_store import DefinitionStore
-from volery.graph.json_decoding import decode_plain
-from volery.graph.json_form import JsonForm
+from volery.graph.codecs.cdr import decode_cdr, encode_cdr
+from volery.graph.codecs.definition_files import parse_definition
+from volery.graph.codecs.definition_store import DefinitionStore
+from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.json_decoding import decode_plain
+from volery.graph.codecs.ros1 import ros1_codec
+from volery.graph.codecs.ros1_names import ros1_name, ros2_name
 from volery.graph.messages import message_type, typestore
 from volery.graph.object_count import CDR, ROS1, check_objects
-from volery.graph.ros1 import ros1_codec
-from volery.graph.ros1_names import ros1_name, ros2_name
 
 TYPES = (
     "std_msgs/msg/String",

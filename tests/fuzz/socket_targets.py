@@ -23,9 +23,9 @@ from volery.bridges.sensor_link.payloads import (
 )
 from volery.core.errors import BridgeError
 from volery.graph import messages as m
-from volery.graph.cdr import encode_cdr
+from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.messages import String, message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"

@@ -10,7 +10,7 @@ from whole_world import Client
 from volery.core.errors import CommandError, NodeError
 from volery.graph.graph import Graph
 from volery.graph.messages import String
-from volery.graph.node import Context, Node
+from volery.graph.nodes.node import Context, Node
 
 
 class Echo(Node):
@@ -152,7 +152,7 @@ def test_what_is_posted_after_close_fails(simulate, flat_data):
         with pytest.raises(CommandError, match="closed"):
             future.result(1.0)
     answers = []
-    from volery.graph.reply import Reply
+    from volery.graph.service_reply import Reply
 
     client.session.call("/get_entities", None, Reply(answers.append, answers.append))
     assert "closed" in str(answers[0])

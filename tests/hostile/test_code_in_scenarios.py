@@ -35,7 +35,7 @@ VOLERY = [sys.executable, "-m", "volery.cli"]
 EVIL = """
 from pathlib import Path
 Path({mark!r}).write_text("run")
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 class Evil(Node):
     def __init__(self, **options):
         super().__init__("evil", **options)

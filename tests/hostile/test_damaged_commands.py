@@ -11,8 +11,8 @@ import pytest
 from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.flights import ORIGIN_TOPIC, read_flight
 from volery.graph import command_records
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Published, String
-from volery.graph.zero import zero_message
 
 RECORD = "volery_interfaces/msg/CommandRecord"
 STRING = "std_msgs/msg/String"

@@ -11,9 +11,9 @@ import pytest
 from whole_world import Client, leaves, nasty_values, offer_rosapi, put, whole_data
 
 from volery.core.errors import NodeError, ScenarioError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import String, message_type
-from volery.graph.node import Context, Node
-from volery.graph.zero import zero_message
+from volery.graph.nodes.node import Context, Node
 from volery.scenario.load import parse_scenario
 
 INJECT = "volery_interfaces/srv/InjectFault_Request"

@@ -25,7 +25,7 @@ from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.records import BAG_MAGIC, MCAP_MAGIC, LogTopic, LogWalk
 from volery.bridges.logs.recover import recover
 from volery.core.errors import GraphError, RecordingError
-from volery.graph import definition_store
+from volery.graph.codecs import definition_store
 from volery.graph.graph import Graph
 from volery.graph.messages import Published, String
 from volery.runtime.replay.command_log import CommandLog

@@ -9,7 +9,7 @@ from whole_world import Client
 
 from volery.bridges.topic_patterns import topic_filter
 from volery.core.errors import GraphError
-from volery.graph.zero import zero_message
+from volery.graph.codecs.zero import zero_message
 from volery.runtime.services.filters import name_filter
 from volery.runtime.services.results import RefusedError
 

@@ -12,7 +12,7 @@ import pytest
 from whole_world import offer_rosapi, whole_data
 
 from volery.bridges.logs.bag import open_log
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.runtime.replay.log_player import Player
 from volery.server.read_only import READ_ONLY_SERVICES
 

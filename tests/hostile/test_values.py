@@ -199,7 +199,7 @@ def test_parameters_set_in_flight_are_finite(simulate, wood_data, value):
 
 
 _BASELESS = """
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 class Silent(Node):
     def __init__(self, **options):

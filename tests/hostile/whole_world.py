@@ -7,7 +7,7 @@ from rosbags.interfaces import Nodetype
 
 from volery.bridges.rosbridge.rosapi import RosApi
 from volery.graph.messages import typestore
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 
 SENSORS = [
     {"kind": "lidar", "noise": False},

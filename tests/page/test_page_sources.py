@@ -10,9 +10,9 @@ WEB = Path(__file__).parents[2] / "web"
 
 def test_message_types_are_those_of_the_definitions():
     written = (WEB / "src/messages/generated.ts").read_text()
-    hint = "python -m volery.graph.typescript > web/src/messages/generated.ts"
+    hint = "python -m volery.graph.codecs.typescript > web/src/messages/generated.ts"
     # in a process that knows no types of other tests
-    words = [sys.executable, "-m", "volery.graph.typescript"]
+    words = [sys.executable, "-m", "volery.graph.codecs.typescript"]
     told = subprocess.run(words, check=True, capture_output=True, text=True, timeout=120).stdout
     assert written.strip() == told.strip(), hint
 

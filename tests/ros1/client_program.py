@@ -7,7 +7,7 @@ import threading
 from volery.bridges.ros1.client import Ros1Client
 from volery.core.errors import GraphError
 from volery.graph.messages import Header, String, Time, message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"

@@ -26,8 +26,10 @@ from volery.bridges.ros1.door import Ros1Door
 from volery.bridges.ros1.environment import load_rospy
 from volery.bridges.ros1.node import join_ros1
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.definition_files import find_definition_files
-from volery.graph.interface_packages import DEFINITIONS, write_generator, write_package
+from volery.graph.codecs.definition_files import find_definition_files
+from volery.graph.codecs.interface_packages import DEFINITIONS, write_generator, write_package
+from volery.graph.codecs.ros1 import ros1_codec
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import (
     Header,
     Point,
@@ -38,9 +40,7 @@ from volery.graph.messages import (
     Vector3,
     message_type,
 )
-from volery.graph.reply import Reply
-from volery.graph.ros1 import ros1_codec
-from volery.graph.zero import zero_message
+from volery.graph.service_reply import Reply
 
 require_ros1()
 pytestmark = [  # rospy uses what is deprecated and forgets to close sockets

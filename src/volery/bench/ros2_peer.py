@@ -13,7 +13,7 @@ from collections.abc import Callable
 from volery.bridges.ros2.environment import Ros2Terms, join_ros2
 from volery.bridges.ros2.middleware import Profile, TopicSpec
 from volery.bridges.ros2.names import NodeName
-from volery.graph.cdr import decode_cdr
+from volery.graph.codecs.cdr import decode_cdr
 
 _TYPES = {"image": "sensor_msgs/msg/Image", "scan": "sensor_msgs/msg/LaserScan"}
 _BEST_EFFORT = Profile(reliable=False, depth=10)

@@ -29,7 +29,7 @@ from volery.bridges.ros1.environment import rospy_is_installed
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import VoleryError
-from volery.graph.node import Context
+from volery.graph.nodes.node import Context
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
 

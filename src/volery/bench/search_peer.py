@@ -18,10 +18,10 @@ from typing import Any
 from volery.autonomy.search.calls import JOIN
 from volery.autonomy.search.cooperative_search import CooperativeSearch
 from volery.bridges.nodes.host import NodeHost
-from volery.graph.client import Future
-from volery.graph.link import Link
+from volery.graph.connection import Link
 from volery.graph.messages import Point, message_type, time_from_ns
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
+from volery.graph.nodes.service_client import Future
 
 CALLED, CALLING = "uav2", "uav1"
 _PERIOD_S = 0.03

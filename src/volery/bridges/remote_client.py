@@ -16,10 +16,10 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 from volery.bridges.remote_topics import RemoteTopics
 from volery.core.errors import BridgeError, GraphError, UnreachableError
-from volery.graph.mailbox import Mailbox, Wake
 from volery.graph.qos import DEFAULT_DEPTH
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Handler
+from volery.graph.subscription_queue import Mailbox, Wake
 
 T = TypeVar("T")
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from volery.core.errors import GraphError
-from volery.graph.mailbox import Mailbox, MailboxInfo, Wake
 from volery.graph.messages import Published, stamp_of
 from volery.graph.qos import check_depth
+from volery.graph.subscription_queue import Mailbox, MailboxInfo, Wake
 
 
 @dataclass

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from volery.core.errors import BridgeError
-from volery.graph.link import Link, TellsServices, TellsTopics, call_and_wait
+from volery.graph.connection import Link, TellsServices, TellsTopics, call_and_wait
 from volery.graph.messages import message_type
 
 TIMEOUT_S = 10.0

@@ -7,7 +7,13 @@ from pathlib import Path
 import typer
 
 from volery.core.errors import VoleryError
-from volery.graph.interface_packages import OWN, needs, packages, write_generator, write_package
+from volery.graph.codecs.interface_packages import (
+    OWN,
+    needs,
+    packages,
+    write_generator,
+    write_package,
+)
 
 
 def write_and_tell(folder: Path, names: list[str], *, overwrite: bool, ros1: bool) -> None:

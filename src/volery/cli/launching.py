@@ -18,7 +18,7 @@ from volery.scenario.access import ScenarioAccess
 if TYPE_CHECKING:
     from volery.bridges.nodes.host import NodeHost
     from volery.bridges.nodes.profile import Profile
-    from volery.graph.node import Node
+    from volery.graph.nodes.node import Node
 
 
 def launch_profile(

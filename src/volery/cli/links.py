@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from volery.bridges.nodes.host import NodeHost
     from volery.bridges.nodes.late_link import LateLink
     from volery.bridges.ros2.environment import Ros2Terms
-    from volery.graph.link import Link
+    from volery.graph.connection import Link
 
 
 DEFAULT_VIA = "rosbridge://127.0.0.1:9090"

@@ -19,7 +19,7 @@ from volery.cli.yaml_form import from_yaml
 from volery.core.errors import BridgeError, VoleryError
 
 if TYPE_CHECKING:
-    from volery.graph.link import Link
+    from volery.graph.connection import Link
 
 
 @dataclass(frozen=True)

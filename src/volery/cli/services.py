@@ -11,7 +11,7 @@ from volery.cli.asking import service_names, type_of_service
 from volery.cli.links import open_link
 from volery.cli.yaml_form import read_message, to_yaml
 from volery.core.errors import BridgeError
-from volery.graph.link import call_and_wait
+from volery.graph.connection import call_and_wait
 
 _RESULT = "simulation_interfaces/msg/Result"
 

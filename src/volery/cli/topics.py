@@ -15,7 +15,7 @@ from volery.cli.asking import topic_types, type_of_topic
 from volery.cli.links import LinkTold, open_link
 from volery.cli.yaml_form import read_message, to_yaml
 from volery.core.errors import BridgeError
-from volery.graph.link import Link
+from volery.graph.connection import Link
 from volery.graph.messages import Published
 
 _DEPTH = 1000

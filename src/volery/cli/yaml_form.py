@@ -14,7 +14,7 @@ _LONGEST_LIST = 128
 def to_yaml(message: Any, *, whole: bool = False) -> str:
     """A message as YAML; long lists of numbers are cut unless `whole`."""
     from volery.cli.yaml_writer import Numbers, write_yaml
-    from volery.graph.json_form import JsonForm
+    from volery.graph.codecs.json_codec import JsonForm
 
     most = sys.maxsize if whole else _LONGEST_LIST
     form = JsonForm(non_finite_as_null=False, arrays=lambda values, _kind: Numbers(values, most))
@@ -23,7 +23,7 @@ def to_yaml(message: Any, *, whole: bool = False) -> str:
 
 def read_message(text: str, msgtype: str) -> Any:
     """The message that a user typed as YAML; what is missing is 0. `GraphError` for a wrong one."""
-    from volery.graph.json_decoding import decode_plain
+    from volery.graph.codecs.json_decoding import decode_plain
 
     return decode_plain(from_yaml(text) or {}, msgtype)
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from volery.core.errors import CommsError, GraphError
-from volery.graph.cdr import decode_cdr, encode_cdr
+from volery.graph.codecs.cdr import decode_cdr, encode_cdr
 
 STATE, STATE_TYPE = "state", "volery_interfaces/msg/VehicleState"
 MISSION, MISSION_TYPE = "mission", "volery_interfaces/msg/MissionStatus"

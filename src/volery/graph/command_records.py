@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
-from volery.graph.cdr import decode_cdr, encode_cdr
-from volery.graph.json_form import JsonForm
-from volery.graph.mailbox import array_bytes
+from volery.graph.codecs.cdr import decode_cdr, encode_cdr
+from volery.graph.codecs.json_codec import JsonForm
 from volery.graph.messages import message_type, time_from_ns, typestore
 from volery.graph.session import Taken
+from volery.graph.subscription_queue import array_bytes
 
 TOPIC = "/volery/log"
 TYPE = "volery_interfaces/msg/CommandRecord"

@@ -24,11 +24,11 @@ from typing import Any, NamedTuple
 
 from volery.core.errors import GraphError, NodeError, VoleryError
 from volery.graph.actions import Actions
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Published, message_type, type_name
 from volery.graph.parameters import Parameters
 from volery.graph.qos import DEFAULT_QOS, QoSProfile
-from volery.graph.reply import Reply
-from volery.graph.zero import zero_message
+from volery.graph.service_reply import Reply
 
 Callback = Callable[[Published], None]
 AsyncHandler = Callable[[Any, Reply], None]

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
 from volery.core.errors import GraphError
+from volery.graph.codecs.zero import DTYPES
 from volery.graph.message_defaults import is_plain_name
 from volery.graph.messages import typestore
-from volery.graph.zero import DTYPES
 
 Copy = Callable[[Any], Any]
 

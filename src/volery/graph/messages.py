@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.stores import ros2_jazzy as _ros2
 
 from volery.core.clock import NS_PER_S, stamp_from_ns
-from volery.graph.definition_store import DefinitionStore
+from volery.graph.codecs.definition_store import DefinitionStore
 from volery.graph.message_defaults import make_arguments_optional
 
 Time = _ros2.builtin_interfaces__msg__Time
@@ -176,6 +176,6 @@ class Published:
     @cached_property
     def ros1(self) -> bytes:
         """The message in ROS 1's wire form; its headers' `seq` is 0."""
-        from volery.graph.ros1 import ros1_codec  # it is built upon this module
+        from volery.graph.codecs.ros1 import ros1_codec  # it is built upon this module
 
         return ros1_codec().encode(self.message, self.msgtype)

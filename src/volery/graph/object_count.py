@@ -17,8 +17,8 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 
 from volery.core.errors import GraphError
+from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import typestore
-from volery.graph.ros1 import ros1_codec
 
 MAX_OBJECTS = 20_000
 """Messages and texts in the arrays of one message of a client: 3,300 transforms; 30 to 40 ms."""

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type
-from volery.graph.zero import zero_message
 
 NOT_SET = 0
 """rcl_interfaces/msg/ParameterType.PARAMETER_NOT_SET."""

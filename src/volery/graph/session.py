@@ -24,13 +24,13 @@ from typing import Any, NamedTuple
 
 from volery.core.errors import GraphError, NodeError, VoleryError
 from volery.graph.graph import Graph, Publisher, Subscription
-from volery.graph.mailbox import Mailbox, MailboxInfo, Wake, message_bytes
 from volery.graph.messages import message_type
 from volery.graph.nodes.failures import report_failure
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
 from volery.graph.read_budget import ReadBudgets, Reading, write_budgets
-from volery.graph.reply import Reply
 from volery.graph.rotor_layout import RotorLayout
+from volery.graph.service_reply import Reply
+from volery.graph.subscription_queue import Mailbox, MailboxInfo, Wake, message_bytes
 
 Post = Callable[[Callable[[], Any]], "Future[Any]"]
 """Has a function called by the simulation's thread; the future holds its result or error."""
@@ -305,7 +305,7 @@ class Session:
         reliable: bool = False,
         wake: Wake,
     ) -> Mailbox:
-        """As `graph.link.Link.subscribe`; `wake` is called from the simulation's thread."""
+        """As `graph.connection.Link.subscribe`; `wake` is called from the simulation's thread."""
         check_depth(depth)
         mailbox = Mailbox(topic, depth, wake, reliable=reliable)
         with self._lock:

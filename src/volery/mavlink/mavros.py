@@ -14,6 +14,7 @@ import numpy as np
 
 from volery.core.errors import CommandError
 from volery.core.rotations import conjugate, rotate, yaw_of
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import (
     BatteryState,
     NavSatFix,
@@ -31,13 +32,12 @@ from volery.graph.messages import (
     header,
     message_type,
 )
-from volery.graph.zero import zero_message
 from volery.mavlink.autopilot import arming, commands, mode_transitions, offboard
 from volery.mavlink.autopilot.modes import mode_named
 from volery.mavlink.autopilot.setpoints import Setpoint
 
 if TYPE_CHECKING:
-    from volery.graph.node import Node
+    from volery.graph.nodes.node import Node
     from volery.mavlink.autopilot.core import Autopilot
     from volery.mavlink.autopilot.state import Source
     from volery.mavlink.autopilot.vehicle import Vector

@@ -22,8 +22,8 @@ from volery.engine.pacing import Pacer
 from volery.engine.partners import Partner, check_terms
 from volery.engine.stepping import OnSteps, StepRequest
 from volery.graph.graph import Graph
-from volery.graph.node import Node
 from volery.graph.nodes.failures import reported_failures
+from volery.graph.nodes.node import Node
 from volery.graph.nodes.presence import outside_nodes
 from volery.graph.session import Gateway, Post
 from volery.publishing.graph_publisher import GraphPublisher

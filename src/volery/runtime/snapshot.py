@@ -12,7 +12,7 @@ from volery.core.clock import s_from_ns
 from volery.core.errors import SnapshotError
 from volery.core.kept import KeepsState
 from volery.engine.partners import Partner
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 from volery.runtime.build.placement import Start
 
 NodeKey = tuple[str, int]

@@ -14,7 +14,7 @@ from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
 from volery.engine.partners import Partner
 from volery.graph.graph import Graph
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.fleet import check_free
 from volery.runtime.build.placement import Start

@@ -266,7 +266,7 @@ class NodeEntry(Data):
     """A node that runs inside the simulation, in lock step: beside a UAV, or for all of them."""
 
     node: Annotated[str, Field(pattern=NODE_PATTERN)]
-    """A registered name, such as `slam`, or the `module:Class` of a `volery.graph.node.Node`."""
+    """A registered name, such as `slam`, or `module:Class`, a `volery.graph.nodes.node.Node`."""
     parameters: dict[str, Any] = Field(default_factory=dict)
     latency_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     """Simulated time from a callback's input to its output; above 0 the node runs on a worker."""

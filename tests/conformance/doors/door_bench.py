@@ -20,7 +20,7 @@ from ros_tcp_client import until
 
 from volery.bridges.doors import Doors
 from volery.graph.messages import String, message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 
 STRING = "std_msgs/msg/String"
 IMAGE = "sensor_msgs/msg/Image"

@@ -32,7 +32,7 @@ from websockets.sync.server import serve
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.graph.messages import message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 
 _numbers = itertools.count()
 

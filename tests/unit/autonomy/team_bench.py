@@ -11,6 +11,7 @@ import numpy as np
 from volery.autonomy.team.task_manager import TaskManager
 from volery.core import rng
 from volery.core.errors import GraphError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.graph import Graph
 from volery.graph.messages import (
     BatteryState,
@@ -27,8 +28,7 @@ from volery.graph.messages import (
     header,
     message_type,
 )
-from volery.graph.node import Context
-from volery.graph.zero import zero_message
+from volery.graph.nodes.node import Context
 
 S = 1_000_000_000
 AREA = [0.0, 0.0, 80.0, 60.0]

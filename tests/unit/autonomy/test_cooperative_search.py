@@ -16,6 +16,7 @@ from volery.autonomy.search.search_positions import Area, check_room, places_aro
 from volery.autonomy.search.teammates import Phase
 from volery.core import rng
 from volery.core.errors import GraphError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.graph import Graph
 from volery.graph.messages import (
     CameraInfo,
@@ -27,8 +28,7 @@ from volery.graph.messages import (
     message_type,
     time_from_ns,
 )
-from volery.graph.node import Context
-from volery.graph.zero import zero_message
+from volery.graph.nodes.node import Context
 
 AREA = [0.0, 0.0, 40.0, 40.0]
 OBJECT = np.array([25.0, 15.0])

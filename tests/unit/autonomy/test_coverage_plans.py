@@ -14,8 +14,8 @@ from volery.autonomy.coverage.spanning_tree import Tour
 from volery.autonomy.coverage.waypoints import Heights, Waypoints, route_waypoints
 from volery.bench.coverage import CASES
 from volery.core.errors import PlanError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import OccupancyGrid
-from volery.graph.zero import zero_message
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

@@ -14,8 +14,8 @@ from volery.autonomy.perception.depth_projection import (
 from volery.autonomy.perception.scan_points import Pose
 from volery.core import rotations
 from volery.core.errors import GraphError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import CameraInfo, Image, header
-from volery.graph.zero import zero_message
 
 WIDTH, HEIGHT, FOCAL = 40, 30, 25.0
 

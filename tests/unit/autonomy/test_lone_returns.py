@@ -5,8 +5,8 @@ import copy
 import numpy as np
 
 from volery.autonomy.perception.speckle_filter import LoneReturns
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import LaserScan
-from volery.graph.zero import zero_message
 
 INF = np.inf
 

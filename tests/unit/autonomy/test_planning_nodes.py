@@ -19,6 +19,7 @@ from volery.autonomy.planning.neighbours import Neighbours
 from volery.autonomy.planning.primitives import Path, State
 from volery.autonomy.planning.trajectory_follower import TrajectoryFollower
 from volery.autonomy.planning.trajectory_messages import samples_of, trajectory_message
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import (
     PathMessage,
     Point,
@@ -30,7 +31,6 @@ from volery.graph.messages import (
     header,
     message_type,
 )
-from volery.graph.zero import zero_message
 
 S = 1_000_000_000
 MS = 1_000_000

@@ -14,6 +14,7 @@ from volery.autonomy.search.ground_view import GroundView, Intrinsics
 from volery.autonomy.team.observations import Doubt, Tracks, sighting_of
 from volery.autonomy.team.target_detection import TargetDetection
 from volery.core import rotations
+from volery.graph.codecs.zero import zero_message
 from volery.graph.graph import Graph
 from volery.graph.messages import (
     Image,
@@ -28,8 +29,7 @@ from volery.graph.messages import (
     header,
 )
 from volery.graph.messages import Pose as PoseMessage
-from volery.graph.node import Context
-from volery.graph.zero import zero_message
+from volery.graph.nodes.node import Context
 
 EXACT = Doubt(0.03, 0.0, 0.0)
 

@@ -20,8 +20,8 @@ from volery.autonomy.team.mission_messages import goal_at
 from volery.autonomy.team.sectors import Coverage, Sectors, from_bits, to_bits
 from volery.autonomy.team.target_list import Find, TargetList
 from volery.core.errors import GraphError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import String, TFMessage, header, message_type
-from volery.graph.zero import zero_message
 
 HOMES = {"uav1": (0.0, 0.0), "uav2": (0.0, 25.0), "uav3": (0.0, 50.0)}
 NONE = np.zeros(12, np.bool_)

@@ -13,7 +13,7 @@ from volery.bench.forest_search import figures_of
 from volery.bench.registry import find
 from volery.core.errors import VoleryError
 from volery.graph import messages as m
-from volery.graph.zero import zero_message
+from volery.graph.codecs.zero import zero_message
 from volery.report.trunk_survey import LEVEL
 
 TREES = np.array([[30.0, 250.0], [34.0, 260.0], [200.0, 430.0]])

@@ -11,8 +11,8 @@ from volery.bridges.nodes.host import NodeHost
 from volery.bridges.nodes.late_link import LateLink
 from volery.core.errors import GraphError, NodeError
 from volery.graph.messages import Clock, String, Time, message_type
-from volery.graph.node import Node
-from volery.graph.reply import Reply
+from volery.graph.nodes.node import Node
+from volery.graph.service_reply import Reply
 
 TRIGGER = "std_srvs/srv/Trigger"
 Response = message_type(f"{TRIGGER}_Response")

@@ -18,7 +18,7 @@ from volery.bridges.logs.recording import Recorder
 from volery.bridges.logs.replay import Replay
 from volery.core.errors import GraphError, RecordingError
 from volery.graph import messages as m
-from volery.graph.cdr import encode_cdr
+from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.graph import Graph
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario

@@ -16,9 +16,9 @@ from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
 from volery.cli.topics import list_topics
 from volery.core.errors import GraphError
-from volery.graph.link import call_and_wait
+from volery.graph.connection import call_and_wait
 from volery.graph.messages import Clock, String, Time, message_type
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 from volery.graph.parameter_values import parameter_message, plain_of
 
 TRIGGER = "std_srvs/srv/Trigger"

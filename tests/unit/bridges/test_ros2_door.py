@@ -30,8 +30,9 @@ from volery.bridges.ros2.middleware import Profile, ServiceSpec
 from volery.bridges.ros2.names import NodeName
 from volery.bridges.rosbridge.beside import WithRosApi
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.cdr import decode_cdr, encode_cdr
-from volery.graph.link import call_and_wait
+from volery.graph.codecs.cdr import decode_cdr, encode_cdr
+from volery.graph.codecs.zero import zero_message
+from volery.graph.connection import call_and_wait
 from volery.graph.messages import (
     Clock,
     LaserScan,
@@ -44,7 +45,6 @@ from volery.graph.messages import (
 )
 from volery.graph.parameter_values import parameter_message, plain_of
 from volery.graph.parameters import Parameter
-from volery.graph.zero import zero_message
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"

@@ -24,7 +24,7 @@ from volery.bridges.ros2.names import (
 from volery.bridges.ros2.profiles import common_profile, profile_of
 from volery.bridges.ros2.type_hashes import message_hash, service_hash
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.cdr import decode_cdr, encode_cdr
+from volery.graph.codecs.cdr import decode_cdr, encode_cdr
 from volery.graph.messages import add_definitions, typestore
 from volery.graph.parameter_values import plain_of, type_of, value_message
 

@@ -18,7 +18,7 @@ from ros_tcp_client import until
 from volery.bridges.doors import Doors
 from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
-from volery.graph.cdr import encode_cdr
+from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.messages import String, header, message_type
 
 STRING = "std_msgs/msg/String"

@@ -38,7 +38,7 @@ from volery.bridges.ros2.zenoh.names import (
 )
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import String, add_definitions, message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"

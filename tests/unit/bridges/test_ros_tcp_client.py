@@ -19,9 +19,9 @@ from volery.bridges.ros_tcp.client import RosTcpClient
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.beside import WithRosApi
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.link import TellsTopics, call_and_wait
+from volery.graph.connection import TellsTopics, call_and_wait
 from volery.graph.messages import Header, String, Time, message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"

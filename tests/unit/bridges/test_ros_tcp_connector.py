@@ -19,7 +19,7 @@ from volery.bridges.ros_tcp.dial import dial
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.core.errors import BridgeError
 from volery.graph.messages import String, Twist, Vector3, message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 
 STRING = "std_msgs/msg/String"
 TWIST = "geometry_msgs/msg/Twist"

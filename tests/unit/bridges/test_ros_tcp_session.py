@@ -18,7 +18,7 @@ from volery.bridges.ros_tcp.unity import Selection, UnitySession
 from volery.bridges.ros_tcp.wire import FrameParser
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import Published, String, message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -259,7 +259,7 @@ def test_a_large_message_that_does_not_fit_is_refused():
 
 
 def test_a_queue_without_end_loses_nothing_or_says_so(monkeypatch):
-    monkeypatch.setattr("volery.graph.mailbox.MOST_DEPTH", 100)
+    monkeypatch.setattr("volery.graph.subscription_queue.MOST_DEPTH", 100)
     bench = Bench()
     session = EndpointSession(bench.gateway, "c", "ros1", 2, lambda: None)
     subscribe(session, "/out", queue_size=0)

@@ -8,7 +8,7 @@ import pytest
 from rosbridge_bench import SET_BOOL, STEPS, STRING, TIME_NS, TRIGGER, Bench
 
 from volery.bridges.rosbridge.rosapi import RosApi
-from volery.graph.node import Context, Node
+from volery.graph.nodes.node import Context, Node
 
 
 class Asked:

@@ -12,7 +12,7 @@ from volery.bridges.rosbridge.client_state import ClientState
 from volery.bridges.rosbridge.wire import decode_frame, encode_json
 from volery.core.errors import GraphError
 from volery.graph.messages import String
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 
 
 @pytest.fixture

@@ -54,7 +54,7 @@ def test_reliable_subscriptions_lose_nothing(bench, client):
 
 
 def test_reliable_subscriptions_end_with_an_error_where_they_must(bench, client, monkeypatch):
-    monkeypatch.setattr("volery.graph.mailbox.MOST_DEPTH", 100)
+    monkeypatch.setattr("volery.graph.subscription_queue.MOST_DEPTH", 100)
     client.send("subscribe", topic="/out", type=STRING, qos={"reliability": "reliable"})
     publish(bench, *map(str, range(500)))
     (status,) = client.read()

@@ -24,7 +24,7 @@ from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import BridgeError, GraphError
 from volery.graph import messages as m
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 
 IMAGE = "sensor_msgs/msg/Image"
 

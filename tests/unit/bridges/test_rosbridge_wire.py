@@ -22,7 +22,7 @@ from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, MOST_OPEN, Assemb
 from volery.bridges.rosbridge.wire import decode_frame, decode_png, encode_json, encode_png
 from volery.core.errors import BridgeError
 from volery.graph import messages as m
-from volery.graph.ros1 import ros1_codec
+from volery.graph.codecs.ros1 import ros1_codec
 
 PLAIN = st.recursive(
     st.none()

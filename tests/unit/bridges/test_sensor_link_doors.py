@@ -20,7 +20,7 @@ from volery.bridges.sensor_link.server import SensorLink
 from volery.bridges.sensor_link.wire import FrameParser, Kind, encode_frame
 from volery.core.errors import BridgeError
 from volery.graph import messages as m
-from volery.graph.cdr import encode_cdr
+from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.messages import message_type
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario

@@ -20,7 +20,7 @@ from volery.bridges.sensor_link.payloads import (
 from volery.bridges.sensor_link.wire import Kind
 from volery.core.errors import BridgeError
 from volery.graph import messages as m
-from volery.graph.cdr import encode_cdr
+from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.messages import message_type
 
 Image = message_type("sensor_msgs/msg/Image")

@@ -6,8 +6,8 @@ from volery.cli.node import _check_namespace
 from volery.cli.services import refusal_of
 from volery.cli.topics import Window
 from volery.core.errors import GraphError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type
-from volery.graph.zero import zero_message
 
 
 @pytest.mark.parametrize("line", [Window.rate_line, Window.bandwidth_line])

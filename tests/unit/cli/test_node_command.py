@@ -16,7 +16,7 @@ GAPS = "gap_following"
         (["volery.autonomy.avoidance.gap_following:Nobody"], "has no class 'Nobody'"),
         (
             ["volery.autonomy.avoidance.gap_following:Phase"],
-            "is no subclass of volery.graph.node.Node",
+            "is no subclass of volery.graph.nodes.node.Node",
         ),
         ([GAPS, "--lock-step", "0"], "lock-step"),
         ([GAPS, "--lock-step", "-1"], "lock-step"),

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from volery.cli import node_logs
 from volery.cli.app import app
-from volery.graph.cdr import decode_cdr
+from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.nodes import PYTHON_LOGGER
 
 BROKEN = """\
@@ -117,7 +117,7 @@ def test_errors_of_volery_and_of_libraries_point_to_the_users_line_too(run):
 def test_traceback_shows_all(run):
     told = run("Broken", "--traceback")[0].output
     assert "Traceback (most recent call last)" in told
-    assert "/graph/node.py" in told
+    assert "/graph/nodes/node.py" in told
 
 
 def test_a_constructor_that_fails_shows_its_line(run):

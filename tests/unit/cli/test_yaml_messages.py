@@ -7,8 +7,8 @@ import pytest
 from ruamel.yaml import YAML
 
 from volery.cli.yaml_form import read_message, to_yaml
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Header, LaserScan, String, Time, message_type
-from volery.graph.zero import zero_message
 
 LASER_SCAN = """\
 header:

@@ -38,8 +38,8 @@ from volery.comms.station.ground_station import Ground
 from volery.comms.station.station_bridge import UavStations
 from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Header, Point, String, Time, Vector3, message_type
-from volery.graph.zero import zero_message
 
 State = message_type(STATE_TYPE)
 States = message_type("volery_interfaces/msg/VehicleStates")

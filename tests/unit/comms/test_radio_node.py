@@ -16,7 +16,7 @@ from volery.comms.station.radio_node import RadioNode
 from volery.core.errors import GraphError
 from volery.graph.graph import Graph
 from volery.graph.messages import Published, String
-from volery.graph.node import Context
+from volery.graph.nodes.node import Context
 
 TOPIC = "hello std_msgs/msg/String"
 

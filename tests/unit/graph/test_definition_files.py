@@ -13,12 +13,12 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from volery.core.errors import GraphError
 from volery.graph import messages
-from volery.graph.definition_files import (
+from volery.graph.codecs.definition_files import (
     find_definition_files,
     parse_definition,
     read_definition_file,
 )
-from volery.graph.definition_store import DefinitionStore
+from volery.graph.codecs.definition_store import DefinitionStore
 
 SHIPPED = Path(messages.__file__).parent / "definitions"
 

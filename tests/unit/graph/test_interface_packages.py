@@ -9,11 +9,11 @@ from typer.testing import CliRunner
 
 from volery.cli.app import app
 from volery.core.errors import GraphError
-from volery.graph import ros1_package
-from volery.graph.definition_files import find_definition_files
-from volery.graph.definition_store import DefinitionStore
-from volery.graph.interface_packages import DEFINITIONS, needs, packages, write_package
-from volery.graph.ros1 import Ros1Codec, ros1_codec
+from volery.graph.codecs import ros1_package
+from volery.graph.codecs.definition_files import find_definition_files
+from volery.graph.codecs.definition_store import DefinitionStore
+from volery.graph.codecs.interface_packages import DEFINITIONS, needs, packages, write_package
+from volery.graph.codecs.ros1 import Ros1Codec, ros1_codec
 
 
 def test_the_package_is_whole(tmp_path):

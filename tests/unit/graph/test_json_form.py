@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from volery.core.errors import GraphError
 from volery.graph import messages as m
-from volery.graph.json_decoding import decode_plain
-from volery.graph.json_form import JsonForm
-from volery.graph.zero import zero_message
+from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.json_decoding import decode_plain
+from volery.graph.codecs.zero import zero_message
 
 TYPES = m.typestore().names()
 TWIST = "geometry_msgs/msg/Twist"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from volery.core.errors import GraphError
-from volery.graph.cdr import decode_cdr, encode_cdr
+from volery.graph.codecs.cdr import decode_cdr, encode_cdr
 from volery.graph.message_copies import copy_message
 from volery.graph.messages import (
     JointState,

@@ -5,7 +5,7 @@ import pytest
 from volery.core.errors import GraphError
 from volery.graph.graph import Graph
 from volery.graph.messages import String
-from volery.graph.node import Context, Node
+from volery.graph.nodes.node import Context, Node
 
 
 class FakeTimers:

@@ -7,7 +7,7 @@ from typing import Any
 
 from volery.graph.graph import Graph
 from volery.graph.messages import String
-from volery.graph.node import Context, Node
+from volery.graph.nodes.node import Context, Node
 
 
 class _NoTimers:

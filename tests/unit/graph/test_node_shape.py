@@ -6,8 +6,8 @@ import pytest
 
 from volery.core.errors import GraphError, NodeError
 from volery.graph.messages import String, message_type
-from volery.graph.node import Context, Node
 from volery.graph.nodes.logger import LoggingSeverity
+from volery.graph.nodes.node import Context, Node
 from volery.graph.nodes.ros_time import ClockType, Duration, Time
 from volery.graph.parameters import ParameterNotDeclaredError, ParameterSetting, ParameterType
 
@@ -169,7 +169,7 @@ def test_a_service_that_fails_is_named_and_the_simulation_goes_on(made, caplog):
     logs = []
     simulation.graph.subscribe_all(lambda p: logs.append(p) if p.topic == "/rosout" else None)
     session = simulation.gateway.open("a client")
-    from volery.graph.reply import Reply
+    from volery.graph.service_reply import Reply
 
     failures = []
     session.call("/uav1/do", None, Reply(print, failures.append))

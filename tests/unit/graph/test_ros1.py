@@ -16,9 +16,9 @@ from rosbags.typesys import Stores, get_typestore
 
 from volery.core.errors import GraphError
 from volery.graph import messages as m
-from volery.graph.cdr import decode_cdr, encode_cdr
-from volery.graph.ros1 import Ros1Codec, ros1_codec, ros1_name, ros2_name
-from volery.graph.zero import zero_message
+from volery.graph.codecs.cdr import decode_cdr, encode_cdr
+from volery.graph.codecs.ros1 import Ros1Codec, ros1_codec, ros1_name, ros2_name
+from volery.graph.codecs.zero import zero_message
 
 ROS1 = get_typestore(Stores.ROS1_NOETIC)
 TYPES = m.typestore().names()

@@ -2,7 +2,9 @@
 
 import pickle
 
-from volery.graph.json_form import JsonForm
+from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.ros1 import ros1_codec
+from volery.graph.lazy_list import Rows
 from volery.graph.messages import (
     Quaternion,
     TFMessage,
@@ -12,8 +14,6 @@ from volery.graph.messages import (
     header,
     typestore,
 )
-from volery.graph.ros1 import ros1_codec
-from volery.graph.rows import Rows
 
 TYPE = "tf2_msgs/msg/TFMessage"
 

@@ -9,7 +9,7 @@ from live_graph import HandGraph
 
 from volery.core.errors import GraphError
 from volery.graph.messages import String, message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -71,7 +71,9 @@ def test_a_reliable_mailbox_keeps_all(bench):
 
 @pytest.mark.parametrize("limit", ["MOST_DEPTH", "MOST_RELIABLE_BYTES"])
 def test_a_reliable_mailbox_that_overflows_says_so_and_ends(bench, monkeypatch, limit):
-    monkeypatch.setattr(f"volery.graph.mailbox.{limit}", {"MOST_DEPTH": 20}.get(limit, 2000))
+    monkeypatch.setattr(
+        f"volery.graph.subscription_queue.{limit}", {"MOST_DEPTH": 20}.get(limit, 2000)
+    )
     wakes = []
     session = bench.gateway.open("slow")
     mailbox = session.subscribe("/out", STRING, reliable=True, wake=lambda: wakes.append(1))

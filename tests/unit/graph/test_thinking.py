@@ -7,7 +7,7 @@ import pytest
 
 from volery.core.errors import NodeError
 from volery.graph.messages import Odometry, String
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 LATENCY_NS = 73_000_000
 ODOM_PERIOD_NS = 20_000_000

@@ -3,8 +3,8 @@
 import pytest
 from flying_bench import fly
 
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Header, PoseStamped, TwistStamped, message_type, time_from_ns
-from volery.graph.zero import zero_message
 
 STATE = "mavros_msgs/msg/State"
 

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from volery.graph.cdr import decode_cdr
+from volery.graph.codecs.cdr import decode_cdr
 
 MORE = [
     {"kind": "battery"},

@@ -15,7 +15,7 @@ from volery.bridges.logs.bag import open_log
 from volery.core import rotations
 from volery.core.errors import VoleryError
 from volery.graph import messages as m
-from volery.graph.zero import zero_message
+from volery.graph.codecs.zero import zero_message
 from volery.report.logged_flights import read_flight, read_way
 from volery.report.page import ReportError
 from volery.report.way_page import write_log_report

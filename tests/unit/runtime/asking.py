@@ -1,8 +1,8 @@
 """Asking services of a simulation, as doors do, with plain data for requests."""
 
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type, typestore
-from volery.graph.reply import Reply
-from volery.graph.zero import zero_message
+from volery.graph.service_reply import Reply
 
 STANDARD = "simulation_interfaces"
 

@@ -11,11 +11,11 @@ from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.flights import Origin, read_flight
 from volery.bridges.logs.recording import Recorder
 from volery.core.errors import RecordingError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.command_records import TOPIC, TYPE, content_of, record_of
 from volery.graph.messages import String, Twist, Vector3, message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Taken
-from volery.graph.zero import zero_message
 from volery.runtime.replay import command_log
 from volery.runtime.replay.command_effects import Weight, weight_of
 from volery.runtime.replay.scenario_record import origin_of_scenario, scenario_of

@@ -6,7 +6,7 @@ import pytest
 from asking import ask, code_of, request_of
 
 from volery.core.errors import GraphError
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.runtime.services.simulation_state import State
 
 STANDARD_REFUSALS = (

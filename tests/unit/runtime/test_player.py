@@ -12,8 +12,8 @@ from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.logs.records import LogWalk
 from volery.core.errors import CommandError, RecordingError
 from volery.graph import messages as m
-from volery.graph.reply import Reply
-from volery.graph.zero import zero_message
+from volery.graph.codecs.zero import zero_message
+from volery.graph.service_reply import Reply
 from volery.runtime import Simulation
 from volery.runtime.replay.log_player import Player
 from volery.scenario.load import load_scenario

@@ -9,7 +9,7 @@ import pytest
 
 from volery.core.errors import CommandError, ScenarioError
 from volery.graph.messages import String
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 from volery.runtime import Simulation
 from volery.runtime.build.line_of_sight import RadioSight
 from volery.scenario.load import parse_scenario

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from volery.core.errors import CommandError
-from volery.graph.zero import zero_message
+from volery.graph.codecs.zero import zero_message
 from volery.runtime import Simulation
 from volery.runtime.vehicles.raw_setpoints import steer_to_message, turn_to_message
 from volery.scenario.load import parse_scenario

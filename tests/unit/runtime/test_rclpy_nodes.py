@@ -108,7 +108,7 @@ def test_what_a_node_says_while_it_is_made_is_recorded(simulate, flat_data, tmp_
 
 def test_a_message_may_be_used_again_after_its_publication(simulate, flat_data):
     simulation = simulate(flat_data)
-    from volery.graph.node import Context, Node
+    from volery.graph.nodes.node import Context, Node
 
     context = Context(simulation.graph, simulation._engine, lambda: simulation.time_ns)
     node = Node("again", context=context)

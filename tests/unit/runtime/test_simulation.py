@@ -231,7 +231,7 @@ def test_every_physics_rate_leaves_the_sweep_its_poses(simulate):
 def test_a_failing_node_is_named(simulate, flat_data, tmp_path, monkeypatch, where, words):
     (tmp_path / f"bad_{where}.py").write_text(
         "from volery.graph.messages import Range\n"
-        "from volery.graph.node import Node\n"
+        "from volery.graph.nodes.node import Node\n"
         "class Bad(Node):\n"
         "    def __init__(self, **options):\n"
         "        super().__init__('bad', **options)\n"

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from volery.autonomy.slam.slam_node import Slam
 from volery.bridges.logs.bag import open_log
 from volery.cli.app import app
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import (
     Published,
     Quaternion,
@@ -25,7 +26,6 @@ from volery.graph.messages import (
     header,
     stamp_of,
 )
-from volery.graph.zero import zero_message
 from volery.runtime.replay.slam.initial_pose import beginning_of
 from volery.runtime.replay.slam.sources import open_source
 

@@ -252,7 +252,7 @@ def test_requests_of_other_threads_reach_a_paused_run(simulate, flat_data):
     answers = []
     simulation.pause()
     with InThread(simulation, 5.0):
-        from volery.graph.reply import Reply
+        from volery.graph.service_reply import Reply
 
         request = message_type("simulation_interfaces/srv/StepSimulation_Request")(steps=3)
         session.call("/step_simulation", request, Reply(answers.append, answers.append))

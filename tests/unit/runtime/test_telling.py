@@ -177,7 +177,7 @@ def test_how_long_nobody_outside_has_commanded(simulate, three):
     kept = simulation.snapshot()
     simulation.run(0.2)
     answers = []
-    from volery.graph.reply import Reply
+    from volery.graph.service_reply import Reply
 
     watcher.session.call("/uav2/hold", None, Reply(answers.append, answers.append))
     simulation.run(0.2)

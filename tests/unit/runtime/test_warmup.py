@@ -13,7 +13,7 @@ import pytest
 from volery.autonomy.mapping import warmup as mapping
 from volery.autonomy.perception import warmup as seeing
 from volery.core.errors import NodeError, ScenarioError
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 from volery.runtime.warmup import core_tasks, parallel_compilation, tasks
 from volery.runtime.warmup.requirements import all_needs, needs_of
 from volery.runtime.warmup.tasks import name_of, task_of
@@ -60,7 +60,7 @@ def test_rarer_sensors_compile_where_they_are(
 
 
 NODE = """
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 def compile_mine():
     print("compiled")
@@ -88,7 +88,7 @@ def test_the_kernels_of_a_users_node_are_asked_for_at_each_start(
 
 
 BROKEN = """
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 def fail():
     raise ValueError("no array")

@@ -8,8 +8,8 @@ from asking import ask
 
 from volery.bridges.logs.replay import Replay
 from volery.core.errors import ScenarioError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Vector3, message_type
-from volery.graph.zero import zero_message
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.world.weather import CLEAR_AIR, Particles
 

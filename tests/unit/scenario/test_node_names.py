@@ -8,7 +8,7 @@ from importlib import import_module
 import pytest
 
 from volery.core.errors import ScenarioError
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 from volery.runtime.build.node_loading import find_node
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.load import parse_scenario
@@ -88,7 +88,7 @@ def planner_of_another_package(tmp_path, monkeypatch):
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: stranger\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[volery.nodes]\nstranger = stranger_node:Stranger\n")
     (tmp_path / "stranger_node.py").write_text(
-        "from volery.graph.node import Node\n"
+        "from volery.graph.nodes.node import Node\n"
         "class Stranger(Node):\n"
         "    def __init__(self, **options):\n"
         '        super().__init__("stranger", **options)\n'

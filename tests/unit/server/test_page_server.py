@@ -16,7 +16,7 @@ from websockets.exceptions import ConnectionClosed
 
 from volery.cli import pages
 from volery.core.errors import BridgeError
-from volery.graph.zero import zero_message
+from volery.graph.codecs.zero import zero_message
 from volery.runtime.idle_server import Lobby
 from volery.server import page
 from volery.server.page_server import PageServer

@@ -14,7 +14,7 @@ from volery.autonomy.perception.list_parameters import declare_numbers
 from volery.autonomy.perception.scan_points import Pose
 from volery.core.kept import keep, put_back
 from volery.graph.messages import CameraInfo, Image, Odometry, String, Twist, Vector3
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 Array = NDArray[np.float64]
 

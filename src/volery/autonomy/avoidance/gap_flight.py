@@ -26,7 +26,7 @@ from volery.autonomy.perception.speckle_filter import LoneReturns
 from volery.core import rotations
 from volery.core.kept import keep, put_back
 from volery.graph.messages import JointState, LaserScan, Odometry, Range, Twist, Vector3
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 Array = NDArray[np.float64]
 

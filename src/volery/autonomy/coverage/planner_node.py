@@ -27,7 +27,6 @@ from volery.autonomy.coverage.waypoints import Heights, route_waypoints
 from volery.core import rotations
 from volery.core.errors import PlanError
 from volery.core.kept import keep, put_back
-from volery.graph.client import Future
 from volery.graph.messages import (
     Float32,
     OccupancyGrid,
@@ -36,7 +35,8 @@ from volery.graph.messages import (
     PoseStamped,
     String,
 )
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
+from volery.graph.nodes.service_client import Future
 
 _PERIOD_S = 0.1
 _REPEAT = 10

@@ -36,7 +36,7 @@ from volery.graph.messages import (
     String,
     stamp_of,
 )
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from volery.core.errors import DataFileError, PlanError
 from volery.core.kept import keep, put_back
 from volery.core.vectors import norm
 from volery.graph.messages import String, TFMessage
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 _STATE = ("_maps", "_placements", "_changed", "_told", "_reasons")
 

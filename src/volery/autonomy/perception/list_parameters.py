@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from volery.core.errors import NodeError
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 _FARTHEST_M = 1e6
 

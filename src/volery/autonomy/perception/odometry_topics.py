@@ -7,7 +7,7 @@ from typing import Any
 
 from volery.autonomy.perception.map_frame import MapFrame
 from volery.graph.messages import Odometry, TFMessage
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 
 def subscribe_odometry(

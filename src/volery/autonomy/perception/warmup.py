@@ -20,8 +20,8 @@ from volery.autonomy.perception.speckle_filter import LoneReturns
 from volery.autonomy.perception.stuck_sensors import ScanRepeats
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import CameraInfo, Image, LaserScan
-from volery.graph.zero import zero_message
 
 
 def scan_returns() -> None:

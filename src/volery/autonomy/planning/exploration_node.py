@@ -35,7 +35,7 @@ from volery.graph.messages import (
     message_type,
     single,
 )
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 Array = NDArray[np.float64]
 

@@ -31,7 +31,7 @@ from volery.graph.messages import (
     String,
     header,
 )
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 Array = NDArray[np.float64]
 

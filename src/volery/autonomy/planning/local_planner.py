@@ -33,7 +33,7 @@ from volery.graph.messages import (
     String,
     message_type,
 )
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 Array = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from volery.graph.messages import (
     Twist,
     Vector3,
 )
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from volery.autonomy.search.colour_blob import ColourRange
 from volery.autonomy.search.search_positions import Area
 from volery.core.errors import GraphError
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 
 @dataclass(frozen=True)

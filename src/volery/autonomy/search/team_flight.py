@@ -18,9 +18,9 @@ from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
 from volery.core.kept import keep, put_back
 from volery.core.vectors import norm
-from volery.graph.client import Client, Future
 from volery.graph.messages import Odometry, Point, Twist, header, message_type
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
+from volery.graph.nodes.service_client import Client, Future
 
 Array = NDArray[np.float64]
 

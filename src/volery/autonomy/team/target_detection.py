@@ -27,7 +27,7 @@ from volery.graph.messages import (
     message_type,
     stamp_of,
 )
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 Array = NDArray[np.float64]
 

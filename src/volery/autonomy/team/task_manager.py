@@ -25,7 +25,6 @@ from volery.autonomy.team.team_state import ALOFT, Phase
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
 from volery.core.vectors import norm
-from volery.graph.client import Client
 from volery.graph.messages import (
     Bool,
     PolygonStamped,
@@ -36,6 +35,7 @@ from volery.graph.messages import (
     Vector3,
     message_type,
 )
+from volery.graph.nodes.service_client import Client
 
 _PERIOD_S = 0.2
 _REPEAT_S = 2.0

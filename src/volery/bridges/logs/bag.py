@@ -238,7 +238,7 @@ class BagLog(Log):
     """ROS 1 bag, format 2.0."""
 
     def __init__(self, path: Path, compression: Compression = "lz4") -> None:
-        from volery.graph.ros1 import ros1_codec
+        from volery.graph.codecs.ros1 import ros1_codec
 
         super().__init__(path)
         if compression == "zstd":

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 from volery.bridges.logs.budgets import MAX_DEFINITION_BYTES, MAX_NESTED_TYPES
 from volery.bridges.logs.records import LogRecord, LogTopic
 from volery.core.errors import GraphError
-from volery.graph.cdr import decode_cdr
+from volery.graph.codecs.cdr import decode_cdr
+from volery.graph.codecs.ros1 import ros1_codec, ros2_name
 from volery.graph.messages import add_definitions, typestore
-from volery.graph.ros1 import ros1_codec, ros2_name
 
 _SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
 _NESTED = re.compile(r"\s*MSG:\s*(\S+)[^\n]*\n?")

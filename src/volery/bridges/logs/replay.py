@@ -25,7 +25,7 @@ from volery.bridges.topic_patterns import renamer, topic_filter
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.errors import GraphError, RecordingError
 from volery.graph.graph import Graph, Publisher
-from volery.graph.thinking import Deferring
+from volery.graph.nodes.deferred_execution import Deferring
 
 EVERYTHING = ("/**",)
 CLOCK = ("/clock",)

@@ -19,6 +19,7 @@ from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.counting import counted
 from volery.core.errors import RecordingError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import (
     LaserScan,
     Odometry,
@@ -31,7 +32,6 @@ from volery.graph.messages import (
     header,
     single,
 )
-from volery.graph.zero import zero_message
 
 _APART = re.compile(r"[\s,;]+")
 _COMMENTS = ("#", "%", "//")

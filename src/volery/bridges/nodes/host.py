@@ -21,8 +21,8 @@ from typing import Any, Literal
 from volery.bridges.nodes.mirrored_graph import MirroredGraph
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.errors import GraphError
+from volery.graph.connection import Link
 from volery.graph.graph import Subscription
-from volery.graph.link import Link
 from volery.graph.messages import Clock, Published, Time, message_type
 from volery.graph.nodes.failures import reported_failures
 from volery.graph.nodes.launch import Context

@@ -15,13 +15,13 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from volery.graph.link import HostsNodes, Link
-from volery.graph.mailbox import Mailbox, Wake
+from volery.graph.connection import HostsNodes, Link
 from volery.graph.messages import Published
 from volery.graph.parameters import Parameters
 from volery.graph.qos import DEFAULT_DEPTH
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Handler
+from volery.graph.subscription_queue import Mailbox, Wake
 
 Action = Callable[[Link], None]
 

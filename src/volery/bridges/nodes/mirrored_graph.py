@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from volery.core.errors import GraphError
+from volery.graph.connection import HostsNodes, Link, call_and_wait
 from volery.graph.graph import AsyncHandler, Callback, Graph, Publisher, Subscription
-from volery.graph.link import HostsNodes, Link, call_and_wait
-from volery.graph.mailbox import Mailbox
 from volery.graph.messages import Published, type_name
 from volery.graph.qos import DEFAULT_QOS, QoSProfile
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
+from volery.graph.subscription_queue import Mailbox
 
 _CALL_TIMEOUT_S = 10.0
 

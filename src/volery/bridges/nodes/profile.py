@@ -72,7 +72,7 @@ def load_profile(path: Path) -> Profile:
 
 
 def absolute_names(remap: dict[str, str], namespace: str) -> dict[str, str]:
-    """`remap` with relative names made absolute, as `graph.node.Context` takes it."""
+    """`remap` with relative names made absolute, as `graph.nodes.node.Context` takes it."""
 
     def resolve(name: str) -> str:
         return name if name.startswith("/") else f"{namespace}/{name}"

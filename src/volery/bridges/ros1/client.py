@@ -18,12 +18,12 @@ from typing import Any
 from volery.bridges.ros1.node import Receive, join_ros1
 from volery.bridges.ros1.raw import raw_message_class
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.mailbox import Mailbox, Wake
+from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import Published, message_type, type_name
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
-from volery.graph.reply import Reply
-from volery.graph.ros1 import ros1_codec
+from volery.graph.service_reply import Reply
 from volery.graph.session import Handler, SessionInfo
+from volery.graph.subscription_queue import Mailbox, Wake
 
 _MASTER_EACH_S = 1.0
 _SERVICE_TIMEOUT_S = 30.0
@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 
 
 class Ros1Client:
-    """One ROS 1 node as a `graph.link.Link`; wakes and requests come in threads of rospy's.
+    """One ROS 1 node as a `graph.connection.Link`; wakes and requests come in threads of rospy's.
 
     Parameters are those of `ros1_node.join_ros1`, which tells what `BridgeError` it raises.
     """

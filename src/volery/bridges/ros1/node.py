@@ -17,7 +17,7 @@ from volery.bridges.ros1.raw import raw_message_class, raw_service_class
 from volery.bridges.ros1.registrar import Ros1Registrar
 from volery.core.errors import BridgeError, GraphError, UnreachableError
 from volery.core.listening import check_address
-from volery.graph.ros1 import ros1_codec, ros2_name
+from volery.graph.codecs.ros1 import ros1_codec, ros2_name
 
 DEFAULT_MASTER = "http://127.0.0.1:11311"
 _BULKY = {"Image", "CompressedImage", "PointCloud2", "OccupancyGrid", "Octomap"}

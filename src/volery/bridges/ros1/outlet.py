@@ -10,10 +10,10 @@ from typing import Any
 from volery.bridges.ros1.node import Ros1Node
 from volery.bridges.ros1.pump import Pump, Reader
 from volery.core.errors import GraphError
-from volery.graph.mailbox import Mailbox
+from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import Published
-from volery.graph.ros1 import ros1_codec
 from volery.graph.session import Session
+from volery.graph.subscription_queue import Mailbox
 
 _DEPTH = 1000
 """One tick may publish once for each UAV, as it does on `/tf`."""

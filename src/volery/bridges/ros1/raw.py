@@ -11,7 +11,7 @@ from functools import cache
 from typing import Any
 
 from volery.bridges.ros1.environment import load_rospy
-from volery.graph.ros1 import ros1_codec, ros1_name
+from volery.graph.codecs.ros1 import ros1_codec, ros1_name
 
 
 @cache

@@ -14,9 +14,9 @@ from volery.bridges.ros1.outlet import Outlet
 from volery.bridges.ros1.pump import Pump
 from volery.bridges.sharing import Sharing
 from volery.core.errors import GraphError
+from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.graph import TopicInfo
-from volery.graph.reply import Reply
-from volery.graph.ros1 import ros1_codec
+from volery.graph.service_reply import Reply
 from volery.graph.session import Session
 
 _SERVICE_TIMEOUT_S = 30.0

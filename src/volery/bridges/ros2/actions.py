@@ -17,11 +17,11 @@ from volery.bridges.ros2.services import answerer
 from volery.bridges.ros2.worker import Worker
 from volery.core.errors import GraphError
 from volery.graph.actions import Goal, GoalStatus
-from volery.graph.cdr import encode_cdr
+from volery.graph.codecs.cdr import encode_cdr
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type, time_from_ns
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Session
-from volery.graph.zero import zero_message
 
 MOST_GOALS = 1000
 """Goals of an action that are remembered, with their results; the oldest ended one goes first."""

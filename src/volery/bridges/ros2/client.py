@@ -31,14 +31,14 @@ from volery.bridges.ros2.services import answerer, ask_server, wait_for
 from volery.bridges.ros2.subscriptions import Subscriptions
 from volery.bridges.ros2.worker import Worker
 from volery.core.errors import GraphError
-from volery.graph.cdr import encode_cdr
-from volery.graph.mailbox import Mailbox, Wake
+from volery.graph.codecs.cdr import encode_cdr
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type, type_name
 from volery.graph.parameters import Parameters
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Handler, SessionInfo
-from volery.graph.zero import zero_message
+from volery.graph.subscription_queue import Mailbox, Wake
 
 _FIRST_LOOK_S = 1.0
 """How long others may take to be found, after joining."""
@@ -48,7 +48,7 @@ _PUBLISHED_DEPTH = 100
 
 
 class Ros2Client:
-    """One participant in a ROS 2 graph as a `graph.link.Link`.
+    """One participant in a ROS 2 graph as a `graph.connection.Link`.
 
     name: of the ROS 2 node that it is until a node of ours says what it is called.
     `BridgeError` where the graph cannot be joined.

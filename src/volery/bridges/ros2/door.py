@@ -29,7 +29,7 @@ from volery.bridges.ros2.worker import Worker
 from volery.bridges.sharing import COMMANDS, Sharing
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Gateway, Session
 
 _SURVEY_S = 0.25

@@ -8,9 +8,9 @@ from typing import Any
 
 from volery.bridges.ros2.middleware import Participant, TopicSpec
 from volery.bridges.ros2.worker import Worker
-from volery.graph.cdr import CODING_ERRORS
-from volery.graph.mailbox import Mailbox
+from volery.graph.codecs.cdr import CODING_ERRORS
 from volery.graph.session import Session
+from volery.graph.subscription_queue import Mailbox
 
 _DEPTH = 1000
 """One tick may publish once for each UAV, as it does on `/tf`."""

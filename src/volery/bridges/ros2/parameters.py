@@ -17,12 +17,12 @@ from volery.bridges.ros2.profiles import profile_of
 from volery.bridges.ros2.services import answerer
 from volery.bridges.ros2.worker import Worker
 from volery.core.errors import GraphError
-from volery.graph.cdr import encode_cdr
+from volery.graph.codecs.cdr import encode_cdr
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type, time_from_ns
 from volery.graph.parameter_values import NOT_SET, plain_of, type_of, value_message
 from volery.graph.parameters import Parameters
-from volery.graph.reply import Reply
-from volery.graph.zero import zero_message
+from volery.graph.service_reply import Reply
 
 _SIM_TIME = "use_sim_time"
 """Every ROS 2 node has it; here it is true and nobody's to change."""

@@ -13,10 +13,10 @@ from volery.bridges.ros2.names import NodeName, check_name
 from volery.bridges.ros2.worker import Worker
 from volery.bridges.sharing import Sharing
 from volery.core.errors import GraphError
-from volery.graph.cdr import decode_cdr, encode_cdr
-from volery.graph.reply import Reply
+from volery.graph.codecs.cdr import decode_cdr, encode_cdr
+from volery.graph.codecs.zero import zero_message
+from volery.graph.service_reply import Reply
 from volery.graph.session import Session
-from volery.graph.zero import zero_message
 
 _LONGEST_WAIT_S = 10.0
 """For a server to appear, which DDS may take seconds to find."""

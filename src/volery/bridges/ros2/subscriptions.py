@@ -10,9 +10,9 @@ from volery.bridges.ros2.complaints import Complaints
 from volery.bridges.ros2.middleware import DEFAULT_DEPTH, Handle, Participant, Profile, TopicSpec
 from volery.bridges.ros2.names import NodeName
 from volery.core.errors import GraphError
-from volery.graph.cdr import decode_cdr
-from volery.graph.mailbox import Mailbox, MailboxInfo
+from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.messages import Published
+from volery.graph.subscription_queue import Mailbox, MailboxInfo
 
 
 class Subscriptions:

@@ -14,7 +14,7 @@ from volery.bridges.ros2.type_hashes import message_hash
 from volery.bridges.ros2.worker import Worker
 from volery.bridges.sharing import Sharing
 from volery.core.errors import GraphError
-from volery.graph.cdr import decode_cdr
+from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.graph import TopicInfo
 from volery.graph.session import Session
 

@@ -16,7 +16,7 @@ from volery.bridges.ros_tcp.outbox import Outbox
 from volery.bridges.ros_tcp.payloads import absolute
 from volery.bridges.ros_tcp.wire import Frame
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Session
 
 MOST_CALLS = 1000

@@ -27,7 +27,7 @@ from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.wire import Frame, FrameParser, Generation, number_field
 from volery.core.errors import BridgeError, GraphError, reason_of
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import SessionInfo
 
 MOST_COMPLAINTS = 100

@@ -12,7 +12,7 @@ from typing import Any
 from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.payloads import Payloads, payloads_of
 from volery.bridges.ros_tcp.wire import Bytes, Generation
-from volery.graph.mailbox import Wake
+from volery.graph.subscription_queue import Wake
 
 MOST_WAITING = 1000
 """Messages that may wait for the network."""

@@ -16,12 +16,12 @@ from volery.bridges.ros_tcp.client_line import Line
 from volery.bridges.ros_tcp.payloads import absolute
 from volery.bridges.ros_tcp.wire import Frame
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.cdr import known
+from volery.graph.codecs.cdr import known
+from volery.graph.codecs.ros1_names import ros2_name
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type
-from volery.graph.reply import Reply
-from volery.graph.ros1_names import ros2_name
+from volery.graph.service_reply import Reply
 from volery.graph.session import Handler
-from volery.graph.zero import zero_message
 
 FIRST_REQUEST = 101
 """As Unity's Connector counts."""

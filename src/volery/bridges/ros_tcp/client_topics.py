@@ -9,9 +9,9 @@ from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.client_line import Line
 from volery.bridges.ros_tcp.wire import Frame
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.cdr import known
-from volery.graph.reply import Reply
-from volery.graph.ros1_names import ros2_name
+from volery.graph.codecs.cdr import known
+from volery.graph.codecs.ros1_names import ros2_name
+from volery.graph.service_reply import Reply
 
 QUEUE_SIZE = 100
 """Messages of a topic that the endpoint lets wait for whom it passes them on to."""

@@ -23,9 +23,9 @@ from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.unity import Selection, UnitySession
 from volery.bridges.ros_tcp.wire import FrameParser, Generation
 from volery.core.errors import BridgeError
-from volery.graph.mailbox import Wake
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.session import Gateway
+from volery.graph.subscription_queue import Wake
 
 _REFRESH_S = 0.5
 _NOTES = 100

@@ -26,10 +26,10 @@ from volery.core.listener import Listener, Opening, open_listener
 from volery.core.listening import check_address
 from volery.core.preamble import Preamble
 from volery.core.waiting_room import look_at_binary
-from volery.graph.mailbox import Wake
+from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.qos import DEFAULT_DEPTH
-from volery.graph.ros1 import ros1_codec
 from volery.graph.session import Gateway
+from volery.graph.subscription_queue import Wake
 
 SILENCE_S = 15.0
 """Fifteen keepalives of Unity's Connector."""

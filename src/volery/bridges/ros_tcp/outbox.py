@@ -16,9 +16,9 @@ from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.payloads import Payloads
 from volery.bridges.ros_tcp.wire import Bytes
 from volery.core.errors import GraphError
-from volery.graph.mailbox import Mailbox, Wake
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.session import Session
+from volery.graph.subscription_queue import Mailbox, Wake
 
 _BATCH_BYTES = 64 << 10
 _BATCH_PARTS = 128

@@ -7,12 +7,12 @@ from typing import Any, Protocol
 from volery.bridges.ros_tcp.views import parts_of
 from volery.bridges.ros_tcp.wire import Bytes, Generation
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.cdr import CODING_ERRORS, decode_cdr, encode_cdr
-from volery.graph.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.cdr import CODING_ERRORS, decode_cdr, encode_cdr
+from volery.graph.codecs.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.ros1 import ros1_codec
+from volery.graph.codecs.ros1_names import ros1_name, ros2_name
 from volery.graph.messages import Published, message_type, typestore
 from volery.graph.object_count import CDR, ROS1, check_objects
-from volery.graph.ros1 import ros1_codec
-from volery.graph.ros1_names import ros1_name, ros2_name
 
 _CDR_HEADER_BYTES = 4
 

@@ -23,11 +23,11 @@ from volery.bridges.ros_tcp.payloads import (
 )
 from volery.bridges.ros_tcp.wire import Frame, Generation, number_field, text_field
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.mailbox import Wake
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.read_budget import Reading
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Gateway
+from volery.graph.subscription_queue import Wake
 
 MOST_DEPTH = 1000
 MOST_REGISTRATIONS = 10_000

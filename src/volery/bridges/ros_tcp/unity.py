@@ -20,8 +20,8 @@ from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.wire import Frame, Generation, number_field
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.graph import TopicInfo
-from volery.graph.mailbox import Wake
 from volery.graph.session import Gateway
+from volery.graph.subscription_queue import Wake
 
 _REFUSED = re.compile(r"Not registered to publish topic '([^']+)'")
 """What endpoints say to each message whose type they do not know."""

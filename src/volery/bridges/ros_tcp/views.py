@@ -18,8 +18,8 @@ from rosbags.interfaces import Nodetype
 
 from volery.bridges.ros_tcp.wire import Bytes
 from volery.core.errors import GraphError
+from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import Published, typestore
-from volery.graph.ros1 import ros1_codec
 
 LARGE_BYTES = 16 << 10
 """Below this a copy costs less than taking a message apart."""

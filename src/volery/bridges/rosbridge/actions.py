@@ -25,10 +25,10 @@ from volery.bridges.rosbridge.services import Post, Send
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.actions import Goal, GoalStatus
-from volery.graph.json_decoding import decode_plain
-from volery.graph.ros1_names import ros2_name
+from volery.graph.codecs.json_decoding import decode_plain
+from volery.graph.codecs.ros1_names import ros2_name
+from volery.graph.codecs.zero import zero_message
 from volery.graph.session import Session
-from volery.graph.zero import zero_message
 
 MOST_GOALS = 1000
 """Open goals of one client, and open goals for it."""

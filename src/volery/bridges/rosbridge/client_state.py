@@ -27,13 +27,13 @@ from volery.bridges.rosbridge.wire import (
     encode_json,
 )
 from volery.core.errors import GraphError, VoleryError
-from volery.graph.json_decoding import decode_plain
-from volery.graph.json_form import JsonForm
-from volery.graph.mailbox import Wake
+from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.json_decoding import decode_plain
+from volery.graph.codecs.ros1_names import ros1_name, ros2_name
 from volery.graph.messages import typestore
-from volery.graph.reply import Reply
-from volery.graph.ros1_names import ros1_name, ros2_name
+from volery.graph.service_reply import Reply
 from volery.graph.session import Handler, SessionInfo
+from volery.graph.subscription_queue import Wake
 
 MOST_WAITING = 1000
 """Publications that may wait for the network."""

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from volery.bridges.rosbridge.cbor_form import encode_cbor
 from volery.bridges.rosbridge.wire import Frame, encode_json, encode_png
-from volery.graph.json_form import JsonForm
+from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import Published
-from volery.graph.ros1 import ros1_codec
 
 Generation = Literal["ros1", "ros2"]
 """Whose field names (`secs` or `sec`), type names and serialization clients are given."""

@@ -5,10 +5,10 @@ Counts are of bytes, not of parsed values: exact for CBOR; for JSON an upper bou
 punctuation inside of texts for structure.
 
 Measured on one core of a 2-core machine (AMD EPYC, Python 3.11), decoding with `json` or `cbor2`
-and `graph.json_decoding` together: 90 to 180 ns a number in a list, .3 to .5 us a member of an
-object, 4 to 10 us an object that becomes a message, .4 us a list, 2 ms a MB of base64 text, .1 to
-.6 ms a MB of a byte string or typed array; counting: .1 ms a MB of JSON, .3 us a value of CBOR that
-is looked at by itself. A message within all budgets takes about 40 ms at most.
+and `graph.codecs.json_decoding` together: 90 to 180 ns a number in a list, .3 to .5 us a member of
+an object, 4 to 10 us an object that becomes a message, .4 us a list, 2 ms a MB of base64 text, .1
+to .6 ms a MB of a byte string or typed array; counting: .1 ms a MB of JSON, .3 us a value of CBOR
+that is looked at by itself. A message within all budgets takes about 40 ms at most.
 """
 
 from __future__ import annotations

@@ -16,10 +16,10 @@ from volery.bridges.rosbridge.rosapi_parameters import NamedParameters, Paramete
 from volery.bridges.rosbridge.rosapi_types import display_name, full_text, type_definitions
 from volery.core.clock import stamp_from_ns
 from volery.core.errors import GraphError
+from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.ros1_names import ros2_name
 from volery.graph.graph import TopicInfo
-from volery.graph.json_form import JsonForm
-from volery.graph.reply import Reply
-from volery.graph.ros1_names import ros2_name
+from volery.graph.service_reply import Reply
 from volery.graph.session import Gateway, Session, SessionInfo
 
 SIMULATION_NODE = "/volery"

@@ -7,10 +7,10 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 
 from volery.core.errors import GraphError
-from volery.graph.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.ros1 import ros1_codec
+from volery.graph.codecs.ros1_names import ros1_name
 from volery.graph.messages import typestore
-from volery.graph.ros1 import ros1_codec
-from volery.graph.ros1_names import ros1_name
 
 TypeDef = dict[str, Any]
 """Fields of rosapi_msgs/msg/TypeDef."""

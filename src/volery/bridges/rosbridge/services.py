@@ -18,11 +18,11 @@ from volery.bridges.rosbridge.fields import (
 from volery.bridges.rosbridge.forms import Forms
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.definition_store import EMPTY_MEMBER
-from volery.graph.json_decoding import decode_plain
+from volery.graph.codecs.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.json_decoding import decode_plain
+from volery.graph.codecs.ros1_names import ros2_name
 from volery.graph.messages import typestore
-from volery.graph.reply import Reply
-from volery.graph.ros1_names import ros2_name
+from volery.graph.service_reply import Reply
 from volery.graph.session import Session
 
 MOST_CALLS = 1000

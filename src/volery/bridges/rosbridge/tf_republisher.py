@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 
 from volery.bridges.rosbridge.frames import Frames, Known
 from volery.core.errors import GraphError
-from volery.graph.mailbox import Mailbox
 from volery.graph.messages import TFMessage, message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Gateway, Session
+from volery.graph.subscription_queue import Mailbox
 
 SERVICE = "/republish_tfs"
 _SRVTYPE = "tf2_web_republisher/srv/RepublishTFs"

@@ -21,12 +21,12 @@ from volery.bridges.rosbridge.forms import COMPRESSIONS
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.clock import stamp_from_ns
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.json_decoding import decode_plain
-from volery.graph.mailbox import Mailbox
+from volery.graph.codecs.json_decoding import decode_plain
+from volery.graph.codecs.ros1_names import ros2_name
 from volery.graph.messages import Published, typestore
 from volery.graph.qos import DEFAULT_DEPTH, MOST_DEPTH
-from volery.graph.ros1_names import ros2_name
 from volery.graph.session import Session
+from volery.graph.subscription_queue import Mailbox
 
 MOST_STREAMS = 10_000
 """Topics that a client may subscribe to, and publish on."""

@@ -28,8 +28,8 @@ from volery.bridges.sensor_link.server import IMAGE_PORT, PORT
 from volery.bridges.sensor_link.wire import Frame, FrameParser, Kind, encode_frame
 from volery.core.errors import BridgeError, GraphError
 from volery.core.listening import write_while_open
-from volery.graph.mailbox import Mailbox
 from volery.graph.session import Gateway, Session
+from volery.graph.subscription_queue import Mailbox
 
 _READ_BYTES = 256 << 10
 _DEPTH = 20

@@ -19,9 +19,9 @@ from volery.bridges.sensor_link.wire import (
 from volery.core.clock import NS_PER_S
 from volery.core.errors import BridgeError, GraphError
 from volery.core.framing import crc16, crc_bytes
-from volery.graph.mailbox import Mailbox
 from volery.graph.messages import Published
 from volery.graph.session import Gateway, Session
+from volery.graph.subscription_queue import Mailbox
 
 SENSORS = (Kind.LASER_SCAN, Kind.POSE, Kind.IMU, Kind.SONAR)
 IMAGES = (Kind.IMAGE,)

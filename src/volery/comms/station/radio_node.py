@@ -23,7 +23,7 @@ from volery.comms.server.tcp import PORT
 from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError, GraphError
 from volery.graph.messages import message_type
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 
 _PERIOD_S = 0.02
 """How often what was heard is published: messages come in another thread."""

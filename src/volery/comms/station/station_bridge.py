@@ -37,10 +37,10 @@ from volery.comms.server.tcp import PORT
 from volery.comms.station.statuses import slam_gist
 from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError, GraphError
-from volery.graph.mailbox import Mailbox
 from volery.graph.messages import message_type
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Gateway, Session
+from volery.graph.subscription_queue import Mailbox
 
 _VEHICLES = "/volery/vehicles"
 _VEHICLES_TYPE = "volery_interfaces/msg/VehicleStates"

@@ -7,7 +7,7 @@ from typing import Any
 
 from volery.graph.graph import Publisher, Subscription
 from volery.graph.message_copies import message_copier
-from volery.graph.thinking import Thinker
+from volery.graph.nodes.deferred_execution import Thinker
 
 
 class NodePublisher(Publisher):

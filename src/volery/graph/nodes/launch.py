@@ -25,7 +25,7 @@ class Context:
     """What a node stands on: a graph, timers, a clock, and the simulated time it takes to think.
 
     With `latency_ns` above 0 the node's callbacks run on a worker and what they publish is
-    released that much later; see `graph.thinking`.
+    released that much later; see `graph.nodes.deferred_execution`.
     """
 
     graph: Graph

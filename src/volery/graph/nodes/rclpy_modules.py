@@ -8,10 +8,10 @@ from typing import Any
 
 from volery.core.errors import GraphError
 from volery.graph import parameters, qos
-from volery.graph.client import Client, Future
 from volery.graph.messages import message_type
-from volery.graph.node import Node as VoleryNode
 from volery.graph.nodes import handles, logger, ros_time
+from volery.graph.nodes.node import Node as VoleryNode
+from volery.graph.nodes.service_client import Client, Future
 from volery.graph.nodes.timer import Timer
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from volery.core.clock import ns_from_s
-from volery.graph.thinking import Deferring
+from volery.graph.nodes.deferred_execution import Deferring
 
 
 class Timers(Deferring, Protocol):

@@ -10,9 +10,9 @@ import math
 from typing import Any
 
 from volery.core.errors import GraphError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Point, Quaternion, Vector3
-from volery.graph.node import Node
-from volery.graph.zero import zero_message
+from volery.graph.nodes.node import Node
 from volery.mavlink.autopilot.vehicle import Build, FlightState, Vector
 from volery.mavlink.autopilot.vehicle import Quaternion as Turn
 

@@ -21,11 +21,11 @@ import numpy as np
 
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
-from volery.graph.mailbox import Mailbox
+from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type, time_from_ns
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Gateway, Session
-from volery.graph.zero import zero_message
+from volery.graph.subscription_queue import Mailbox
 
 _JOIN = "volery_interfaces/srv/JoinLockStep"
 _SPEEDS = "std_msgs/msg/Float32MultiArray"

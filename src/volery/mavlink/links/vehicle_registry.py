@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from volery.core.errors import GraphError
-from volery.graph.mailbox import Mailbox
 from volery.graph.messages import message_type
 from volery.graph.session import Gateway, Session
+from volery.graph.subscription_queue import Mailbox
 
 PACKETS = "volery_interfaces/msg/MavlinkPackets"
 _IN, _OUT = "/mavlink/in", "/mavlink/out"

@@ -12,7 +12,7 @@ from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.engine.faults import FaultPlan
 from volery.graph.graph import Graph
-from volery.graph.node import Context, Node
+from volery.graph.nodes.node import Context, Node
 from volery.publishing.camera_messages import Camera
 from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.node_loading import start_node

@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import Any
 
 from volery.core.errors import ScenarioError, VoleryError
-from volery.graph.node import Context, Node
 from volery.graph.nodes.failures import add_frames, place_of
 from volery.graph.nodes.imports import provide_ros_imports
 from volery.graph.nodes.launch import Launch, make_node
+from volery.graph.nodes.node import Context, Node
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.node_names import node_module, node_path
 from volery.scenario.schema import NodeEntry, Scenario
@@ -171,7 +171,7 @@ def _find_class(path: str, where: str) -> type[Any]:
         ) from None
     if not (isinstance(found, type) and issubclass(found, Node)):
         raise ScenarioError(
-            f"{where}: '{path}' is no subclass of volery.graph.node.Node{_hint(found)}"
+            f"{where}: '{path}' is no subclass of volery.graph.nodes.node.Node{_hint(found)}"
         )
     return found
 

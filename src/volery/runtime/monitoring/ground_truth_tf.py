@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from volery.engine.engine import Engine
 from volery.graph.graph import Graph
+from volery.graph.lazy_list import Rows
 from volery.graph.messages import (
     Quaternion,
     TFMessage,
@@ -21,7 +22,6 @@ from volery.graph.messages import (
     Vector3,
     header,
 )
-from volery.graph.rows import Rows
 from volery.runtime.monitoring.live_topic import Present
 
 Array = NDArray[np.float64]

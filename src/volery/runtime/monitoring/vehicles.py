@@ -14,8 +14,8 @@ from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.core.clock import s_from_ns
 from volery.engine.engine import Engine
+from volery.graph.lazy_list import Rows
 from volery.graph.messages import Point, Vector3, header, message_type
-from volery.graph.rows import Rows
 from volery.graph.session import Gateway
 from volery.runtime.monitoring.live_topic import Present
 from volery.runtime.vehicles.uav import Uav

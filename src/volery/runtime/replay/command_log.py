@@ -15,9 +15,9 @@ from volery.engine.commands import Moment
 from volery.engine.engine import Engine
 from volery.graph import command_records as records
 from volery.graph.graph import Graph
-from volery.graph.mailbox import array_bytes
 from volery.graph.messages import Published
 from volery.graph.session import Taken
+from volery.graph.subscription_queue import array_bytes
 from volery.runtime.replay.command_effects import Weight, weight_of
 
 MOST_KEPT_BYTES = 32 * 1024 * 1024

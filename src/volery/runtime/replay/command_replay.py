@@ -21,7 +21,7 @@ from volery.engine.commands import Moment
 from volery.engine.engine import Engine
 from volery.engine.pacing import Pacer
 from volery.graph.graph import Graph, Publisher
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Gateway, Taken
 from volery.runtime.replay.command_effects import Weight, weight_of
 from volery.runtime.replay.command_log import CommandLog

@@ -7,10 +7,10 @@ from enum import IntEnum
 from typing import Any
 
 from volery.core.errors import VoleryError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.graph import Graph
 from volery.graph.messages import message_type
-from volery.graph.reply import Reply
-from volery.graph.zero import zero_message
+from volery.graph.service_reply import Reply
 
 Fields = Mapping[str, Any]
 """Fields of a response by name; those that are missing stay zero."""

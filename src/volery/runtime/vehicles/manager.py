@@ -15,7 +15,7 @@ from volery.core.errors import CommandError, PlacementError
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
 from volery.graph.graph import Graph
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.assembly import Assembly, assemble
 from volery.runtime.build.graph import announce_sensors, start_nodes, start_system_nodes

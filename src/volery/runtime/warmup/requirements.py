@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from importlib import import_module
 
 from volery.core.errors import DataFileError, ScenarioError
-from volery.graph.node import Node
+from volery.graph.nodes.node import Node
 from volery.runtime.build.node_loading import find_node
 from volery.runtime.warmup import core_tasks
 from volery.runtime.warmup.tasks import Task

@@ -19,7 +19,7 @@ from volery.bridges.ros2.dds.qos import qos_of
 from volery.bridges.ros2.middleware import Profile
 from volery.bridges.ros2.names import NodeName
 from volery.bridges.ros2.type_hashes import message_hash
-from volery.graph.cdr import encode_cdr
+from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.messages import message_type
 
 TOPIC = "ros_discovery_info"

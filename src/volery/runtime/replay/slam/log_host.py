@@ -10,7 +10,7 @@ from typing import Any
 from volery.core.clock import ns_from_s
 from volery.graph.graph import Graph
 from volery.graph.messages import Published
-from volery.graph.node import Context
+from volery.graph.nodes.node import Context
 
 _LEAP_NS = 60_000_000_000
 """After a longer gap timers ring once, not for all of it."""

@@ -21,8 +21,8 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
 
 from volery.core.errors import GraphError
-from volery.graph.definition_store import EMPTY_MEMBER
-from volery.graph.json_decoding import (
+from volery.graph.codecs.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.json_decoding import (
     BYTES,
     HEADER,
     ROS1_TIME,
@@ -31,8 +31,8 @@ from volery.graph.json_decoding import (
     decode_plain,
     plain_fields,
 )
-from volery.graph.ros1 import ros1_codec
-from volery.graph.zero import DTYPES
+from volery.graph.codecs.ros1 import ros1_codec
+from volery.graph.codecs.zero import DTYPES
 
 ArrayHook = Callable[[NDArray[Any], str], Any]
 """Array of numbers, shape (n,), little-endian, and its ROS type, to what stands in the dict."""

@@ -11,8 +11,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from volery.core.errors import GraphError
-from volery.graph import ros1_package
-from volery.graph.definition_files import (
+from volery.graph.codecs import ros1_package
+from volery.graph.codecs.definition_files import (
     DefinitionFile,
     find_definition_files,
     read_definition_file,
@@ -20,7 +20,7 @@ from volery.graph.definition_files import (
 
 OWN = "volery_interfaces"
 """The package that nobody else has."""
-DEFINITIONS = Path(__file__).parent / "definitions"
+DEFINITIONS = Path(__file__).parents[1] / "definitions"
 _ROS2_ALONE = ("action_msgs", "rcl_interfaces")
 _ACTIONS_NEED = "action_msgs"
 """What rosidl adds to packages with actions."""

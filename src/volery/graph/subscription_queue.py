@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from volery.core.counting import counted
+from volery.graph.lazy_list import Rows
 from volery.graph.messages import Published
 from volery.graph.qos import MOST_DEPTH
-from volery.graph.rows import Rows
 
 Wake = Callable[[], None]
 """Called in the simulation's thread when there is something to take; must not block."""

@@ -23,20 +23,20 @@ from functools import partial
 from typing import Any
 
 from volery.core.errors import GraphError, NodeError, VoleryError
-from volery.graph.client import Client
 from volery.graph.graph import Subscription, check_period
 from volery.graph.message_copies import copy_message
 from volery.graph.messages import Published, message_type
+from volery.graph.nodes.deferred_execution import Thinker
 from volery.graph.nodes.failures import add_frames, place_of
 from volery.graph.nodes.handles import NodePublisher, NodeService, NodeSubscription
 from volery.graph.nodes.launch import Context, present_launch
 from volery.graph.nodes.logger import LOG_TYPE, ROSOUT, NodeLogger
 from volery.graph.nodes.parameter_methods import ParameterMethods
 from volery.graph.nodes.ros_time import Clock
+from volery.graph.nodes.service_client import Client
 from volery.graph.nodes.timer import Timer, Timers
 from volery.graph.parameters import ParameterSetting
 from volery.graph.qos import DEFAULT_DEPTH, QoSProfile, profile_of
-from volery.graph.thinking import Thinker
 
 __all__ = ["Clock", "Context", "Node", "Timers"]
 

@@ -12,7 +12,7 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 
 from volery.core.errors import GraphError
-from volery.graph.definition_files import NUMBERS, Definition
+from volery.graph.codecs.definition_files import NUMBERS, Definition
 
 EMPTY_MEMBER = "structure_needs_at_least_one_member"
 """The byte that a message without fields has in ROS 2, and only there."""

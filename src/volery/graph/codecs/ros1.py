@@ -29,11 +29,11 @@ from rosbags.typesys.base import normalize_fieldname
 from rosbags.typesys.store import Typestore
 
 from volery.core.errors import GraphError
-from volery.graph.cdr import CODING_ERRORS, is_number_array, own_array
-from volery.graph.definition_store import EMPTY_MEMBER, DefinitionStore, element_type
+from volery.graph.codecs.cdr import CODING_ERRORS, is_number_array, own_array
+from volery.graph.codecs.definition_store import EMPTY_MEMBER, DefinitionStore, element_type
+from volery.graph.codecs.ros1_names import ros1_name, ros2_name
+from volery.graph.codecs.zero import value_maker
 from volery.graph.messages import typestore
-from volery.graph.ros1_names import ros1_name, ros2_name
-from volery.graph.zero import value_maker
 
 __all__ = ["Ros1Codec", "ros1_codec", "ros1_name", "ros2_name"]
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 from volery.core.errors import GraphError
-from volery.graph.mailbox import Mailbox, Wake
 from volery.graph.parameters import Parameters
 from volery.graph.qos import DEFAULT_DEPTH
-from volery.graph.reply import Reply
+from volery.graph.service_reply import Reply
 from volery.graph.session import Handler
+from volery.graph.subscription_queue import Mailbox, Wake
 
 
 class Link(Protocol):

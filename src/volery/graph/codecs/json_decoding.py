@@ -17,10 +17,10 @@ from rosbags.interfaces import Nodetype
 
 from volery.core.counting import counted
 from volery.core.errors import GraphError
-from volery.graph.definition_files import INTEGER_RANGES, NUMBERS
-from volery.graph.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.definition_files import INTEGER_RANGES, NUMBERS
+from volery.graph.codecs.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.zero import DTYPES, value_maker
 from volery.graph.messages import single, typestore
-from volery.graph.zero import DTYPES, value_maker
 
 Convert = Callable[[Any], Any]
 

@@ -16,9 +16,9 @@ from rosbags.typesys import TypesysError
 from rosbags.typesys.store import Typestore
 
 from volery.core.errors import GraphError
-from volery.graph import definition_budget
-from volery.graph.definition_budget import MAX_DEPTH, check_definitions, check_foreign
-from volery.graph.definition_files import (
+from volery.graph.codecs import definition_budget
+from volery.graph.codecs.definition_budget import MAX_DEPTH, check_definitions, check_foreign
+from volery.graph.codecs.definition_files import (
     Definition,
     DefinitionFile,
     find_definition_files,

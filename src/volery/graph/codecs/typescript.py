@@ -1,6 +1,6 @@
 """Message types for TypeScript, written from the one definition of each type.
 
-    python -m volery.graph.typescript > web/src/messages/generated.ts
+    python -m volery.graph.codecs.typescript > web/src/messages/generated.ts
 
 Interfaces are named `package_Type`, with `_Request` and `_Response` for services. Integers of 64
 bits come as `number` or, beyond 2^53, as `bigint`; arrays of numbers as typed arrays where the
@@ -15,11 +15,11 @@ from typing import Any
 
 from rosbags.interfaces import Nodetype
 
-from volery.graph.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.definition_store import EMPTY_MEMBER
 from volery.graph.messages import typestore
 
 _HEAD = """\
-// Written by `python -m volery.graph.typescript` from the definitions of the messages.
+// Written by `python -m volery.graph.codecs.typescript` from the definitions of the messages.
 // A test of the project fails when this file is older than they are.
 """
 _ARRAYS = {

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from volery.graph.definition_files import DefinitionFile
-from volery.graph.ros1 import Ros1Codec, ros1_codec, ros1_name
+from volery.graph.codecs.definition_files import DefinitionFile
+from volery.graph.codecs.ros1 import Ros1Codec, ros1_codec, ros1_name
 
 GENERATOR = Path(__file__).with_name("ros1_python_generator.py")
 """What makes Python modules of such packages; it runs by itself, with ROS 1's own Python."""

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 from volery.core.errors import GraphError
+from volery.graph.codecs.zero import zero_message
 from volery.graph.graph import Graph
 from volery.graph.message_copies import copy_message
-from volery.graph.reply import Reply
-from volery.graph.thinking import Thinker
-from volery.graph.zero import zero_message
+from volery.graph.nodes.deferred_execution import Thinker
+from volery.graph.service_reply import Reply
 
 Later = Callable[[Callable[[], None]], None]
 

@@ -13,8 +13,8 @@ from rosbags.serde import SerdeError
 from rosbags.typesys.base import normalize_fieldname
 
 from volery.core.errors import GraphError
-from volery.graph.definition_files import NUMBERS
-from volery.graph.definition_store import element_type
+from volery.graph.codecs.definition_files import NUMBERS
+from volery.graph.codecs.definition_store import element_type
 from volery.graph.messages import typestore
 
 _HEADER_BYTES = 4

@@ -10,7 +10,7 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 
 from volery.core.errors import GraphError
-from volery.graph.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.definition_store import EMPTY_MEMBER
 from volery.graph.messages import typestore
 
 DTYPES: dict[str, np.dtype[Any]] = {
