@@ -160,12 +160,14 @@ def test_joining_needs_a_way_to_answer():
     with Simulation(scenario(with_node=False)) as simulation:
         session = simulation.gateway.open("mute")
         from volery.graph.messages import message_type
-        from volery.graph.service_reply import Reply
+        from volery.graph.service_reply import ServiceReply
 
         kind = message_type("volery_interfaces/srv/JoinLockStep_Request")
         request = kind("mute", 0.001, 1.0, False, False)
         answers = []
-        session.call("/volery/join_lock_step", request, Reply(answers.append, answers.append))
+        session.call(
+            "/volery/join_lock_step", request, ServiceReply(answers.append, answers.append)
+        )
         simulation.step()
         assert not answers[0].success
         assert "advertise" in answers[0].message

@@ -25,7 +25,7 @@ from volery.graph.codecs.zero import zero_message
 from volery.graph.command_records import content_bytes
 from volery.graph.connection import call_and_wait
 from volery.graph.messages import Twist, Vector3, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.runtime import Simulation
 from volery.runtime.replay.command_effects import Weight, weight_of
 from volery.scenario.load import parse_scenario
@@ -360,9 +360,11 @@ def test_a_recording_begun_late_holds_what_came_before(tmp_path):
         simulation.run(0.5)
         request = message_type("volery_interfaces/srv/StartRecording_Request")("late.mcap", [], [])
         answers = []
-        session.call("/volery/start_recording", request, Reply(answers.append, answers.append))
+        session.call(
+            "/volery/start_recording", request, ServiceReply(answers.append, answers.append)
+        )
         simulation.run(0.5)
-        stopping = Reply(answers.append, answers.append)
+        stopping = ServiceReply(answers.append, answers.append)
         session.call("/volery/stop_recording", None, stopping)
         simulation.run(0.1)
         assert [answer.success for answer in answers] == [True, True]
@@ -391,7 +393,7 @@ def test_nobody_changes_a_flight_that_is_repeated(tmp_path):
         session = simulation.gateway.open("visitor")
         answers = []
         for service in ("/uav1/land", "/get_entities"):
-            session.call(service, None, Reply(answers.append, answers.append))
+            session.call(service, None, ServiceReply(answers.append, answers.append))
         simulation.run()
         assert simulation.time_s == 0.3
         assert isinstance(answers[0], GraphError)
@@ -425,7 +427,7 @@ def test_a_lock_step_partner_is_met_again(tmp_path):
         request = zero_message("volery_interfaces/srv/JoinLockStep_Request")
         request.name, request.period_s, request.timeout_s = "pilot", 0.05, 20.0
         joined = []
-        session.call("/volery/join_lock_step", request, Reply(joined.append, joined.append))
+        session.call("/volery/join_lock_step", request, ServiceReply(joined.append, joined.append))
         meetings = []
 
         def steer():
@@ -519,7 +521,7 @@ def test_a_flight_past_its_scenarios_end_is_repeated(tmp_path):
 
         def call(service):
             message = zero_message(f"{simulation.graph.services()[service]}_Request")
-            session.call(service, message, Reply(_ignore, _ignore))
+            session.call(service, message, ServiceReply(_ignore, _ignore))
 
         simulation.wait_at_end(lambda: call("/volery/continue_run"))
         simulation.run(0.1)
@@ -528,7 +530,7 @@ def test_a_flight_past_its_scenarios_end_is_repeated(tmp_path):
         session.call(
             "/reset_simulation",
             zero_message("simulation_interfaces/srv/ResetSimulation_Request"),
-            Reply(_ignore, _ignore),
+            ServiceReply(_ignore, _ignore),
         )
         simulation.run(0.15)
         simulation.commands.end()

@@ -18,7 +18,7 @@ from volery.graph import object_count
 from volery.graph.codecs.cdr import decode_cdr, encode_cdr
 from volery.graph.codecs.definition_files import parse_definition
 from volery.graph.codecs.definition_store import DefinitionStore
-from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.codecs.json_decoding import decode_plain
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.codecs.ros1_names import ros1_name, ros2_name
@@ -55,9 +55,9 @@ def _seeds(msgtype, form):
     if form == "ros1":
         return [ros1_codec().encode(message, msgtype) for message in messages]
     if form == "plain":
-        plain = JsonForm(non_finite_as_null=False)
-        old = JsonForm(ros1_names=True)
-        typed = JsonForm(arrays=lambda values, _type: values)
+        plain = JsonCodec(non_finite_as_null=False)
+        old = JsonCodec(ros1_names=True)
+        typed = JsonCodec(arrays=lambda values, _type: values)
         return [f.encode(message, msgtype) for f in (plain, old, typed) for message in messages]
     store = typestore()
     return [
@@ -136,7 +136,7 @@ def plain_values(mutator):
         return 1
     back = decode_cdr(encode_cdr(message, msgtype), msgtype)
     assert encode_cdr(back, msgtype) == encode_cdr(message, msgtype)
-    JsonForm().encode(message, msgtype)
+    JsonCodec().encode(message, msgtype)
     return 1
 
 

@@ -19,7 +19,7 @@ from volery.bridges.rosbridge.rosapi import RosApi
 from volery.bridges.rosbridge.wire import decode_frame, decode_png, encode_json, encode_png
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import String, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 _GOAL = {"op": "send_action_goal", "id": "g", "action": "/act", "action_type": STEPS}
 OPERATIONS = (
@@ -253,7 +253,7 @@ def client(mutator):
     calls = []
 
     def reply():
-        calls.append(Reply(lambda _: None, lambda _: None))
+        calls.append(ServiceReply(lambda _: None, lambda _: None))
         return calls[-1]
 
     state.subscribe("/out", STRING, 2, False, lambda: None)

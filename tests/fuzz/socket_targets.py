@@ -25,7 +25,7 @@ from volery.core.errors import BridgeError
 from volery.graph import messages as m
 from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.messages import String, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -127,7 +127,7 @@ def _play(mutator, bench, session):
             bench.work_off()
         if mutator.chance(0.1):
             for service in bench.graph.services():
-                calls.append(Reply(lambda _: None, lambda _: None))
+                calls.append(ServiceReply(lambda _: None, lambda _: None))
                 bench.graph.call_async(service, None, calls[-1])
     return steps, calls
 

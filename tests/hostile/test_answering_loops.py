@@ -152,7 +152,7 @@ def test_what_is_posted_after_close_fails(simulate, flat_data):
         with pytest.raises(CommandError, match="closed"):
             future.result(1.0)
     answers = []
-    from volery.graph.service_reply import Reply
+    from volery.graph.service_reply import ServiceReply
 
-    client.session.call("/get_entities", None, Reply(answers.append, answers.append))
+    client.session.call("/get_entities", None, ServiceReply(answers.append, answers.append))
     assert "closed" in str(answers[0])

@@ -12,7 +12,7 @@ import pytest
 from whole_world import offer_rosapi, whole_data
 
 from volery.bridges.logs.bag import open_log
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.runtime.replay.log_player import Player
 from volery.server.read_only import READ_ONLY_SERVICES
 
@@ -30,7 +30,7 @@ IN_PLAYBACK = ("/volery/player/info",)
 def charge(inbox, gateway, service, serve):
     """CPU time that a new client owes after one call of a service."""
     session = gateway.open("viewer")
-    session.call(service, None, Reply(lambda _: None, lambda _: None))
+    session.call(service, None, ServiceReply(lambda _: None, lambda _: None))
     queue = session._post.__self__
     assert queue.client is not None
     before_s = inbox._budget._owed_s.get(queue.client, 0.0)

@@ -7,7 +7,7 @@ from rosbags.interfaces import Nodetype
 
 from volery.bridges.rosbridge.rosapi import RosApi
 from volery.graph.messages import typestore
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 SENSORS = [
     {"kind": "lidar", "noise": False},
@@ -103,7 +103,7 @@ class Client:
     def call(self, service, request):
         """The answer of a service after a step, as a response or an error; None: there is none."""
         answers = []
-        self.session.call(service, request, Reply(answers.append, answers.append))
+        self.session.call(service, request, ServiceReply(answers.append, answers.append))
         self.simulation.take_in()
         return answers[0] if answers else None
 

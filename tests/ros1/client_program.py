@@ -7,7 +7,7 @@ import threading
 from volery.bridges.ros1.client import Ros1Client
 from volery.core.errors import GraphError
 from volery.graph.messages import Header, String, Time, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -25,7 +25,7 @@ def call(link, service, request=None):
         results.append(value)
         told.set()
 
-    link.call(service, request, Reply(keep, keep))
+    link.call(service, request, ServiceReply(keep, keep))
     assert told.wait(60.0)
     return results[0]
 

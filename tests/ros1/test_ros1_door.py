@@ -40,7 +40,7 @@ from volery.graph.messages import (
     Vector3,
     message_type,
 )
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 require_ros1()
 pytestmark = [  # rospy uses what is deprecated and forgets to close sockets
@@ -342,7 +342,7 @@ def test_packages_for_ros1_have_the_sums_of_the_bridge(own_types):
 def test_services_of_ros1_for_the_graph(live, door):
     def call():
         come, got = threading.Event(), []
-        reply = Reply(got.append, got.append)
+        reply = ServiceReply(got.append, got.append)
         reply.when_done(come.set)
         live.do(lambda: live.graph.call_async("/remote", None, reply))
         assert come.wait(60.0)

@@ -18,7 +18,7 @@ from typing import Any
 from volery.autonomy.search.calls import JOIN
 from volery.autonomy.search.cooperative_search import CooperativeSearch
 from volery.bridges.nodes.host import NodeHost
-from volery.graph.connection import Link
+from volery.graph.connection import GraphConnection
 from volery.graph.messages import Point, message_type, time_from_ns
 from volery.graph.nodes.node import Node
 from volery.graph.nodes.service_client import Future
@@ -106,7 +106,7 @@ def _say(value: Any) -> None:
     sys.stdout.flush()
 
 
-def _open_link(via: str, port: int, name: str) -> Link:
+def _open_link(via: str, port: int, name: str) -> GraphConnection:
     if via == "rosbridge":
         from volery.bridges.rosbridge.client import RosbridgeClient
 

@@ -17,9 +17,9 @@ from typing import Any, ClassVar, Protocol, TypeVar
 from volery.bridges.remote_topics import RemoteTopics
 from volery.core.errors import BridgeError, GraphError, UnreachableError
 from volery.graph.qos import DEFAULT_DEPTH
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Handler
-from volery.graph.subscription_queue import Mailbox, Wake
+from volery.graph.subscription_queue import SubscriptionQueue, Wake
 
 T = TypeVar("T")
 
@@ -29,7 +29,7 @@ _ANSWER_TIMEOUT_S = 5.0
 class RemoteServices(Protocol):
     """Services that a client calls and offers, also when there is no connection."""
 
-    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+    def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Call a service; without a request the server is asked for its type first."""
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
@@ -139,7 +139,7 @@ class RemoteClient(ABC):
         depth: int = DEFAULT_DEPTH,
         reliable: bool = False,
         wake: Wake,
-    ) -> Mailbox:
+    ) -> SubscriptionQueue:
         """As `Link.subscribe`; without a type the client asks the server for it."""
         self._check_open()
         if msgtype is None:
@@ -148,7 +148,7 @@ class RemoteClient(ABC):
                 raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
         return self._topics.subscribe(topic, msgtype, depth, reliable, wake)
 
-    def unsubscribe(self, mailbox: Mailbox) -> None:
+    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
         """Receive no more; what waits can still be taken."""
         self._topics.unsubscribe(mailbox)
 
@@ -175,7 +175,7 @@ class RemoteClient(ABC):
 
     # ---------------------------------------------------------------------------------- services
 
-    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+    def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Call a service; `reply` gets the response or a `GraphError` in the client's thread.
 
         Calls that are open when the connection breaks fail.

@@ -11,7 +11,7 @@ from typing import Any
 from volery.core.errors import GraphError
 from volery.graph.messages import Published, stamp_of
 from volery.graph.qos import check_depth
-from volery.graph.subscription_queue import Mailbox, MailboxInfo, Wake
+from volery.graph.subscription_queue import SubscriptionQueue, SubscriptionQueueInfo, Wake
 
 
 @dataclass
@@ -19,7 +19,7 @@ class Subscription:
     """A topic that is received, once for all its mailboxes."""
 
     msgtype: str
-    mailboxes: list[Mailbox] = field(default_factory=list)
+    mailboxes: list[SubscriptionQueue] = field(default_factory=list)
     depth: int = 1
     """The most that a mailbox has asked for."""
     reliable: bool = False
@@ -96,11 +96,11 @@ class RemoteTopics(ABC):
 
     def subscribe(
         self, topic: str, msgtype: str, depth: int, reliable: bool, wake: Wake
-    ) -> Mailbox:
+    ) -> SubscriptionQueue:
         """Begin to receive a topic. `GraphError` for an unknown type, or a second one."""
         self._check_type(msgtype)
         check_depth(depth)
-        mailbox = Mailbox(topic, depth, wake, reliable=reliable)
+        mailbox = SubscriptionQueue(topic, depth, wake, reliable=reliable)
         with self._lock:
             found = self._subscriptions.setdefault(topic, Subscription(msgtype))
             if found.msgtype != msgtype:
@@ -111,7 +111,7 @@ class RemoteTopics(ABC):
             self._tell_subscribed(topic, found)
         return mailbox
 
-    def unsubscribe(self, mailbox: Mailbox) -> None:
+    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
         """Receive no more; the server is told with the topic's last mailbox."""
         with self._lock:
             found = self._subscriptions.get(mailbox.topic)
@@ -123,7 +123,7 @@ class RemoteTopics(ABC):
                 self._tell_unsubscribed(mailbox.topic)
 
     @property
-    def mailboxes(self) -> tuple[MailboxInfo, ...]:
+    def mailboxes(self) -> tuple[SubscriptionQueueInfo, ...]:
         """How the subscriptions fare."""
         with self._lock:
             return tuple(m.info for s in self._subscriptions.values() for m in s.mailboxes)

@@ -5,19 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 from volery.core.errors import BridgeError
-from volery.graph.connection import Link, TellsServices, TellsTopics, call_and_wait
+from volery.graph.connection import GraphConnection, TellsServices, TellsTopics, call_and_wait
 from volery.graph.messages import message_type
 
 TIMEOUT_S = 10.0
 
 
-def ask_rosapi(link: Link, question: str, **fields: Any) -> Any:
+def ask_rosapi(link: GraphConnection, question: str, **fields: Any) -> Any:
     """Ask a `/rosapi` service, `question` being its type: `TopicType`."""
     request = message_type(f"rosapi_msgs/srv/{question}_Request")(**fields)
     return call_and_wait(link, "/rosapi/" + _snake(question), request, TIMEOUT_S)
 
 
-def topic_types(link: Link) -> dict[str, str]:
+def topic_types(link: GraphConnection) -> dict[str, str]:
     """Topics of the graph and their types, by name."""
     if isinstance(link, TellsTopics):
         return dict(sorted(link.topic_types().items()))
@@ -25,7 +25,7 @@ def topic_types(link: Link) -> dict[str, str]:
     return dict(sorted(zip(answer.topics, answer.types, strict=True)))
 
 
-def type_of_topic(link: Link, topic: str) -> str:
+def type_of_topic(link: GraphConnection, topic: str) -> str:
     """Type of a topic. `BridgeError` where there is no such topic."""
     if isinstance(link, TellsTopics):
         found = link.topic_types().get(topic, "")
@@ -36,14 +36,14 @@ def type_of_topic(link: Link, topic: str) -> str:
     return found
 
 
-def service_names(link: Link) -> list[str]:
+def service_names(link: GraphConnection) -> list[str]:
     """Services of the graph, sorted."""
     if isinstance(link, TellsServices):
         return sorted(link.service_types())
     return sorted(ask_rosapi(link, "Services").services)
 
 
-def type_of_service(link: Link, service: str) -> str:
+def type_of_service(link: GraphConnection, service: str) -> str:
     """Type of a service. `BridgeError` where nobody offers it."""
     if isinstance(link, TellsServices):
         found = link.service_types().get(service, "")

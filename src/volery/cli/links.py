@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from volery.bridges.nodes.host import NodeHost
     from volery.bridges.nodes.late_link import LateLink
     from volery.bridges.ros2.environment import Ros2Terms
-    from volery.graph.connection import Link
+    from volery.graph.connection import GraphConnection
 
 
 DEFAULT_VIA = "rosbridge://127.0.0.1:9090"
@@ -26,7 +26,7 @@ PATIENCE_S = 30.0
 _AGAIN_S = 0.2
 
 
-def open_link(via: str, name: str) -> Link:
+def open_link(via: str, name: str) -> GraphConnection:
     """Join the graph at `via` under a name. `BridgeError` where nobody answers there."""
     scheme, _, rest = via.partition("://")
     if scheme in ("rosbridge", "ws", "wss"):
@@ -52,7 +52,7 @@ def open_link(via: str, name: str) -> Link:
     raise _no_way(via)
 
 
-def await_link(via: str, name: str, patience_s: float = PATIENCE_S) -> Link:
+def await_link(via: str, name: str, patience_s: float = PATIENCE_S) -> GraphConnection:
     """As `open_link`, for programs that may be started before the graph: waits, and says so."""
     until = time.monotonic() + patience_s
     told = False
@@ -68,7 +68,7 @@ def await_link(via: str, name: str, patience_s: float = PATIENCE_S) -> Link:
             time.sleep(_AGAIN_S)
 
 
-def join_late(late: LateLink, host: NodeHost) -> Link:
+def join_late(late: LateLink, host: NodeHost) -> GraphConnection:
     """Join the graph of nodes that are there already; their timers count from then on."""
     before_ns = host.now_ns()
     link = late.join()
@@ -82,7 +82,7 @@ class LinkTold:
     For `NodeHost.spin` it is an end that never comes.
     """
 
-    def __init__(self, link: Link, via: str) -> None:
+    def __init__(self, link: GraphConnection, via: str) -> None:
         self._link = link
         self._via = via
         self._was = True

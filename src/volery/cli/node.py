@@ -19,7 +19,7 @@ from volery.cli.yaml_form import from_yaml
 from volery.core.errors import BridgeError, VoleryError
 
 if TYPE_CHECKING:
-    from volery.graph.connection import Link
+    from volery.graph.connection import GraphConnection
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def run_node(options: NodeOptions) -> None:
             node.destroy_node()
 
 
-def _check_namespace(link: Link, namespace: str) -> None:
+def _check_namespace(link: GraphConnection, namespace: str) -> None:
     """Warn where the graph has no topic of the node's UAV, if the graph lists its topics."""
     uav = namespace.strip("/")
     try:

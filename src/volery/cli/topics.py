@@ -15,7 +15,7 @@ from volery.cli.asking import topic_types, type_of_topic
 from volery.cli.links import LinkTold, open_link
 from volery.cli.yaml_form import read_message, to_yaml
 from volery.core.errors import BridgeError
-from volery.graph.connection import Link
+from volery.graph.connection import GraphConnection
 from volery.graph.messages import Published
 
 _DEPTH = 1000
@@ -126,7 +126,9 @@ def publish(
         _repeat(link, topic, message, 1.0 / rate_hz, times)
 
 
-def _repeat(link: Link, topic: str, message: object, period_s: float, times: int | None) -> None:
+def _repeat(
+    link: GraphConnection, topic: str, message: object, period_s: float, times: int | None
+) -> None:
     sent, due = 0, time.monotonic()
     while times is None or sent < times:
         link.publish(topic, message)

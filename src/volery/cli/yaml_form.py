@@ -14,10 +14,10 @@ _LONGEST_LIST = 128
 def to_yaml(message: Any, *, whole: bool = False) -> str:
     """A message as YAML; long lists of numbers are cut unless `whole`."""
     from volery.cli.yaml_writer import Numbers, write_yaml
-    from volery.graph.codecs.json_codec import JsonForm
+    from volery.graph.codecs.json_codec import JsonCodec
 
     most = sys.maxsize if whole else _LONGEST_LIST
-    form = JsonForm(non_finite_as_null=False, arrays=lambda values, _kind: Numbers(values, most))
+    form = JsonCodec(non_finite_as_null=False, arrays=lambda values, _kind: Numbers(values, most))
     return write_yaml(form.encode(message, message.__msgtype__))
 
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
 from volery.graph.codecs.cdr import decode_cdr, encode_cdr
-from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.messages import message_type, time_from_ns, typestore
-from volery.graph.session import Taken
+from volery.graph.session import ClientCommand
 from volery.graph.subscription_queue import array_bytes
 
 TOPIC = "/volery/log"
@@ -43,14 +43,14 @@ def content_type(kind: str, name: str) -> str:
     return name + _PARTS.get(kind, "")
 
 
-def is_large(taken: Taken) -> bool:
+def is_large(taken: ClientCommand) -> bool:
     """Whether a command is a published message that rather follows its record."""
     if taken.kind != "publish" or not _grows(taken.type):
         return False
     return array_bytes(taken.content) > _INLINE_BYTES
 
 
-def content_bytes(taken: Taken) -> bytes:
+def content_bytes(taken: ClientCommand) -> bytes:
     """The content of a command, exactly. `GraphError` where it does not fit its type."""
     if taken.content is None:
         return b""
@@ -69,7 +69,7 @@ def content_of(kind: str, type_name: str, cdr: bytes) -> Any:
 
 
 def record_of(
-    taken: Taken, cdr: bytes | None, *, number: int, time_ns: int, step: int, turn: int
+    taken: ClientCommand, cdr: bytes | None, *, number: int, time_ns: int, step: int, turn: int
 ) -> Any:
     """The message that tells of a command; `cdr` as of `content_bytes`, None: it follows."""
     return message_type(TYPE)(
@@ -89,7 +89,7 @@ def record_of(
     )
 
 
-def _for_people(taken: Taken) -> str:
+def _for_people(taken: ClientCommand) -> str:
     if taken.content is None:
         return ""
     if isinstance(taken.content, str):
@@ -115,8 +115,8 @@ def _grows(msgtype: str) -> bool:
 
 
 @cache
-def _form() -> JsonForm:
-    return JsonForm(arrays=_array_for_people)
+def _form() -> JsonCodec:
+    return JsonCodec(arrays=_array_for_people)
 
 
 def _array_for_people(array: NDArray[Any], base: str) -> Any:

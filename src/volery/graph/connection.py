@@ -9,12 +9,12 @@ from typing import Any, Protocol, runtime_checkable
 from volery.core.errors import GraphError
 from volery.graph.parameters import Parameters
 from volery.graph.qos import DEFAULT_DEPTH
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Handler
-from volery.graph.subscription_queue import Mailbox, Wake
+from volery.graph.subscription_queue import SubscriptionQueue, Wake
 
 
-class Link(Protocol):
+class GraphConnection(Protocol):
     """One client's connection to a graph; the nearest one is `graph.session.Session`.
 
     This is the contract of all of them; an implementation documents only what it adds. Any thread
@@ -41,7 +41,7 @@ class Link(Protocol):
         depth: int = DEFAULT_DEPTH,
         reliable: bool = False,
         wake: Wake,
-    ) -> Mailbox:
+    ) -> SubscriptionQueue:
         """Receive the messages of `topic` in the mailbox that is returned.
 
         Parameters
@@ -51,18 +51,18 @@ class Link(Protocol):
         msgtype
             None: the type that the topic has; `GraphError` where the topic does not exist.
         depth, reliable
-            How many messages wait, and what happens to more: see `Mailbox`. The newest message of
-            each latched publisher is the first.
+            How many messages wait, and what happens to more: see `SubscriptionQueue`. The newest
+            message of each latched publisher is the first.
         wake
             Called from a thread of the link when a message comes to an empty mailbox. It must not
             block.
 
         """
 
-    def unsubscribe(self, mailbox: Mailbox) -> None:
+    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
         """Receive no more; messages that wait can still be taken."""
 
-    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+    def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Call a service; `reply` gets the response or a `GraphError`, in another thread.
 
         Without a request the service gets an empty one.
@@ -99,7 +99,9 @@ class HostsNodes(Protocol):
         """Be this node; parameters are set by what is handed to `post`."""
 
 
-def call_and_wait(link: Link, service: str, request: Any | None, timeout_s: float) -> Any:
+def call_and_wait(
+    link: GraphConnection, service: str, request: Any | None, timeout_s: float
+) -> Any:
     """Call a service and wait for its response, at most `timeout_s` of wall time.
 
     Not for the thread from which the link's replies come. `GraphError` with the reason where there
@@ -112,7 +114,7 @@ def call_and_wait(link: Link, service: str, request: Any | None, timeout_s: floa
         outcome.append(what)
         come.set()
 
-    link.call(service, request, Reply(take, take))
+    link.call(service, request, ServiceReply(take, take))
     if not come.wait(timeout_s):
         raise GraphError(f"service '{service}' did not answer within {timeout_s:g} s")
     if isinstance(outcome[0], GraphError):

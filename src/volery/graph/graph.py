@@ -28,10 +28,10 @@ from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Published, message_type, type_name
 from volery.graph.parameters import Parameters
 from volery.graph.qos import DEFAULT_QOS, QoSProfile
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 Callback = Callable[[Published], None]
-AsyncHandler = Callable[[Any, Reply], None]
+AsyncHandler = Callable[[Any, ServiceReply], None]
 """Takes a request and answers through the reply, at once or later."""
 
 _log = logging.getLogger(__name__)
@@ -572,7 +572,7 @@ class Graph:
     def offer(self, service: str, srvtype: str, handler: Callable[[Any], Any]) -> None:
         """Offer a service: `handler(request)` returns the response message."""
 
-        def ask(request: Any, reply: Reply) -> None:
+        def ask(request: Any, reply: ServiceReply) -> None:
             reply.answer(handler(request))
 
         self._add_service(service, _Service(srvtype, handler, ask))
@@ -593,7 +593,7 @@ class Graph:
             raise GraphError(f"service '{service}' is offered from outside: use call_async")
         return found.handler(_request(found, request))
 
-    def call_async(self, service: str, request: Any | None, reply: Reply) -> None:
+    def call_async(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Call a service that may take its time. `GraphError` if nobody offers it."""
         found = self._service(service)
         found.ask(_request(found, request), reply)

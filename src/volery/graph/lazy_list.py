@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, overload
 
 
-class Rows(Sequence[Any]):
+class LazyList(Sequence[Any]):
     """A list of `count` parts that `make()` yields anew each time it is read.
 
     A message with hundreds of parts, of which a slow client drops most, costs next to nothing until
@@ -32,7 +32,7 @@ class Rows(Sequence[Any]):
         return list(self)[which]
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, list | Rows) and list(self) == list(other)
+        return isinstance(other, list | LazyList) and list(self) == list(other)
 
     __hash__ = None  # type: ignore[assignment]
 

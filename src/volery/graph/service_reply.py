@@ -9,7 +9,7 @@ from typing import Any
 from volery.core.errors import GraphError
 
 
-class Reply:
+class ServiceReply:
     """One answer: a response or a failure, once, from any thread.
 
     Whoever waits for it is told in the thread that answers.

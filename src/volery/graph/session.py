@@ -2,8 +2,8 @@
 
 A door opens one `Session` for each of its clients. All its methods may be called by any thread.
 What a client publishes and calls is posted to the simulation's thread, which takes it in between
-two ticks, in the order of arrival; what it receives waits in a bounded `Mailbox` that keeps the
-newest. A client that does not read loses messages of its own and delays nobody.
+two ticks, in the order of arrival; what it receives waits in a bounded `SubscriptionQueue` that
+keeps the newest. A client that does not read loses messages of its own and delays nobody.
 
     session = gateway.open("rosbridge 127.0.0.1:51234")
     mailbox = session.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=loop_wakes_up)
@@ -29,12 +29,17 @@ from volery.graph.nodes.failures import report_failure
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
 from volery.graph.read_budget import ReadBudgets, Reading, write_budgets
 from volery.graph.rotor_layout import RotorLayout
-from volery.graph.service_reply import Reply
-from volery.graph.subscription_queue import Mailbox, MailboxInfo, Wake, message_bytes
+from volery.graph.service_reply import ServiceReply
+from volery.graph.subscription_queue import (
+    SubscriptionQueue,
+    SubscriptionQueueInfo,
+    Wake,
+    message_bytes,
+)
 
 Post = Callable[[Callable[[], Any]], "Future[Any]"]
 """Has a function called by the simulation's thread; the future holds its result or error."""
-Handler = Callable[[Any, Reply], None]
+Handler = Callable[[Any, ServiceReply], None]
 """Takes a request in the simulation's thread, at once, and answers through the reply later."""
 
 _log = logging.getLogger(__name__)
@@ -48,7 +53,7 @@ _MOST_NAMES = 20_000
 """Of UAVs that are remembered as commanded; more than any fleet has."""
 
 
-class Taken(NamedTuple):
+class ClientCommand(NamedTuple):
     """What a client did, told in the simulation's thread just before it takes effect.
 
     kind: `call`, `publish`, `advertise`, ... as in `volery_interfaces/msg/CommandRecord`.
@@ -65,7 +70,7 @@ class Taken(NamedTuple):
     """Which request to that service is answered."""
 
 
-Watch = Callable[[Taken], None]
+Watch = Callable[[ClientCommand], None]
 """Is told what clients do; the `GraphError` that it raises refuses it."""
 
 
@@ -75,7 +80,7 @@ class SessionInfo:
 
     name: str
     publishes: tuple[str, ...]
-    mailboxes: tuple[MailboxInfo, ...]
+    mailboxes: tuple[SubscriptionQueueInfo, ...]
     offers: tuple[str, ...]
 
 
@@ -188,8 +193,8 @@ class Session:
         self._graph = gateway.graph
         self._lock = threading.RLock()
         self._publishers: dict[str, Publisher] = {}
-        self._mailboxes: dict[Mailbox, Subscription] = {}
-        self._offers: dict[str, set[Reply]] = {}
+        self._mailboxes: dict[SubscriptionQueue, Subscription] = {}
+        self._offers: dict[str, set[ServiceReply]] = {}
         self._closed = False
         self._failed: set[str] = set()
 
@@ -271,7 +276,7 @@ class Session:
                 publisher.check(message)
                 topic = publisher.topic
                 self._note(topic)
-                self._watch(Taken(self.name, "publish", topic, publisher.msgtype, message))
+                self._watch(ClientCommand(self.name, "publish", topic, publisher.msgtype, message))
                 publisher.publish_posted(message)
 
         if known:
@@ -304,16 +309,16 @@ class Session:
         depth: int = DEFAULT_DEPTH,
         reliable: bool = False,
         wake: Wake,
-    ) -> Mailbox:
+    ) -> SubscriptionQueue:
         """As `graph.connection.Link.subscribe`; `wake` is called from the simulation's thread."""
         check_depth(depth)
-        mailbox = Mailbox(topic, depth, wake, reliable=reliable)
+        mailbox = SubscriptionQueue(topic, depth, wake, reliable=reliable)
         with self._lock:
             self._check_open()
             self._mailboxes[mailbox] = self._graph.attach(topic, mailbox.put, msgtype)
         return mailbox
 
-    def unsubscribe(self, mailbox: Mailbox) -> None:
+    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
         """Receive no more; what waits can still be taken."""
         with self._lock:
             subscription = self._mailboxes.pop(mailbox, None)
@@ -323,14 +328,14 @@ class Session:
 
     # ---------------------------------------------------------------------------------- services
 
-    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+    def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Call a service; `reply` gets the response or a `GraphError`, in some other thread."""
 
         def ask() -> None:
             self._note(service)
             try:
                 srvtype = self._graph.service_type(service)
-                self._watch(Taken(self.name, "call", service, srvtype, request))
+                self._watch(ClientCommand(self.name, "call", service, srvtype, request))
                 self._graph.call_async(service, request, reply)
             except GraphError as error:
                 reply.fail(error)
@@ -353,10 +358,10 @@ class Session:
             self._check_open()
             if service in self._offers:
                 raise GraphError(f"{self.name} offers service '{service}' already")
-            pending: set[Reply] = set()
+            pending: set[ServiceReply] = set()
             numbers = itertools.count()
 
-            def handle(request: Any, reply: Reply) -> None:
+            def handle(request: Any, reply: ServiceReply) -> None:
                 relayed = self._relay(service, srvtype, reply, next(numbers))
                 pending.add(relayed)
                 relayed.when_done(lambda: pending.discard(relayed))
@@ -378,7 +383,7 @@ class Session:
             reply.fail(GraphError(f"service '{service}': {self.name} has left"))
         self.tell("withdraw", service, srvtype)
 
-    def _relay(self, service: str, srvtype: str, reply: Reply, request: int) -> Reply:
+    def _relay(self, service: str, srvtype: str, reply: ServiceReply, request: int) -> ServiceReply:
         """A reply whose answer reaches `reply` between two ticks, as all that comes from outside.
 
         One that is given in the simulation's thread at once, as inside, goes on at once.
@@ -387,7 +392,9 @@ class Session:
 
         def come(settle: Callable[[], None], kind: str, content: Any) -> None:
             def take() -> None:
-                self._watch(Taken(self.name, kind, service, srvtype, content, request=request))
+                self._watch(
+                    ClientCommand(self.name, kind, service, srvtype, content, request=request)
+                )
                 settle()
 
             if threading.get_ident() == here:
@@ -395,7 +402,7 @@ class Session:
             else:
                 self.post(take).add_done_callback(lambda done: self._log_failure(done, service))
 
-        return Reply(
+        return ServiceReply(
             lambda response: come(lambda: reply.answer(response), "answer", response),
             lambda error: come(lambda: reply.fail(error), "failure", str(error)),
         )
@@ -406,7 +413,9 @@ class Session:
         self, kind: str, name: str, msgtype: str, content: Any = None, *, latched: bool = False
     ) -> None:
         """Have the watch told what the client does, where that is not posted anyway."""
-        self.post(lambda: self._watch(Taken(self.name, kind, name, msgtype, content, latched)))
+        self.post(
+            lambda: self._watch(ClientCommand(self.name, kind, name, msgtype, content, latched))
+        )
 
     def close(self) -> None:
         """Take back everything; a second time nothing happens."""
@@ -425,7 +434,7 @@ class Session:
         self._gateway.forget(self)
 
     @property
-    def mailboxes(self) -> tuple[MailboxInfo, ...]:
+    def mailboxes(self) -> tuple[SubscriptionQueueInfo, ...]:
         """How its subscriptions fare."""
         with self._lock:
             return tuple(mailbox.info for mailbox in self._mailboxes)
@@ -456,7 +465,7 @@ def _look_away(_what: object) -> None:
     """Watch nothing."""
 
 
-def _tell_failure(asked: Future[Any], reply: Reply, service: str, client: str) -> None:
+def _tell_failure(asked: Future[Any], reply: ServiceReply, service: str, client: str) -> None:
     """Answer a caller whose question was never asked, or broke in the asking."""
     if asked.cancelled():
         reply.fail(GraphError("the simulation has ended"))

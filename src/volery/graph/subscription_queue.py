@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from volery.core.counting import counted
-from volery.graph.lazy_list import Rows
+from volery.graph.lazy_list import LazyList
 from volery.graph.messages import Published
 from volery.graph.qos import MOST_DEPTH
 
@@ -29,7 +29,7 @@ _arrivals = itertools.count()
 
 
 @dataclass(frozen=True)
-class MailboxInfo:
+class SubscriptionQueueInfo:
     """How a subscription of an outside client fares."""
 
     topic: str
@@ -38,7 +38,7 @@ class MailboxInfo:
     waiting: int
 
 
-class Mailbox:
+class SubscriptionQueue:
     """Messages of one topic that await one client.
 
     With best effort the newest `depth` of them. A `reliable` one loses none, up to MOST_DEPTH
@@ -113,10 +113,12 @@ class Mailbox:
             return self._waiting[0][0] if self._waiting else None
 
     @property
-    def info(self) -> MailboxInfo:
+    def info(self) -> SubscriptionQueueInfo:
         """Counts so far."""
         with self._lock:
-            return MailboxInfo(self.topic, self._received, self._dropped, len(self._waiting))
+            return SubscriptionQueueInfo(
+                self.topic, self._received, self._dropped, len(self._waiting)
+            )
 
 
 def array_bytes(message: Any) -> int:
@@ -128,7 +130,7 @@ def array_bytes(message: Any) -> int:
     for name, value in vars(message).items():
         if isinstance(value, np.ndarray):
             size += value.nbytes
-        elif isinstance(value, str | bytes | list | Rows) and not name.startswith("__"):
+        elif isinstance(value, str | bytes | list | LazyList) and not name.startswith("__"):
             size += len(value)
         elif is_dataclass(value):
             inner = vars(value).values()
@@ -145,7 +147,7 @@ def message_bytes(message: Any) -> int:
         return int(message.nbytes)
     if isinstance(message, str | bytes):
         return len(message)
-    if isinstance(message, list | Rows):
+    if isinstance(message, list | LazyList):
         return sum(map(message_bytes, message))
     if is_dataclass(message):
         return _PART_BYTES + sum(map(message_bytes, vars(message).values()))

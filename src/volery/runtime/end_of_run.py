@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError
-from volery.graph.session import Taken
+from volery.graph.session import ClientCommand
 from volery.runtime.replay.command_effects import restarts
 
 if TYPE_CHECKING:
@@ -66,6 +66,6 @@ class EndOfRun:
         """Another state was restored: commands have effect again."""
         self.waits = self.waits and self._loop.finished
 
-    def _refusal(self, command: Taken) -> str:
+    def _refusal(self, command: ClientCommand) -> str:
         """Return why a client's command is refused; empty: it is not."""
         return self.notice if self.waits and not restarts(command) else ""

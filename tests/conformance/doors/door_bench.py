@@ -20,7 +20,7 @@ from ros_tcp_client import until
 
 from volery.bridges.doors import Doors
 from volery.graph.messages import String, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 STRING = "std_msgs/msg/String"
 IMAGE = "sensor_msgs/msg/Image"
@@ -157,7 +157,7 @@ class Ours:
         request = message_type(f"{TRIGGER}_Request")()
 
         def ask():
-            self.live.graph.call_async(service, request, Reply(come.put, come.put))
+            self.live.graph.call_async(service, request, ServiceReply(come.put, come.put))
 
         self.live.do(ask)
         return come

@@ -32,7 +32,7 @@ from websockets.sync.server import serve
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.graph.messages import message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 _numbers = itertools.count()
 
@@ -218,7 +218,7 @@ class Program:
     def call(self, service):
         come = queue.Queue()
         request = message_type(f"{TRIGGER}_Request")()
-        self.link.call(service, request, Reply(come.put, come.put))
+        self.link.call(service, request, ServiceReply(come.put, come.put))
         return come
 
     def wait_for_service(self, service):

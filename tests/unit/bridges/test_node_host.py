@@ -12,7 +12,7 @@ from volery.bridges.nodes.late_link import LateLink
 from volery.core.errors import GraphError, NodeError
 from volery.graph.messages import Clock, String, Time, message_type
 from volery.graph.nodes.node import Node
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 TRIGGER = "std_srvs/srv/Trigger"
 Response = message_type(f"{TRIGGER}_Response")
@@ -87,7 +87,7 @@ def test_topics_and_services_both_ways(world):
     node.ask.call_async().add_done_callback(lambda a: answers.append(a.result().message))
     other = world.gateway.open("caller")
 
-    other.call("/uav1/do", None, Reply(lambda r: answers.append(r.message), answers.append))
+    other.call("/uav1/do", None, ServiceReply(lambda r: answers.append(r.message), answers.append))
     spin_until(host, lambda: len(answers) == 2)
     assert sorted(answers) == ["hi", "there"]
 
@@ -118,7 +118,9 @@ def test_nodes_that_are_there_before_their_graph(world):
     world.do(lambda: heard.publish(String("you")))
     answer = node.ask.call_async()
     world.do(
-        lambda: world.graph.call_async("/uav1/do", None, Reply(answers.append, answers.append))
+        lambda: world.graph.call_async(
+            "/uav1/do", None, ServiceReply(answers.append, answers.append)
+        )
     )
     spin_until(host, lambda: said and answers and early and answer.done())
     assert [p.message.data for p in (*early, *said)] == ["early", "hi you"]

@@ -13,7 +13,7 @@ from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import GraphError
 from volery.graph.messages import String, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -114,9 +114,9 @@ def test_several_mailboxes_are_one_subscription_of_the_server(loop, client):
 def test_calls_that_are_open_when_it_leaves_fail(loop, client):
     asked, outcome = threading.Event(), queue.Queue()
     loop.graph.offer_async("/waits", TRIGGER, lambda _request, _reply: asked.set())
-    client.call("/waits", Request(), Reply(outcome.put, outcome.put))
+    client.call("/waits", Request(), ServiceReply(outcome.put, outcome.put))
     assert asked.wait(60.0)
     client.close()
     assert isinstance(outcome.get(timeout=60.0), GraphError)
     with pytest.raises(GraphError, match="planner has left"):
-        client.call("/waits", Request(), Reply(outcome.put, outcome.put))
+        client.call("/waits", Request(), ServiceReply(outcome.put, outcome.put))

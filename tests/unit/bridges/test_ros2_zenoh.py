@@ -38,7 +38,7 @@ from volery.bridges.ros2.zenoh.names import (
 )
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import String, add_definitions, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -201,7 +201,7 @@ def test_services_go_both_ways(world, other):
 
 def call(world, service):
     come = queue.Queue()
-    world.do(lambda: world.graph.call_async(service, None, Reply(come.put, come.put)))
+    world.do(lambda: world.graph.call_async(service, None, ServiceReply(come.put, come.put)))
     return come
 
 

@@ -21,7 +21,7 @@ from volery.bridges.rosbridge.beside import WithRosApi
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.connection import TellsTopics, call_and_wait
 from volery.graph.messages import Header, String, Time, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -219,7 +219,7 @@ def test_without_a_request_rosapi_tells_the_type(loop, connect):
 
 def ask_graph(loop, service, request):
     come = Future()
-    reply = Reply(come.set_result, come.set_exception)
+    reply = ServiceReply(come.set_result, come.set_exception)
     loop.do(lambda: loop.graph.call_async(service, request, reply))
     return come.result(10.0)
 
@@ -252,7 +252,7 @@ def test_it_comes_back_and_asks_for_everything_again(loop, connect):
     client.offer("/do", TRIGGER, lambda _q, reply: reply.answer(Response(True, "again")))
     loop.graph.offer_async("/waits", TRIGGER, lambda _q, _reply: None)
     outcome = queue.Queue()
-    client.call("/waits", Request(), Reply(outcome.put, outcome.put))
+    client.call("/waits", Request(), ServiceReply(outcome.put, outcome.put))
     until(lambda: "/do" in loop.graph.services())
     loop.doors.call(first.stop())
     assert "is broken" in str(outcome.get(timeout=60.0))
@@ -400,7 +400,7 @@ def test_unitys_endpoint_answers_calls(unity):
     other, client = unity
     outcome = queue.Queue()
     for _ in range(2):
-        client.call("/do", Request(), Reply(outcome.put, outcome.put))
+        client.call("/do", Request(), ServiceReply(outcome.put, outcome.put))
     names = {"topic": "/do", "message_name": "std_srvs/Trigger"}
     assert other.next() == ("__ros_service", names)
     for number in (101, 102):
@@ -427,8 +427,8 @@ def test_unitys_endpoint_answers_calls(unity):
 def test_unitys_endpoint_gives_no_response_to_a_call_that_fails(unity, text):
     other, client = unity
     outcome = queue.Queue()
-    client.call("/do", Request(), Reply(outcome.put, outcome.put))
-    client.call("/other", Request(), Reply(outcome.put, outcome.put))
+    client.call("/do", Request(), ServiceReply(outcome.put, outcome.put))
+    client.call("/other", Request(), ServiceReply(outcome.put, outcome.put))
     other.next()
     other.command("error", text=text)
     assert str(outcome.get(timeout=60.0)) == text

@@ -19,7 +19,7 @@ from volery.bridges.ros_tcp.dial import dial
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.core.errors import BridgeError
 from volery.graph.messages import String, Twist, Vector3, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 STRING = "std_msgs/msg/String"
 TWIST = "geometry_msgs/msg/Twist"
@@ -126,7 +126,7 @@ def test_services_can_be_called_from_there(here, there, generation):
     join(here, there, generation)
     until(lambda: there.graph.has_service("/uav1/land"))
     answers, failures = [], []
-    reply = Reply(answers.append, failures.append)
+    reply = ServiceReply(answers.append, failures.append)
     there.do(lambda: there.graph.call_async("/uav1/land", None, reply))
     until(lambda: answers)
     assert answers[0].message == "down"
@@ -140,7 +140,7 @@ def test_a_call_that_fails_here_fails_there(here, there):
     _, connector = join(here, there)
     until(lambda: there.graph.has_service("/do"))
     failures = []
-    there.do(lambda: there.graph.call_async("/do", None, Reply(print, failures.append)))
+    there.do(lambda: there.graph.call_async("/do", None, ServiceReply(print, failures.append)))
     until(lambda: failures)
     assert any("'/do' failed" in note for note in connector.notes)
 

@@ -18,7 +18,7 @@ from volery.bridges.doors import Doors
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import String, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -251,7 +251,7 @@ class Caller:
 
     def __init__(self, loop, service):
         self.answers, self.failures = [], []
-        reply = Reply(self.answers.append, self.failures.append)
+        reply = ServiceReply(self.answers.append, self.failures.append)
         loop.do(lambda: loop.graph.call_async(service, None, reply))
 
 

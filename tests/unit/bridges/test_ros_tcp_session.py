@@ -18,7 +18,7 @@ from volery.bridges.ros_tcp.unity import Selection, UnitySession
 from volery.bridges.ros_tcp.wire import FrameParser
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import Published, String, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -107,7 +107,7 @@ def play(bench, session, script):
             bench.work_off()
         elif step == "call":
             for service in bench.graph.services():
-                calls.append(Reply(lambda _: None, lambda _: None))
+                calls.append(ServiceReply(lambda _: None, lambda _: None))
                 bench.graph.call_async(service, None, calls[-1])
         elif step == "drain":
             drain(session)

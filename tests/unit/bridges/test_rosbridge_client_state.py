@@ -12,7 +12,7 @@ from volery.bridges.rosbridge.client_state import ClientState
 from volery.bridges.rosbridge.wire import decode_frame, encode_json
 from volery.core.errors import GraphError
 from volery.graph.messages import String
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def respond(state, call, values, result=True):
 def test_a_server_that_misnames_a_service_leaves_no_call_open(state, values):
     """The call without a request asks for the type first; any answer to that is an end."""
     answers, failures = [], []
-    state.call("/do", None, Reply(answers.append, failures.append))
+    state.call("/do", None, ServiceReply(answers.append, failures.append))
     (asked,) = ordered(state)
     assert asked["service"] == "/rosapi/service_type"
     respond(state, asked, values)
@@ -46,7 +46,7 @@ def test_a_server_that_misnames_a_service_leaves_no_call_open(state, values):
 
 def test_a_service_is_called_by_the_type_that_the_server_names(state):
     answers = []
-    state.call("/do", None, Reply(answers.append, answers.append))
+    state.call("/do", None, ServiceReply(answers.append, answers.append))
     respond(state, *ordered(state), {"type": "std_srvs/Trigger"})
     respond(state, *ordered(state), {"success": True, "message": "done"})
     assert (answers[0].__msgtype__, answers[0].message) == (f"{TRIGGER}_Response", "done")
@@ -64,7 +64,7 @@ def test_who_waits_for_the_type_of_a_topic_is_told_of_nonsense(state, name):
 def test_whatever_breaks_calls_end_with_the_connection(state):
     failures = []
     for service in ("/a", "/b"):
-        state.call(service, None, Reply(failures.append, failures.append))
+        state.call(service, None, ServiceReply(failures.append, failures.append))
     state.lose("it has left")
     assert [str(failure) for failure in failures] == ["it has left"] * 2
 
@@ -72,7 +72,7 @@ def test_whatever_breaks_calls_end_with_the_connection(state):
 def test_a_response_of_another_type_is_the_callers_error() -> None:
     state = ClientState(None, lambda: None)
     state.begin(cbor=False)
-    asked: list[Reply] = []
+    asked: list[ServiceReply] = []
     state.offer("/a", "std_srvs/srv/Trigger", lambda _request, reply: asked.append(reply))
     list(state.frames())
     call = {"op": "call_service", "service": "/a", "id": "1", "args": {}}

@@ -24,7 +24,7 @@ from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import BridgeError, GraphError
 from volery.graph import messages as m
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 IMAGE = "sensor_msgs/msg/Image"
 
@@ -351,7 +351,7 @@ def ask(client, service, request=None):
         answers.append(answer)
         done.set()
 
-    client.call(service, request, Reply(take, take))
+    client.call(service, request, ServiceReply(take, take))
     assert done.wait(60.0)
     return answers[0]
 
@@ -461,7 +461,7 @@ def test_roslibpy(simulation, server):
         until(lambda: simulation.graph.has_service("/mine"))
         answers = []
         simulation.do(
-            lambda: simulation.graph.call_async("/mine", None, Reply(answers.append, print))
+            lambda: simulation.graph.call_async("/mine", None, ServiceReply(answers.append, print))
         )
         until(lambda: answers)
         assert answers[0].message == "by roslibpy"

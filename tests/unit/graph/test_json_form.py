@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from volery.core.errors import GraphError
 from volery.graph import messages as m
-from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.codecs.json_decoding import decode_plain
 from volery.graph.codecs.zero import zero_message
 
@@ -34,10 +34,10 @@ def test_round_trips(name: str) -> None:
     """Through JSON text, with either generation's names, and with arrays kept as arrays."""
     for seed in range(3):
         message = filled(name, np.random.default_rng(seed))
-        plain = JsonForm().encode(message, name)
+        plain = JsonCodec().encode(message, name)
         text = json.dumps(plain, allow_nan=False)
         assert_same(decode_plain(json.loads(text), name), message, name)
-        form = JsonForm(arrays=as_numpy, non_finite_as_null=False)
+        form = JsonCodec(arrays=as_numpy, non_finite_as_null=False)
         assert_same(form.decode(form.encode(message, name), name), message, name)
         zero = zero_message(name)
         assert_same(decode_plain({}, name), zero, name)
@@ -49,25 +49,25 @@ def test_round_trips(name: str) -> None:
 )
 def test_ros1_names_are_read(name: str) -> None:
     message = filled(name, np.random.default_rng(1))
-    plain = JsonForm(ros1_names=True).encode(message, name)
+    plain = JsonCodec(ros1_names=True).encode(message, name)
     assert_same(decode_plain(json.loads(json.dumps(plain)), name), message, name)
 
 
 def test_twist() -> None:
     twist = m.Twist(m.Vector3(np.float32(1.5), 2, 3.0), m.Vector3(0.0, math.nan, -math.inf))
-    plain = JsonForm().encode(twist, TWIST)
+    plain = JsonCodec().encode(twist, TWIST)
     assert plain == {
         "linear": {"x": 1.5, "y": 2.0, "z": 3.0},
         "angular": {"x": 0.0, "y": None, "z": None},
     }
     assert type(plain["linear"]["x"]) is float
-    kept = JsonForm(non_finite_as_null=False).encode(twist, TWIST)
+    kept = JsonCodec(non_finite_as_null=False).encode(twist, TWIST)
     assert kept["angular"]["z"] == -math.inf
     assert math.isnan(decode_plain(plain, TWIST).angular.y)
 
 
 def test_arrays() -> None:
-    form = JsonForm()
+    form = JsonCodec()
     image = zero_message("sensor_msgs/msg/Image")
     image.data = np.arange(5, dtype=np.uint8)
     plain = form.encode(image, "sensor_msgs/msg/Image")
@@ -78,7 +78,7 @@ def test_arrays() -> None:
     scan = zero_message(SCAN)
     scan.ranges = np.array([1.5, np.nan, np.inf], np.float32)
     assert form.encode(scan, SCAN)["ranges"] == [1.5, None, None]
-    kept = JsonForm(non_finite_as_null=False).encode(scan, SCAN)["ranges"]
+    kept = JsonCodec(non_finite_as_null=False).encode(scan, SCAN)["ranges"]
     assert kept[2] == math.inf
     uuid = form.encode(
         zero_message("unique_identifier_msgs/msg/UUID"), "unique_identifier_msgs/msg/UUID"
@@ -103,7 +103,7 @@ def test_arrays_for_cbor() -> None:
 
     scan = zero_message(SCAN)
     scan.ranges = np.array([1.0, np.inf], ">f4")
-    assert JsonForm(arrays=hook).encode(scan, SCAN)["ranges"] == "tagged"
+    assert JsonCodec(arrays=hook).encode(scan, SCAN)["ranges"] == "tagged"
     assert seen[0] == ("<f4", "float32")
     big_endian = decode_plain({"ranges": np.array([1.0, 2.0], ">f4")}, SCAN).ranges
     assert big_endian.dtype == np.float32
@@ -118,7 +118,7 @@ def test_given_arrays_are_copied() -> None:
 
 
 def test_ros1_names() -> None:
-    form = JsonForm(ros1_names=True)
+    form = JsonCodec(ros1_names=True)
     info = form.encode(zero_message("sensor_msgs/msg/CameraInfo"), "sensor_msgs/msg/CameraInfo")
     assert {"D", "K", "R", "P"} <= info.keys()
     assert not {"d", "k", "r", "p"} & info.keys()
@@ -209,9 +209,9 @@ def test_refusals_name_the_path(name: str, plain: Any, text: str) -> None:
 
 def test_messages_that_do_not_fit() -> None:
     with pytest.raises(GraphError, match="does not fit geometry_msgs/msg/Twist"):
-        JsonForm().encode(m.String("a"), TWIST)
+        JsonCodec().encode(m.String("a"), TWIST)
     with pytest.raises(GraphError, match="is not known"):
-        JsonForm().encode(m.String("a"), "a/msg/B")
+        JsonCodec().encode(m.String("a"), "a/msg/B")
 
 
 json_values = st.recursive(

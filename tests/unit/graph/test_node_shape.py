@@ -169,10 +169,10 @@ def test_a_service_that_fails_is_named_and_the_simulation_goes_on(made, caplog):
     logs = []
     simulation.graph.subscribe_all(lambda p: logs.append(p) if p.topic == "/rosout" else None)
     session = simulation.gateway.open("a client")
-    from volery.graph.service_reply import Reply
+    from volery.graph.service_reply import ServiceReply
 
     failures = []
-    session.call("/uav1/do", None, Reply(print, failures.append))
+    session.call("/uav1/do", None, ServiceReply(print, failures.append))
     simulation.run(0.02)
     assert "in its service /uav1/do (fail): ZeroDivisionError" in str(failures[0])
     assert [p.message.level for p in logs] == [50]

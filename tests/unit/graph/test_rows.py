@@ -2,9 +2,9 @@
 
 import pickle
 
-from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.codecs.ros1 import ros1_codec
-from volery.graph.lazy_list import Rows
+from volery.graph.lazy_list import LazyList
 from volery.graph.messages import (
     Quaternion,
     TFMessage,
@@ -25,12 +25,12 @@ def parts():
 
 
 def test_every_wire_takes_them():
-    plain, lazy = TFMessage(list(parts())), TFMessage(Rows(3, parts))
+    plain, lazy = TFMessage(list(parts())), TFMessage(LazyList(3, parts))
     assert lazy == plain
     store = typestore()
     assert bytes(store.serialize_cdr(lazy, TYPE)) == bytes(store.serialize_cdr(plain, TYPE))
     assert ros1_codec().encode(lazy, TYPE) == ros1_codec().encode(plain, TYPE)
-    assert JsonForm().encode(lazy, TYPE) == JsonForm().encode(plain, TYPE)
+    assert JsonCodec().encode(lazy, TYPE) == JsonCodec().encode(plain, TYPE)
 
 
 def test_they_read_like_a_list_and_are_not_made_before():
@@ -40,7 +40,7 @@ def test_they_read_like_a_list_and_are_not_made_before():
         made.append(1)
         return parts()
 
-    rows = Rows(3, make)
+    rows = LazyList(3, make)
     assert len(rows) == 3
     assert made == []
     assert rows[1].child_frame_id == "uav1/base_link"

@@ -9,7 +9,7 @@ from live_graph import HandGraph
 
 from volery.core.errors import GraphError
 from volery.graph.messages import String, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -122,11 +122,11 @@ def test_a_service_of_the_simulation(bench):
     bench.graph.offer("/do", TRIGGER, lambda _request: Response(True, "done"))
     answers, failures = [], []
     session = bench.gateway.open("caller")
-    session.call("/do", None, Reply(answers.append, failures.append))
+    session.call("/do", None, ServiceReply(answers.append, failures.append))
     assert not answers
     bench.work_off()
     assert answers[0].message == "done"
-    session.call("/nobody", None, Reply(answers.append, failures.append))
+    session.call("/nobody", None, ServiceReply(answers.append, failures.append))
     bench.work_off()
     assert "nobody offers" in str(failures[0])
 
@@ -137,7 +137,7 @@ def test_a_service_that_breaks_is_the_callers_business(bench, caplog):
 
     bench.graph.offer("/do", TRIGGER, broken)
     failures = []
-    bench.gateway.open("caller").call("/do", None, Reply(print, failures.append))
+    bench.gateway.open("caller").call("/do", None, ServiceReply(print, failures.append))
     bench.work_off()
     assert "/do" in str(failures[0])
     assert "ZeroDivisionError" in caplog.text
@@ -147,7 +147,7 @@ def test_a_service_of_one_client_for_another(bench):
     server, caller = bench.gateway.open("server"), bench.gateway.open("caller")
     requests, answers, failures = [], [], []
     server.offer("/do", TRIGGER, lambda request, reply: requests.append((request, reply)))
-    caller.call("/do", None, Reply(answers.append, failures.append))
+    caller.call("/do", None, ServiceReply(answers.append, failures.append))
     bench.work_off()
     requests[0][1].answer(Response(True, "from outside"))
     requests[0][1].answer(Response(False, "again"))
@@ -159,7 +159,7 @@ def test_a_service_of_one_client_for_another(bench):
 def test_who_leaves_fails_those_who_wait_for_him(bench):
     server, failures, requests = bench.gateway.open("server"), [], []
     server.offer("/do", TRIGGER, lambda request, reply: requests.append(reply))
-    bench.gateway.open("caller").call("/do", None, Reply(print, failures.append))
+    bench.gateway.open("caller").call("/do", None, ServiceReply(print, failures.append))
     bench.work_off()
     server.close()
     assert "server has left" in str(failures[0])
@@ -255,7 +255,7 @@ def test_who_was_commanded_from_outside(bench, monkeypatch):
     for topic in ("/chat", "/uav1/word", "/uav2/word", "/uav1/word", "/uav3/word"):
         session.advertise(topic, STRING)
         session.publish(topic, message_type(STRING)("x"))
-    session.call("/uav3/none", None, Reply(lambda _: None, lambda _: None))
+    session.call("/uav3/none", None, ServiceReply(lambda _: None, lambda _: None))
     bench.work_off()
     assert list(gateway.commanded_ns) == ["uav1", "uav3"]
     assert gateway.commanded_ns["uav3"] == bench.graph.now_ns()

@@ -2,7 +2,7 @@
 
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type, typestore
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 STANDARD = "simulation_interfaces"
 
@@ -37,7 +37,7 @@ def ask(simulation, service, **fields):
 def ask_later(simulation, service, **fields):
     """A list that will hold the response."""
     answers = []
-    reply = Reply(answers.append, answers.append)
+    reply = ServiceReply(answers.append, answers.append)
     request = request_of(simulation.graph, service, **fields)
     simulation.graph.call_async(service, request, reply)
     return answers

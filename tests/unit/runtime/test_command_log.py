@@ -14,8 +14,8 @@ from volery.core.errors import RecordingError
 from volery.graph.codecs.zero import zero_message
 from volery.graph.command_records import TOPIC, TYPE, content_of, record_of
 from volery.graph.messages import String, Twist, Vector3, message_type
-from volery.graph.service_reply import Reply
-from volery.graph.session import Taken
+from volery.graph.service_reply import ServiceReply
+from volery.graph.session import ClientCommand
 from volery.runtime.replay import command_log
 from volery.runtime.replay.command_effects import Weight, weight_of
 from volery.runtime.replay.scenario_record import origin_of_scenario, scenario_of
@@ -43,7 +43,9 @@ def ask(simulation, service, srvtype, **fields):
     for name, value in fields.items():
         setattr(request, name, value)
     answers = []
-    simulation.gateway.open("page").call(service, request, Reply(answers.append, answers.append))
+    simulation.gateway.open("page").call(
+        service, request, ServiceReply(answers.append, answers.append)
+    )
     simulation.take_in()
     return answers[0]
 
@@ -101,7 +103,7 @@ def test_what_only_paces_is_no_turn(flying, heard):
     ],
 )
 def test_how_much_hangs_on_a_command(kind, srvtype, weight):
-    assert weight_of(Taken("x", kind, "/x", srvtype)) is weight
+    assert weight_of(ClientCommand("x", kind, "/x", srvtype)) is weight
 
 
 def test_the_record_of_going_back_is_not_taken_back(flying, heard):
@@ -153,13 +155,13 @@ def test_a_log_without_what_follows_is_refused(tmp_path, flying):
 
 
 def test_texts_and_lists_are_shortened_for_people():
-    taken = Taken("x", "publish", "/x", "std_msgs/msg/String", String("a" * 10_000))
+    taken = ClientCommand("x", "publish", "/x", "std_msgs/msg/String", String("a" * 10_000))
     record = record_of(taken, b"", number=0, time_ns=0, step=0, turn=0)
     assert "(10000 characters)" in json.loads(record.content)["data"]
     points = message_type("nav_msgs/msg/Path")
     pose = zero_message("geometry_msgs/msg/PoseStamped")
     path = points(header=pose.header, poses=[pose] * 500)
-    taken = Taken("x", "publish", "/x", "nav_msgs/msg/Path", path)
+    taken = ClientCommand("x", "publish", "/x", "nav_msgs/msg/Path", path)
     record = record_of(taken, b"", number=0, time_ns=0, step=0, turn=0)
     assert json.loads(record.content)["poses"][-1] == "and 484 more"
 

@@ -6,7 +6,7 @@ import pytest
 from asking import ask, code_of, request_of
 
 from volery.core.errors import GraphError
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.runtime.services.simulation_state import State
 
 STANDARD_REFUSALS = (
@@ -33,7 +33,7 @@ class Client:
         def look():
             if len(answers) < len(calls):
                 service, fields = calls[len(answers)]
-                reply = Reply(answers.append, answers.append)
+                reply = ServiceReply(answers.append, answers.append)
                 request = request_of(self.simulation.graph, service, **fields)
                 self.session.call(service, request, reply)
                 self.simulation.take_in()

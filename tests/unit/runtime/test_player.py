@@ -13,7 +13,7 @@ from volery.bridges.logs.records import LogWalk
 from volery.core.errors import CommandError, RecordingError
 from volery.graph import messages as m
 from volery.graph.codecs.zero import zero_message
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.runtime import Simulation
 from volery.runtime.replay.log_player import Player
 from volery.scenario.load import load_scenario
@@ -58,7 +58,7 @@ class Visitor:
         for name, value in fields.items():
             setattr(request, name, value)
         answers = []
-        self.session.call(service, request, Reply(answers.append, answers.append))
+        self.session.call(service, request, ServiceReply(answers.append, answers.append))
         self.player.wait(0.0)
         return answers[0]
 

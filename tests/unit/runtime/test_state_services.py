@@ -252,10 +252,10 @@ def test_requests_of_other_threads_reach_a_paused_run(simulate, flat_data):
     answers = []
     simulation.pause()
     with InThread(simulation, 5.0):
-        from volery.graph.service_reply import Reply
+        from volery.graph.service_reply import ServiceReply
 
         request = message_type("simulation_interfaces/srv/StepSimulation_Request")(steps=3)
-        session.call("/step_simulation", request, Reply(answers.append, answers.append))
+        session.call("/step_simulation", request, ServiceReply(answers.append, answers.append))
         wait_for(lambda: answers)
         assert code_of(answers[0]) == OK
         assert simulation.time_ns == 3_000_000

@@ -177,9 +177,9 @@ def test_how_long_nobody_outside_has_commanded(simulate, three):
     kept = simulation.snapshot()
     simulation.run(0.2)
     answers = []
-    from volery.graph.service_reply import Reply
+    from volery.graph.service_reply import ServiceReply
 
-    watcher.session.call("/uav2/hold", None, Reply(answers.append, answers.append))
+    watcher.session.call("/uav2/hold", None, ServiceReply(answers.append, answers.append))
     simulation.run(0.2)
     assert len(answers) == 1
     ages = [v.command_age for v in watcher.last(VEHICLES).vehicles]

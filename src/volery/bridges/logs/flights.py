@@ -14,7 +14,7 @@ from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.logs.records import LogRecord
 from volery.core.errors import GraphError, RecordingError
 from volery.graph import command_records
-from volery.graph.session import Taken
+from volery.graph.session import ClientCommand
 
 ORIGIN_TOPIC = "/volery/scenario"
 _ORIGIN_TYPE = "std_msgs/msg/String"
@@ -56,7 +56,7 @@ class Command(NamedTuple):
     number: int
     step: int
     turn: int
-    taken: Taken
+    taken: ClientCommand
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ def _commands_of(log: ChunkedLog) -> tuple[Command, ...]:
 
 def _command(message: Any, content: Any) -> Command:
     m = message
-    taken = Taken(m.client, m.kind, m.name, m.type, content, m.latched, int(m.request))
+    taken = ClientCommand(m.client, m.kind, m.name, m.type, content, m.latched, int(m.request))
     return Command(int(m.number), int(m.step), int(m.turn), taken)
 
 

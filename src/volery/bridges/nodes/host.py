@@ -21,7 +21,7 @@ from typing import Any, Literal
 from volery.bridges.nodes.mirrored_graph import MirroredGraph
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.errors import GraphError
-from volery.graph.connection import Link
+from volery.graph.connection import GraphConnection
 from volery.graph.graph import Subscription
 from volery.graph.messages import Clock, Published, Time, message_type
 from volery.graph.nodes.failures import reported_failures
@@ -55,7 +55,7 @@ class NodeHost:
     computer's clock (ns since 1970); `auto` is `wall` until a `/clock` is heard.
     """
 
-    def __init__(self, link: Link, *, clock: ClockKind = "auto") -> None:
+    def __init__(self, link: GraphConnection, *, clock: ClockKind = "auto") -> None:
         self._link = link
         self._kind = clock
         self._woken = threading.Event()

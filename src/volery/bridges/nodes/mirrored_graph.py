@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from volery.core.errors import GraphError
-from volery.graph.connection import HostsNodes, Link, call_and_wait
+from volery.graph.connection import GraphConnection, HostsNodes, call_and_wait
 from volery.graph.graph import AsyncHandler, Callback, Graph, Publisher, Subscription
 from volery.graph.messages import Published, type_name
 from volery.graph.qos import DEFAULT_QOS, QoSProfile
-from volery.graph.service_reply import Reply
-from volery.graph.subscription_queue import Mailbox
+from volery.graph.service_reply import ServiceReply
+from volery.graph.subscription_queue import SubscriptionQueue
 
 _CALL_TIMEOUT_S = 10.0
 
@@ -23,12 +23,14 @@ class MirroredGraph(Graph):
     that there is something to do.
     """
 
-    def __init__(self, link: Link, now_ns: Callable[[], int], wake: Callable[[], None]) -> None:
+    def __init__(
+        self, link: GraphConnection, now_ns: Callable[[], int], wake: Callable[[], None]
+    ) -> None:
         self._posted: list[Callable[[], Any]] = []
         super().__init__(now_ns, self._keep)
         self._link = link
         self._wake = wake
-        self._mailboxes: dict[str, Mailbox] = {}
+        self._mailboxes: dict[str, SubscriptionQueue] = {}
         self._readers: dict[str, list[Callback]] = {}
         self._held: list[tuple[str, Published]] = []
         self._barrier: tuple[str, Callable[[Published], None]] | None = None
@@ -127,7 +129,7 @@ class MirroredGraph(Graph):
     def offer(self, service: str, srvtype: str, handler: Callable[[Any], Any]) -> None:
         """Offer a service over there; its handler runs here, in `hand_out`."""
 
-        def ask(request: Any, reply: Reply) -> None:
+        def ask(request: Any, reply: ServiceReply) -> None:
             self.post(lambda: _answer(handler, request, reply))
 
         self._link.offer(service, srvtype, ask)
@@ -144,7 +146,7 @@ class MirroredGraph(Graph):
         """Call and wait for the response; `GraphError` where none comes in time."""
         return call_and_wait(self._link, service, request, _CALL_TIMEOUT_S)
 
-    def call_async(self, service: str, request: Any | None, reply: Reply) -> None:
+    def call_async(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Call; the answer comes from the link's thread."""
         self._link.call(service, request, reply)
 
@@ -171,7 +173,7 @@ class _RemoteSubscription(Subscription):
 class _RemotePublisher(Publisher):
     """Publishes through the link; whether anybody listens over there is not known."""
 
-    def __init__(self, local: Publisher, link: Link) -> None:
+    def __init__(self, local: Publisher, link: GraphConnection) -> None:
         self._local = local
         self._link = link
         self.latched = local.latched
@@ -213,7 +215,7 @@ def _number(entry: tuple[int, str, Published]) -> int:
     return entry[0]
 
 
-def _answer(handler: Callable[[Any], Any], request: Any, reply: Reply) -> None:
+def _answer(handler: Callable[[Any], Any], request: Any, reply: ServiceReply) -> None:
     try:
         reply.answer(handler(request))
     except Exception as error:  # the caller's business too

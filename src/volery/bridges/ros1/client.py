@@ -21,9 +21,9 @@ from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import Published, message_type, type_name
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Handler, SessionInfo
-from volery.graph.subscription_queue import Mailbox, Wake
+from volery.graph.subscription_queue import SubscriptionQueue, Wake
 
 _MASTER_EACH_S = 1.0
 _SERVICE_TIMEOUT_S = 30.0
@@ -50,7 +50,7 @@ class Ros1Client:
         self._codec = ros1_codec()
         self._lock = threading.RLock()
         self._publishers: dict[str, _Publisher] = {}
-        self._mailboxes: dict[Mailbox, Any] = {}
+        self._mailboxes: dict[SubscriptionQueue, Any] = {}
         self._offers: dict[str, Any] = {}
         self._closed = threading.Event()
         threading.Thread(target=self._watch, name="volery-ros1-master", daemon=True).start()
@@ -101,28 +101,28 @@ class Ros1Client:
         depth: int = DEFAULT_DEPTH,
         reliable: bool = False,
         wake: Wake,
-    ) -> Mailbox:
+    ) -> SubscriptionQueue:
         """As `Link.subscribe`; a message's time is that of its arrival, by the computer's clock."""
         check_depth(depth)
         found = msgtype or self._node.topic_type(topic)
         if found is None:
             raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
         self._codec.learn(found)
-        mailbox = Mailbox(topic, depth, wake, reliable=reliable)
+        mailbox = SubscriptionQueue(topic, depth, wake, reliable=reliable)
         with self._lock:
             self._check_open()
             receive = self._receiver(topic, found, mailbox)
             self._mailboxes[mailbox] = self._node.subscriber(topic, found, receive)
         return mailbox
 
-    def unsubscribe(self, mailbox: Mailbox) -> None:
+    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
         """Receive no more; what waits can still be taken."""
         with self._lock:
             subscriber = self._mailboxes.pop(mailbox, None)
         if subscriber is not None:
             subscriber.unregister()
 
-    def _receiver(self, topic: str, msgtype: str, mailbox: Mailbox) -> Receive:
+    def _receiver(self, topic: str, msgtype: str, mailbox: SubscriptionQueue) -> Receive:
         def receive(data: bytes, sender: str, _latched: bool) -> None:
             try:
                 message = self._codec.decode(data, msgtype)
@@ -135,7 +135,7 @@ class Ros1Client:
 
     # ---------------------------------------------------------------------------------- services
 
-    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+    def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Call a service; `reply` gets the response or a `GraphError`, in another thread."""
 
         def ask() -> None:
@@ -158,7 +158,7 @@ class Ros1Client:
 
         def handle(request: Any) -> Any:
             come: Future[Any] = Future()
-            handler(request, Reply(come.set_result, come.set_exception))
+            handler(request, ServiceReply(come.set_result, come.set_exception))
             try:
                 return come.result(_SERVICE_TIMEOUT_S)
             except FutureTimeout:

@@ -13,7 +13,7 @@ from volery.core.errors import GraphError
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import Published
 from volery.graph.session import Session
-from volery.graph.subscription_queue import Mailbox
+from volery.graph.subscription_queue import SubscriptionQueue
 
 _DEPTH = 1000
 """One tick may publish once for each UAV, as it does on `/tf`."""
@@ -37,7 +37,7 @@ class Outlet:
         self._session = session
         self._pump = pump
         self._encode = ros1_codec().encode
-        self._mailbox: Mailbox | None = None
+        self._mailbox: SubscriptionQueue | None = None
         self._connections: list[Any] = []
         self._readers: dict[Any, Reader] = {}
         self._own: OrderedDict[int, Any] = OrderedDict()

@@ -16,7 +16,7 @@ from volery.bridges.sharing import Sharing
 from volery.core.errors import GraphError
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.graph import TopicInfo
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
 
 _SERVICE_TIMEOUT_S = 30.0
@@ -145,7 +145,7 @@ class Shared:
             self._remote.add(name)
 
     def _caller(self, name: str, srvtype: str) -> Any:
-        def handle(request: Any, reply: Reply) -> None:
+        def handle(request: Any, reply: ServiceReply) -> None:
             def ask() -> None:
                 try:
                     reply.answer(self.node.call(name, srvtype, request))
@@ -177,7 +177,7 @@ class Shared:
     def _answerer(self, name: str) -> Any:
         def answer(request: Any) -> Any:
             come: Future[Any] = Future()
-            self._session.call(name, request, Reply(come.set_result, come.set_exception))
+            self._session.call(name, request, ServiceReply(come.set_result, come.set_exception))
             try:
                 return come.result(_SERVICE_TIMEOUT_S)
             except FutureTimeout:

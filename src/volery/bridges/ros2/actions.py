@@ -20,7 +20,7 @@ from volery.graph.actions import Goal, GoalStatus
 from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type, time_from_ns
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
 
 MOST_GOALS = 1000
@@ -45,7 +45,7 @@ class _Asked:
         self.goal: Goal | None = None
         self.status = int(GoalStatus.ACCEPTED)
         self.result: Any = None
-        self.waiting: list[Reply] = []
+        self.waiting: list[ServiceReply] = []
 
     @property
     def ended(self) -> bool:
@@ -94,15 +94,17 @@ class ActionServer:
         for handle in self._handles:
             handle.close()
 
-    def _in_simulation(self, take: Callable[[Any, Reply], None]) -> Callable[[Any, Reply], None]:
-        def ask(request: Any, reply: Reply) -> None:
+    def _in_simulation(
+        self, take: Callable[[Any, ServiceReply], None]
+    ) -> Callable[[Any, ServiceReply], None]:
+        def ask(request: Any, reply: ServiceReply) -> None:
             self._graph.post(lambda: take(request, reply))
 
         return ask
 
     # ------------------------------------------------------------------------------------- goals
 
-    def _on_goal(self, request: Any, reply: Reply) -> None:
+    def _on_goal(self, request: Any, reply: ServiceReply) -> None:
         now_ns = self._graph.now_ns()
         goal_id = request.goal_id.uuid.tobytes()
         asked = _Asked(goal_id, now_ns)
@@ -152,7 +154,7 @@ class ActionServer:
     def _response(self, asked: _Asked) -> Any:
         return message_type(f"{self._type}_GetResult_Response")(asked.status, asked.result)
 
-    def _on_result(self, request: Any, reply: Reply) -> None:
+    def _on_result(self, request: Any, reply: ServiceReply) -> None:
         asked = self._asked.get(request.goal_id.uuid.tobytes())
         if asked is None:
             response = zero_message(f"{self._type}_GetResult_Response")
@@ -165,7 +167,7 @@ class ActionServer:
 
     # ---------------------------------------------------------------------------------- ending
 
-    def _on_cancel(self, request: Any, reply: Reply) -> None:
+    def _on_cancel(self, request: Any, reply: ServiceReply) -> None:
         response = zero_message("action_msgs/srv/CancelGoal_Response")
         goal_id = request.goal_info.goal_id.uuid.tobytes()
         stamp = request.goal_info.stamp

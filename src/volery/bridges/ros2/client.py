@@ -36,9 +36,9 @@ from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type, type_name
 from volery.graph.parameters import Parameters
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Handler, SessionInfo
-from volery.graph.subscription_queue import Mailbox, Wake
+from volery.graph.subscription_queue import SubscriptionQueue, Wake
 
 _FIRST_LOOK_S = 1.0
 """How long others may take to be found, after joining."""
@@ -163,7 +163,7 @@ class Ros2Client:
         depth: int = DEFAULT_DEPTH,
         reliable: bool = False,
         wake: Wake,
-    ) -> Mailbox:
+    ) -> SubscriptionQueue:
         """As `Link.subscribe`; a message's time is that of its arrival, by the computer's clock.
 
         The middleware delivers reliably where all publishers do; `reliable` is of the mailbox only.
@@ -172,14 +172,14 @@ class Ros2Client:
         check_name(topic)
         found = msgtype or self._type_of(topic)
         _known(found)
-        mailbox = Mailbox(topic, depth, wake, reliable=reliable)
+        mailbox = SubscriptionQueue(topic, depth, wake, reliable=reliable)
         with self._lock:
             self._check_open()
             self._subscriptions.open(mailbox, found, depth)
         self._participant.announce()
         return mailbox
 
-    def unsubscribe(self, mailbox: Mailbox) -> None:
+    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
         """Receive no more; what waits can still be taken."""
         self._subscriptions.close(mailbox)
         self._participant.announce()
@@ -201,7 +201,7 @@ class Ros2Client:
         self._look_around()
         return dict(self._participant.service_types())
 
-    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+    def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Call a service; `reply` gets the response or a `GraphError`, in another thread."""
 
         def ask() -> None:

@@ -29,7 +29,7 @@ from volery.bridges.ros2.worker import Worker
 from volery.bridges.sharing import COMMANDS, Sharing
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Gateway, Session
 
 _SURVEY_S = 0.25
@@ -187,7 +187,7 @@ class _Shared:
     def _set(self, node: str, name: str, value: Any, done: Callable[[str], None]) -> None:
         """Set a parameter as clients of all doors do, so that recorded flights repeat it."""
         request = message_type(f"{_SET}_Request")(f"{node}:{name}", json.dumps(value))
-        reply = Reply(lambda response: done(response.reason), lambda error: done(str(error)))
+        reply = ServiceReply(lambda response: done(response.reason), lambda error: done(str(error)))
         self._session.call("/rosapi/set_param", request, reply)
 
     def close(self) -> None:

@@ -10,7 +10,7 @@ from volery.bridges.ros2.middleware import Participant, TopicSpec
 from volery.bridges.ros2.worker import Worker
 from volery.graph.codecs.cdr import CODING_ERRORS
 from volery.graph.session import Session
-from volery.graph.subscription_queue import Mailbox
+from volery.graph.subscription_queue import SubscriptionQueue
 
 _DEPTH = 1000
 """One tick may publish once for each UAV, as it does on `/tf`."""
@@ -32,7 +32,7 @@ class Outlet:
         self.spec = spec
         self._session = session
         self._worker = worker
-        self._mailbox: Mailbox | None = None
+        self._mailbox: SubscriptionQueue | None = None
         self._own: OrderedDict[int, Any] = OrderedDict()
         self._complained = False
         self._closed = False

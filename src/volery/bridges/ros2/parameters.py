@@ -22,7 +22,7 @@ from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type, time_from_ns
 from volery.graph.parameter_values import NOT_SET, plain_of, type_of, value_message
 from volery.graph.parameters import Parameters
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 _SIM_TIME = "use_sim_time"
 """Every ROS 2 node has it; here it is true and nobody's to change."""
@@ -97,7 +97,7 @@ class ParameterServices:
     def _serve(self, node: NodeName, base: str) -> Handle:
         srvtype = f"rcl_interfaces/srv/{base}"
         word = "".join(f"_{c.lower()}" if c.isupper() else c for c in base).strip("_")
-        answers: dict[str, Callable[[NodeName, Any, Reply], None]] = {
+        answers: dict[str, Callable[[NodeName, Any, ServiceReply], None]] = {
             "DescribeParameters": self._describe,
             "GetParameterTypes": self._types,
             "GetParameters": self._get,
@@ -133,23 +133,23 @@ class ParameterServices:
         except GraphError:
             return True
 
-    def _list(self, node: NodeName, request: Any, reply: Reply) -> None:
+    def _list(self, node: NodeName, request: Any, reply: ServiceReply) -> None:
         names = [n for n in self._names(node) if _is_below(n, request.prefixes, request.depth)]
         prefixes = sorted({name.rpartition(".")[0] for name in names} - {""})
         response = zero_message("rcl_interfaces/srv/ListParameters_Response")
         response.result.names, response.result.prefixes = names, prefixes
         reply.answer(response)
 
-    def _get(self, node: NodeName, request: Any, reply: Reply) -> None:
+    def _get(self, node: NodeName, request: Any, reply: ServiceReply) -> None:
         values = [value_message(self._value(node, name)) for name in request.names]
         reply.answer(message_type("rcl_interfaces/srv/GetParameters_Response")(values))
 
-    def _types(self, node: NodeName, request: Any, reply: Reply) -> None:
+    def _types(self, node: NodeName, request: Any, reply: ServiceReply) -> None:
         found = [type_of(self._value(node, name)) for name in request.names]
         response = message_type("rcl_interfaces/srv/GetParameterTypes_Response")
         reply.answer(response(np.array(found, np.uint8)))
 
-    def _describe(self, node: NodeName, request: Any, reply: Reply) -> None:
+    def _describe(self, node: NodeName, request: Any, reply: ServiceReply) -> None:
         descriptors = []
         for name in request.names:
             descriptor = zero_message("rcl_interfaces/msg/ParameterDescriptor")
@@ -160,11 +160,11 @@ class ParameterServices:
 
     # ----------------------------------------------------------------------------------- setting
 
-    def _set(self, node: NodeName, request: Any, reply: Reply) -> None:
+    def _set(self, node: NodeName, request: Any, reply: ServiceReply) -> None:
         response = message_type("rcl_interfaces/srv/SetParameters_Response")
         self._set_each(node, request.parameters, lambda found: reply.answer(response(found)))
 
-    def _set_all(self, node: NodeName, request: Any, reply: Reply) -> None:
+    def _set_all(self, node: NodeName, request: Any, reply: ServiceReply) -> None:
         """All or none: refused before anything is set where one is read-only or unknown."""
         response = message_type("rcl_interfaces/srv/SetParametersAtomically_Response")
         bad = [p.name for p in request.parameters if self._refuses(node, p)]

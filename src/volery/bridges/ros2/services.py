@@ -15,7 +15,7 @@ from volery.bridges.sharing import Sharing
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import decode_cdr, encode_cdr
 from volery.graph.codecs.zero import zero_message
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
 
 _LONGEST_WAIT_S = 10.0
@@ -78,7 +78,7 @@ class Services:
         for caller in self._callers.values():
             caller.close()
 
-    def _asker(self, name: str) -> Callable[[Any, Reply], None]:
+    def _asker(self, name: str) -> Callable[[Any, ServiceReply], None]:
         return lambda request, reply: self._session.call(name, request, reply)
 
 
@@ -90,7 +90,7 @@ def _is_of_ros2(name: str) -> bool:
 def answerer(
     worker: Worker,
     srvtype: str,
-    ask: Callable[[Any, Reply], None],
+    ask: Callable[[Any, ServiceReply], None],
     complaints: Complaints,
 ) -> Callable[[bytes, Answer], None]:
     """A `TakeRequest` that reads requests for `ask` and writes its responses.
@@ -115,7 +115,7 @@ def answerer(
         except GraphError as error:
             complaints.tell(srvtype, str(error))
             return
-        ask(request, Reply(respond, fail))
+        ask(request, ServiceReply(respond, fail))
 
     return take
 
@@ -134,7 +134,7 @@ def _refusal(response_type: str, reason: str) -> Any | None:
     return None
 
 
-def ask_server(caller: Caller, spec: ServiceSpec, request: Any, reply: Reply) -> None:
+def ask_server(caller: Caller, spec: ServiceSpec, request: Any, reply: ServiceReply) -> None:
     """Ask a ROS 2 server, waiting for it to be found; `reply` gets its response or an error."""
 
     def respond(data: bytes) -> None:
@@ -159,10 +159,10 @@ def ask_server(caller: Caller, spec: ServiceSpec, request: Any, reply: Reply) ->
         reply.fail(error)
 
 
-def _forwarder(caller: Caller, spec: ServiceSpec) -> Callable[[Any, Reply], None]:
+def _forwarder(caller: Caller, spec: ServiceSpec) -> Callable[[Any, ServiceReply], None]:
     """A handler of a service of the graph that passes requests on to a ROS 2 server."""
 
-    def handle(request: Any, reply: Reply) -> None:
+    def handle(request: Any, reply: ServiceReply) -> None:
         name = f"volery-ros2 {spec.service}"
         work = (caller, spec, request, reply)
         threading.Thread(target=ask_server, args=work, name=name, daemon=True).start()

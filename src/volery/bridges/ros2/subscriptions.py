@@ -12,7 +12,7 @@ from volery.bridges.ros2.names import NodeName
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.messages import Published
-from volery.graph.subscription_queue import Mailbox, MailboxInfo
+from volery.graph.subscription_queue import SubscriptionQueue, SubscriptionQueueInfo
 
 
 class Subscriptions:
@@ -21,18 +21,18 @@ class Subscriptions:
     def __init__(self, participant: Participant, node: NodeName) -> None:
         self._participant = participant
         self._node = node
-        self._inlets: dict[Mailbox, _Inlet] = {}
+        self._inlets: dict[SubscriptionQueue, _Inlet] = {}
         self._complaints = Complaints()
         self._lock = threading.RLock()
         self._closed = False
 
     @property
-    def infos(self) -> tuple[MailboxInfo, ...]:
+    def infos(self) -> tuple[SubscriptionQueueInfo, ...]:
         """How they fare."""
         with self._lock:
             return tuple(mailbox.info for mailbox in self._inlets)
 
-    def open(self, mailbox: Mailbox, msgtype: str, depth: int) -> None:
+    def open(self, mailbox: SubscriptionQueue, msgtype: str, depth: int) -> None:
         """Begin to fill a mailbox."""
         receive = self._receiver(mailbox, msgtype)
         with self._lock:
@@ -40,7 +40,7 @@ class Subscriptions:
             self._inlets[mailbox] = inlet
             self._subscribe(inlet)
 
-    def close(self, mailbox: Mailbox) -> None:
+    def close(self, mailbox: SubscriptionQueue) -> None:
         """Fill it no more; nothing happens a second time."""
         with self._lock:
             inlet = self._inlets.pop(mailbox, None)
@@ -69,7 +69,7 @@ class Subscriptions:
                 inlet.profile = None
                 self._subscribe(inlet)
 
-    def _receiver(self, mailbox: Mailbox, msgtype: str) -> Callable[[bytes], None]:
+    def _receiver(self, mailbox: SubscriptionQueue, msgtype: str) -> Callable[[bytes], None]:
         def receive(data: bytes) -> None:
             try:
                 message = decode_cdr(data, msgtype)

@@ -16,7 +16,7 @@ from volery.bridges.ros_tcp.outbox import Outbox
 from volery.bridges.ros_tcp.payloads import absolute
 from volery.bridges.ros_tcp.wire import Frame
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
 
 MOST_CALLS = 1000
@@ -30,7 +30,7 @@ class Calls:
         self._session = session
         self._outbox = outbox
         self._complain = complain
-        self._open: set[Reply] = set()
+        self._open: set[ServiceReply] = set()
 
     def call(self, number: int, frame: Frame, expected: str | None = None) -> None:
         """Call the service that `frame` names, with its payload, as the peer's request `number`.
@@ -61,7 +61,7 @@ class Calls:
             else:
                 self.respond(number, name, body)
 
-        reply = Reply(respond, fail)
+        reply = ServiceReply(respond, fail)
         self._open.add(reply)
         reply.when_done(lambda: self._open.discard(reply))
         self._session.call(absolute(name), request, reply)

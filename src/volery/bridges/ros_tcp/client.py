@@ -27,7 +27,7 @@ from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.wire import Frame, FrameParser, Generation, number_field
 from volery.core.errors import BridgeError, GraphError, reason_of
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import SessionInfo
 
 MOST_COMPLAINTS = 100
@@ -109,7 +109,9 @@ class RosTcpClient(RemoteClient):
     def topic_types(self) -> dict[str, str]:
         """Topics of the graph and their types, by name. `GraphError` where no answer comes."""
         return self._ask(
-            lambda found: self._topics.ask_list(Reply(found.set_result, found.set_exception)),
+            lambda found: self._topics.ask_list(
+                ServiceReply(found.set_result, found.set_exception)
+            ),
             f"the endpoint at {self._where} tells no topics",
         )
 

@@ -20,7 +20,7 @@ from volery.graph.codecs.cdr import known
 from volery.graph.codecs.ros1_names import ros2_name
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Handler
 
 FIRST_REQUEST = 101
@@ -34,7 +34,7 @@ _TYPE_OF = "/rosapi/service_type"
 class _Call:
     service: str
     srvtype: str
-    reply: Reply
+    reply: ServiceReply
     why: str = ""
     """What the endpoint said of the service meanwhile."""
 
@@ -43,7 +43,7 @@ class _Call:
 class _Offer:
     srvtype: str
     handler: Handler
-    pending: set[Reply] = field(default_factory=set)
+    pending: set[ServiceReply] = field(default_factory=set)
 
 
 class ClientServices:
@@ -73,7 +73,7 @@ class ClientServices:
 
     # ------------------------------------------------------------------------------------- calls
 
-    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+    def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Call a service; without a request rosapi is asked for its type first."""
         if request is not None:
             name: str = request.__msgtype__
@@ -90,9 +90,9 @@ class ClientServices:
                 reply.fail(error)
 
         question = message_type("rosapi_msgs/srv/ServiceType_Request")(service=service)
-        self._call(_TYPE_OF, "rosapi_msgs/srv/ServiceType", question, Reply(ask, reply.fail))
+        self._call(_TYPE_OF, "rosapi_msgs/srv/ServiceType", question, ServiceReply(ask, reply.fail))
 
-    def _call(self, service: str, srvtype: str, request: Any, reply: Reply) -> None:
+    def _call(self, service: str, srvtype: str, request: Any, reply: ServiceReply) -> None:
         with self._line.lock:
             if self._line.open:
                 body = self._line.payloads.encode(request, f"{srvtype}_Request")
@@ -193,7 +193,7 @@ class ClientServices:
         def fail(error: GraphError) -> None:
             self._respond(connection, number, name, error=str(error))
 
-        reply = Reply(answer, fail)
+        reply = ServiceReply(answer, fail)
         try:
             request = self._line.payloads.decode(frame.payload, f"{offer.srvtype}_Request")
             offer.pending.add(reply)

@@ -11,7 +11,7 @@ from volery.bridges.ros_tcp.wire import Frame
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.cdr import known
 from volery.graph.codecs.ros1_names import ros2_name
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 QUEUE_SIZE = 100
 """Messages of a topic that the endpoint lets wait for whom it passes them on to."""
@@ -27,7 +27,7 @@ class ClientTopics(RemoteTopics):
     def __init__(self, line: Line) -> None:
         super().__init__(line.lock, known)
         self._line = line
-        self._listings: list[Reply] = []
+        self._listings: list[ServiceReply] = []
 
     def lose(self, why: str) -> None:
         """The connection is gone: nobody answers any more what was asked."""
@@ -45,7 +45,7 @@ class ClientTopics(RemoteTopics):
 
     # ------------------------------------------------------------------------------------- lists
 
-    def ask_list(self, reply: Reply) -> None:
+    def ask_list(self, reply: ServiceReply) -> None:
         """Ask for topics and their types; the reply gets a dictionary by name."""
         with self._line.lock:
             if self._line.open:

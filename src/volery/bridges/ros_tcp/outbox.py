@@ -18,7 +18,7 @@ from volery.bridges.ros_tcp.wire import Bytes
 from volery.core.errors import GraphError
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.session import Session
-from volery.graph.subscription_queue import Mailbox, Wake
+from volery.graph.subscription_queue import SubscriptionQueue, Wake
 
 _BATCH_BYTES = 64 << 10
 _BATCH_PARTS = 128
@@ -31,7 +31,7 @@ class _Stream:
 
     def __init__(self, destination: str) -> None:
         self.destination = destination
-        self.mailbox: Mailbox | None = None
+        self.mailbox: SubscriptionQueue | None = None
         self.queued = False
         """Whether its turn is planned."""
 

@@ -25,7 +25,7 @@ from volery.bridges.ros_tcp.wire import Frame, Generation, number_field, text_fi
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.read_budget import Reading
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Gateway
 from volery.graph.subscription_queue import Wake
 
@@ -185,7 +185,7 @@ class EndpointSession:
             self._offered.discard(name)
             self._session.withdraw(service)
 
-        def ask(request: Any, reply: Reply) -> None:
+        def ask(request: Any, reply: ServiceReply) -> None:
             if self.outbox.crowded:
                 reply.fail(GraphError(f"service '{service}': its server does not read"))
                 return
@@ -244,11 +244,11 @@ class _Requests:
     """Requests that the client has not answered yet; added to by the simulation's thread."""
 
     def __init__(self) -> None:
-        self._open: dict[int, tuple[Reply, str]] = {}
+        self._open: dict[int, tuple[ServiceReply, str]] = {}
         self._next = _FIRST_REQUEST
         self._lock = threading.Lock()
 
-    def add(self, reply: Reply, srvtype: str) -> int:
+    def add(self, reply: ServiceReply, srvtype: str) -> int:
         with self._lock:
             number, self._next = self._next, self._next + 1
             self._open[number] = (reply, srvtype)
@@ -258,7 +258,7 @@ class _Requests:
     def _forget(self, number: int) -> None:
         self._open.pop(number, None)
 
-    def pop(self, number: int) -> tuple[Reply, str]:
+    def pop(self, number: int) -> tuple[ServiceReply, str]:
         with self._lock:
             found = self._open.pop(number, None)
         if found is None:

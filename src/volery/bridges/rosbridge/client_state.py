@@ -27,11 +27,11 @@ from volery.bridges.rosbridge.wire import (
     encode_json,
 )
 from volery.core.errors import GraphError, VoleryError
-from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.codecs.json_decoding import decode_plain
 from volery.graph.codecs.ros1_names import ros1_name, ros2_name
 from volery.graph.messages import typestore
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Handler, SessionInfo
 from volery.graph.subscription_queue import Wake
 
@@ -45,12 +45,12 @@ MOST_COMPLAINTS = 100
 class _Offer:
     srvtype: str
     handler: Handler
-    pending: set[Reply] = field(default_factory=set)
+    pending: set[ServiceReply] = field(default_factory=set)
 
 
 @dataclass(frozen=True)
 class _Call:
-    reply: Reply
+    reply: ServiceReply
     take: Callable[[Any], Any]
     """Makes the response of its plain form."""
 
@@ -76,8 +76,8 @@ class ClientState(RemoteTopics):
         self._connected = False
         self._cbor = False
         self._ros1 = generation == "ros1"
-        self._plain = JsonForm(ros1_names=self._ros1)
-        self._typed = JsonForm(
+        self._plain = JsonCodec(ros1_names=self._ros1)
+        self._typed = JsonCodec(
             non_finite_as_null=False, ros1_names=self._ros1, arrays=lambda values, _type: values
         )
         self._offers: dict[str, _Offer] = {}
@@ -140,7 +140,7 @@ class ClientState(RemoteTopics):
 
     # ---------------------------------------------------------------------------------- services
 
-    def call(self, service: str, request: Any | None, reply: Reply) -> None:
+    def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Call a service; without a request rosapi is asked for its type first."""
         if request is not None:
             srvtype = request.__msgtype__.removesuffix("_Request")
@@ -155,16 +155,16 @@ class ClientState(RemoteTopics):
             answer = f"{srvtype}_Response"
             self._call(service, {}, reply, lambda values: decode_plain(values, answer))
 
-        asking = Reply(ask, reply.fail)
+        asking = ServiceReply(ask, reply.fail)
         self._call("/rosapi/service_type", {"service": service}, asking, _service_type_of)
 
     def ask_rosapi(self, service: str, args: dict[str, Any], found: Future[str]) -> None:
         """Ask rosapi for the type of something."""
-        reply = Reply(found.set_result, found.set_exception)
+        reply = ServiceReply(found.set_result, found.set_exception)
         self._call(f"/rosapi/{service}", args, reply, _type_of)
 
     def _call(
-        self, service: str, args: dict[str, Any], reply: Reply, take: Callable[[Any], Any]
+        self, service: str, args: dict[str, Any], reply: ServiceReply, take: Callable[[Any], Any]
     ) -> None:
         with self._lock:
             if self._connected:
@@ -313,7 +313,7 @@ class ClientState(RemoteTopics):
         def fail(error: GraphError) -> None:
             respond(str(error), False)
 
-        reply = Reply(answer, fail)
+        reply = ServiceReply(answer, fail)
         try:
             request = decode_plain(operation.get("args") or {}, f"{offer.srvtype}_Request")
             offer.pending.add(reply)

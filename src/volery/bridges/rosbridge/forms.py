@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from volery.bridges.rosbridge.cbor_form import encode_cbor
 from volery.bridges.rosbridge.wire import Frame, encode_json, encode_png
-from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import Published
 
@@ -34,12 +34,12 @@ class Forms:
 
     def __init__(self, generation: Generation = "ros2") -> None:
         self.generation = generation
-        self._json = JsonForm(ros1_names=generation == "ros1")
-        self._splicing = JsonForm(ros1_names=generation == "ros1", arrays=self._json_array)
+        self._json = JsonCodec(ros1_names=generation == "ros1")
+        self._splicing = JsonCodec(ros1_names=generation == "ros1", arrays=self._json_array)
         self._mark = f"<{secrets.token_hex(16)}>"
         """Stands where base64 text goes; no message can hold it by chance."""
         self._base64: list[str] = []
-        self._cbor = JsonForm(
+        self._cbor = JsonCodec(
             ros1_names=generation == "ros1",
             non_finite_as_null=False,
             arrays=lambda values, _type: values,

@@ -16,10 +16,10 @@ from volery.bridges.rosbridge.rosapi_parameters import NamedParameters, Paramete
 from volery.bridges.rosbridge.rosapi_types import display_name, full_text, type_definitions
 from volery.core.clock import stamp_from_ns
 from volery.core.errors import GraphError
-from volery.graph.codecs.json_codec import JsonForm
+from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.codecs.ros1_names import ros2_name
 from volery.graph.graph import TopicInfo
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Gateway, Session, SessionInfo
 
 SIMULATION_NODE = "/volery"
@@ -59,7 +59,7 @@ class RosApi:
         self._parameters = NamedParameters(
             parameters or Parameters(), gateway.graph.parameters, ros1=self._ros1
         )
-        self._plain = JsonForm()
+        self._plain = JsonCodec()
         self._session: Session | None = None
 
     def start(self) -> None:
@@ -79,8 +79,8 @@ class RosApi:
             self._session.close()
             self._session = None
 
-    def _handler(self, srvtype: str, answer: Answer) -> Callable[[Any, Reply], None]:
-        def handle(request: Any, reply: Reply) -> None:
+    def _handler(self, srvtype: str, answer: Answer) -> Callable[[Any, ServiceReply], None]:
+        def handle(request: Any, reply: ServiceReply) -> None:
             try:
                 plain = answer(request)
                 reply.answer(self._plain.decode(plain, f"{srvtype}_Response"))

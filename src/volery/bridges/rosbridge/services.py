@@ -22,7 +22,7 @@ from volery.graph.codecs.definition_store import EMPTY_MEMBER
 from volery.graph.codecs.json_decoding import decode_plain
 from volery.graph.codecs.ros1_names import ros2_name
 from volery.graph.messages import typestore
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
 
 MOST_CALLS = 1000
@@ -42,10 +42,10 @@ class Services:
         self._forms = forms
         self._send = send
         self._post = post
-        self._calls: dict[int, tuple[float, Reply]] = {}
+        self._calls: dict[int, tuple[float, ServiceReply]] = {}
         self._call_numbers = itertools.count()
         self._offers: dict[str, tuple[str, str]] = {}
-        self._requests: dict[str, tuple[str, str, Reply]] = {}
+        self._requests: dict[str, tuple[str, str, ServiceReply]] = {}
         self._request_numbers = itertools.count(1)
 
     # ------------------------------------------------------------------------------------- calls
@@ -97,7 +97,7 @@ class Services:
             if self._calls.pop(number, None) is not None:
                 respond(str(error), False)
 
-        reply = Reply(
+        reply = ServiceReply(
             lambda response: self._post(lambda: answer(response)),
             lambda error: self._post(lambda: fail(error)),
         )
@@ -137,7 +137,7 @@ class Services:
                 return
             self._session.withdraw(service)
 
-        def handle(request: Any, reply: Reply) -> None:
+        def handle(request: Any, reply: ServiceReply) -> None:
             self._post(lambda: self._request(name, srvtype, request, reply))
 
         self._offers.pop(service, None)
@@ -150,7 +150,7 @@ class Services:
         self._session.withdraw(service)
         self._offers.pop(service, None)
 
-    def _request(self, name: str, srvtype: str, request: Any, reply: Reply) -> None:
+    def _request(self, name: str, srvtype: str, request: Any, reply: ServiceReply) -> None:
         """Hand a request to the client."""
         if len(self._requests) >= MOST_CALLS:
             reply.fail(GraphError(f"service '{name}': its server is busy"))

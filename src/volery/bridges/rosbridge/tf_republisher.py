@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 from volery.bridges.rosbridge.frames import Frames, Known
 from volery.core.errors import GraphError
 from volery.graph.messages import TFMessage, message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Gateway, Session
-from volery.graph.subscription_queue import Mailbox
+from volery.graph.subscription_queue import SubscriptionQueue
 
 SERVICE = "/republish_tfs"
 _SRVTYPE = "tf2_web_republisher/srv/RepublishTFs"
@@ -65,7 +65,7 @@ class TfRepublisher:
         self._frames = Frames()
         self._topics: dict[_Wish, _Topic] = {}
         self._numbers = itertools.count(1)
-        self._mailboxes: list[Mailbox] = []
+        self._mailboxes: list[SubscriptionQueue] = []
         self._thread: threading.Thread | None = None
         self._lock = threading.Lock()
         self._ended = threading.Event()
@@ -88,7 +88,7 @@ class TfRepublisher:
             self._session.close()
             self._session = None
 
-    def _ask(self, request: Any, reply: Reply) -> None:
+    def _ask(self, request: Any, reply: ServiceReply) -> None:
         try:
             name = self._follow(_wish_of(request), _timeout_of(request))
             reply.answer(message_type(f"{_SRVTYPE}_Response")(name))

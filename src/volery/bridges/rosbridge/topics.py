@@ -26,7 +26,7 @@ from volery.graph.codecs.ros1_names import ros2_name
 from volery.graph.messages import Published, typestore
 from volery.graph.qos import DEFAULT_DEPTH, MOST_DEPTH
 from volery.graph.session import Session
-from volery.graph.subscription_queue import Mailbox
+from volery.graph.subscription_queue import SubscriptionQueue
 
 MOST_STREAMS = 10_000
 """Topics that a client may subscribe to, and publish on."""
@@ -93,7 +93,7 @@ class Stream:
         self.msgtype = msgtype
         self.requests: dict[Id, Wishes] = {}
         self.wishes = Wishes()
-        self.mailbox: Mailbox | None = None
+        self.mailbox: SubscriptionQueue | None = None
         self._tuned = (0, False)
         self._left: deque[Published] = deque()
         """What waited in a mailbox that another one has replaced."""

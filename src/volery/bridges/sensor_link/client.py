@@ -29,7 +29,7 @@ from volery.bridges.sensor_link.wire import Frame, FrameParser, Kind, encode_fra
 from volery.core.errors import BridgeError, GraphError
 from volery.core.listening import write_while_open
 from volery.graph.session import Gateway, Session
-from volery.graph.subscription_queue import Mailbox
+from volery.graph.subscription_queue import SubscriptionQueue
 
 _READ_BYTES = 256 << 10
 _DEPTH = 20
@@ -54,7 +54,7 @@ class SensorLinkClient:
         self._writer: asyncio.StreamWriter | None = None
         self._inlets: dict[str, Inlet] = {}
         self._sequences: dict[tuple[int, str], int] = {}
-        self._commands: dict[tuple[Kind, int], Mailbox] = {}
+        self._commands: dict[tuple[Kind, int], SubscriptionQueue] = {}
         self._sent = 0
         self.received = 0
         """Messages received."""

@@ -21,7 +21,7 @@ from volery.core.errors import BridgeError, GraphError
 from volery.core.framing import crc16, crc_bytes
 from volery.graph.messages import Published
 from volery.graph.session import Gateway, Session
-from volery.graph.subscription_queue import Mailbox
+from volery.graph.subscription_queue import SubscriptionQueue
 
 SENSORS = (Kind.LASER_SCAN, Kind.POSE, Kind.IMU, Kind.SONAR)
 IMAGES = (Kind.IMAGE,)
@@ -43,7 +43,7 @@ class Stream:
         self.kind = kind
         self.uav = uav
         self.name = name
-        self.mailbox: Mailbox | None = None
+        self.mailbox: SubscriptionQueue | None = None
         self.sequence = 0
         self.last_ns = 0
         self.next_ns = 0

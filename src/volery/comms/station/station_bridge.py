@@ -38,9 +38,9 @@ from volery.comms.station.statuses import slam_gist
 from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError, GraphError
 from volery.graph.messages import message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Gateway, Session
-from volery.graph.subscription_queue import Mailbox
+from volery.graph.subscription_queue import SubscriptionQueue
 
 _VEHICLES = "/volery/vehicles"
 _VEHICLES_TYPE = "volery_interfaces/msg/VehicleStates"
@@ -56,7 +56,7 @@ _REPEAT_S = 2.0
 class _Told:
     """One topic of a UAV, told to ground stations when it changes and now and then."""
 
-    def __init__(self, name: str, msgtype: str, mailbox: Mailbox) -> None:
+    def __init__(self, name: str, msgtype: str, mailbox: SubscriptionQueue) -> None:
         self.mailbox = mailbox
         self._name, self._type = name, msgtype
         self._said: object = None
@@ -195,7 +195,7 @@ class UavStations:
             self._tell_soon(tell, f"{command.name}: {error}")
 
         def ask(_response: Any = None) -> None:
-            session.call(service, command.message, Reply(answered, failed))
+            session.call(service, command.message, ServiceReply(answered, failed))
 
         service = f"/{uav}/{command.name}"
         mission = f"/{uav}/{_MISSION}"
@@ -207,7 +207,7 @@ class UavStations:
             return
         if command.name == "go_to" and missioned:
             trigger = message_type(f"{COMMANDS['hold']}_Request")()
-            session.call(f"{mission}/hold", trigger, Reply(ask, failed))
+            session.call(f"{mission}/hold", trigger, ServiceReply(ask, failed))
         else:
             ask()
 

@@ -4,7 +4,7 @@
     form.encode(twist, "geometry_msgs/msg/Twist")  # {"linear": {"x": 1.0, ...}, ...}
     form.decode({"linear": {"x": 1.0}}, "geometry_msgs/msg/Twist")
 
-Arrays of bytes become base64 text, other arrays lists. A `JsonForm` with a hook for arrays keeps
+Arrays of bytes become base64 text, other arrays lists. A `JsonCodec` with a hook for arrays keeps
 them as numpy arrays instead, for CBOR. Converters are built once a type and form.
 """
 
@@ -38,7 +38,7 @@ ArrayHook = Callable[[NDArray[Any], str], Any]
 """Array of numbers, shape (n,), little-endian, and its ROS type, to what stands in the dict."""
 
 
-class JsonForm:
+class JsonCodec:
     """Converts messages to plain values and back.
 
     Parameters

@@ -61,7 +61,7 @@ class _Batch:
             return
 
 
-class Thinker:
+class DeferredExecutor:
     """The worker of one node. All methods but `now_ns` and `hold_back` belong to the engine.
 
     Waking a thread takes longer than most callbacks: they are handed over some at a time, when the

@@ -7,7 +7,7 @@ from typing import Any
 
 from volery.graph.graph import Publisher, Subscription
 from volery.graph.message_copies import message_copier
-from volery.graph.nodes.deferred_execution import Thinker
+from volery.graph.nodes.deferred_execution import DeferredExecutor
 
 
 class NodePublisher(Publisher):
@@ -16,7 +16,7 @@ class NodePublisher(Publisher):
     What a node with a latency publishes in a callback leaves when the callback's time is up.
     """
 
-    def __init__(self, publisher: Publisher, thinker: Thinker | None) -> None:
+    def __init__(self, publisher: Publisher, thinker: DeferredExecutor | None) -> None:
         self._publisher = publisher
         self._thinker = thinker
         self._copy = message_copier(publisher.msgtype)

@@ -26,7 +26,7 @@ from volery.core.errors import GraphError, NodeError, VoleryError
 from volery.graph.graph import Subscription, check_period
 from volery.graph.message_copies import copy_message
 from volery.graph.messages import Published, message_type
-from volery.graph.nodes.deferred_execution import Thinker
+from volery.graph.nodes.deferred_execution import DeferredExecutor
 from volery.graph.nodes.failures import add_frames, place_of
 from volery.graph.nodes.handles import NodePublisher, NodeService, NodeSubscription
 from volery.graph.nodes.launch import Context, present_launch
@@ -86,7 +86,7 @@ class Node(ParameterMethods):
         self.__last_client = ""
         """External client whose message was taken last, and its topic."""
         self.__thinker = (
-            Thinker(node_name, context.latency_ns, context.timers, context.now_ns)
+            DeferredExecutor(node_name, context.latency_ns, context.timers, context.now_ns)
             if context.latency_ns
             else None
         )

@@ -10,8 +10,8 @@ from volery.core.errors import GraphError
 from volery.graph.codecs.zero import zero_message
 from volery.graph.graph import Graph
 from volery.graph.message_copies import copy_message
-from volery.graph.nodes.deferred_execution import Thinker
-from volery.graph.service_reply import Reply
+from volery.graph.nodes.deferred_execution import DeferredExecutor
+from volery.graph.service_reply import ServiceReply
 
 Later = Callable[[Callable[[], None]], None]
 
@@ -91,7 +91,7 @@ class Client:
         graph: Graph,
         service: str,
         srvtype: str,
-        thinker: Thinker | None,
+        thinker: DeferredExecutor | None,
         *,
         later: Callable[[], Later | None],
         run: Callable[[Callable[[], None], str], None],
@@ -175,7 +175,7 @@ class Client:
 
         def ask() -> None:
             here = threading.get_ident()
-            reply = Reply(
+            reply = ServiceReply(
                 lambda response: settle(lambda: future.set_result(response), here),
                 lambda error: settle(lambda: future.set_exception(error), here),
             )

@@ -23,9 +23,9 @@ from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type, time_from_ns
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Gateway, Session
-from volery.graph.subscription_queue import Mailbox
+from volery.graph.subscription_queue import SubscriptionQueue
 
 _JOIN = "volery_interfaces/srv/JoinLockStep"
 _SPEEDS = "std_msgs/msg/Float32MultiArray"
@@ -114,7 +114,7 @@ class Meetings:
         self._period_s = period_ns / NS_PER_S
         self._watch = self._loop.create_task(self._watch_silence())
         self._time_ns = -1
-        self._boxes: dict[str, Mailbox] = {
+        self._boxes: dict[str, SubscriptionQueue] = {
             name: self._session.subscribe(f"/{uav}/{name}", msgtype, depth=1, wake=_nothing)
             for name, msgtype in topics.items()
         }
@@ -165,7 +165,7 @@ class Meetings:
         request.timeout_s = self._patience.timeout_s + (_MARGIN_S if drops else 0.0)
         request.stop_when_silent = not drops
         request.restarts = True
-        self._session.call("/volery/join_lock_step", request, Reply(_answered, _answered))
+        self._session.call("/volery/join_lock_step", request, ServiceReply(_answered, _answered))
 
     def _wake(self) -> None:
         if self._pilot.is_in_step:

@@ -16,7 +16,7 @@ import numpy as np
 from volery.core.errors import GraphError
 from volery.graph.messages import message_type
 from volery.graph.session import Gateway, Session
-from volery.graph.subscription_queue import Mailbox
+from volery.graph.subscription_queue import SubscriptionQueue
 
 PACKETS = "volery_interfaces/msg/MavlinkPackets"
 _IN, _OUT = "/mavlink/in", "/mavlink/out"
@@ -40,7 +40,7 @@ class Craft:
 
     name: str
     system: int
-    mailbox: Mailbox
+    mailbox: SubscriptionQueue
     sink: Sink
     heartbeat: bytes = b""
     heard_s: float = 0.0

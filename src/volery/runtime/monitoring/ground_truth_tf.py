@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from volery.engine.engine import Engine
 from volery.graph.graph import Graph
-from volery.graph.lazy_list import Rows
+from volery.graph.lazy_list import LazyList
 from volery.graph.messages import (
     Quaternion,
     TFMessage,
@@ -48,7 +48,7 @@ def _message(engine: Engine) -> TFMessage:
         frames += things.names
         poses = np.vstack([poses, things.poses_at(engine.time_ns)])
     stamp = header(engine.time_ns, "map")
-    transforms: Any = Rows(len(frames), lambda: _transforms(stamp, frames, poses))
+    transforms: Any = LazyList(len(frames), lambda: _transforms(stamp, frames, poses))
     return TFMessage(transforms)
 
 

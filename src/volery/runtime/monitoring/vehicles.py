@@ -14,7 +14,7 @@ from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.core.clock import s_from_ns
 from volery.engine.engine import Engine
-from volery.graph.lazy_list import Rows
+from volery.graph.lazy_list import LazyList
 from volery.graph.messages import Point, Vector3, header, message_type
 from volery.graph.session import Gateway
 from volery.runtime.monitoring.live_topic import Present
@@ -83,7 +83,7 @@ class Vehicles:
             [self._command_age_s(name) for name in self._engine.names],
             [self._holder(name) for name in self._engine.names],
         )
-        vehicles = Rows(len(build.airframes), lambda: _vehicles(*columns))
+        vehicles = LazyList(len(build.airframes), lambda: _vehicles(*columns))
         return message_type(_ALL)(header(self._engine.time_ns, "map"), vehicles)
 
     def content(self) -> tuple[Any, ...]:

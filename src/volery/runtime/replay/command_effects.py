@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from volery.graph.session import Taken
+from volery.graph.session import ClientCommand
 
 _STOPPED = 0
 """Of `simulation_interfaces/msg/SimulationState`: setting it resets, the others change the pace."""
@@ -51,14 +51,14 @@ class Weight(Enum):
     CHANGES = "its results"
 
 
-def restarts(taken: Taken) -> bool:
+def restarts(taken: ClientCommand) -> bool:
     """Return whether a command has effect where a scenario has ended."""
     if taken.kind == "call" and (taken.type in _AT_THE_END or taken.name in _AT_THE_END_BY_NAME):
         return True
     return weight_of(taken) is not Weight.CHANGES
 
 
-def weight_of(taken: Taken) -> Weight:
+def weight_of(taken: ClientCommand) -> Weight:
     """How much hangs on a command; of services that nobody knows: the results."""
     if taken.kind in ("publish", "answer", "failure"):
         return Weight.CHANGES

@@ -16,7 +16,7 @@ from volery.engine.engine import Engine
 from volery.graph import command_records as records
 from volery.graph.graph import Graph
 from volery.graph.messages import Published
-from volery.graph.session import Taken
+from volery.graph.session import ClientCommand
 from volery.graph.subscription_queue import array_bytes
 from volery.runtime.replay.command_effects import Weight, weight_of
 
@@ -30,7 +30,7 @@ class _Kept(NamedTuple):
     number: int
     time_ns: int
     moment: Moment
-    taken: Taken
+    taken: ClientCommand
     """Without its content where `cdr` has that."""
     cdr: bytes | None
 
@@ -50,10 +50,10 @@ class CommandLog:
         self._ended = False
         self.repeats = False
         """Whether a recorded flight is repeated: clients may look on, and change nothing."""
-        self.refuse: Callable[[Taken], str] = _accept
+        self.refuse: Callable[[ClientCommand], str] = _accept
         """Returns why a command is refused at present; empty: it is not."""
 
-    def watch(self, taken: Taken) -> None:
+    def watch(self, taken: ClientCommand) -> None:
         """Note what a client does. `GraphError` where that must not be."""
         weight = weight_of(taken)
         if self.repeats and weight is Weight.CHANGES:
@@ -63,7 +63,7 @@ class CommandLog:
         if weight is not Weight.ASKS:
             self.note(taken, weight)
 
-    def note(self, taken: Taken, weight: Weight) -> None:
+    def note(self, taken: ClientCommand, weight: Weight) -> None:
         """Tell of a command that is about to take effect."""
         cdr = None if records.is_large(taken) else records.content_bytes(taken)
         moment = self._engine.moment
@@ -79,7 +79,7 @@ class CommandLog:
         """Tell that the flight is over; a second time nothing happens."""
         if not self._ended:
             self._ended = True
-            self.note(Taken("", "end", "", ""), Weight.PACES)
+            self.note(ClientCommand("", "end", "", ""), Weight.PACES)
             self._graph.deliver()
 
     def earlier(self) -> Iterator[Published]:
@@ -108,7 +108,7 @@ class CommandLog:
             self._kept.append(kept)
 
 
-def _accept(_taken: Taken) -> str:
+def _accept(_taken: ClientCommand) -> str:
     """Refuse nothing."""
     return ""
 

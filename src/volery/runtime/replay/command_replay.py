@@ -21,8 +21,8 @@ from volery.engine.commands import Moment
 from volery.engine.engine import Engine
 from volery.engine.pacing import Pacer
 from volery.graph.graph import Graph, Publisher
-from volery.graph.service_reply import Reply
-from volery.graph.session import Gateway, Taken
+from volery.graph.service_reply import ServiceReply
+from volery.graph.session import ClientCommand, Gateway
 from volery.runtime.replay.command_effects import Weight, weight_of
 from volery.runtime.replay.command_log import CommandLog
 from volery.runtime.services.simulation_state import State
@@ -90,7 +90,7 @@ class Repetition:
             )
         return command if moment == here else None
 
-    def _repeat(self, taken: Taken) -> None:
+    def _repeat(self, taken: ClientCommand) -> None:
         if taken.kind == "end":
             self.over = True
             return
@@ -104,7 +104,7 @@ class Repetition:
         if self._pacer.paused and not paused:
             self._pacer.resume()
 
-    def _is_left_out(self, taken: Taken) -> bool:
+    def _is_left_out(self, taken: ClientCommand) -> bool:
         """Whether a command changed only the pace, or was refused because of the pace."""
         if taken.kind == "call" and taken.type == _SET_STATE:
             state = State.STOPPED if taken.content is None else taken.content.state.state
@@ -120,8 +120,8 @@ class _Clients:
     def __init__(self, graph: Graph) -> None:
         self._graph = graph
         self._publishers: dict[tuple[str, str], Publisher] = {}
-        self._requests: dict[str, list[Reply]] = {}
-        self._deeds: dict[str, Callable[[Taken], None]] = {
+        self._requests: dict[str, list[ServiceReply]] = {}
+        self._deeds: dict[str, Callable[[ClientCommand], None]] = {
             "call": self._call,
             "publish": self._publish,
             "advertise": self._advertise,
@@ -132,43 +132,45 @@ class _Clients:
             "failure": lambda taken: self._request(taken).fail(GraphError(taken.content or "")),
         }
 
-    def do(self, taken: Taken) -> None:
+    def do(self, taken: ClientCommand) -> None:
         """Do it again; raises whatever a service that it calls raises."""
         self._deeds[taken.kind](taken)
 
-    def _call(self, taken: Taken) -> None:
-        self._graph.call_async(taken.name, taken.content, Reply(_nobody_hears, _nobody_hears))
+    def _call(self, taken: ClientCommand) -> None:
+        self._graph.call_async(
+            taken.name, taken.content, ServiceReply(_nobody_hears, _nobody_hears)
+        )
 
-    def _publish(self, taken: Taken) -> None:
+    def _publish(self, taken: ClientCommand) -> None:
         key = taken.client, taken.name
         if key not in self._publishers:
             self._advertise(taken)
         if taken.content is not None:
             self._publishers[key].publish(taken.content)
 
-    def _advertise(self, taken: Taken) -> None:
+    def _advertise(self, taken: ClientCommand) -> None:
         self._unadvertise(taken)
         self._publishers[taken.client, taken.name] = self._graph.advertise(
             taken.name, taken.type, latched=taken.latched
         )
 
-    def _unadvertise(self, taken: Taken) -> None:
+    def _unadvertise(self, taken: ClientCommand) -> None:
         publisher = self._publishers.pop((taken.client, taken.name), None)
         if publisher is not None:
             publisher.cancel()
 
-    def _offer(self, taken: Taken) -> None:
+    def _offer(self, taken: ClientCommand) -> None:
         requests = self._requests[taken.name] = []
 
-        def ask(_request: Any, reply: Reply) -> None:
+        def ask(_request: Any, reply: ServiceReply) -> None:
             requests.append(reply)
 
         self._graph.offer_async(taken.name, taken.type, ask)
 
-    def _withdraw(self, taken: Taken) -> None:
+    def _withdraw(self, taken: ClientCommand) -> None:
         self._graph.withdraw(taken.name)
 
-    def _request(self, taken: Taken) -> Reply:
+    def _request(self, taken: ClientCommand) -> ServiceReply:
         return self._requests[taken.name][taken.request]
 
 

@@ -10,7 +10,7 @@ from volery.core.errors import VoleryError
 from volery.graph.codecs.zero import zero_message
 from volery.graph.graph import Graph
 from volery.graph.messages import message_type
-from volery.graph.service_reply import Reply
+from volery.graph.service_reply import ServiceReply
 
 Fields = Mapping[str, Any]
 """Fields of a response by name; those that are missing stay zero."""
@@ -88,7 +88,7 @@ def offer_result_later(
 ) -> None:
     """Offer a service of the standard that `ask(request, settle)` answers some time."""
 
-    def handle(request: Any, reply: Reply) -> None:
+    def handle(request: Any, reply: ServiceReply) -> None:
         def settle(outcome: Fields | Exception) -> None:
             fields = {"result": failed(outcome)} if isinstance(outcome, Exception) else outcome
             reply.answer(filled(f"{srvtype}_Response", {"result": result(), **fields}))
