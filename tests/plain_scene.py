@@ -18,7 +18,7 @@ from volery.core import rotations
 from volery.core.workers import Workers
 from volery.sensors.lidar import Echoes, LidarBatch, move_bodies, scan_rays
 from volery.sensors.lidar_model import LidarModel
-from volery.sensors.measure_kernels import Surfaces, measure_scan
+from volery.sensors.measurement_kernels import Surfaces, measure_scan
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.ground_cover import ground_material
 from volery.world.mesh import Mesh, concatenate

@@ -7,7 +7,7 @@ from concurrent.futures import Future
 
 from live_graph import LiveGraph
 
-from volery.bridges.rosbridge.forms import Forms
+from volery.bridges.rosbridge.message_encoder import Forms
 from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
 from volery.graph.graph import Graph
 from volery.graph.messages import message_type

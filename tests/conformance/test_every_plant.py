@@ -7,7 +7,7 @@ from volery.control.fleet import Fleet
 from volery.vehicle.airframe import load_airframe
 from volery.vehicle.identified import load_identified
 from volery.vehicle.kinematic import Kinematic
-from volery.vehicle.plants import RigidBody
+from volery.vehicle.plant_types import RigidBody
 from volery.world.terrain import Terrain
 from volery.world.weather import Weather
 

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.rosbridge.server import RosbridgeServer
 
 roslibpy = pytest.importorskip("roslibpy")

@@ -10,15 +10,15 @@ from typing import Any
 import pytest
 
 from volery import Simulation
-from volery.bridges.doors import Doors
-from volery.bridges.logs.bag import open_log
+from volery.bridges.bridge_host import Doors
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.replay import Replay
 from volery.bridges.nodes.host import NodeHost
 from volery.bridges.nodes.profile import Profile, load_profile
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
-from volery.cli.launching import start_profile
+from volery.cli.launch import start_profile
 from volery.runtime.build.node_loading import start_node
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.load import load_scenario, parse_scenario

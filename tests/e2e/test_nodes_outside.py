@@ -10,7 +10,7 @@ import pytest
 
 from volery import Simulation
 from volery.autonomy.avoidance.gap_following import GapFollowing
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.nodes.host import NodeHost
 from volery.bridges.ros_tcp.client import RosTcpClient
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.graph.codecs.zero import zero_message
 from volery.graph.connection import call_and_wait

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from volery import Simulation, load_scenario
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.recorded_topics import recorded_topics
 from volery.publishing.camera_publishing import CameraPublisher

@@ -14,9 +14,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from volery.bridges.doors import Doors
-from volery.bridges.logs.bag import open_log
-from volery.bridges.logs.flights import read_flight
+from volery.bridges.bridge_host import Doors
+from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.recorded_flight import read_flight
 from volery.bridges.logs.records import LogWalk
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer

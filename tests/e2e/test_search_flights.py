@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from ros1_bench import missing_of_ros1, shared_master
 
-from volery.bridges.doors import Doors
-from volery.bridges.ros1.door import Ros1Door
+from volery.bridges.bridge_host import Doors
+from volery.bridges.ros1.bridge import Ros1Door
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.engine.events import EventKind

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from test_mapped_flights import FOREST
 
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.replay import Replay
 from volery.graph.messages import stamp_of

@@ -17,14 +17,14 @@ from file_place import path_of
 from rosbags.rosbag1 import Writer as BagWriter
 from rosbags.rosbag2 import Writer as Ros2Writer
 
-from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.bag_writer import bag_writer
 from volery.bridges.logs.decoding import LogDecoder
-from volery.bridges.logs.flights import ORIGIN_TOPIC, read_flight
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.playback import Playback
 from volery.bridges.logs.reader import summarize
+from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, read_flight
 from volery.bridges.logs.records import LogWalk
-from volery.bridges.logs.recover import recover
+from volery.bridges.logs.recovery import recover
 from volery.core.errors import GraphError, RecordingError
 from volery.graph import command_records
 from volery.graph.codecs import definition_store

@@ -12,7 +12,7 @@ from rosbags.rosbag1 import Writer as BagWriter
 from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.records import LogWalk
-from volery.bridges.logs.recover import recover
+from volery.bridges.logs.recovery import recover
 from volery.core.errors import GraphError, RecordingError
 from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.codecs.ros1 import ros1_codec

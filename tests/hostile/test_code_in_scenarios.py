@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from volery.bridges.logs.bag import open_log
-from volery.bridges.logs.flights import Origin
+from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.recorded_flight import Origin
 from volery.cli import trust
 from volery.cli.app import app
 from volery.cli.trust import may_run_local_nodes
@@ -27,9 +27,9 @@ from volery.runtime.build.node_loading import find_node, is_local, local_nodes
 from volery.runtime.replay.scenario_record import scenario_of
 from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.access import ScenarioAccess
+from volery.scenario.catalog import Shelf
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import NodeEntry, Scenario
-from volery.scenario.shelf import Shelf
 
 VOLERY = [sys.executable, "-m", "volery.cli"]
 EVIL = """

@@ -27,13 +27,13 @@ SERVERS = """
     import asyncio, json, os, resource, sys, threading
     resource.setrlimit(resource.RLIMIT_NOFILE, ({descriptors}, {descriptors}))
     from live_graph import LiveGraph
-    from volery.bridges.doors import Doors
+    from volery.bridges.bridge_host import Doors
     from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
     from volery.bridges.rosbridge.server import RosbridgeServer
     from volery.bridges.sensor_link.server import SensorLink
     from volery.comms.server.tcp import CommsServer
     from volery.core.connection_limits import SHARED
-    from volery.mavlink.links.tcp_door import MavlinkTcp
+    from volery.mavlink.links.tcp_bridge import MavlinkTcp
     from volery.server.page_server import PageServer
     from volery.server.settings import PageSettings
 
@@ -177,7 +177,7 @@ def test_established_connections_are_limited_in_all(servers):
 @pytest.fixture
 def page(tmp_path, monkeypatch):
     monkeypatch.setattr("volery.server.http_protocol.HEAD_TIMEOUT_S", 0.3)
-    monkeypatch.setattr("volery.server.bodies.LONGEST_PAUSE_S", 0.3)
+    monkeypatch.setattr("volery.server.request_bodies.LONGEST_PAUSE_S", 0.3)
     with PageServer(PageSettings(port=0, uploads=tmp_path)) as server:
         yield server
 

@@ -16,8 +16,8 @@ from volery.graph.parameters import Parameter
 from volery.runtime.vehicles.control_authority import Pilots, operator_name, same_operator
 from volery.runtime.vehicles.control_targets import names_in, parts_of
 from volery.scenario.faults import parse_fault
-from volery.server.crew_list import CrewList
-from volery.server.gate import PilotGate, service_of
+from volery.server.access_policy import PilotGate, service_of
+from volery.server.operator_names import CrewList
 
 NODE, PARAMETER = "/uav1/gap_following", "height_m"
 

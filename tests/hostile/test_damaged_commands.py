@@ -8,8 +8,8 @@ from contextlib import closing
 
 import pytest
 
-from volery.bridges.logs.bag import open_log
-from volery.bridges.logs.flights import ORIGIN_TOPIC, read_flight
+from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, read_flight
 from volery.graph import command_records
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Published, String

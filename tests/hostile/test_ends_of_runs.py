@@ -17,10 +17,10 @@ from pathlib import Path
 
 import pytest
 
-from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.file_lock import locked_for_reading
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.reader import summarize
-from volery.bridges.logs.recover import recover
+from volery.bridges.logs.recovery import recover
 from volery.core.errors import RecordingError
 from volery.graph.messages import Published, String
 

@@ -10,11 +10,11 @@ import pytest
 from live_graph import HandGraph
 from ros_tcp_client import frame
 
-from volery.bridges.ros_tcp.pipe import Pipe
+from volery.bridges.ros_tcp.connection import Pipe
 from volery.bridges.ros_tcp.wire import FrameParser
 from volery.bridges.rosbridge.bulk_turns import BulkTurns
-from volery.bridges.rosbridge.conversation import Bell, converse, post_to
 from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
+from volery.bridges.rosbridge.websocket_session import Bell, converse, post_to
 from volery.core.errors import GraphError
 from volery.engine.pacing import Pacer
 from volery.graph import read_budget

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from volery.bridges.logs.bag import open_log
-from volery.bridges.logs.flights import Origin, read_flight
+from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.recorded_flight import Origin, read_flight
 from volery.core.errors import DataFileError, GraphError, RecordingError, ScenarioError, VoleryError
 from volery.graph import messages as m
 from volery.runtime import Simulation
@@ -20,8 +20,8 @@ from volery.runtime.build.worlds import geometry_of
 from volery.runtime.replay.log_player import Player
 from volery.runtime.replay.scenario_record import scenario_of
 from volery.scenario.access import SHIPPED_DATA, ScenarioAccess
+from volery.scenario.catalog import Shelf
 from volery.scenario.load import load_scenario, parse_scenario
-from volery.scenario.shelf import Shelf
 
 SECRET = "swordfish"
 GROUND = "0.0,1.0,2.0\n3.0,4.0,5.0\n6.0,7.0,8.0\n"

@@ -16,14 +16,14 @@ import lz4.frame
 import pytest
 import zstandard
 
-from volery.bridges.logs import budgets, content, mcap_format, recordings_room, unpacking
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs import budgets, content, mcap_format, recordings_quota, unpacking
 from volery.bridges.logs.decoding import LogDecoder
-from volery.bridges.logs.flights import read_flight
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.playback import Playback
 from volery.bridges.logs.reader import summarize
+from volery.bridges.logs.recorded_flight import read_flight
 from volery.bridges.logs.records import BAG_MAGIC, MCAP_MAGIC, LogTopic, LogWalk
-from volery.bridges.logs.recover import recover
+from volery.bridges.logs.recovery import recover
 from volery.core.errors import GraphError, RecordingError
 from volery.graph.codecs import definition_store
 from volery.graph.graph import Graph
@@ -319,18 +319,18 @@ def test_a_child_keeps_to_its_bounds(tmp_path, monkeypatch, program, why):
 def test_recordings_are_limited_in_number_and_bytes(tmp_path, monkeypatch):
     for name in ("a.mcap", "b.bag", "c.txt"):
         (tmp_path / name).write_bytes(bytes(1000))
-    monkeypatch.setattr(recordings_room, "MAX_TOTAL_BYTES", 10_000)
-    assert recordings_room.room_left(tmp_path) == 8_000
-    monkeypatch.setattr(recordings_room, "MAX_TOTAL_BYTES", 2_000)
+    monkeypatch.setattr(recordings_quota, "MAX_TOTAL_BYTES", 10_000)
+    assert recordings_quota.room_left(tmp_path) == 8_000
+    monkeypatch.setattr(recordings_quota, "MAX_TOTAL_BYTES", 2_000)
     with pytest.raises(RecordingError, match="the most that are kept"):
-        recordings_room.room_left(tmp_path)
-    monkeypatch.setattr(recordings_room, "MAX_RECORDINGS", 2)
+        recordings_quota.room_left(tmp_path)
+    monkeypatch.setattr(recordings_quota, "MAX_RECORDINGS", 2)
     with pytest.raises(RecordingError, match="there are 2 recordings already"):
-        recordings_room.room_left(tmp_path)
+        recordings_quota.room_left(tmp_path)
 
 
 def test_a_recording_ends_where_the_folder_is_full(tmp_path, monkeypatch):
-    monkeypatch.setattr(recordings_room, "MAX_TOTAL_BYTES", 100_000)
+    monkeypatch.setattr(recordings_quota, "MAX_TOTAL_BYTES", 100_000)
     graph = Graph(lambda: 0)
     recording = Recording(graph, tmp_path, CommandLog(graph, lambda: (0, 0)))
     recording._start(type("Request", (), {"path": "flight.mcap", "topics": (), "exclude": ()}))

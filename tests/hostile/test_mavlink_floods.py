@@ -7,12 +7,12 @@ import threading
 import pytest
 from live_graph import LiveGraph
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.mavlink.codec import dialect
 from volery.mavlink.links.connection import Party
-from volery.mavlink.links.intake import FRAMES_PER_S, IntakeLimits
-from volery.mavlink.links.tcp_door import MavlinkTcp
-from volery.mavlink.links.udp_door import _UdpLink
+from volery.mavlink.links.rate_limits import FRAMES_PER_S, IntakeLimits
+from volery.mavlink.links.tcp_bridge import MavlinkTcp
+from volery.mavlink.links.udp_bridge import _UdpLink
 
 PATIENCE_S = 60.0
 

@@ -17,12 +17,12 @@ from rosbridge_bench import Bench, FakeSimulation
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.ros_tcp.session import EndpointSession
 from volery.bridges.ros_tcp.wire import FrameParser
 from volery.bridges.rosbridge import first_message
 from volery.bridges.rosbridge import message_budget as budget
-from volery.bridges.rosbridge.cbor_form import encode_cbor
+from volery.bridges.rosbridge.cbor_codec import encode_cbor
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.bridges.rosbridge.wire import decode_frame, encode_png
 from volery.core.errors import BridgeError, GraphError

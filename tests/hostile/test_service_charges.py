@@ -11,7 +11,7 @@ import itertools
 import pytest
 from whole_world import offer_rosapi, whole_data
 
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 from volery.graph.service_reply import ServiceReply
 from volery.runtime.replay.log_player import Player
 from volery.server.read_only import READ_ONLY_SERVICES

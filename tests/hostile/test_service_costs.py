@@ -11,7 +11,7 @@ from volery.engine.call_budget import MAX_FRACTION
 from volery.graph.messages import String
 from volery.runtime.services import scenario_loading
 from volery.scenario import load
-from volery.scenario.shelf import Shelf
+from volery.scenario.catalog import Shelf
 from volery.server.read_only import READ_ONLY_SERVICES
 
 
@@ -40,9 +40,9 @@ def test_worlds_are_read_once(simulate, flat_data, tmp_path, monkeypatch):
     client = Client(simulate(flat_data, shelf=shelf))
     worlds = client.call("/get_available_worlds", None).worlds
     assert "mine" in [world.name for world in worlds]
-    monkeypatch.setattr("volery.scenario.shelf.load_scenario", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("volery.scenario.catalog.load_scenario", lambda *_, **__: 1 / 0)
     assert len(client.call("/get_available_worlds", None).worlds) == len(worlds)
-    monkeypatch.setattr("volery.scenario.shelf.load_scenario", load.load_scenario)
+    monkeypatch.setattr("volery.scenario.catalog.load_scenario", load.load_scenario)
     (folder / "scenario.toml").write_text(f'name = "mine"\ndescription = "new"\n{text}')
     worlds = client.call("/get_available_worlds", None).worlds
     assert "new" in [world.description for world in worlds]

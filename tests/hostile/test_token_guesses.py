@@ -16,15 +16,15 @@ from live_graph import LiveGraph
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.comms.addresses import Identity
 from volery.comms.server.settings import RouterSettings
 from volery.comms.server.tcp import CommsServer
 from volery.comms.station.tcp import Station
 from volery.core.token_guesses import TokenGuesses
+from volery.server.auth import Tokens
 from volery.server.page_server import PageServer
-from volery.server.rights import Tokens
 from volery.server.settings import PageSettings
 
 TOKEN = "the right one"

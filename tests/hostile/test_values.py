@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 import volery
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.logs.reader import summarize
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.cli.app import app

@@ -20,7 +20,7 @@ from websockets.frames import Opcode
 from websockets.sync.client import connect
 
 from volery.bridges import frame_limits
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.frame_limits import (
     FRAMES_PER_S,
     MAX_FRAGMENTS,

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from live_graph import LiveGraph
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.ros_tcp.wire import frame as ros_tcp_frame
 from volery.bridges.sensor_link.payloads import encode_payload
@@ -28,8 +28,8 @@ from volery.comms.server.tcp import CommsServer
 from volery.core.preamble import Preamble
 from volery.graph import messages as m
 from volery.mavlink.codec import dialect
-from volery.mavlink.hil.px4_door import Px4Door
-from volery.mavlink.links.tcp_door import MavlinkTcp
+from volery.mavlink.hil.px4_bridge import Px4Door
+from volery.mavlink.links.tcp_bridge import MavlinkTcp
 
 PATIENCE_S = 60.0
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "CONNECT", "OPTIONS", "TRACE", "PATCH")

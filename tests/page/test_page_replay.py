@@ -9,7 +9,7 @@ from scene_reading import on_screen, wait_for_picture, wait_until
 from truth import vehicle, weather
 from working import WIDE, choose, inspect, open_panel, set_slider
 
-from volery.bridges.logs.flights import read_flight
+from volery.bridges.logs.recorded_flight import read_flight
 from volery.bridges.logs.records import LogWalk
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]

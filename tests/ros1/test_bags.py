@@ -9,8 +9,8 @@ import pytest
 from filling import filled
 from ros1_bench import HERE, SYSTEM_PYTHON, Program, peer, require_ros1, shared_master, tool
 
-from volery.bridges.logs.bag import open_log
-from volery.bridges.logs.recover import recover
+from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.recovery import recover
 from volery.graph.messages import Published, String, Time, message_type, typestore
 
 require_ros1()

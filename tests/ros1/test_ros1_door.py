@@ -21,8 +21,8 @@ from ros1_bench import (
 )
 from rosbags.highlevel import AnyReader
 
-from volery.bridges.doors import Doors
-from volery.bridges.ros1.door import Ros1Door
+from volery.bridges.bridge_host import Doors
+from volery.bridges.ros1.bridge import Ros1Door
 from volery.bridges.ros1.environment import load_rospy
 from volery.bridges.ros1.node import join_ros1
 from volery.core.errors import BridgeError, GraphError

@@ -14,8 +14,8 @@ from volery.engine.events import EventKind
 from volery.graph.messages import Published, stamp_of
 from volery.report.alignment import Alignment, at_times, ate_rmse_m, common_times, umeyama
 from volery.report.logged_flights import ESTIMATES, TRUTH
+from volery.report.trajectories import Way
 from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
-from volery.report.ways import Way
 from volery.runtime import Simulation
 from volery.scenario import overrides
 from volery.scenario.load import load_scenario, parse_scenario

@@ -59,8 +59,8 @@ def _scenario(count: int, physics_hz: int = 1000) -> Any:
 
 def _fly_ten(*, streams: bool) -> tuple[float, list[float]]:
     """CPU seconds a second in real time, and milliseconds from commands to their answers."""
-    from volery.bridges.doors import Doors
-    from volery.mavlink.links.udp_door import MavlinkUdp
+    from volery.bridges.bridge_host import Doors
+    from volery.mavlink.links.udp_bridge import MavlinkUdp
     from volery.runtime import Simulation
 
     plain, outfitted = _scenario(_VEHICLES)

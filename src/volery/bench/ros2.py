@@ -22,7 +22,7 @@ from volery.bench.bridge.measuring import (
     stream_ages,
     stream_scenario,
 )
-from volery.bridges.ros2.door import Ros2Door
+from volery.bridges.ros2.bridge import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
 from volery.core.errors import VoleryError
 from volery.runtime import Simulation

@@ -23,8 +23,8 @@ from volery.autonomy.search.calls import JOIN
 from volery.bench.bridge.native_ros1 import ros1_master
 from volery.bench.registry import Measured
 from volery.bench.search_peer import CALLED, CALLING, Called, Calling
-from volery.bridges.doors import Doors
-from volery.bridges.ros1.door import Ros1Door
+from volery.bridges.bridge_host import Doors
+from volery.bridges.ros1.bridge import Ros1Door
 from volery.bridges.ros1.environment import rospy_is_installed
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer

@@ -36,7 +36,7 @@ def _ros_tcp_endpoint(
     address: Address, options: BridgeOptions, generation: Literal["ros1", "ros2"]
 ) -> Bridge:
     from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
-    from volery.bridges.rosbridge.beside import WithRosApi
+    from volery.bridges.rosbridge.rosapi_bridge import WithRosApi
 
     endpoint = RosTcpEndpoint(*address, generation=generation, anywhere=options.allow_remote)
     return WithRosApi(endpoint)
@@ -49,7 +49,7 @@ def _ros_tcp_connector(address: Address, options: BridgeOptions) -> Bridge:
 
 
 def _ros1(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.bridges.ros1.door import Ros1Door
+    from volery.bridges.ros1.bridge import Ros1Door
 
     uri = f"http://{address.host}:{address.port}" if address.port else None
     return Ros1Door(uri, anywhere=options.allow_remote)
@@ -72,8 +72,8 @@ def _ros2_zenoh(address: Address, options: BridgeOptions) -> Bridge:
 
 
 def _ros2_bridge(terms: Ros2Terms) -> Bridge:
-    from volery.bridges.ros2.door import Ros2Door
-    from volery.bridges.rosbridge.beside import WithRosApi
+    from volery.bridges.ros2.bridge import Ros2Door
+    from volery.bridges.rosbridge.rosapi_bridge import WithRosApi
 
     return WithRosApi(Ros2Door(terms))
 

@@ -10,7 +10,7 @@ import ipaddress
 from collections.abc import Sequence
 from urllib.parse import urlsplit
 
-from volery.core.listening import LOOPBACK
+from volery.core.network_access import LOOPBACK
 
 
 class Origins:

@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
+from volery.cli.error_reporting import word_logs
 from volery.cli.flight_commands import launch, list_scenarios, play, px4, run, serve
 from volery.cli.graph_commands import node, service_app, topic_app
-from volery.cli.guard import word_logs
 from volery.cli.log_commands import convert, info, recover, report, slam
 from volery.cli.machine_commands import bench, doctor
 from volery.cli.model_commands import export, identify, interfaces

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import typer
 
-from volery.core.counting import counted
+from volery.core.plurals import counted
 
 _PYTHON = (3, 11)
 _MEMORY_GIB = 2.0

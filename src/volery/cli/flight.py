@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from volery.cli.guard import USER_ERROR, complain, complain_of
+from volery.cli.error_reporting import USER_ERROR, complain, complain_of
 from volery.cli.interrupt import Interrupts, stopped_code, stopped_how
+from volery.cli.keyboard_control import steer
 from volery.cli.keys import Keys
 from volery.cli.progress import FlightProgress
 from volery.cli.record_size import warn_of_size
-from volery.cli.steering import steer
-from volery.cli.waiting import DEFAULT_TIMEOUT_S, start_paused, wait_for_clients
-from volery.core.counting import counted
+from volery.cli.start_conditions import DEFAULT_TIMEOUT_S, start_paused, wait_for_clients
 from volery.core.errors import RecordingError, VoleryError
+from volery.core.plurals import counted
 
 if TYPE_CHECKING:
-    from volery.bridges.logs.bag import Log
+    from volery.bridges.logs.log_writer import Log
     from volery.graph.graph import Subscription
     from volery.report.collect import FlightCollector
     from volery.scenario.changes import Changes
@@ -111,7 +111,7 @@ class Flight:
 
             self._collector = FlightCollector(simulation)
         if options.record is not None:
-            from volery.bridges.logs.bag import open_log
+            from volery.bridges.logs.log_writer import open_log
             from volery.bridges.logs.recorded_topics import recorded_topics
 
             matches = recorded_topics(simulation.graph, options.topics, options.exclude)

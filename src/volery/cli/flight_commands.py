@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from volery.cli import run_words
-from volery.cli.guard import guarded
+from volery.cli import run_options
+from volery.cli.error_reporting import guarded
 from volery.cli.options import (
     DomainOption,
     DoorsOption,
@@ -25,33 +25,33 @@ from volery.cli.options import (
     TracebackOption,
     TrustOption,
 )
-from volery.cli.waiting import DEFAULT_TIMEOUT_S
+from volery.cli.start_conditions import DEFAULT_TIMEOUT_S
 from volery.core.errors import BridgeError
 
 
 @guarded
 def run(
-    scenario: run_words.Scenario,
-    uavs: run_words.Uavs = None,
-    seconds: run_words.Seconds = None,
-    seed: run_words.Seed = None,
-    no_nodes: run_words.NoNodes = False,
+    scenario: run_options.Scenario,
+    uavs: run_options.Uavs = None,
+    seconds: run_options.Seconds = None,
+    seed: run_options.Seed = None,
+    no_nodes: run_options.NoNodes = False,
     trust: TrustOption = False,
-    speed: run_words.Speed = None,
-    start_paused: run_words.StartPaused = False,
-    wait_for: run_words.WaitFor = None,
-    wait_timeout: run_words.WaitTimeout = DEFAULT_TIMEOUT_S,
+    speed: run_options.Speed = None,
+    start_paused: run_options.StartPaused = False,
+    wait_for: run_options.WaitFor = None,
+    wait_timeout: run_options.WaitTimeout = DEFAULT_TIMEOUT_S,
     threads: ThreadsOption = None,
-    replay_commands: run_words.ReplayCommands = None,
-    record: run_words.Record = None,
-    topics: run_words.Topics = None,
-    exclude: run_words.Exclude = None,
-    report: run_words.Report = None,
-    recordings: run_words.Recordings = None,
-    overwrite: run_words.Overwrite = False,
-    digest: run_words.Digest = False,
-    page: run_words.Page = None,
-    exit_at_end: run_words.ExitAtEnd = False,
+    replay_commands: run_options.ReplayCommands = None,
+    record: run_options.Record = None,
+    topics: run_options.Topics = None,
+    exclude: run_options.Exclude = None,
+    report: run_options.Report = None,
+    recordings: run_options.Recordings = None,
+    overwrite: run_options.Overwrite = False,
+    digest: run_options.Digest = False,
+    page: run_options.Page = None,
+    exit_at_end: run_options.ExitAtEnd = False,
     door: DoorsOption = None,
     allow_remote: RemoteOption = False,
     token: DoorTokenOption = None,
@@ -165,7 +165,7 @@ def serve(
     """
     from volery.cli.run import RunOptions, parse_speed
     from volery.cli.serve import ServeOptions, serve
-    from volery.server.rights import Tokens
+    from volery.server.auth import Tokens
     from volery.server.settings import PageSettings
 
     serve(
@@ -215,7 +215,7 @@ def play(
     At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
     + and - double and halve the speed, m frees it, comma and slash leap 5 s back and forward.
     """
-    from volery.cli.playing import play as play_log
+    from volery.cli.play import play as play_log
     from volery.cli.run import RunOptions, parse_speed
 
     options = RunOptions(
@@ -235,7 +235,7 @@ def list_scenarios(
     ] = False,
 ) -> None:
     """List the scenarios that ship."""
-    from volery.cli.listing import show_nodes, show_scenarios
+    from volery.cli.list import show_nodes, show_scenarios
 
     if nodes:
         show_nodes()
@@ -294,6 +294,6 @@ def launch(
     traceback: TracebackOption = False,  # noqa: ARG001
 ) -> None:
     """Run the nodes of a launch profile in a process of their own."""
-    from volery.cli.launching import launch_profile
+    from volery.cli.launch import launch_profile
 
     launch_profile(profile, via=via, namespace=namespace, lock_step_s=lock_step, trust=trust)

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from volery.cli.guard import guarded
-from volery.cli.links import DEFAULT_VIA, WAYS
+from volery.cli.connections import DEFAULT_VIA, WAYS
+from volery.cli.error_reporting import guarded
 from volery.cli.options import TracebackOption
 
 _CONTEXT = {"help_option_names": ["-h", "--help"]}

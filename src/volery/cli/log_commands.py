@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from volery.cli.guard import guarded, warn
+from volery.cli.error_reporting import guarded, warn
 
 
 @guarded
@@ -121,7 +121,7 @@ def report(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an older one.")] = False,
 ) -> None:
     """Draw the ways of a log, simulated against estimated, with a map of trunks."""
-    from volery.report.way_page import write_log_report
+    from volery.report.trajectory_page import write_log_report
 
     written = write_log_report(
         log, out, compare=compare, compare_topic=compare_topic, uav=uav, overwrite=overwrite

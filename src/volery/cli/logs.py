@@ -6,10 +6,10 @@ from pathlib import Path
 
 import typer
 
-from volery.cli.guard import complain, warn
+from volery.cli.error_reporting import complain, warn
 from volery.cli.tables import print_table
 from volery.core.clock import NS_PER_S
-from volery.core.counting import counted
+from volery.core.plurals import counted
 
 _FORMATS = {"mcap": "MCAP", "bag": "ROS 1 bag"}
 
@@ -40,7 +40,7 @@ def show_log(path: Path) -> bool:
 def recover_log(path: Path, out: Path | None) -> None:
     """Write the readable part of a log as a whole file and say what was saved."""
     from volery.bridges.logs.reader import summarize
-    from volery.bridges.logs.recover import recover
+    from volery.bridges.logs.recovery import recover
 
     if out is None and not summarize(path).trouble:
         typer.echo(f"{path} is whole: nothing to recover")
@@ -56,7 +56,7 @@ def recover_log(path: Path, out: Path | None) -> None:
 
 def convert_log(path: Path, out: Path, layout: Path, *, overwrite: bool) -> None:
     """Write a plain text log of scans as a log of messages and say what was in it."""
-    from volery.bridges.logs.bag import check_target, open_log
+    from volery.bridges.logs.log_writer import check_target, open_log
     from volery.bridges.logs.text_layout import TextLayout
     from volery.bridges.logs.text_scans import TextScans
     from volery.scenario.data_files import load_data_file

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from volery.bench.registry import BENCHES
-from volery.cli.guard import guarded
+from volery.cli.error_reporting import guarded
 
 _QUICK = [name for name, bench in BENCHES.items() if bench.has_quick]
 
@@ -26,7 +26,7 @@ def bench(
     ] = False,
 ) -> None:
     """Measure how fast Volery is on this machine."""
-    from volery.cli.benching import measure_and_show
+    from volery.cli.bench import measure_and_show
 
     measure_and_show(name, as_json=json, out=out, markdown=markdown, quick=quick)
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from volery.cli.guard import guarded
+from volery.cli.error_reporting import guarded
 
 
 @guarded
@@ -17,7 +17,7 @@ def identify(
     order: Annotated[int, typer.Option(min=1, max=2, help="Of the roll and pitch loops.")] = 2,
 ) -> None:
     """Fit the identified plant to an airframe's rigid body and write it as a data file."""
-    from volery.cli.identifying import identify_and_write
+    from volery.cli.identify import identify_and_write
 
     identify_and_write(airframe, out, order)
 
@@ -31,7 +31,7 @@ def export(
     ] = "sensing",
 ) -> None:
     """Write the world of a scenario as glTF: ground, trees, buildings."""
-    from volery.cli.exporting import export_and_tell
+    from volery.cli.export import export_and_tell
 
     export_and_tell(scenario, file, detail)
 

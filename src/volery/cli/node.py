@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from volery.cli.asking import topic_types
-from volery.cli.guard import warn
-from volery.cli.links import DEFAULT_VIA, ROS2_WAYS, LinkTold, await_link, join_late
-from volery.cli.yaml_form import from_yaml
+from volery.cli.connections import DEFAULT_VIA, ROS2_WAYS, LinkTold, await_link, join_late
+from volery.cli.error_reporting import warn
+from volery.cli.graph_queries import topic_types
+from volery.cli.yaml_codec import from_yaml
 from volery.core.errors import BridgeError, VoleryError
 
 if TYPE_CHECKING:
@@ -40,8 +40,8 @@ def run_node(options: NodeOptions) -> None:
     """Run a node until Ctrl-C, or until it fails."""
     from pydantic import ValidationError
 
+    from volery.bridges.nodes.deferred_connection import LateLink
     from volery.bridges.nodes.host import NodeHost
-    from volery.bridges.nodes.late_link import LateLink
     from volery.bridges.nodes.profile import Profile, absolute_names, load_profile
     from volery.graph.messages import add_definitions
     from volery.runtime.build.node_loading import start_node

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from volery.cli.error_reporting import warn
 from volery.cli.flight import RunOptions
-from volery.cli.guard import warn
 from volery.core.errors import CommandError
 
 if TYPE_CHECKING:
+    from volery.scenario.catalog import Shelf
     from volery.scenario.schema import Scenario
-    from volery.scenario.shelf import Shelf
     from volery.server.page_server import PageServer
     from volery.server.settings import PageSettings
 
@@ -69,7 +69,7 @@ def serving(settings: PageSettings, shelf: Shelf | None = None) -> Iterator[Page
 
 
 def _settings_of(options: RunOptions) -> PageSettings:
-    from volery.server.rights import Tokens
+    from volery.server.auth import Tokens
     from volery.server.settings import PageSettings
 
     settings = PageSettings(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from volery.cli.guard import guarded
+from volery.cli.error_reporting import guarded
 from volery.cli.options import BatchSizeOption, TokenOption
 
 

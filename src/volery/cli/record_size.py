@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from volery.cli.guard import warn
+from volery.cli.error_reporting import warn
 
 _NOTABLE_MB_PER_MIN = 100.0
 _MOST_NAMED = 3

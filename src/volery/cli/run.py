@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from volery.cli.door_checks import check_doors, token_gaps
-from volery.cli.doors import fit_out, open_doors
+from volery.cli.bridge_checks import check_doors, token_gaps
+from volery.cli.bridges import fit_out, open_doors
+from volery.cli.command_replay import recorded_flight, recorded_scenario
+from volery.cli.error_reporting import warn
 from volery.cli.flight import Flight, RunOptions
-from volery.cli.guard import warn
 from volery.cli.interrupt import Interrupts, stopped_code, stopped_how
+from volery.cli.output_paths import check_record, check_report
 from volery.cli.pages import Page, page_of
 from volery.cli.progress import FlightProgress
-from volery.cli.repeating import recorded_flight, recorded_scenario
-from volery.cli.targets import check_record, check_report
 from volery.cli.trust import with_trust
 from volery.core.allocator import return_large_blocks
 from volery.core.collector import spared_objects

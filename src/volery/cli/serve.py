@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from volery.cli.door_checks import check_doors, token_gaps
-from volery.cli.doors import fit_out, open_doors
+from volery.cli.bridge_checks import check_doors, token_gaps
+from volery.cli.bridges import fit_out, open_doors
+from volery.cli.error_reporting import complain_of, warn
 from volery.cli.flight import RunOptions
-from volery.cli.guard import complain_of, warn
 from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, serving
 from volery.cli.trust import with_trust
@@ -25,9 +25,9 @@ from volery.scenario import changes
 from volery.scenario.changes import LogRequest
 
 if TYPE_CHECKING:
+    from volery.scenario.catalog import Shelf
     from volery.scenario.changes import WorldRequest
     from volery.scenario.schema import Scenario
-    from volery.scenario.shelf import Shelf
     from volery.server.settings import PageSettings
 
 _log = logging.getLogger(__name__)
@@ -57,7 +57,7 @@ def serve(options: ServeOptions) -> None:
 
     Raises `VoleryError` where the first scenario cannot be built or the server cannot listen.
     """
-    from volery.scenario.shelf import Shelf
+    from volery.scenario.catalog import Shelf
 
     check_doors(options.first)
     for gap in token_gaps(options.first):

@@ -7,9 +7,9 @@ from typing import Any
 
 import typer
 
-from volery.cli.asking import service_names, type_of_service
-from volery.cli.links import open_link
-from volery.cli.yaml_form import read_message, to_yaml
+from volery.cli.connections import open_link
+from volery.cli.graph_queries import service_names, type_of_service
+from volery.cli.yaml_codec import read_message, to_yaml
 from volery.core.errors import BridgeError
 from volery.graph.connection import call_and_wait
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from volery.cli.guard import warn
-from volery.cli.targets import check_folder
-from volery.core.counting import counted
+from volery.cli.error_reporting import warn
+from volery.cli.output_paths import check_folder
 from volery.core.errors import RecordingError, VoleryError
+from volery.core.plurals import counted
 
 if TYPE_CHECKING:
     from volery.runtime.replay.slam.initial_pose import Pose

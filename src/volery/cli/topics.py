@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 import typer
 
-from volery.cli.asking import topic_types, type_of_topic
-from volery.cli.links import LinkTold, open_link
-from volery.cli.yaml_form import read_message, to_yaml
+from volery.cli.connections import LinkTold, open_link
+from volery.cli.graph_queries import topic_types, type_of_topic
+from volery.cli.yaml_codec import read_message, to_yaml
 from volery.core.errors import BridgeError
 from volery.graph.connection import GraphConnection
 from volery.graph.messages import Published

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from volery.control import mass_commands
-from volery.control.belief import Motion
+from volery.control import batch_commands
+from volery.control.estimated_state import Motion
 from volery.control.flight_modes import FlightMode
 from volery.control.segment_store import SegmentStore
 from volery.control.setpoints import (
@@ -25,7 +25,7 @@ from volery.core.errors import CommandError
 from volery.vehicle.airframe import GRAVITY, Airframe
 from volery.vehicle.identified import IdentifiedModel
 from volery.vehicle.kinematic import Kinematic
-from volery.vehicle.plants import Plant, RigidBody
+from volery.vehicle.plant_types import Plant, RigidBody
 
 Array = NDArray[np.float64]
 
@@ -143,7 +143,7 @@ class FleetCommands:
         """
         velocity = checked("velocity", velocity, (len(self), 3), 1e3)
         rate = checked("yaw rate", yaw_rate, (len(self),), 100.0)
-        mass_commands.command_velocities(self._bodies, self._pilots, self.step, velocity, rate)
+        batch_commands.command_velocities(self._bodies, self._pilots, self.step, velocity, rate)
 
     def command_velocity_map(
         self, i: int, velocity: ArrayLike, yaw_rate: float = 0.0, *, yaw: float | None = None

@@ -1,7 +1,7 @@
 """A fleet of UAVs: give commands, advance time, read the state, collect what happened.
 
 `Fleet` owns all state of plants and controllers as rows of arrays; the compiled step
-(`control.step`) does the work. It knows the ground and the air; trees and other UAVs are the
+(`control.fused_step`) does the work. It knows the ground and the air; trees and other UAVs are the
 engine's business, which looks up clearances, fills the budgets and calls `strike`.
 """
 
@@ -19,6 +19,7 @@ from volery.control.estimator.errors import EstimationError
 from volery.control.fleet_events import FleetEvent, event_of
 from volery.control.fleet_rows import begun_anew, checked_modes, checked_plants, new_uavs, one_each
 from volery.control.flight_modes import FlightMode
+from volery.control.fused_step import EVENT, EVENTS_A_STEP, advance_fleet
 from volery.control.gains import STANDARD_RATES, ControlRates
 from volery.control.model_table import (
     checked_wear,
@@ -34,7 +35,6 @@ from volery.control.setpoints import (
     checked_attitude,
     checked_within,
 )
-from volery.control.step import EVENT, EVENTS_A_STEP, advance_fleet
 from volery.core.clock import NS_PER_S, s_from_ns
 from volery.core.errors import CommandError
 from volery.core.rows import Rows
@@ -49,7 +49,7 @@ from volery.vehicle.fleet import (
     fit_rotors,
     state_of,
 )
-from volery.vehicle.plants import RIGID_BODY, Plant, RigidBody
+from volery.vehicle.plant_types import RIGID_BODY, Plant, RigidBody
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.terrain import TerrainGrid
 from volery.world.weather import CALM, Gust, Weather
@@ -72,7 +72,7 @@ class Fleet(FleetCommands):
     or "bounce" (it rebounds and flies on). mode: `HOLD` starts in the air with rotors turning,
     `LANDED` on the ground with rotors stopped; one for all or one a UAV. names: for messages and,
     with `seed`, the streams of what is random. control: how often its layers run. plants: what
-    turns commands into motion (`vehicle.plants`), one for all or one a UAV. weather: the air;
+    turns commands into motion (`vehicle.plant_types`), one for all or one a UAV. weather: the air;
     `set_weather` changes it. wear: of the rotors, one a rotor, for each UAV; an empty one means
     new. battery_charge: shares from 0 to 1, one for all or one a UAV. copies: (N,) whole numbers;
     UAVs of different copies of a scenario do not feel each other's air.

@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Any
 
 from volery.control.flight_modes import FlightMode
-from volery.control.step import BATTERY_FELL, MODE_CHANGE
+from volery.control.fused_step import BATTERY_FELL, MODE_CHANGE
 from volery.vehicle.battery import BatteryLevel
 from volery.vehicle.contact import IMPACT, TOUCH_DOWN
 

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from volery.control.belief import new_beliefs
+from volery.control.estimated_state import new_beliefs
 from volery.control.flight_modes import FlightMode
+from volery.control.fused_step import UAV
 from volery.control.setpoints import checked, new_pilots
-from volery.control.step import UAV
-from volery.core.counting import counted
 from volery.core.errors import CommandError
+from volery.core.plurals import counted
 from volery.vehicle.fleet import NEVER, new_bodies
-from volery.vehicle.plants import Plant
+from volery.vehicle.plant_types import Plant
 from volery.world.weather.dryden import new_turbulence
 
 Array = NDArray[np.float64]

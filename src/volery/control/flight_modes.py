@@ -16,7 +16,6 @@ import math
 from enum import IntEnum
 from typing import Any
 
-from volery.control.follow import follow_path, follow_setpoint, path_is_flown
 from volery.control.heading import heading_of, turn_heading
 from volery.control.outer_loop import track
 from volery.control.reference import (
@@ -29,8 +28,9 @@ from volery.control.reference import (
     steer_level,
 )
 from volery.control.setpoints import ControlLevel
+from volery.control.trajectory_kernels import follow_path, follow_setpoint, path_is_flown
 from volery.vehicle.compiled import apart_kernel, inner_kernel
-from volery.vehicle.rigid import three
+from volery.vehicle.rotation_math import three
 
 
 class FlightMode(IntEnum):

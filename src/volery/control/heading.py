@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from volery.vehicle.compiled import inner_kernel
-from volery.vehicle.rigid import four
+from volery.vehicle.rotation_math import four
 
 
 @inner_kernel

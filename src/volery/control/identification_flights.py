@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.vehicle.airframe import GRAVITY, Airframe
-from volery.vehicle.plants import Plant, RigidBody
+from volery.vehicle.plant_types import Plant, RigidBody
 from volery.world.terrain import Terrain
 
 Array = NDArray[np.float64]

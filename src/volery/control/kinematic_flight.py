@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from volery.control.belief import believe_attitude, believe_place
+from volery.control.estimated_state import believe_attitude, believe_place
 from volery.control.flight_modes import (
     LAND,
     LANDED,
@@ -15,12 +15,12 @@ from volery.control.flight_modes import (
     stop,
     wanted_velocity,
 )
-from volery.control.follow import END, path_time, polynomial, segment_at
 from volery.control.heading import heading_of
 from volery.control.setpoints import ControlLevel
+from volery.control.trajectory_kernels import END, path_time, polynomial, segment_at
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.kinematic import drive, face, glide, put, stop_at_ground, turn_by
-from volery.vehicle.rigid import three
+from volery.vehicle.rotation_math import three
 from volery.world.terrain import TerrainGrid
 
 _STOPPED = int(ControlLevel.STOPPED)

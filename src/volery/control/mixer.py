@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from volery.core.lanes import LANES, any_outside, lanes_at, magnitudes, put_lanes, roots
+from volery.core.simd import LANES, any_outside, lanes_at, magnitudes, put_lanes, roots
 from volery.vehicle.compiled import inner_kernel
 
 

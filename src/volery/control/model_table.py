@@ -7,18 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.control.fused_step import MODEL
 from volery.control.gains import ControlRates, gains_of
 from volery.control.stability import check_stability
-from volery.control.step import MODEL
-from volery.core.counting import counted
 from volery.core.errors import CommandError
+from volery.core.plurals import counted
 from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe
 from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.identified import REFERENCE_COLUMNS, IdentifiedModel, identified_row
 from volery.vehicle.kinematic import Kinematic, kinematic_row
 from volery.vehicle.plant import plant_of
-from volery.vehicle.plants import IDENTIFIED_LOOPS, Plant, kind_of
+from volery.vehicle.plant_types import IDENTIFIED_LOOPS, Plant, kind_of
 
 Array = NDArray[np.float64]
 

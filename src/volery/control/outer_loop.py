@@ -17,7 +17,7 @@ from typing import Any
 
 from volery.vehicle.airframe import GRAVITY
 from volery.vehicle.compiled import inner_kernel
-from volery.vehicle.rigid import four, three
+from volery.vehicle.rotation_math import four, three
 
 _FAR = 0.999
 """Share of the leash from which a reference counts as at its end."""

@@ -15,7 +15,7 @@ from typing import Any
 from volery.control.mixer import mix
 from volery.control.setpoints import ControlLevel
 from volery.vehicle.compiled import inner_kernel
-from volery.vehicle.rigid import four, three
+from volery.vehicle.rotation_math import four, three
 
 _STOPPED = int(ControlLevel.STOPPED)
 _ROTORS = int(ControlLevel.ROTORS)

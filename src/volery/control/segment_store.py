@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.flight_modes import FlightMode
-from volery.control.follow import SEGMENT_COLUMNS
+from volery.control.trajectory_kernels import SEGMENT_COLUMNS
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from volery.vehicle.airframe import Airframe
 from volery.vehicle.identified import IdentifiedModel
 from volery.vehicle.kinematic import Kinematic
 from volery.vehicle.plant import AIR_DENSITY
-from volery.vehicle.plants import Plant
+from volery.vehicle.plant_types import Plant
 
 STABLE_BELOW = 1.0
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from volery.control.follow import BEGIN, END, FIRST, ORDER, SEGMENT_COLUMNS
 from volery.control.setpoints import MAX_COORDINATE, checked
+from volery.control.trajectory_kernels import BEGIN, END, FIRST, ORDER, SEGMENT_COLUMNS
 from volery.core.errors import CommandError
 
 Array = NDArray[np.float64]

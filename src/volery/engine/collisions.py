@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from volery.control.fleet import Fleet
 from volery.core.compiled import brief_kernel
 from volery.core.vectors import norm
+from volery.engine.actor_contacts import ThingContacts, ThingLooks
 from volery.engine.events import Event, EventKind
-from volery.engine.thing_contacts import ThingContacts, ThingLooks
 from volery.world.scene import Scene
 
 Array = NDArray[np.float64]

@@ -14,18 +14,18 @@ from numpy.typing import ArrayLike, NDArray
 from volery.control.fleet import Fleet
 from volery.core.clock import NS_PER_S, Schedule, ns_from_s, s_from_ns
 from volery.core.errors import CommandError
-from volery.engine import flight_log
-from volery.engine.agenda import Agenda
+from volery.engine import event_collection
+from volery.engine.actor_contacts import ThingLooks
 from volery.engine.collisions import BOUNCE, CRASH, Collisions
-from volery.engine.commands import Inbox, Moment, Repeats
-from volery.engine.deadlines import Deadlines
+from volery.engine.command_queue import Inbox, Moment, Repeats
 from volery.engine.events import Event, EventKind
-from volery.engine.partners import Partner
-from volery.engine.regrouping import common_rows, continue_bank
-from volery.engine.restart import Keys, restart_sensors
+from volery.engine.fleet_resizing import common_rows, continue_bank
+from volery.engine.lock_step import Partner
+from volery.engine.one_shot_timers import Deadlines
+from volery.engine.scheduler import Agenda
+from volery.engine.sensor_restart import Keys, restart_sensors
 from volery.engine.stages import STAGES, Tick, take_commands
 from volery.engine.state_check import StateCheck
-from volery.engine.thing_contacts import ThingLooks
 from volery.sensors.bank import Bank
 from volery.sensors.faults import FaultTable
 from volery.sensors.samples import Samples
@@ -274,7 +274,7 @@ class Engine:
 
     def collect_events(self) -> list[Event]:
         """Events since the last call, oldest first."""
-        self._new_events += flight_log.drain(self.fleet, self.names)
+        self._new_events += event_collection.drain(self.fleet, self.names)
         events = sorted(self._new_events, key=lambda event: event.time_ns)
         self._new_events.clear()
         return events
@@ -284,7 +284,8 @@ class Engine:
     ) -> list[tuple[Samples, NDArray[np.int64]]]:
         """Put the sensors of `uavs`, and what is made of them, back to their start.
 
-        See `engine.restart`; the random stream of an estimate is found under its sensor's name.
+        See `engine.sensor_restart`; the random stream of an estimate is found under its sensor's
+        name.
         """
         if self.estimation is not None:
             self.estimation.restart(
@@ -305,7 +306,7 @@ class Engine:
         All parts are new, as at a start. The UAVs `going_on` are as they were, and so are their
         sensors and estimates; the others, and theirs, begin now.
         """
-        self._new_events += flight_log.drain(self.fleet, self.names)
+        self._new_events += event_collection.drain(self.fleet, self.names)
         kept = common_rows(names, self.names, going_on)
         fleet.continue_from(self.fleet, kept)
         collisions, old_banks = self.collisions, self.banks

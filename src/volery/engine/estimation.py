@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from volery.control.estimator.errors import estimation_error
 from volery.control.estimator.estimator import Estimator
+from volery.control.estimator.initial_estimate import drawn_start
 from volery.control.estimator.settings import StartSigmas
-from volery.control.estimator.start import drawn_start
 from volery.control.fleet import Fleet
 from volery.core import atmosphere
 from volery.core.rows import Rows, in_one_piece

@@ -26,7 +26,7 @@ from volery.scenario.faults import (
 )
 from volery.sensors.faults import FaultableBank
 from volery.sensors.gnss import GnssBank
-from volery.vehicle.plants import RigidBody
+from volery.vehicle.plant_types import RigidBody
 from volery.world.weather import Gust
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ import time
 
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
-from volery.engine.stepping import OnSteps, StepQueue, StepRequest
+from volery.engine.single_steps import OnSteps, StepQueue, StepRequest
 
 _SLICE_S = 0.005
 _PROMPT_SLICE_S = 0.001

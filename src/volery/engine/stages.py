@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from volery.engine.partners import meet
+from volery.engine.lock_step import meet
 
 if TYPE_CHECKING:
     from volery.engine.engine import Engine

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.core.counting import counted
+from volery.core.plurals import counted
 from volery.graph.lazy_list import LazyList
 from volery.graph.messages import Published
 from volery.graph.qos import MOST_DEPTH

@@ -11,25 +11,25 @@ if TYPE_CHECKING:
 
 
 def _mavlink(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.mavlink.links.udp_door import MavlinkUdp
+    from volery.mavlink.links.udp_bridge import MavlinkUdp
 
     return MavlinkUdp(*address, anywhere=options.allow_remote, key=_key_of(options))
 
 
 def _mavlink_tcp(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.mavlink.links.tcp_door import MavlinkTcp
+    from volery.mavlink.links.tcp_bridge import MavlinkTcp
 
     return MavlinkTcp(*address, anywhere=options.allow_remote, key=_key_of(options))
 
 
 def _mavlink_serial(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.mavlink.links.serial_door import MavlinkSerial
+    from volery.mavlink.links.serial_bridge import MavlinkSerial
 
     return MavlinkSerial(*address, key=_key_of(options))
 
 
 def _px4(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.mavlink.hil.px4_door import Px4Door
+    from volery.mavlink.hil.px4_bridge import Px4Door
 
     return Px4Door(
         *address,
@@ -40,13 +40,13 @@ def _px4(address: Address, options: BridgeOptions) -> Bridge:
 
 
 def _px4_serial(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.mavlink.hil.px4_serial_door import Px4Serial
+    from volery.mavlink.hil.px4_serial_bridge import Px4Serial
 
     return Px4Serial(*address, patience=_patience_of(options), notice_s=_notice_of(options))
 
 
 def _ardupilot(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.mavlink.hil.ardupilot_door import ArdupilotDoor
+    from volery.mavlink.hil.ardupilot_bridge import ArdupilotDoor
 
     return ArdupilotDoor(
         *address,

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from volery.autonomy.coverage.plan import CoveragePlan, plan_coverage
-from volery.core.counting import counted
+from volery.core.plurals import counted
 from volery.report.palette import uav_color
 from volery.world.grid_maps.reading import read_cells
 

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from volery.autonomy.perception.static_transforms import FixedJoints
 from volery.bridges.logs.decoding import LogDecoder
-from volery.bridges.logs.flights import Origin
+from volery.bridges.logs.recorded_flight import Origin
 from volery.bridges.logs.records import LogRecord, LogWalk
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError, RecordingError, VoleryError
 from volery.graph.messages import stamp_of
+from volery.report.trajectories import Way
 from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
-from volery.report.ways import Way
 
 Array = NDArray[np.float64]
 

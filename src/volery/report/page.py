@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 
-from volery.core.counting import counted
 from volery.core.errors import VoleryError
+from volery.core.plurals import counted
 from volery.report import charts, maps
 from volery.report.flight_data import FlightData, UavTrack
 from volery.report.palette import uav_color

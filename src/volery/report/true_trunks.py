@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.bridges.logs.flights import Origin
+from volery.bridges.logs.recorded_flight import Origin
 from volery.core.errors import VoleryError
 from volery.runtime.build.worlds import build_city, build_forest, build_terrain
 from volery.runtime.replay.scenario_record import scenario_of

@@ -17,8 +17,8 @@ from volery.autonomy.perception.static_transforms import FixedJoints, Mount
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.graph.messages import stamp_of
+from volery.report.trajectories import Way
 from volery.report.trunks import TrunkMap, trunks_of_scan
-from volery.report.ways import Way
 
 Array = NDArray[np.float64]
 

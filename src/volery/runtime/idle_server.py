@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from volery.engine.commands import Inbox
+from volery.engine.command_queue import Inbox
 from volery.graph.graph import Graph
 from volery.graph.session import Gateway
 from volery.runtime.services.features import offer_features
 from volery.runtime.services.results import Fields, RefusedError, filled, offer_result
 from volery.runtime.services.simulation_state import WRONG_TRANSITION, State
 from volery.runtime.services.worlds import OnLoad, offer_worlds
-from volery.scenario.shelf import Shelf
+from volery.scenario.catalog import Shelf
 
 _SRV = "simulation_interfaces/srv"
 

@@ -18,9 +18,9 @@ from volery.core.errors import CommandError, ScenarioError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.engine.faults import FaultPlan
+from volery.engine.lock_step import Partner, check_terms
 from volery.engine.pacing import Pacer
-from volery.engine.partners import Partner, check_terms
-from volery.engine.stepping import OnSteps, StepRequest
+from volery.engine.single_steps import OnSteps, StepRequest
 from volery.graph.graph import Graph
 from volery.graph.nodes.failures import reported_failures
 from volery.graph.nodes.node import Node
@@ -61,16 +61,16 @@ from volery.runtime.vehicles.teleport import Relocator
 from volery.runtime.vehicles.uav import Uav
 from volery.runtime.warmup.parallel_compilation import compiled
 from volery.runtime.warmup.requirements import needs_of
+from volery.scenario.catalog import Shelf
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario, UavType
-from volery.scenario.shelf import Shelf
 from volery.sensors.mount import Mount
+from volery.world.actors import MovingThings
 from volery.world.ground_cover import BARE_GROUND
-from volery.world.things import MovingThings
 from volery.world.weather import Weather
 
 if TYPE_CHECKING:
-    from volery.bridges.logs.flights import RecordedFlight
+    from volery.bridges.logs.recorded_flight import RecordedFlight
     from volery.bridges.logs.replay import Replay
 
 _CLOCK_PERIOD_S = 0.01
@@ -418,7 +418,7 @@ class Simulation:
         restarts: bool = False,
         meets_at_start: bool = False,
     ) -> Partner:
-        """Wait for an outside program each `period_s` of simulated time; see `engine.partners`.
+        """Wait for an outside program each `period_s` of simulated time; see `engine.lock_step`.
 
         `timeout_s` is wall time; a partner that lets more pass ends the run with `PartnerError`, or
         is waited for no more. `on_meeting(time_ns)` is called when a meeting begins; a partner that

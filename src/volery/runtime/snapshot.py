@@ -10,8 +10,8 @@ from typing import Any
 
 from volery.core.clock import s_from_ns
 from volery.core.errors import SnapshotError
-from volery.core.kept import KeepsState
-from volery.engine.partners import Partner
+from volery.core.saved_state import KeepsState
+from volery.engine.lock_step import Partner
 from volery.graph.nodes.node import Node
 from volery.runtime.build.placement import Start
 

@@ -12,7 +12,7 @@ from volery.comms.radio.network import RadioNet
 from volery.core.errors import SnapshotError
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
-from volery.engine.partners import Partner
+from volery.engine.lock_step import Partner
 from volery.graph.graph import Graph
 from volery.graph.nodes.node import Node
 from volery.publishing.graph_publisher import GraphPublisher

@@ -26,8 +26,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.clock import ns_from_s, s_from_ns
-from volery.core.counting import counted
 from volery.core.errors import CommandError, ScenarioError
+from volery.core.plurals import counted
 from volery.runtime.build.fleet import place
 from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, PrivateAttr, model_validator
 
 from volery.scenario.access import ScenarioAccess
+from volery.scenario.actors import Things, check_things
 from volery.scenario.base import (
     Data,
     MountedSensor,
@@ -30,7 +31,6 @@ from volery.scenario.grid_map import GridMapWorld
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
 from volery.scenario.node_names import NODE_PATTERN
 from volery.scenario.radio import Radio
-from volery.scenario.things import Things, check_things
 from volery.scenario.user_mesh import UserMesh
 from volery.scenario.weather import Weather
 from volery.scenario.wind import Wind

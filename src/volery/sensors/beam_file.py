@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.clock import NS_PER_S
-from volery.core.counting import counted
 from volery.core.errors import DataFileError
+from volery.core.plurals import counted
 
 _NEEDED = ("azimuth_deg", "elevation_deg", "time_s")
 _MOST_RINGS = 65535

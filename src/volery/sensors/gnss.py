@@ -18,7 +18,7 @@ from volery.core.clock import NS_PER_S, Schedule, ns_from_s
 from volery.core.errors import CommandError, DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.sensors.bank import NoisyBank, rows_of
-from volery.sensors.denial import NOWHERE, Denial
+from volery.sensors.gnss_denial import NOWHERE, Denial
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov_of_sigma
 from volery.sensors.samples import GnssReadings, SensorId, owned

@@ -14,7 +14,7 @@ from volery.core.workers import fetch_add
 from volery.sensors.aim_kernels import LidarBatch, aim_packets, sensor_frame
 from volery.sensors.beam_table import BeamTable
 from volery.sensors.echo_kernels import Echoes, LidarConstants, Surfaces
-from volery.sensors.measure_kernels import measure
+from volery.sensors.measurement_kernels import measure
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.embree import DIRECTION, FAR, LANES, NORMAL, PACKET_ROWS
 from volery.world.scene_kernels import RayBlock, SceneHandle, cast_block, near_bodies

@@ -12,14 +12,14 @@ from starlette.responses import Response
 from starlette.routing import Mount, Route, WebSocketRoute
 
 from volery.bridges.origins import Origins
-from volery.server.guard import Guard
+from volery.server.auth import Tokens
+from volery.server.auth_middleware import Guard
 from volery.server.page import PageFiles, index
 from volery.server.recordings import bring_recording, recording, recordings
 from volery.server.replies import RefusedError, refused
-from volery.server.rights import Tokens
 from volery.server.rosbridge_route import serve_rosbridge
 from volery.server.scenarios import picture, scenarios
-from volery.server.site import Site
+from volery.server.server_state import Site
 from volery.server.status import status
 from volery.server.uploads.route import upload
 from volery.server.world_files import WorldFiles

@@ -22,16 +22,16 @@ from volery.bridges.rosbridge.message_budget import MAX_MESSAGE_BYTES
 from volery.bridges.unsent import bound_unsent
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, Opening, open_listener
-from volery.core.listening import LOOPBACK
+from volery.core.network_access import LOOPBACK
 from volery.core.rare_log import RepeatFilter
 from volery.core.waiting_room import look_at_http
+from volery.scenario.catalog import Shelf
 from volery.scenario.schema import Scenario
-from volery.scenario.shelf import Shelf
 from volery.server.app import make_app
+from volery.server.auth import check_rights
 from volery.server.http_protocol import HEAD_TIMEOUT_S, http_protocol
-from volery.server.rights import check_rights
+from volery.server.server_state import Site, Situation, State, World
 from volery.server.settings import PageSettings
-from volery.server.site import Site, Situation, State, World
 from volery.server.websocket_protocol import PageWebSocket
 
 _KEEPALIVE_S = 20.0

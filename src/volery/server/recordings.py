@@ -13,12 +13,12 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 
-from volery.bridges.logs.recordings_room import room_left
+from volery.bridges.logs.recordings_quota import room_left
 from volery.core.errors import RecordingError
-from volery.server.bodies import check_pilot, save_body
 from volery.server.log_check import look_into
 from volery.server.replies import RefusedError
-from volery.server.site import Site
+from volery.server.request_bodies import check_pilot, save_body
+from volery.server.server_state import Site
 
 MOST_BYTES = 2_000_000_000
 """Of a log that somebody brings."""

@@ -10,13 +10,13 @@ from contextlib import contextmanager
 from starlette.types import Message
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from volery.bridges.rosbridge.conversation import SERVICE_RESTART, Bell, converse, post_to
-from volery.bridges.rosbridge.gate import Gate
+from volery.bridges.rosbridge.access_policy import Gate
 from volery.bridges.rosbridge.protocol import RosbridgePeer
+from volery.bridges.rosbridge.websocket_session import SERVICE_RESTART, Bell, converse, post_to
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, Frame
-from volery.server.gate import PilotGate, ViewerGate
-from volery.server.rights import Role
-from volery.server.site import Client, JoinedWorld, Site
+from volery.server.access_policy import PilotGate, ViewerGate
+from volery.server.auth import Role
+from volery.server.server_state import Client, JoinedWorld, Site
 
 _log = logging.getLogger(__name__)
 

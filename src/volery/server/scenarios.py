@@ -12,12 +12,12 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from volery.core.errors import VoleryError
 from volery.runtime.build.world_asset import kind_of
 from volery.scenario import library
+from volery.scenario.catalog import Shelf
 from volery.scenario.load import load_scenario
 from volery.scenario.schema import Scenario
-from volery.scenario.shelf import Shelf
 from volery.server.cards import CARDS
 from volery.server.replies import RefusedError
-from volery.server.site import Site
+from volery.server.server_state import Site
 
 _DAY_S = 86_400
 Card = dict[str, Any]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from volery.server.rights import Tokens
+from volery.server.auth import Tokens
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8080
 

@@ -8,8 +8,8 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from volery import __version__
-from volery.server.rights import Role
-from volery.server.site import Site, State
+from volery.server.auth import Role
+from volery.server.server_state import Site, State
 
 
 async def status(request: Request) -> Response:

@@ -6,7 +6,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from volery.server.replies import RefusedError
-from volery.server.site import Site
+from volery.server.server_state import Site
 from volery.server.world_files import WorldFiles
 from volery.world.trees.model import DetailLevel
 

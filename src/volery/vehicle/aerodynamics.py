@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from volery.core.lanes import (
+from volery.core.simd import (
     LANES,
     lanes_at,
     magnitudes,

@@ -22,7 +22,7 @@ from volery.vehicle.tables import NotNegative, Positive, PositiveVector, Table, 
 GRAVITY = 9.80665
 """Standard gravity, m/s^2 (ISO 80000-3)."""
 MAX_ROTORS = 12
-"""A whole number of `core.lanes`: kernels take rotors two at a time."""
+"""A whole number of `core.simd`: kernels take rotors two at a time."""
 MAX_FEET = 8
 _HOVER_MARGIN = 1.1
 _AIRFRAMES = Path(__file__).parent / "airframes"

@@ -19,7 +19,7 @@ from volery.core import rotations
 from volery.vehicle.airframe import Airframe
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.plant import MAX_CONTACTS
-from volery.vehicle.rigid import matrix_of, three
+from volery.vehicle.rotation_math import matrix_of, three
 from volery.world.terrain import Terrain, TerrainGrid, terrain_height, terrain_normal
 
 Array = NDArray[np.float64]

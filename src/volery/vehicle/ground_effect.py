@@ -25,7 +25,7 @@ from typing import Any
 
 from volery.vehicle.compiled import apart_kernel, inner_kernel
 from volery.vehicle.plant import AIR_DENSITY, GROUND_FADE
-from volery.vehicle.rigid import matrix_of
+from volery.vehicle.rotation_math import matrix_of
 from volery.world.terrain import TerrainGrid, terrain_height
 
 BODY_LIFT = 2.0

@@ -24,7 +24,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from volery.scenario.data_files import find_data_file, load_data_file
 from volery.vehicle.airframe import GRAVITY, Airframe
 from volery.vehicle.compiled import inner_kernel
-from volery.vehicle.rigid import four, matrix_of, nudged, three
+from volery.vehicle.rotation_math import four, matrix_of, nudged, three
 
 Array = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0.0)]

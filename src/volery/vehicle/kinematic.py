@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from volery.vehicle.airframe import Airframe, hover_thrusts
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.contact import FRESH_S, IMPACT, NO_TOUCH, TOUCH_DOWN
-from volery.vehicle.rigid import four, three
+from volery.vehicle.rotation_math import four, three
 from volery.world.terrain import TerrainGrid, terrain_height
 
 _GROUND_MARGIN = 0.05

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.counting import counted
 from volery.core.errors import ScenarioError
+from volery.core.plurals import counted
 from volery.core.rng import generator
 from volery.world.inventory import Inventory, read_inventory
 from volery.world.species_map import shipped_species

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.counting import counted
 from volery.core.errors import DataFileError
+from volery.core.plurals import counted
 
 _REQUIRED = ("x_m", "y_m")
 _OPTIONAL = ("dbh_cm", "height_m", "species")

@@ -16,9 +16,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.counting import counted
 from volery.core.errors import DataFileError
 from volery.core.frames import enu_from_gltf
+from volery.core.plurals import counted
 from volery.world.gltf_reading import Part, read_gltf
 from volery.world.mesh import Mesh
 

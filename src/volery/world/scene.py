@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.workers import Workers
+from volery.world.actors.moving import MovingThings
 from volery.world.embree_backend import EmbreeBackend
 from volery.world.ground_cover import BARE_GROUND, GroundCover
 from volery.world.moving_bodies import NO_ROWS, body_rows, body_table, with_blades
 from volery.world.scene_content import BodyShape, Look, Solid, collect, with_solids
 from volery.world.scene_memory import SceneHandle
 from volery.world.terrain import Terrain
-from volery.world.things.moving import MovingThings
 from volery.world.trees.model import DetailLevel
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
-from volery.core.counting import counted
 from volery.core.errors import ScenarioError
+from volery.core.plurals import counted
 from volery.world.trees import species_names
 
 _log = logging.getLogger(__name__)

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.compiled import inline_kernel, kernel
-from volery.core.counting import counted
 from volery.core.errors import DataFileError
+from volery.core.plurals import counted
 from volery.world.mesh import Mesh
 
 _SHOWN_FAULTS = 20

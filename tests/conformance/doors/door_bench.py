@@ -18,7 +18,7 @@ import pytest
 from live_graph import LiveGraph
 from ros_tcp_client import until
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.graph.messages import String, message_type
 from volery.graph.service_reply import ServiceReply
 

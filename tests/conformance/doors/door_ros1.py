@@ -15,7 +15,7 @@ from plain_tcpros import WRONG_SUM, PlainNode
 from ros1_bench import shared_master
 from ros_tcp_client import until
 
-from volery.bridges.ros1.door import Ros1Door
+from volery.bridges.ros1.bridge import Ros1Door
 from volery.bridges.ros1.environment import rospy_is_installed
 
 _numbers = itertools.count(1)

@@ -14,8 +14,8 @@ from plain_peers import take_peer
 from ros2_bench import DOMAIN
 from ros_tcp_client import until
 
+from volery.bridges.ros2.bridge import Ros2Door
 from volery.bridges.ros2.dds import library
-from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
 
 LATCHED = ("/map", "/plan")

@@ -106,7 +106,7 @@ def test_who_speaks_no_more_counts_as_gone(bench, others):
 @pytest.mark.parametrize("talking", [True, False])
 def test_who_vanished_without_a_word_is_missed(bench, others, monkeypatch, talking):
     """Neither FIN nor RST came: found out by what is sent to it, or by asking whether it lives."""
-    monkeypatch.setattr("volery.core.listening.PROBES", QUICK_PROBES)
+    monkeypatch.setattr("volery.core.network_access.PROBES", QUICK_PROBES)
     others.check()
     before = bench.ours.counts()
     client = bench.connect()

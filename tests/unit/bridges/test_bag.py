@@ -19,8 +19,8 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from volery.bridges.logs import bag
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs import log_writer
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.reader import summarize
 from volery.core.errors import RecordingError
 from volery.graph.messages import Published, typestore
@@ -210,7 +210,7 @@ def test_a_chunk_is_closed_after_a_while(
     log.write(first)
     before = path.stat().st_size
     later = time.monotonic() + 3.0
-    monkeypatch.setattr(bag.time, "monotonic", lambda: later)
+    monkeypatch.setattr(log_writer.time, "monotonic", lambda: later)
     log.write(second)
     assert path.stat().st_size > before
     log.abort()
@@ -274,7 +274,7 @@ def test_file_size_limit_stops_the_run_with_one_error(
 def test_messages_are_those_that_can_be_read(
     tmp_path: Path, flight: Flight, suffix: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("volery.bridges.logs.bag.CHUNK_WALL_S", float("inf"))
+    monkeypatch.setattr("volery.bridges.logs.log_writer.CHUNK_WALL_S", float("inf"))
     log = open_log(tmp_path / f"flight{suffix}")
     counts = []
     for message in flight(10.0):
@@ -290,7 +290,7 @@ KILLED = """
 import sys, time
 sys.path.insert(0, sys.argv[2])
 from conftest import make_flight
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 log = open_log(sys.argv[1])
 messages = make_flight(20.0)
 for message in messages:

@@ -7,8 +7,8 @@ import time
 import pytest
 from live_graph import LiveGraph
 
+from volery.bridges.nodes.deferred_connection import LateLink
 from volery.bridges.nodes.host import NodeHost
-from volery.bridges.nodes.late_link import LateLink
 from volery.core.errors import GraphError, NodeError
 from volery.graph.messages import Clock, String, Time, message_type
 from volery.graph.nodes.node import Node

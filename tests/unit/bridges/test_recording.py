@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ros_tcp_client import Loop
 
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.recording import Recorder
 from volery.bridges.topic_patterns import renamer, topic_filter

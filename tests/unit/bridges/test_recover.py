@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from rosbags.highlevel import AnyReader
 
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.records import LogWalk
-from volery.bridges.logs.recover import recover, recovered_name
+from volery.bridges.logs.recovery import recover, recovered_name
 from volery.core.errors import RecordingError
 from volery.graph.messages import Published, typestore
 

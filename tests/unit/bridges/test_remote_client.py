@@ -6,7 +6,7 @@ import threading
 import pytest
 from ros_tcp_client import Loop, until
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.ros_tcp.client import RosTcpClient
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.client import RosbridgeClient

@@ -13,7 +13,7 @@ from mcap.writer import CompressionType, Writer
 from rosbags.rosbag1 import Writer as BagWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.recording import Recorder
 from volery.bridges.logs.replay import Replay
 from volery.core.errors import GraphError, RecordingError

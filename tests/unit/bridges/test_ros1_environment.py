@@ -10,7 +10,7 @@ import pytest
 from volery.bridges.ros1 import environment as ros1_environment
 from volery.bridges.ros1.master import Ros1Master
 from volery.bridges.ros1.node import _check_master
-from volery.bridges.sharing import Sharing
+from volery.bridges.shared_names import Sharing
 from volery.core.errors import BridgeError, UnreachableError
 
 

@@ -9,7 +9,7 @@ import threading
 
 import pytest
 
-from volery.bridges.ros1.pump import Pump, Reader
+from volery.bridges.ros1.writer_thread import Pump, Reader
 
 
 class Connection:

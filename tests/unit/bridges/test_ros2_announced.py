@@ -18,14 +18,14 @@ from ros2_bench import DOMAIN
 from ros_tcp_client import until
 
 from volery.bridges.ros2.dds import library
-from volery.bridges.ros2.dds.announced import (
+from volery.bridges.ros2.dds.domain import join_domain, leave_domain
+from volery.bridges.ros2.dds.endpoint_info import (
     Terms,
     announcements,
     matched_reader,
     matched_writer,
     terms_at,
 )
-from volery.bridges.ros2.dds.domain import join_domain, leave_domain
 from volery.bridges.ros2.dds.idl_types import message_struct
 from volery.bridges.ros2.dds.qos import qos_of
 from volery.bridges.ros2.middleware import Profile

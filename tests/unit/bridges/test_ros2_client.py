@@ -9,10 +9,10 @@ from live_graph import LiveGraph
 from ros2_bench import DOMAIN, Other
 from ros_tcp_client import until
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.nodes.host import NodeHost
+from volery.bridges.ros2.bridge import Ros2Door
 from volery.bridges.ros2.client import Ros2Client
-from volery.bridges.ros2.door import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
 from volery.cli.topics import list_topics
 from volery.core.errors import GraphError

@@ -16,19 +16,19 @@ from live_graph import NOW_NS, LiveGraph
 from ros2_bench import DOMAIN, Other
 from ros_tcp_client import until
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
+from volery.bridges.ros2.bridge import Ros2Door
 from volery.bridges.ros2.client import Ros2Client
 from volery.bridges.ros2.dds import library
-from volery.bridges.ros2.dds.counterparts import why_foreign
+from volery.bridges.ros2.dds.discovery_info import TYPE as RECORD
+from volery.bridges.ros2.dds.discovery_info import record_message
 from volery.bridges.ros2.dds.idl_types import message_struct, request_struct
 from volery.bridges.ros2.dds.qos import qos_of
-from volery.bridges.ros2.dds.records import TYPE as RECORD
-from volery.bridges.ros2.dds.records import record_message
-from volery.bridges.ros2.door import Ros2Door
+from volery.bridges.ros2.dds.service_peers import why_foreign
 from volery.bridges.ros2.environment import Ros2Terms, join_ros2
 from volery.bridges.ros2.middleware import Profile, ServiceSpec
 from volery.bridges.ros2.names import NodeName
-from volery.bridges.rosbridge.beside import WithRosApi
+from volery.bridges.rosbridge.rosapi_bridge import WithRosApi
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.cdr import decode_cdr, encode_cdr
 from volery.graph.codecs.zero import zero_message

@@ -12,7 +12,7 @@ from volery.bridges.ros2.environment import Ros2Terms, join_ros2
 from volery.bridges.ros2.middleware import Profile, RemotePublisher
 from volery.bridges.ros2.rcl import types
 from volery.bridges.ros2.rcl.qos import remote_publisher
-from volery.cli.links import _ros2_terms, open_link
+from volery.cli.connections import _ros2_terms, open_link
 from volery.core.errors import BridgeError, GraphError
 
 SCAN = "sensor_msgs/msg/LaserScan"

@@ -11,7 +11,7 @@ from ruamel.yaml import YAML
 
 from volery.bridges.ros2.middleware import Profile
 from volery.bridges.ros2.profiles import profile_of
-from volery.bridges.sharing import COMMANDS, Sharing
+from volery.bridges.shared_names import COMMANDS, Sharing
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario
 

@@ -15,8 +15,8 @@ from plain_peers import take_peer
 from ros2_bench import DOMAIN
 from ros_tcp_client import until
 
-from volery.bridges.doors import Doors
-from volery.bridges.ros2.door import Ros2Door
+from volery.bridges.bridge_host import Doors
+from volery.bridges.ros2.bridge import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
 from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.messages import String, header, message_type

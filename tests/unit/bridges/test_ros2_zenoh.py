@@ -17,8 +17,8 @@ from live_graph import LiveGraph
 from ros2_bench import DOMAIN, Other
 from ros_tcp_client import until
 
-from volery.bridges.doors import Doors
-from volery.bridges.ros2.door import Ros2Door
+from volery.bridges.bridge_host import Doors
+from volery.bridges.ros2.bridge import Ros2Door
 from volery.bridges.ros2.environment import Ros2Terms
 from volery.bridges.ros2.middleware import Profile, ServiceSpec, TopicSpec
 from volery.bridges.ros2.names import NodeName

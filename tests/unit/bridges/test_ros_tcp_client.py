@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from ros_tcp_client import Loop, frame, ros1_string, until
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.ros_tcp import wire
 from volery.bridges.ros_tcp.client import RosTcpClient
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
-from volery.bridges.rosbridge.beside import WithRosApi
+from volery.bridges.rosbridge.rosapi_bridge import WithRosApi
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.connection import TellsTopics, call_and_wait
 from volery.graph.messages import Header, String, Time, message_type

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from ros_tcp_client import Loop, cdr_string, frame, ros1_string, until
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
+from volery.bridges.ros_tcp.connect import dial
 from volery.bridges.ros_tcp.connector import RosTcpConnector
-from volery.bridges.ros_tcp.dial import dial
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.core.errors import BridgeError
 from volery.graph.messages import String, Twist, Vector3, message_type

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from ros_tcp_client import Client, Loop, cdr_string, frame, ros1_string, until
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import String, message_type

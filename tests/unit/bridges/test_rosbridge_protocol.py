@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbridge_bench import SET_BOOL, STEPS, STRING, TIME_NS, TRIGGER, Bench, trigger_response
 
-from volery.bridges.rosbridge.cbor_form import encode_cbor
+from volery.bridges.rosbridge.cbor_codec import encode_cbor
 from volery.bridges.rosbridge.fragments import split
 from volery.bridges.rosbridge.protocol import MOST_WAITING_BYTES
 from volery.bridges.rosbridge.wire import encode_png

@@ -18,7 +18,7 @@ from rosbridge_bench import SET_BOOL, STEPS, STRING, TRIGGER, FakeSimulation, tr
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.origins import Origins
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer

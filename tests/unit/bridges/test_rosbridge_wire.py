@@ -16,9 +16,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from volery.bridges.rosbridge.cbor_form import decode_cbor, encode_cbor
-from volery.bridges.rosbridge.forms import Forms
+from volery.bridges.rosbridge.cbor_codec import decode_cbor, encode_cbor
 from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, MOST_OPEN, Assembly, split
+from volery.bridges.rosbridge.message_encoder import Forms
 from volery.bridges.rosbridge.wire import decode_frame, decode_png, encode_json, encode_png
 from volery.core.errors import BridgeError
 from volery.graph import messages as m

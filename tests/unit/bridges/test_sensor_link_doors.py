@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ros_tcp_client import Loop, until
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.sensor_link.client import SensorLinkClient
 from volery.bridges.sensor_link.payloads import (
     decode_notice,

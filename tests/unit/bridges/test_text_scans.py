@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.decoding import LogDecoder
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.records import LogWalk
 from volery.bridges.logs.text_layout import TextLayout
 from volery.bridges.logs.text_scans import TextScans

@@ -16,10 +16,10 @@ from volery.bench import registry
 from volery.bench.document import read_results, render
 from volery.bench.machine import describe_machine, describe_versions
 from volery.bench.registry import Result
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 from volery.cli import doctor, start
 from volery.cli.app import app
-from volery.cli.guard import guarded, word_logs
+from volery.cli.error_reporting import guarded, word_logs
 from volery.core.errors import VoleryError
 from volery.scenario import library
 from volery.scenario.load import load_scenario

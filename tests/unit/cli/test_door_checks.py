@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.cli.app import app
-from volery.cli.door_checks import check_autopilots, check_doors, token_gaps
+from volery.cli.bridge_checks import check_autopilots, check_doors, token_gaps
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
 from volery.mavlink.scenario_setup import with_autopilots

@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
+from volery.cli.keyboard_control import steer
 from volery.cli.keys import Keys
-from volery.cli.steering import steer
 
 
 class Terminal:

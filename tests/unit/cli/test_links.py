@@ -2,7 +2,7 @@
 
 import pytest
 
-from volery.cli import links
+from volery.cli import connections
 from volery.core.errors import BridgeError, UnreachableError
 
 
@@ -15,19 +15,19 @@ def test_nodes_wait_for_their_graph_and_say_so(monkeypatch, capsys) -> None:
             raise UnreachableError(f"nobody at {via}")
         return "link"
 
-    monkeypatch.setattr(links, "open_link", open_link)
-    monkeypatch.setattr(links, "_AGAIN_S", 0.0)
-    assert links.await_link("x://y", "node") == "link"
+    monkeypatch.setattr(connections, "open_link", open_link)
+    monkeypatch.setattr(connections, "_AGAIN_S", 0.0)
+    assert connections.await_link("x://y", "node") == "link"
     assert capsys.readouterr().err == "nobody at x://y; waits 30 s for it\n"
     tries.clear()
     with pytest.raises(UnreachableError):
-        links.await_link("x://y", "node", patience_s=0.0)
+        connections.await_link("x://y", "node", patience_s=0.0)
     assert tries == ["node"]
 
 
 def test_what_never_comes_is_not_waited_for(capsys) -> None:
     with pytest.raises(BridgeError, match="no way into a graph"):
-        links.await_link("pigeon://post", "node")
+        connections.await_link("pigeon://post", "node")
     assert capsys.readouterr().err == ""
 
 
@@ -36,12 +36,12 @@ def test_a_graph_that_goes_and_comes_is_told_once_each(capsys) -> None:
         connected = True
 
     line = Line()
-    told = links.LinkTold(line, "x://y")
+    told = connections.LinkTold(line, "x://y")
     for connected in (True, False, False, True, True):
         line.connected = connected
         assert told() is False
     assert capsys.readouterr().err == (
         "the graph at x://y is gone; waiting for it\nthe graph at x://y is there again\n"
     )
-    assert links.LinkTold(object(), "ros2")() is False  # of which no server tells
+    assert connections.LinkTold(object(), "ros2")() is False  # of which no server tells
     assert capsys.readouterr().err == ""

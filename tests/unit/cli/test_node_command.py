@@ -3,7 +3,7 @@
 import pytest
 from typer.testing import CliRunner
 
-from volery.cli import launching, node
+from volery.cli import node
 from volery.cli.app import app
 
 GAPS = "gap_following"
@@ -48,7 +48,7 @@ def test_profiles_are_looked_through_before_it_waits(lines, told, monkeypatch, t
     def wait(*_):
         raise AssertionError("it waits for a graph")
 
-    for module in (node, launching):
+    for module in (node, launch):
         monkeypatch.setattr(module, "await_link", wait)
     profile, several = tmp_path / "one.toml", tmp_path / "several.toml"
     profile.write_text(lines)

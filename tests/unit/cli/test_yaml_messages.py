@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from volery.cli.yaml_form import read_message, to_yaml
+from volery.cli.yaml_codec import read_message, to_yaml
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Header, LaserScan, String, Time, message_type
 

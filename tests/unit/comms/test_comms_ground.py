@@ -14,7 +14,7 @@ import pytest
 from live_graph import LiveGraph
 
 from volery.bench.comms import served
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.cli.gcs import parse_server
 from volery.comms.addresses import ALL, ALL_GROUND, FIRST_GROUND, Identity, batch_address, is_meant
 from volery.comms.control_payloads import Reason, Refusal

@@ -19,7 +19,7 @@ from volery.control.estimator.motion_kernels import flow_on, motion_at_horizon, 
 from volery.control.estimator.settings import EstimatorSettings, Mounting
 from volery.core import rotations
 from volery.vehicle.compiled import fused_kernel
-from volery.vehicle.rigid import three
+from volery.vehicle.rotation_math import three
 
 N = r.STATES
 MOUNTING = Mounting(

@@ -8,8 +8,8 @@ from volery.control.estimator.errors import EstimationError
 from volery.control.fleet import Fleet
 from volery.control.fleet_events import FleetEventKind
 from volery.control.flight_modes import FlightMode
+from volery.control.fused_step import UAV
 from volery.control.setpoints import PILOT
-from volery.control.step import UAV
 from volery.core import rotations
 from volery.core.errors import CommandError
 from volery.vehicle.contact import standing_pose

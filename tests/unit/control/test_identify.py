@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from flights import F450
 
-from volery.control import identify as identification
+from volery.control import identification as identification
+from volery.control.identification import identify, to_toml, validate
 from volery.control.identification_flights import SAMPLE_S
-from volery.control.identify import identify, to_toml, validate
 from volery.core.errors import VoleryError
 from volery.vehicle.identified import IdentifiedModel, SecondOrder, load_identified
 

@@ -14,7 +14,7 @@ from volery.core.errors import CommandError
 from volery.vehicle.contact import standing_pose
 from volery.vehicle.identified import FirstOrder, SecondOrder, load_identified, transition
 from volery.vehicle.kinematic import Kinematic
-from volery.vehicle.plants import RigidBody
+from volery.vehicle.plant_types import RigidBody
 from volery.world.terrain import Terrain
 from volery.world.weather import Weather
 

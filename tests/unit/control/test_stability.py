@@ -9,7 +9,7 @@ from volery.core.errors import DataFileError
 from volery.vehicle.airframe import airframe_names, load_airframe
 from volery.vehicle.identified import load_identified
 from volery.vehicle.kinematic import Kinematic
-from volery.vehicle.plants import RigidBody
+from volery.vehicle.plant_types import RigidBody
 
 
 def with_body(name, **body):

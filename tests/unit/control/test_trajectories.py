@@ -7,10 +7,10 @@ from scipy.interpolate import BPoly, CubicHermiteSpline
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
-from volery.control.follow import polynomial, segment_at
 from volery.control.segment_store import SegmentStore
 from volery.control.setpoints import new_pilots
 from volery.control.trajectory import Trajectory
+from volery.control.trajectory_kernels import polynomial, segment_at
 from volery.core import rotations
 from volery.core.errors import CommandError
 from volery.vehicle.compiled import fused_kernel

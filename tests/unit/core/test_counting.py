@@ -2,7 +2,7 @@
 
 import pytest
 
-from volery.core.counting import counted
+from volery.core.plurals import counted
 
 
 @pytest.mark.parametrize(

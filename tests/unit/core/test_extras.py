@@ -39,14 +39,14 @@ def mavlink():
 
 
 def identification():
-    from volery.control.identify import identify
+    from volery.control.identification import identify
     from volery.vehicle.airframe import load_airframe
 
     identify(load_airframe("f450"))
 
 
 def answers_of_loops():
-    from volery.control.identify import _answer
+    from volery.control.identification import _answer
     from volery.vehicle.identified import FirstOrder
 
     _answer(FirstOrder(kind="first_order", time_constant_s=0.1), 0.0, np.ones(3))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from volery.core.compiled import kernel
-from volery.core.lanes import (
+from volery.core.simd import (
     LANES,
     any_outside,
     lanes_at,

@@ -6,8 +6,8 @@ import struct
 from types import SimpleNamespace
 
 from volery.comms.server.tcp import CommsServer
-from volery.core.listening import write_while_open
-from volery.mavlink.links.tcp_door import _TcpClient
+from volery.core.network_access import write_while_open
+from volery.mavlink.links.tcp_bridge import _TcpClient
 
 
 async def _write_after_reset(write):

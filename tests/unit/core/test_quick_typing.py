@@ -9,8 +9,8 @@ import pytest
 from numba import njit, types
 from numba.core.errors import TypingError
 
-from volery.core import quick_typing
-from volery.core.quick_typing import remembered_types
+from volery.core import typing_cache
+from volery.core.typing_cache import remembered_types
 
 _RESOLVE = types.BaseFunction.get_call_type
 _PRODUCT = (operator.mul, (types.float64, types.float64))
@@ -81,7 +81,7 @@ def test_numba_is_left_as_it_was():
 @pytest.mark.parametrize("lacks", ["BaseFunction", "Record"])
 def test_a_numba_without_these_names_compiles_as_ever(questions, monkeypatch, lacks):
     others = {name: getattr(types, name) for name in ("BaseFunction", "Record") if name != lacks}
-    monkeypatch.setattr(quick_typing, "_TYPES", SimpleNamespace(**others))
+    monkeypatch.setattr(typing_cache, "_TYPES", SimpleNamespace(**others))
     with remembered_types():
         assert njit(_blend)(np.ones(4), 1) == (1.0, 0, False)
     assert (questions.count(_PRODUCT) > 2) == (lacks == "BaseFunction")
@@ -95,7 +95,7 @@ def test_a_numba_that_asks_in_other_words_is_answered_by_itself(monkeypatch):
             self.asked += 1
             return arguments
 
-    monkeypatch.setattr(quick_typing, "_TYPES", SimpleNamespace(BaseFunction=Function))
+    monkeypatch.setattr(typing_cache, "_TYPES", SimpleNamespace(BaseFunction=Function))
     function = Function()
     with remembered_types():
         assert [function.get_call_type((1, 2)) for _ in range(2)] == 2 * [(1, 2)]

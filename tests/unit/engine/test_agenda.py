@@ -1,7 +1,7 @@
 """Firings: at the right step, in a fixed order, without drift."""
 
 from volery.core.clock import Schedule
-from volery.engine.agenda import Agenda
+from volery.engine.scheduler import Agenda
 
 MS = 1_000_000
 

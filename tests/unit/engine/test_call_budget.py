@@ -6,7 +6,7 @@ import pytest
 
 from volery.core.errors import CommandError
 from volery.engine.call_budget import MAX_FRACTION, CallBudget
-from volery.engine.commands import Inbox
+from volery.engine.command_queue import Inbox
 
 
 class Clock:

@@ -7,11 +7,11 @@ import pytest
 from autopilot_bench import free_port, irises
 from px4_stand_in import Terminal, connect
 
-from volery.bridges.doors import Doors
-from volery.mavlink.hil.ardupilot_door import ArdupilotDoor
+from volery.bridges.bridge_host import Doors
+from volery.mavlink.hil.ardupilot_bridge import ArdupilotDoor
 from volery.mavlink.hil.connection_notice import notice
-from volery.mavlink.hil.px4_door import Px4Door, how_to_start
-from volery.mavlink.hil.px4_serial_door import Px4Serial
+from volery.mavlink.hil.px4_bridge import Px4Door, how_to_start
+from volery.mavlink.hil.px4_serial_bridge import Px4Serial
 from volery.mavlink.scenario_setup import with_ardupilot, with_px4
 from volery.runtime import Simulation
 

@@ -12,10 +12,10 @@ import pytest
 from ardupilot_stand_in import ArdupilotStandIn, read
 from autopilot_bench import free_port, irises
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.core.errors import BridgeError, PartnerError
 from volery.graph.rotor_layout import RotorPosition
-from volery.mavlink.hil.ardupilot_door import ArdupilotDoor
+from volery.mavlink.hil.ardupilot_bridge import ArdupilotDoor
 from volery.mavlink.hil.ardupilot_json import (
     STATE_HZ,
     State,

@@ -9,13 +9,13 @@ import pytest
 from flying_bench import scenario
 
 from volery.bridges.bridge_factory import BridgeOptions, make_bridge
-from volery.bridges.doors import Doors
-from volery.cli.doors import open_doors
+from volery.bridges.bridge_host import Doors
+from volery.cli.bridges import open_doors
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
-from volery.mavlink.links.serial_door import MavlinkSerial
-from volery.mavlink.links.tcp_door import MavlinkTcp
-from volery.mavlink.links.udp_door import MavlinkUdp
+from volery.mavlink.links.serial_bridge import MavlinkSerial
+from volery.mavlink.links.tcp_bridge import MavlinkTcp
+from volery.mavlink.links.udp_bridge import MavlinkUdp
 from volery.runtime import Simulation
 
 mavutil = pytest.importorskip("pymavlink.mavutil")

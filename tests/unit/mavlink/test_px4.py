@@ -11,13 +11,13 @@ import pytest
 from autopilot_bench import free_port, irises
 from px4_stand_in import StandIn, Terminal
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.core.errors import BridgeError, PartnerError
 from volery.mavlink.codec import Codec, dialect
 from volery.mavlink.hil.lock_step import PATIENCE, Patience
 from volery.mavlink.hil.protocol import HilLink
-from volery.mavlink.hil.px4_door import Px4Door, _Connection
-from volery.mavlink.hil.px4_serial_door import Px4Serial
+from volery.mavlink.hil.px4_bridge import Px4Door, _Connection
+from volery.mavlink.hil.px4_serial_bridge import Px4Serial
 from volery.mavlink.hil.session import HilSeat
 from volery.mavlink.scenario_setup import with_px4
 from volery.runtime import Simulation

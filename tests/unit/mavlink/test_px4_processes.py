@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import pytest
 from autopilot_bench import free_port
 
-from volery.cli.doors import _px4_instances
+from volery.cli.bridges import _px4_instances
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
-from volery.mavlink.hil.px4_door import Px4Door
+from volery.mavlink.hil.px4_bridge import Px4Door
 from volery.mavlink.hil.px4_processes import FIRST_PORT, Px4Instances, established_ports, find_px4
 from volery.vehicle.airframe import load_airframe
 
@@ -147,7 +147,7 @@ time.sleep(1000)
 
 def test_one_that_never_connects_is_told_with_its_last_words(tmp_path, monkeypatch):
     make_px4(tmp_path, HANGS)
-    monkeypatch.setattr("volery.cli.doors._LONGEST_START_S", 1.0)
+    monkeypatch.setattr("volery.cli.bridges._LONGEST_START_S", 1.0)
     uav = SimpleNamespace(airframe=load_airframe("f450"))
     simulation = SimpleNamespace(uav_names=["uav1"], uavs={"uav1": uav})
     options = RunOptions("hover", px4_dir=tmp_path)

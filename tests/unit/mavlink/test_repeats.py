@@ -3,8 +3,8 @@
 import numpy as np
 from flying_bench import Station, fly, scenario
 
-from volery.bridges.logs.bag import open_log
-from volery.bridges.logs.flights import read_flight
+from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.recorded_flight import read_flight
 from volery.mavlink.scenario_setup import NODE, with_autopilots
 from volery.runtime import Simulation
 from volery.runtime.replay.scenario_record import scenario_of

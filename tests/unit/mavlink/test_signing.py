@@ -6,13 +6,13 @@ import threading
 import pytest
 from autopilot_bench import free_port, irises
 
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.core.errors import BridgeError
 from volery.mavlink.autopilot.dialect_extensions import available_modes
 from volery.mavlink.codec import Codec, Parser, dialect
 from volery.mavlink.framing import Framer
 from volery.mavlink.links.signing import Signing, key_of
-from volery.mavlink.links.tcp_door import MavlinkTcp
+from volery.mavlink.links.tcp_bridge import MavlinkTcp
 from volery.mavlink.scenario_setup import with_autopilots
 from volery.runtime import Simulation
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 from volery.core.errors import DataFileError, ScenarioError
 from volery.graph.messages import typestore
 from volery.sensors.lidar_model import load_lidar

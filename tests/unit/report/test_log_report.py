@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 from volery.core import rotations
 from volery.core.errors import VoleryError
 from volery.graph import messages as m
 from volery.graph.codecs.zero import zero_message
 from volery.report.logged_flights import read_flight, read_way
 from volery.report.page import ReportError
-from volery.report.way_page import write_log_report
+from volery.report.trajectory_page import write_log_report
 
 S = 1_000_000_000
 TREES = np.array([[5.0, 3.0], [12.0, -3.0], [20.0, 4.0]])

@@ -10,8 +10,8 @@ from post_scans import HEIGHT_M, TRUNK, nods_message, scan_message, seen_from
 
 from volery.autonomy.mapping.vertical_structures import Columns
 from volery.core import rotations
+from volery.report.trajectories import Way
 from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
-from volery.report.ways import Way
 
 S = 1_000_000_000
 

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from volery.bridges.logs.bag import open_log
-from volery.bridges.logs.flights import Origin, read_flight
+from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.recorded_flight import Origin, read_flight
 from volery.bridges.logs.recording import Recorder
 from volery.core.errors import RecordingError
 from volery.graph.codecs.zero import zero_message

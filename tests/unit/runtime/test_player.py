@@ -7,8 +7,8 @@ import time
 import pytest
 from fake_wall_clock import FakeWallClock
 
-from volery.bridges.logs.bag import open_log
 from volery.bridges.logs.decoding import LogDecoder
+from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.records import LogWalk
 from volery.core.errors import CommandError, RecordingError
 from volery.graph import messages as m

@@ -12,7 +12,7 @@ from slam_bench import LEVEL, NODDING, Flight, S, messages, nod_angle, trunks
 from typer.testing import CliRunner
 
 from volery.autonomy.slam.slam_node import Slam
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 from volery.cli.app import app
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import (

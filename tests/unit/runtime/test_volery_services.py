@@ -132,7 +132,7 @@ def test_a_disk_that_fills_up_ends_the_recording_alone(simulate, flat_data, tmp_
     def fail(_log, _published):
         raise RecordingError("the disk is full")
 
-    monkeypatch.setattr("volery.bridges.logs.bag.McapLog.write", fail)
+    monkeypatch.setattr("volery.bridges.logs.log_writer.McapLog.write", fail)
     simulation.run(0.1)
     assert simulation.time_s == pytest.approx(0.1)
     refused(ask(simulation, "/volery/stop_recording"), "full")

@@ -5,8 +5,8 @@ import numpy as np
 from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
 from volery.core.geodesy import LocalFrame
-from volery.sensors.denial import NOWHERE
 from volery.sensors.gnss import GnssBank, load_gnss_model
+from volery.sensors.gnss_denial import NOWHERE
 from volery.sensors.samples import SensorId
 from volery.vehicle.airframe import load_airframe
 

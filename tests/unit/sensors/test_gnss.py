@@ -9,8 +9,8 @@ from navigation_bench import NS, ZURICH, fleet_of, gnss_bank, keys_of, put
 from volery.core import rotations
 from volery.core.errors import CommandError, DataFileError, ScenarioError
 from volery.scenario.load import parse_scenario
-from volery.sensors.denial import Denial, Prism
 from volery.sensors.gnss import load_gnss_model
+from volery.sensors.gnss_denial import Denial, Prism
 
 PERIOD = NS // 5
 

@@ -11,8 +11,8 @@ from websockets.sync.client import connect
 
 from volery import Simulation, load_scenario
 from volery.scenario import overrides
+from volery.server.auth import Tokens
 from volery.server.page_server import PageServer
-from volery.server.rights import Tokens
 from volery.server.settings import PageSettings
 
 PILOT, VIEWER = "pilots' token", "viewers' token"

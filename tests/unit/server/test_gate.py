@@ -4,8 +4,8 @@ import pytest
 
 from volery.core.errors import BridgeError
 from volery.runtime.vehicles.control_authority import Pilots
-from volery.server.crew_list import CrewList
-from volery.server.gate import PilotGate, ViewerGate
+from volery.server.access_policy import PilotGate, ViewerGate
+from volery.server.operator_names import CrewList
 from volery.server.read_only import READ_ONLY_SERVICES
 
 

@@ -5,7 +5,7 @@ import os
 import pytest
 from page_bench import ask, serving
 
-from volery.bridges.logs.bag import open_log
+from volery.bridges.logs.log_writer import open_log
 from volery.graph import messages as m
 
 

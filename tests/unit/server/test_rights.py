@@ -3,7 +3,7 @@
 import pytest
 
 from volery.core.errors import BridgeError
-from volery.server.rights import Role, Sessions, Tokens, check_rights
+from volery.server.auth import Role, Sessions, Tokens, check_rights
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,10 @@ from page_bench import ask, serving
 from PIL import Image
 
 from volery.scenario import library
+from volery.scenario.catalog import Shelf
 from volery.scenario.load import load_scenario, parse_scenario
-from volery.scenario.shelf import Shelf
+from volery.server.card_renderer import HEIGHT, VIEWS, WIDTH
 from volery.server.cards import CARDS
-from volery.server.draw_cards import HEIGHT, VIEWS, WIDTH
 from volery.server.scenarios import cards_of
 
 

@@ -10,12 +10,12 @@ from PIL import Image
 
 from volery.core.errors import VoleryError
 from volery.runtime.build.worlds import build_forest, build_solids, build_terrain
+from volery.scenario.catalog import Shelf
 from volery.scenario.load import load_scenario
-from volery.scenario.shelf import Shelf
-from volery.server.uploads import kinds, making
-from volery.server.uploads.check import check
+from volery.server.uploads import kinds, scenario_builder
 from volery.server.uploads.kinds import KINDS
 from volery.server.uploads.route import name_for
+from volery.server.uploads.validation import check
 
 
 def outlines(*corners):
@@ -115,13 +115,13 @@ def test_what_is_wrong_is_told_in_a_sentence(checked, kind, suffix, content, why
 
 
 def test_there_are_limits(checked, monkeypatch):
-    monkeypatch.setattr(making, "MOST_CELLS", 3)
+    monkeypatch.setattr(scenario_builder, "MOST_CELLS", 3)
     with pytest.raises(VoleryError, match="4 x 1 cells; at most 3"):
         checked("grid_map", ".csv", b"0,0,0,1\n")
-    monkeypatch.setattr(making, "MOST_TREES", 2)
+    monkeypatch.setattr(scenario_builder, "MOST_TREES", 2)
     with pytest.raises(VoleryError, match="3 trees; allowed are 1 to 2"):
         checked("forest", ".csv", INVENTORY)
-    monkeypatch.setattr(making, "MOST_TRIANGLES", 11)
+    monkeypatch.setattr(scenario_builder, "MOST_TRIANGLES", 11)
     with pytest.raises(VoleryError, match="12 triangles; at most 11"):
         checked("mesh", ".stl", box())
 

@@ -5,7 +5,7 @@ from volery.core import rotations
 from volery.core.compiled import kernel
 from volery.core.rotation_kernels import matrix_rows, quaternion_product
 from volery.vehicle.compiled import fused_kernel
-from volery.vehicle.rigid import matrix_of, product, turned
+from volery.vehicle.rotation_math import matrix_of, product, turned
 
 
 @fused_kernel

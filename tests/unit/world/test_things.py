@@ -10,11 +10,11 @@ from plain_scene import PlainScene
 
 from volery.core import rotations
 from volery.core.errors import CommandError
+from volery.world.actors import SHAPES, MovingThings, Thing
+from volery.world.actors.motions import CircleMotion, GivenMotion, WaypointMotion
 from volery.world.materials import Material
 from volery.world.scene import Scene, Solid
 from volery.world.terrain import Terrain
-from volery.world.things import SHAPES, MovingThings, Thing
-from volery.world.things.motions import CircleMotion, GivenMotion, WaypointMotion
 
 SQUARE = [[0.0, 0.0, 1.0], [10.0, 0.0, 1.0], [10.0, 10.0, 1.0], [0.0, 10.0, 1.0]]
 

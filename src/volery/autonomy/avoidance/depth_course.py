@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.perception.list_parameters import declare_numbers
 from volery.autonomy.perception.scan_points import Pose
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.graph.messages import CameraInfo, Image, Odometry, String, Twist, Vector3
 from volery.graph.nodes.node import Node
 

@@ -24,7 +24,7 @@ from volery.autonomy.perception.list_parameters import declare_mount
 from volery.autonomy.perception.scan_points import Pose, ScanProjector
 from volery.autonomy.perception.speckle_filter import LoneReturns
 from volery.core import rotations
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.graph.messages import JointState, LaserScan, Odometry, Range, Twist, Vector3
 from volery.graph.nodes.node import Node
 

@@ -20,8 +20,8 @@ from volery.autonomy.coverage.cells import Cells, Ints, Mask
 from volery.autonomy.coverage.components import Reach, Shares, level_shares, share_parts
 from volery.autonomy.coverage.darp import divide
 from volery.autonomy.coverage.spanning_tree import Tour, tours
-from volery.core.counting import counted
 from volery.core.errors import PlanError
+from volery.core.plurals import counted
 
 NOT_TO_VISIT = -2
 """Owner of cells that are blocked, or that need no visit."""

@@ -26,7 +26,7 @@ from volery.autonomy.coverage.plan import (
 from volery.autonomy.coverage.waypoints import Heights, route_waypoints
 from volery.core import rotations
 from volery.core.errors import PlanError
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.graph.messages import (
     Float32,
     OccupancyGrid,

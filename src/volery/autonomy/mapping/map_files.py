@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.mapping.octomap_stream import Voxels, decode_binary
-from volery.core.counting import counted
 from volery.core.errors import DataFileError
+from volery.core.plurals import counted
 
 Bytes = NDArray[np.uint8]
 

@@ -26,7 +26,7 @@ from volery.autonomy.perception.scan_rays import Beams, RayMaker, Rays
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, NodeError
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.graph.messages import (
     JointState,
     LaserScan,

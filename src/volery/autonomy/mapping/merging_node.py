@@ -13,7 +13,7 @@ from volery.autonomy.perception.map_frame import MAP
 from volery.autonomy.perception.motion_history import Placement
 from volery.autonomy.status import publish_status
 from volery.core.errors import DataFileError, PlanError
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.core.vectors import norm
 from volery.graph.messages import String, TFMessage
 from volery.graph.nodes.node import Node

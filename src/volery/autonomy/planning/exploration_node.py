@@ -19,9 +19,9 @@ from volery.autonomy.planning.search_area import SearchArea
 from volery.autonomy.planning.viewpoints import Viewpoint, next_viewpoint
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
-from volery.core.counting import counted
 from volery.core.errors import PlanError
-from volery.core.kept import keep, put_back
+from volery.core.plurals import counted
+from volery.core.saved_state import keep, put_back
 from volery.graph.messages import (
     Float32,
     OccupancyGrid,

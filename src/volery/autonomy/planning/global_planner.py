@@ -19,7 +19,7 @@ from volery.autonomy.planning.voxel_space import Solid, VoxelSpace
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, NodeError, PlanError
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.graph.messages import (
     Bool,
     Odometry,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_rays import Rays
 from volery.core.compiled import kernel
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

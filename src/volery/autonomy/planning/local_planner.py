@@ -21,7 +21,7 @@ from volery.autonomy.planning.reciprocal_avoidance import Separation, half_plane
 from volery.autonomy.planning.surroundings import Surroundings
 from volery.autonomy.planning.trajectory_messages import trajectory_message
 from volery.core.clock import NS_PER_S, ns_from_s
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.graph.messages import (
     Bool,
     JointState,

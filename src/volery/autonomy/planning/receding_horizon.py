@@ -32,7 +32,7 @@ from volery.autonomy.planning.primitives import (
 from volery.autonomy.planning.reciprocal_avoidance import HalfPlane, violation
 from volery.autonomy.planning.surface import Surface
 from volery.core.clock import NS_PER_S
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.core.vectors import norm
 
 Array = NDArray[np.float64]

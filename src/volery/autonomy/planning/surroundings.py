@@ -17,7 +17,7 @@ from volery.autonomy.planning.clearance import Clearance, clearance_of
 from volery.autonomy.planning.local_grid import LocalGrid
 from volery.autonomy.planning.surface import Surface
 from volery.core.clock import NS_PER_S
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.graph.messages import JointState, LaserScan, Range, stamp_of
 
 Array = NDArray[np.float64]

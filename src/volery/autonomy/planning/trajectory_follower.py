@@ -13,7 +13,7 @@ from volery.autonomy.perception.stuck_sensors import is_stuck
 from volery.autonomy.planning.trajectory_messages import Samples, samples_of
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S, ns_from_s
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.core.vectors import norm
 from volery.graph.messages import (
     Bool,

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rng
-from volery.core.counting import counted
 from volery.core.errors import GraphError
+from volery.core.plurals import counted
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from volery.autonomy.search.steering import is_at, towards
 from volery.autonomy.search.teammates import ALOFT, GOING_HOME, RISING, UNDER_WAY, Phase, Teammate
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.core.vectors import norm
 from volery.graph.messages import Odometry, Point, Twist, header, message_type
 from volery.graph.nodes.node import Node

@@ -7,7 +7,7 @@ from typing import Any
 from volery.autonomy.slam.match import MANY, MISFIT
 from volery.autonomy.slam.tracker import Tracker
 from volery.core.clock import NS_PER_S
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 
 _SILENT_NS = NS_PER_S
 _LOST_NS = NS_PER_S

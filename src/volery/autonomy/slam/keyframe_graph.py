@@ -24,7 +24,7 @@ from volery.autonomy.slam.sweep import Seen
 from volery.autonomy.slam.tracker import Tracker
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.core.vectors import norm
 
 Array = NDArray[np.float64]

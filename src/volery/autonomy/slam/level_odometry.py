@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from volery.autonomy.slam.inertial_kernels import G, Q
 from volery.autonomy.slam.keyframes import levelling
 from volery.core import rotations
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 
 Array = NDArray[np.float64]
 

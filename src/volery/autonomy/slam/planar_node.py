@@ -22,7 +22,7 @@ from volery.autonomy.slam.planar.tracker import Follower
 from volery.autonomy.status import publish_status
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.graph.messages import (
     LaserScan,
     Odometry,

@@ -32,8 +32,8 @@ from volery.autonomy.slam.stationarity import Rest, first_covariance, first_stat
 from volery.autonomy.slam.sweep import Seen, Sweep
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.kept import keep, put_back
 from volery.core.rotation_kernels import moved_points
+from volery.core.saved_state import keep, put_back
 from volery.core.vectors import norm
 
 Array = NDArray[np.float64]

@@ -21,7 +21,7 @@ from volery.autonomy.team.target_list import Find, TargetList
 from volery.autonomy.team.team_state import TYPE as REPORT_TYPE
 from volery.autonomy.team.team_state import Phase, Team
 from volery.core.clock import NS_PER_S
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.graph.messages import (
     BatteryState,
     Odometry,

@@ -16,7 +16,7 @@ from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
 from volery.autonomy.team.observations import Doubt, Tracks, sighting_of
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.graph.messages import (
     CameraInfo,
     Image,

@@ -23,7 +23,7 @@ from volery.bench.bridge.latency_figures import (
 )
 from volery.bench.bridge.native_ros1 import one_way_figures
 from volery.bench.registry import Measured
-from volery.bridges.doors import Doors
+from volery.bridges.bridge_host import Doors
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import VoleryError

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from volery.bridges.doors import Doors
-from volery.bridges.ros1.door import Ros1Door
+from volery.bridges.bridge_host import Doors
+from volery.bridges.ros1.bridge import Ros1Door
 from volery.bridges.ros1.environment import rospy_is_installed
 from volery.core.errors import VoleryError
 from volery.graph.messages import Header, message_type, time_from_ns

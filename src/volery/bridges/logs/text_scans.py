@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.bridges.logs.bag import Log
+from volery.bridges.logs.log_writer import Log
 from volery.bridges.logs.text_layout import Place, TextLayout
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.counting import counted
 from volery.core.errors import RecordingError
+from volery.core.plurals import counted
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import (
     LaserScan,

@@ -16,7 +16,7 @@ from concurrent.futures import TimeoutError as FutureTimeout
 from typing import Any
 
 from volery.bridges.ros1.node import Receive, join_ros1
-from volery.bridges.ros1.raw import raw_message_class
+from volery.bridges.ros1.raw_messages import raw_message_class
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import Published, message_type, type_name

@@ -13,10 +13,10 @@ from typing import Any
 from volery.bridges.ros1.environment import load_rospy
 from volery.bridges.ros1.master import Ros1Master
 from volery.bridges.ros1.port_guards import guard_ports
-from volery.bridges.ros1.raw import raw_message_class, raw_service_class
+from volery.bridges.ros1.raw_messages import raw_message_class, raw_service_class
 from volery.bridges.ros1.registrar import Ros1Registrar
 from volery.core.errors import BridgeError, GraphError, UnreachableError
-from volery.core.listening import check_address
+from volery.core.network_access import check_address
 from volery.graph.codecs.ros1 import ros1_codec, ros2_name
 
 DEFAULT_MASTER = "http://127.0.0.1:11311"

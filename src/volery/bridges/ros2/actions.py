@@ -10,11 +10,11 @@ from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any
 
-from volery.bridges.ros2.complaints import Complaints
 from volery.bridges.ros2.middleware import Handle, Participant, Profile, ServiceSpec, TopicSpec
 from volery.bridges.ros2.names import NodeName, check_name
 from volery.bridges.ros2.services import answerer
-from volery.bridges.ros2.worker import Worker
+from volery.bridges.ros2.warning_filter import Complaints
+from volery.bridges.ros2.writer_thread import Worker
 from volery.core.errors import GraphError
 from volery.graph.actions import Goal, GoalStatus
 from volery.graph.codecs.cdr import encode_cdr

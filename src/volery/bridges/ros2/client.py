@@ -15,7 +15,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from volery.bridges.ros2.complaints import Complaints
 from volery.bridges.ros2.environment import Ros2Terms, join_ros2
 from volery.bridges.ros2.middleware import (
     Caller,
@@ -29,7 +28,8 @@ from volery.bridges.ros2.names import NodeName, check_name
 from volery.bridges.ros2.parameters import ParameterServices
 from volery.bridges.ros2.services import answerer, ask_server, wait_for
 from volery.bridges.ros2.subscriptions import Subscriptions
-from volery.bridges.ros2.worker import Worker
+from volery.bridges.ros2.warning_filter import Complaints
+from volery.bridges.ros2.writer_thread import Worker
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.codecs.zero import zero_message

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from volery.bridges.ros2.complaints import Complaints
 from volery.bridges.ros2.middleware import Handle, Participant, ServiceSpec, TopicSpec
 from volery.bridges.ros2.names import NodeName, check_name
 from volery.bridges.ros2.profiles import profile_of
 from volery.bridges.ros2.services import answerer
-from volery.bridges.ros2.worker import Worker
+from volery.bridges.ros2.warning_filter import Complaints
+from volery.bridges.ros2.writer_thread import Worker
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.codecs.zero import zero_message

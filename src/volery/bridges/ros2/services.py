@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
 
-from volery.bridges.ros2.complaints import Complaints
 from volery.bridges.ros2.middleware import Answer, Caller, Handle, Participant, ServiceSpec
 from volery.bridges.ros2.names import NodeName, check_name
-from volery.bridges.ros2.worker import Worker
-from volery.bridges.sharing import Sharing
+from volery.bridges.ros2.warning_filter import Complaints
+from volery.bridges.ros2.writer_thread import Worker
+from volery.bridges.shared_names import Sharing
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import decode_cdr, encode_cdr
 from volery.graph.codecs.zero import zero_message

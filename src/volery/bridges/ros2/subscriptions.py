@@ -6,9 +6,9 @@ import threading
 import time
 from collections.abc import Callable
 
-from volery.bridges.ros2.complaints import Complaints
 from volery.bridges.ros2.middleware import DEFAULT_DEPTH, Handle, Participant, Profile, TopicSpec
 from volery.bridges.ros2.names import NodeName
+from volery.bridges.ros2.warning_filter import Complaints
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.messages import Published

@@ -5,14 +5,14 @@ from __future__ import annotations
 import fnmatch
 from typing import Any
 
-from volery.bridges.ros2.complaints import Complaints
 from volery.bridges.ros2.middleware import Handle, Participant, Profile, RemotePublisher, TopicSpec
 from volery.bridges.ros2.names import NodeName, check_name
-from volery.bridges.ros2.outlet import Outlet
+from volery.bridges.ros2.outgoing_topic import Outlet
 from volery.bridges.ros2.profiles import common_profile, profile_of
 from volery.bridges.ros2.type_hashes import message_hash
-from volery.bridges.ros2.worker import Worker
-from volery.bridges.sharing import Sharing
+from volery.bridges.ros2.warning_filter import Complaints
+from volery.bridges.ros2.writer_thread import Worker
+from volery.bridges.shared_names import Sharing
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.graph import TopicInfo

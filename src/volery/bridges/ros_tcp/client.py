@@ -16,15 +16,15 @@ import socket
 from collections import deque
 from typing import Any
 
-from volery.bridges.doors import wake_of
+from volery.bridges.bridge_host import wake_of
 from volery.bridges.remote_client import RemoteClient
 from volery.bridges.ros_tcp import wire as ros_tcp
-from volery.bridges.ros_tcp.client_line import Line
+from volery.bridges.ros_tcp.client_outbox import Line
 from volery.bridges.ros_tcp.client_services import ClientServices
 from volery.bridges.ros_tcp.client_topics import ClientTopics
-from volery.bridges.ros_tcp.dial import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUSE_S, dial
+from volery.bridges.ros_tcp.connect import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUSE_S, dial
+from volery.bridges.ros_tcp.connection import Pipe
 from volery.bridges.ros_tcp.payloads import payloads_of
-from volery.bridges.ros_tcp.pipe import Pipe
 from volery.bridges.ros_tcp.wire import Frame, FrameParser, Generation, number_field
 from volery.core.errors import BridgeError, GraphError, reason_of
 from volery.graph.service_reply import ServiceReply

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from volery.bridges.ros_tcp import wire as ros_tcp
-from volery.bridges.ros_tcp.client_line import Line
+from volery.bridges.ros_tcp.client_outbox import Line
 from volery.bridges.ros_tcp.payloads import absolute
 from volery.bridges.ros_tcp.wire import Frame
 from volery.core.errors import BridgeError, GraphError

@@ -6,7 +6,7 @@ from typing import Any
 
 from volery.bridges.remote_topics import RemoteTopics, Subscription
 from volery.bridges.ros_tcp import wire as ros_tcp
-from volery.bridges.ros_tcp.client_line import Line
+from volery.bridges.ros_tcp.client_outbox import Line
 from volery.bridges.ros_tcp.wire import Frame
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.cdr import known

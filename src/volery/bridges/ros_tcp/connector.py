@@ -16,10 +16,10 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from volery.bridges.doors import wake_of
+from volery.bridges.bridge_host import wake_of
 from volery.bridges.ros_tcp import wire as ros_tcp
-from volery.bridges.ros_tcp.dial import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUSE_S, dial
-from volery.bridges.ros_tcp.pipe import Pipe
+from volery.bridges.ros_tcp.connect import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUSE_S, dial
+from volery.bridges.ros_tcp.connection import Pipe
 from volery.bridges.ros_tcp.unity import Selection, UnitySession
 from volery.bridges.ros_tcp.wire import FrameParser, Generation
 from volery.core.errors import BridgeError

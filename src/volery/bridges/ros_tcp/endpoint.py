@@ -15,15 +15,15 @@ import socket
 from collections.abc import Callable
 from functools import partial
 
-from volery.bridges.doors import wake_of
+from volery.bridges.bridge_host import wake_of
 from volery.bridges.ros_tcp import wire as ros_tcp
+from volery.bridges.ros_tcp.connection import Pipe, ServerEnd
 from volery.bridges.ros_tcp.payloads import payloads_of
-from volery.bridges.ros_tcp.pipe import Pipe, ServerEnd
 from volery.bridges.ros_tcp.session import FEATURES, EndpointSession
 from volery.bridges.ros_tcp.wire import MOST_PAYLOAD_BYTES, FrameParser, Generation
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, Opening, open_listener
-from volery.core.listening import check_address
+from volery.core.network_access import check_address
 from volery.core.preamble import Preamble
 from volery.core.waiting_room import look_at_binary
 from volery.graph.codecs.ros1 import ros1_codec

@@ -14,7 +14,7 @@ from fnmatch import fnmatchcase
 
 from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.calls import Calls
-from volery.bridges.ros_tcp.inlet import Inlet
+from volery.bridges.ros_tcp.incoming_queue import Inlet
 from volery.bridges.ros_tcp.outbox import Outbox
 from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.wire import Frame, Generation, number_field

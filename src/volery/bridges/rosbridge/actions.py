@@ -20,7 +20,7 @@ from volery.bridges.rosbridge.fields import (
     read_text,
     with_id,
 )
-from volery.bridges.rosbridge.forms import Forms
+from volery.bridges.rosbridge.message_encoder import Forms
 from volery.bridges.rosbridge.services import Post, Send
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError, GraphError

@@ -19,10 +19,10 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidURI, WebSocketException
 from websockets.uri import parse_uri
 
-from volery.bridges.doors import wake_of
+from volery.bridges.bridge_host import wake_of
 from volery.bridges.remote_client import RemoteClient
 from volery.bridges.rosbridge.client_state import ClientState
-from volery.bridges.rosbridge.forms import Generation
+from volery.bridges.rosbridge.message_encoder import Generation
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES, Frame
 from volery.core.errors import BridgeError, reason_of
 from volery.graph.session import SessionInfo

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from volery.bridges.remote_topics import RemoteTopics, Subscription
-from volery.bridges.rosbridge.cbor_form import encode_cbor
-from volery.bridges.rosbridge.forms import Generation
+from volery.bridges.rosbridge.cbor_codec import encode_cbor
 from volery.bridges.rosbridge.fragments import Assembly
+from volery.bridges.rosbridge.message_encoder import Generation
 from volery.bridges.rosbridge.wire import (
     MOST_MESSAGE_BYTES,
     Frame,

@@ -19,18 +19,18 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
+from volery.bridges.rosbridge.access_policy import Gate, refusal
 from volery.bridges.rosbridge.actions import Actions
-from volery.bridges.rosbridge.cbor_form import encode_cbor
+from volery.bridges.rosbridge.cbor_codec import encode_cbor
 from volery.bridges.rosbridge.fields import read_choice, read_id, with_id
-from volery.bridges.rosbridge.forms import Forms
 from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, Assembly, split
-from volery.bridges.rosbridge.gate import Gate, refusal
 from volery.bridges.rosbridge.message_budget import (
     MAX_MESSAGE_BYTES,
     MAX_PICTURE_BYTES,
     MAX_TEXT_BYTES,
     MAX_UNAUTHORIZED_BYTES,
 )
+from volery.bridges.rosbridge.message_encoder import Forms
 from volery.bridges.rosbridge.services import Post, Services
 from volery.bridges.rosbridge.topics import Topics
 from volery.bridges.rosbridge.wire import (
@@ -42,7 +42,7 @@ from volery.bridges.rosbridge.wire import (
     encode_png,
 )
 from volery.core.errors import BridgeError, VoleryError
-from volery.core.listening import shows_token
+from volery.core.network_access import shows_token
 from volery.graph.read_budget import Reading
 from volery.graph.session import Session
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from volery.bridges.rosbridge.fields import absolute
-from volery.bridges.rosbridge.forms import Generation
+from volery.bridges.rosbridge.message_encoder import Generation
 from volery.bridges.rosbridge.rosapi_parameters import NamedParameters, Parameters
 from volery.bridges.rosbridge.rosapi_types import display_name, full_text, type_definitions
 from volery.core.clock import stamp_from_ns

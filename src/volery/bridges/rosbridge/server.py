@@ -17,20 +17,20 @@ from websockets.http11 import Request, Response
 
 from volery.bridges.origins import Origins
 from volery.bridges.rosbridge.bulk_turns import BulkTurns
-from volery.bridges.rosbridge.checkpoint import Checkpoint
-from volery.bridges.rosbridge.conversation import Bell, converse, post_to
 from volery.bridges.rosbridge.first_message import GuardedConnection, guarded
-from volery.bridges.rosbridge.forms import Forms, Generation
 from volery.bridges.rosbridge.message_budget import MAX_MESSAGE_BYTES
+from volery.bridges.rosbridge.message_encoder import Forms, Generation
 from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
 from volery.bridges.rosbridge.rosapi import RosApi
 from volery.bridges.rosbridge.rosapi_parameters import Parameters
 from volery.bridges.rosbridge.tf_republisher import TfRepublisher
+from volery.bridges.rosbridge.token_check import Checkpoint
+from volery.bridges.rosbridge.websocket_session import Bell, converse, post_to
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL
 from volery.bridges.unsent import bound_unsent
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, Opening, open_listener
-from volery.core.listening import check_address, check_token, shows_token, tend
+from volery.core.network_access import check_address, check_token, shows_token, tend
 from volery.core.rare_log import RepeatFilter
 from volery.core.token_guesses import TokenGuesses
 from volery.core.waiting_room import look_at_http

@@ -15,7 +15,7 @@ from volery.bridges.rosbridge.fields import (
     read_text,
     with_id,
 )
-from volery.bridges.rosbridge.forms import Forms
+from volery.bridges.rosbridge.message_encoder import Forms
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.definition_store import EMPTY_MEMBER

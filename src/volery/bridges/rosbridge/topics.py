@@ -17,7 +17,7 @@ from volery.bridges.rosbridge.fields import (
     read_qos,
     read_text,
 )
-from volery.bridges.rosbridge.forms import COMPRESSIONS
+from volery.bridges.rosbridge.message_encoder import COMPRESSIONS
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.clock import stamp_from_ns
 from volery.core.errors import BridgeError, GraphError

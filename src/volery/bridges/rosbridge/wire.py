@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.bridges.rosbridge.cbor_form import MOST_DEPTH, decode_cbor
+from volery.bridges.rosbridge.cbor_codec import MOST_DEPTH, decode_cbor
 from volery.bridges.rosbridge.message_budget import check_cbor, check_json
 from volery.core.errors import BridgeError
 

@@ -14,8 +14,8 @@ import asyncio
 import contextlib
 from collections import deque
 
-from volery.bridges.doors import wake_of
-from volery.bridges.ros_tcp.inlet import Inlet
+from volery.bridges.bridge_host import wake_of
+from volery.bridges.ros_tcp.incoming_queue import Inlet
 from volery.bridges.sensor_link.commands import COMMAND_TOPICS
 from volery.bridges.sensor_link.payloads import (
     PAYLOADS,
@@ -27,7 +27,7 @@ from volery.bridges.sensor_link.payloads import (
 from volery.bridges.sensor_link.server import IMAGE_PORT, PORT
 from volery.bridges.sensor_link.wire import Frame, FrameParser, Kind, encode_frame
 from volery.core.errors import BridgeError, GraphError
-from volery.core.listening import write_while_open
+from volery.core.network_access import write_while_open
 from volery.graph.session import Gateway, Session
 from volery.graph.subscription_queue import SubscriptionQueue
 

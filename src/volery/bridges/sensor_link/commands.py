@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from volery.bridges.ros_tcp.inlet import Inlet
+from volery.bridges.ros_tcp.incoming_queue import Inlet
 from volery.bridges.sensor_link.payloads import PAYLOADS, decode_payload
 from volery.bridges.sensor_link.wire import Frame, Kind
 from volery.core.errors import BridgeError, GraphError

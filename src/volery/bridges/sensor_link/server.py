@@ -19,7 +19,7 @@ from volery.bridges.sensor_link.streams import IMAGES, SENSORS, Stream, Streams,
 from volery.bridges.sensor_link.wire import VERSION, Frame, FrameParser, Kind, encode_frame
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, open_listener
-from volery.core.listening import check_address, tend
+from volery.core.network_access import check_address, tend
 from volery.core.preamble import Preamble
 from volery.graph.session import Gateway
 

@@ -18,7 +18,7 @@ from volery.comms.radio.path_loss import Paths, loss_db
 from volery.comms.radio.reception import air_time_ns, packet_error_rate, snr_db
 from volery.core import rng
 from volery.core.clock import NS_PER_S
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 from volery.scenario.radio import Radio
 
 Array = NDArray[np.float64]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from volery.comms.addresses import Identity
 from volery.comms.control_payloads import Hello, Reason, Refusal
 from volery.comms.server.settings import RouterSettings
-from volery.core.counting import counted
 from volery.core.errors import CommsError
-from volery.core.listening import shows_token
+from volery.core.network_access import shows_token
+from volery.core.plurals import counted
 
 
 def admit(hello: Hello, source: int, settings: RouterSettings) -> Refusal | None:

@@ -21,7 +21,7 @@ from volery.comms.server.settings import RouterSettings
 from volery.comms.server.statistics import Statistics
 from volery.core.errors import CommsError
 from volery.core.listener import Listener, open_listener
-from volery.core.listening import check_address, check_token, tend, write_while_open
+from volery.core.network_access import check_address, check_token, tend, write_while_open
 from volery.core.preamble import Preamble
 from volery.core.token_guesses import TokenGuesses
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from volery.comms.addresses import is_station
 from volery.comms.protocol import Kind
-from volery.core.counting import counted
 from volery.core.errors import CommsError
+from volery.core.plurals import counted
 
 MOST_A_DESTINATION = 1024
 """As deep as a lane of the server, so that it takes all of them after a restart."""

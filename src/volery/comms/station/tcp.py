@@ -21,7 +21,7 @@ from volery.comms.protocol import Frame, Kind
 from volery.comms.server.tcp import PORT
 from volery.comms.station.core import StationCore
 from volery.core.errors import CommsError
-from volery.core.listening import tend, write_while_open
+from volery.core.network_access import tend, write_while_open
 
 _AGAIN_S = 0.2
 _CONNECT_S = 1.0

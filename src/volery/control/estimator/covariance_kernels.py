@@ -25,7 +25,7 @@ from volery.control.estimator.records import (
     VELOCITY,
 )
 from volery.vehicle.compiled import inner_kernel
-from volery.vehicle.rigid import three
+from volery.vehicle.rotation_math import three
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from volery.control.estimator.alignment import start_covariance
 from volery.control.estimator.checks import checked_rows, each_of, shaped
+from volery.control.estimator.estimate import Estimate, Gate
 from volery.control.estimator.filter_kernels import predict_rows
-from volery.control.estimator.present_kernels import present_covariances
+from volery.control.estimator.output_predictor import present_covariances
 from volery.control.estimator.queue_kernels import enqueue_rows
 from volery.control.estimator.records import (
     FILTER,
@@ -32,7 +33,6 @@ from volery.control.estimator.records import (
     tuning_of,
 )
 from volery.control.estimator.settings import EstimatorSettings, Mounting, StartSigmas
-from volery.control.estimator.views import Estimate, Gate
 from volery.core import rotations
 from volery.core.errors import EstimatorError
 

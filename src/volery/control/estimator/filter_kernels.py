@@ -27,7 +27,7 @@ from volery.control.estimator.covariance_kernels import (
 )
 from volery.control.estimator.measurement_kernels import linearise
 from volery.control.estimator.motion_kernels import flow_on, motion_at_horizon, still, travelled
-from volery.control.estimator.present_kernels import renew_present
+from volery.control.estimator.output_predictor import renew_present
 from volery.control.estimator.records import (
     ACCEL_BIAS,
     GNSS,
@@ -43,7 +43,7 @@ from volery.control.estimator.records import (
 )
 from volery.core.rotation_kernels import rotate_vector
 from volery.vehicle.compiled import fused_kernel, inner_kernel
-from volery.vehicle.rigid import four, product, three
+from volery.vehicle.rotation_math import four, product, three
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

@@ -30,7 +30,7 @@ from volery.control.estimator.records import (
 )
 from volery.core.rotation_kernels import cross, rotate_vector
 from volery.vehicle.compiled import inner_kernel
-from volery.vehicle.rigid import four, three, turned
+from volery.vehicle.rotation_math import four, three, turned
 
 Array = NDArray[np.float64]
 _OFFSET_0 = PRESSURE_OFFSET

@@ -14,7 +14,7 @@ from volery.control.estimator.compiled import part_kernel
 from volery.core.rotation_kernels import cross, rotate_vector
 from volery.vehicle.airframe import GRAVITY
 from volery.vehicle.compiled import inner_kernel
-from volery.vehicle.rigid import four, matrix_of, three, turned
+from volery.vehicle.rotation_math import four, matrix_of, three, turned
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

@@ -17,8 +17,8 @@ from typing import Any
 
 from rosbags.interfaces import Nodetype
 
-from volery.core.counting import counted
 from volery.core.errors import GraphError
+from volery.core.plurals import counted
 
 INTEGER_RANGES = {
     "byte": (-(2**7), 2**8 - 1),  # octet in ROS 2, a signed number in ROS 1

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
-from volery.core.counting import counted
 from volery.core.errors import GraphError
+from volery.core.plurals import counted
 from volery.graph.codecs.definition_files import INTEGER_RANGES, NUMBERS
 from volery.graph.codecs.definition_store import EMPTY_MEMBER
 from volery.graph.codecs.zero import DTYPES, value_maker

@@ -6,7 +6,7 @@ import errno
 
 from volery.mavlink.codec import Parser
 from volery.mavlink.framing import Framer
-from volery.mavlink.links.intake import IntakeAccount
+from volery.mavlink.links.rate_limits import IntakeAccount
 from volery.mavlink.links.signing import Signing
 from volery.mavlink.links.vehicle_registry import Fleet
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from volery.core import rotations
-from volery.scenario import things as schema
+from volery.scenario import actors as schema
 from volery.scenario.schema import Scenario
+from volery.world.actors import SHAPES, MovingThings, Thing
+from volery.world.actors.motions import CircleMotion, GivenMotion, HeightAt, Motion, WaypointMotion
 from volery.world.terrain import Terrain
-from volery.world.things import SHAPES, MovingThings, Thing
-from volery.world.things.motions import CircleMotion, GivenMotion, HeightAt, Motion, WaypointMotion
 
 _TURN_M = {"person": 0.3, "car": 2.0, "bird": 2.0}
 """How far ahead of a waypoint, and behind it, a thing turns: a modelling choice."""

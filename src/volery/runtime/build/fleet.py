@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.control.gains import ControlRates
-from volery.core.counting import counted
 from volery.core.errors import CommandError, DataFileError, ScenarioError
+from volery.core.plurals import counted
 from volery.runtime.build.placement import Start, place_uavs
 from volery.runtime.build.plant import plant_of_type
 from volery.runtime.build.worlds import build_weather

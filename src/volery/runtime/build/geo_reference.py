@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from volery.core.geodesy import LocalFrame
 from volery.scenario.navigation import DeniedBox, DeniedPolygon
 from volery.scenario.schema import World
-from volery.sensors.denial import Denial, Prism
+from volery.sensors.gnss_denial import Denial, Prism
 from volery.world.magnetic_field import angles_of_field, field_enu, field_of_angles
 
 

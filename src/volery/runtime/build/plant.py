@@ -7,7 +7,7 @@ from volery.scenario.schema import Scenario
 from volery.vehicle.airframe import Airframe
 from volery.vehicle.identified import load_identified
 from volery.vehicle.kinematic import Kinematic
-from volery.vehicle.plants import Plant, RigidBody
+from volery.vehicle.plant_types import Plant, RigidBody
 
 
 def plant_of_type(scenario: Scenario, type_name: str, airframe: Airframe) -> Plant:

@@ -6,9 +6,9 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING
 
-from volery.core.counting import counted
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
 from volery.core.geodesy import LocalFrame
+from volery.core.plurals import counted
 from volery.runtime.build.actors import build_things
 from volery.runtime.build.geometry import Geometry
 from volery.runtime.build.grid_map import starting_blocks

@@ -1,8 +1,8 @@
 """What clients do, told on `/volery/log` and kept for logs that are begun later.
 
 Everything that comes from outside is taken by the simulation's thread between two ticks, or in a
-meeting with lock-step partners. Each command is noted there with its moment (`engine.commands`), at
-which `runtime.replay.command_replay` takes it again.
+meeting with lock-step partners. Each command is noted there with its moment
+(`engine.command_queue`), at which `runtime.replay.command_replay` takes it again.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from volery.core.errors import GraphError
-from volery.engine.commands import Moment
+from volery.engine.command_queue import Moment
 from volery.engine.engine import Engine
 from volery.graph import command_records as records
 from volery.graph.graph import Graph

@@ -15,9 +15,9 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
-from volery.bridges.logs.flights import Command, RecordedFlight
+from volery.bridges.logs.recorded_flight import Command, RecordedFlight
 from volery.core.errors import CommandError, GraphError
-from volery.engine.commands import Moment
+from volery.engine.command_queue import Moment
 from volery.engine.engine import Engine
 from volery.engine.pacing import Pacer
 from volery.graph.graph import Graph, Publisher

@@ -18,12 +18,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from volery.bridges.logs.flights import Origin, origin_of
 from volery.bridges.logs.playback import Playback
+from volery.bridges.logs.recorded_flight import Origin, origin_of
 from volery.core.clock import NS_PER_S, ns_from_s, s_from_ns
 from volery.core.errors import CommandError, RecordingError, VoleryError
 from volery.engine.call_budget import CallBudget
-from volery.engine.commands import Inbox
+from volery.engine.command_queue import Inbox
 from volery.graph.graph import Graph
 from volery.graph.messages import Clock, time_from_ns
 from volery.graph.session import Gateway
@@ -34,8 +34,8 @@ from volery.runtime.replay.scenario_record import scenario_of
 from volery.runtime.services.player import PlayerServices, State
 from volery.runtime.services.worlds import OnLoad
 from volery.scenario import library
+from volery.scenario.catalog import Shelf
 from volery.scenario.schema import Scenario
-from volery.scenario.shelf import Shelf
 
 _SLICE_S = 0.004
 """Wall time between two looks at what is due, while it plays."""

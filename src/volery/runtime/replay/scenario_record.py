@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from volery.bridges.logs.flights import ORIGIN_TOPIC, Origin
+from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, Origin
 from volery.core.errors import ScenarioError
 from volery.graph.graph import Graph
 from volery.graph.messages import String

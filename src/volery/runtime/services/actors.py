@@ -16,8 +16,8 @@ from volery.graph.messages import (
     Vector3,
     header,
 )
-from volery.world.things import MovingThings
-from volery.world.things.motions import GivenMotion
+from volery.world.actors import MovingThings
+from volery.world.actors.motions import GivenMotion
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation

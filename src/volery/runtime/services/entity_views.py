@@ -14,8 +14,8 @@ from volery.runtime.services.filters import Category
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.schema import UavType
 from volery.vehicle.body_shape import body_shape
+from volery.world.actors import MovingThings, Thing
 from volery.world.scene_content import BodyShape
-from volery.world.things import MovingThings, Thing
 
 Array = NDArray[np.float64]
 

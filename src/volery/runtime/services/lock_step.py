@@ -14,7 +14,7 @@ from typing import Any
 
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
-from volery.engine.partners import Partner
+from volery.engine.lock_step import Partner
 from volery.graph.graph import Graph
 from volery.graph.messages import Clock, Published, message_type, time_from_ns
 

@@ -23,7 +23,7 @@ from volery.runtime.services.worlds import OnLoad, offer_worlds
 
 if TYPE_CHECKING:
     from volery.runtime.replay.log_player import Player
-    from volery.scenario.shelf import Shelf
+    from volery.scenario.catalog import Shelf
 
 __all__ = ["PlayerServices", "State"]
 

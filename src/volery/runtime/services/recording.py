@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from volery.bridges.logs.bag import Log, open_log
+from volery.bridges.logs.log_writer import Log, open_log
 from volery.bridges.logs.recorded_topics import recorded_topics
-from volery.bridges.logs.recordings_room import room_left
+from volery.bridges.logs.recordings_quota import room_left
 from volery.core.errors import RecordingError
 from volery.graph.graph import Graph, Subscription
 from volery.graph.messages import Published

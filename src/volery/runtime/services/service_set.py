@@ -19,7 +19,7 @@ from volery.runtime.services.single_steps import offer_steps
 from volery.runtime.services.snapshot_services import KeptStates
 from volery.runtime.services.spawning import Spawning
 from volery.runtime.services.worlds import OnLoad, offer_worlds
-from volery.scenario.shelf import Shelf
+from volery.scenario.catalog import Shelf
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation

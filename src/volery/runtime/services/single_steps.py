@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from volery.core.counting import counted
 from volery.core.errors import CommandError
-from volery.engine.stepping import StepRequest
+from volery.core.plurals import counted
+from volery.engine.single_steps import StepRequest
 from volery.graph.actions import Goal
 from volery.runtime.services.results import (
     Code,

@@ -20,10 +20,10 @@ from volery.runtime.services.results import (
 from volery.runtime.services.scenario_loading import offer_choices
 from volery.runtime.services.spawning import resource
 from volery.scenario import library
+from volery.scenario.catalog import Shelf
 from volery.scenario.changes import LogRequest, WorldRequest
 from volery.scenario.load import load_scenario
 from volery.scenario.schema import Scenario
-from volery.scenario.shelf import Shelf
 
 _SRV = "simulation_interfaces/srv"
 _UNSUPPORTED_FORMAT = 101

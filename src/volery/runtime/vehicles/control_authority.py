@@ -2,7 +2,7 @@
 
 This is an agreement between people, not part of what is simulated: a reset or a snapshot leaves it
 as it is. Programs of doors, and nodes of the scenario, command UAVs without asking here; clients of
-the page's server are held to it (`volery.server.gate`).
+the page's server are held to it (`volery.server.access_policy`).
 """
 
 from __future__ import annotations

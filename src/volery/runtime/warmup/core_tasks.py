@@ -26,7 +26,7 @@ from volery.sensors.sonar import SonarBank, load_sonar_model
 from volery.vehicle.airframe import load_airframe
 from volery.vehicle.body_shape import body_shape
 from volery.vehicle.kinematic import Kinematic
-from volery.vehicle.plants import Plant, RigidBody
+from volery.vehicle.plant_types import Plant, RigidBody
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 from volery.world.weather import Particles, Weather

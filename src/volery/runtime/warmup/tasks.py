@@ -10,7 +10,7 @@ from pathlib import Path
 
 from volery.core.compiled import cache_dir
 from volery.core.errors import NodeError
-from volery.core.quick_typing import remembered_types
+from volery.core.typing_cache import remembered_types
 
 Task = Callable[[], None]
 """A function of a module, without arguments."""

@@ -1,4 +1,4 @@
-"""Pictures of the scenarios that ship, `NAME.jpg`; `volery.server.draw_cards` makes them."""
+"""Pictures of the scenarios that ship, `NAME.jpg`; `volery.server.card_renderer` makes them."""
 
 from pathlib import Path
 

@@ -12,11 +12,11 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from volery.scenario import library
-from volery.scenario.shelf import Shelf
-from volery.server.bodies import check_pilot, save_body
+from volery.scenario.catalog import Shelf
 from volery.server.bounded_process import BoundedError, run_bounded
 from volery.server.replies import RefusedError
-from volery.server.site import Site
+from volery.server.request_bodies import check_pilot, save_body
+from volery.server.server_state import Site
 from volery.server.uploads.kinds import BOUNDS, MOST_UPLOADS, kind_of_upload, suffix_of
 
 _MOST_CHARACTERS = 30

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.counting import counted
 from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
+from volery.core.plurals import counted
 from volery.world.city.buildings import Building, solids_of, stand
 from volery.world.city.furniture import FurnitureRule, lamp_solids, place_lamps, place_trees
 from volery.world.city.heights import HeightRule

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.counting import counted
 from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
+from volery.core.plurals import counted
 from volery.world.city.geojson import Feature, Ring, read_features
 from volery.world.city.heights import Height, HeightRule, height_of
 

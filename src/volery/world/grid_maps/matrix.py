@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core.counting import counted
 from volery.core.errors import DataFileError
+from volery.core.plurals import counted
 from volery.world.grid_maps.grid_map import MOST_CELLS
 
 _ZERO, _ONE, _COMMA = (ord(character) for character in "01,")

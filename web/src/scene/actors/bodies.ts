@@ -1,4 +1,4 @@
-// Bodies of actors, after `volery.world.things.shapes`: the origin of people and cars is on the
+// Bodies of actors, after `volery.world.actors.shapes`: the origin of people and cars is on the
 // ground below their middle, that of a bird in its middle; x is forward. Metres.
 
 import { BufferGeometry, SphereGeometry } from "three";

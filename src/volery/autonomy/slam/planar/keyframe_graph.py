@@ -15,7 +15,7 @@ from volery.autonomy.slam.planar.poses import between, compose, grown, turned
 from volery.autonomy.slam.planar.settings import PlanarSettings
 from volery.autonomy.slam.planar.tracker import Kept
 from volery.autonomy.slam.pose_graph import load_gtsam
-from volery.core.kept import keep, put_back
+from volery.core.saved_state import keep, put_back
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from typing import NamedTuple
 from cyclonedds.builtin import BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
 from cyclonedds.domain import DomainParticipant
 
-from volery.bridges.ros2.dds.announced import Announced, announcements
-from volery.bridges.ros2.dds.counterparts import CLIENT, why_foreign
-from volery.bridges.ros2.dds.listening import Ear
+from volery.bridges.ros2.dds.endpoint_info import Announced, announcements
+from volery.bridges.ros2.dds.reader_thread import Ear
+from volery.bridges.ros2.dds.service_peers import CLIENT, why_foreign
 from volery.bridges.ros2.middleware import Profile, RemotePublisher
 from volery.bridges.ros2.names import ros_type, service_of, topic_of
 

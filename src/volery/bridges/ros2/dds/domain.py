@@ -13,7 +13,7 @@ from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.qos import Policy, Qos
 
 from volery.bridges.ros2.dds import library
-from volery.bridges.ros2.dds.confining import confine
+from volery.bridges.ros2.dds.loopback_sockets import confine
 from volery.core.errors import BridgeError
 
 _ENCLAVE = b"enclave=/;"

@@ -17,14 +17,13 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-from volery.bridges.ros2.complaints import Complaints
 from volery.bridges.ros2.dds import library
-from volery.bridges.ros2.dds.announced import matched_reader, matched_writer
-from volery.bridges.ros2.dds.counterparts import CLIENT, SERVER, Counterparts
+from volery.bridges.ros2.dds.discovery_info import Record
+from volery.bridges.ros2.dds.endpoint_info import matched_reader, matched_writer
 from volery.bridges.ros2.dds.idl_types import message_struct, request_struct
-from volery.bridges.ros2.dds.listening import Ear
 from volery.bridges.ros2.dds.qos import qos_of
-from volery.bridges.ros2.dds.records import Record
+from volery.bridges.ros2.dds.reader_thread import Ear
+from volery.bridges.ros2.dds.service_peers import CLIENT, SERVER, Counterparts
 from volery.bridges.ros2.middleware import (
     ServiceSpec,
     TakeMessage,
@@ -34,6 +33,7 @@ from volery.bridges.ros2.middleware import (
 from volery.bridges.ros2.names import NodeName, dds_reply_topic, dds_request_topic, dds_topic
 from volery.bridges.ros2.profiles import SERVICES
 from volery.bridges.ros2.type_hashes import message_hash
+from volery.bridges.ros2.warning_filter import Complaints
 
 _HEADER = struct.Struct("<Qq")
 """rmw_cyclonedds' cdds_request_header_t: whose question, and its number."""

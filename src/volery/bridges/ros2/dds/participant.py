@@ -7,10 +7,10 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 
 from volery.bridges.ros2.dds.discovery import Discovery
+from volery.bridges.ros2.dds.discovery_info import Record
 from volery.bridges.ros2.dds.domain import join_domain, leave_domain
 from volery.bridges.ros2.dds.endpoints import DdsCaller, DdsReader, DdsServer, DdsWriter, Place
-from volery.bridges.ros2.dds.listening import Ear
-from volery.bridges.ros2.dds.records import Record
+from volery.bridges.ros2.dds.reader_thread import Ear
 from volery.bridges.ros2.middleware import (
     RemotePublisher,
     ServiceSpec,

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from volery.autonomy.perception.static_transforms import FixedJoints, Mount
-from volery.bridges.logs.flights import ORIGIN_TOPIC, Origin
+from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, Origin
 from volery.core import rotations
 from volery.core.errors import RecordingError, ScenarioError
 from volery.runtime.replay.scenario_record import scenario_of

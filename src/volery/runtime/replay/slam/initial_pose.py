@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import closing
 
-from volery.bridges.logs.flights import ORIGIN_TOPIC, Origin
+from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, Origin
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.errors import VoleryError

@@ -1,0 +1,124 @@
+"""Writes a log that a killed run left as a whole file with an index."""
+
+from __future__ import annotations
+
+import io
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from volery.bridges.logs.bag_writer import CHUNK_BYTES, bag_writer
+from volery.bridges.logs.disk_file import DiskFile
+from volery.bridges.logs.file_lock import locked_for_reading, locked_for_replacing
+from volery.bridges.logs.log_writer import LIBRARY
+from volery.bridges.logs.records import LogRecord, LogTopic, LogWalk, log_format
+from volery.core.errors import RecordingError
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """What was saved, and where to."""
+
+    path: Path
+    messages: int
+    end_ns: int
+    trouble: str
+    """What was wrong with the original; empty if nothing was."""
+
+
+def recovered_name(path: Path) -> Path:
+    """Where `recover` writes by default: `flight.mcap` becomes `flight.recovered.mcap`."""
+    return path.with_name(f"{path.stem}.recovered{path.suffix}")
+
+
+def recover(path: str | Path, out: str | Path | None = None) -> Recovery:
+    """Copy every readable message into a new log of the same format.
+
+    Raises
+    ------
+    RecordingError
+        The file is no log, holds no readable message or is being written, or the new one exists
+        already or cannot be written; then nothing is left of it.
+
+    """
+    path = Path(path)
+    kind = log_format(path)
+    out = recovered_name(path) if out is None else Path(out)
+    if out.exists():
+        raise RecordingError(f"{out}: exists already; choose another name")
+    with locked_for_reading(path):
+        walk = LogWalk(path)
+        records = iter(walk)
+        first = next(records, None)
+        if first is None:
+            trouble = f" ({walk.trouble})" if walk.trouble else ""
+            raise RecordingError(f"{path}: holds no readable message{trouble}; nothing is written")
+        count, end_ns = _write(kind, itertools.chain([first], records), out)
+    return Recovery(out, count, end_ns, walk.trouble)
+
+
+def _write(kind: str, records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
+    """Write a whole log under another name first, so that `out` is whole or not there."""
+    made = out.with_name(f".{out.stem}.part{out.suffix}")
+    try:
+        with locked_for_replacing(made):
+            made.unlink(missing_ok=True)
+        try:
+            found = (_to_mcap if kind == "mcap" else _to_bag)(records, made)
+            made.rename(out)
+        finally:
+            made.unlink(missing_ok=True)
+    except OSError as error:
+        raise RecordingError(
+            f"{out}: cannot write the log: {error.strerror}; nothing of it is left"
+        ) from None
+    return found
+
+
+def _to_mcap(records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
+    from mcap.writer import CompressionType, Writer
+
+    file = DiskFile(out)
+    try:
+        stream = cast("io.BufferedWriter", file)
+        writer: Any = Writer(stream, chunk_size=CHUNK_BYTES, compression=CompressionType.LZ4)
+        writer.start(profile="ros2", library=LIBRARY)
+        schemas: dict[tuple[str, str], int] = {}
+        channels: dict[LogTopic, int] = {}
+        count = end_ns = 0
+        for topic, time_ns, data, sequence in records:
+            if topic not in channels:
+                key = (topic.msgtype, topic.definition)
+                if key not in schemas:
+                    schemas[key] = writer.register_schema(
+                        topic.msgtype, topic.schema_encoding, topic.definition.encode()
+                    )
+                channels[topic] = writer.register_channel(
+                    topic.topic, topic.encoding, schemas[key], {}
+                )
+            writer.add_message(channels[topic], time_ns, data, time_ns, sequence)
+            count, end_ns = count + 1, max(end_ns, time_ns)
+            if file.pending:
+                file.commit()
+        writer.finish()
+        file.close()
+    finally:
+        file.discard()
+    return count, end_ns
+
+
+def _to_bag(records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
+    writer = bag_writer(out)
+    connections: dict[LogTopic, Any] = {}
+    count = end_ns = 0
+    with writer:
+        for topic, time_ns, data, _ in records:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(
+                    topic.topic, topic.msgtype, msgdef=topic.definition, md5sum=topic.digest
+                )
+            writer.write(connections[topic], time_ns, data)
+            count, end_ns = count + 1, max(end_ns, time_ns)
+    return count, end_ns

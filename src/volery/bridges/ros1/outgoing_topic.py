@@ -1,0 +1,147 @@
+"""Topics of the graph on their way to ROS 1 subscribers."""
+
+from __future__ import annotations
+
+import logging
+from collections import OrderedDict
+from collections.abc import Iterable
+from typing import Any
+
+from volery.bridges.ros1.node import Ros1Node
+from volery.bridges.ros1.writer_thread import Pump, Reader
+from volery.core.errors import GraphError
+from volery.graph.codecs.ros1 import ros1_codec
+from volery.graph.messages import Published
+from volery.graph.session import Session
+from volery.graph.subscription_queue import SubscriptionQueue
+
+_DEPTH = 1000
+"""One tick may publish once for each UAV, as it does on `/tf`."""
+_OWN_KEPT = 1000
+
+_log = logging.getLogger(__name__)
+
+
+class Outlet:
+    """One topic: its messages are taken and turned into bytes only while somebody subscribes.
+
+    `serve` runs in the pump's thread; all else may be called by any.
+    """
+
+    def __init__(
+        self, node: Ros1Node, session: Session, pump: Pump, info: tuple[str, str], *, latched: bool
+    ) -> None:
+        self.topic, self.msgtype = info
+        self.latched = latched
+        self.wake = pump.waker(self)
+        self._session = session
+        self._pump = pump
+        self._encode = ros1_codec().encode
+        self._mailbox: SubscriptionQueue | None = None
+        self._connections: list[Any] = []
+        self._readers: dict[Any, Reader] = {}
+        self._own: OrderedDict[int, Any] = OrderedDict()
+        self._sequence = 0
+        self._dropped = 0
+        self._complained = False
+        self._publisher = node.outlet(self.topic, self.msgtype, self.wake, latched=latched)
+        self.wake()
+
+    @property
+    def is_current(self) -> bool:
+        """Whether it listens to the graph just while somebody subscribes."""
+        return bool(self._publisher.get_num_connections()) == self.holds
+
+    @property
+    def holds(self) -> bool:
+        """Whether it listens to the graph."""
+        return self._mailbox is not None
+
+    @property
+    def dropped(self) -> int:
+        """Messages that subscribers have missed because they were slow."""
+        return self._dropped + sum(reader.dropped for reader in tuple(self._readers.values()))
+
+    def leave_out(self, message: Any) -> None:
+        """Do not send a message that came from ROS 1 itself."""
+        if self._mailbox is not None:
+            self._own[id(message)] = message
+            if len(self._own) > _OWN_KEPT:
+                self._own.popitem(last=False)
+
+    def serve(self) -> None:
+        """Send what waits; begin or end to listen to the graph as subscribers come and go."""
+        newcomers = self._meet()
+        if not self._readers:
+            self._let_go()
+            return
+        if self._mailbox is None:  # a new mailbox holds what was latched, for all of them
+            self._mailbox = self._session.subscribe(
+                self.topic, self.msgtype, depth=_DEPTH, wake=self.wake
+            )
+            newcomers = []
+        kept = self._kept() if self.latched and newcomers else []
+        fresh = self._mailbox.take()
+        known = {id(published) for published in fresh}
+        for published in kept:
+            if id(published) not in known:
+                self._send(published, newcomers)
+        for published in fresh:
+            if not self._own or self._own.pop(id(published.message), None) is None:
+                self._send(published, self._readers.values())
+
+    def close(self) -> None:
+        """Publish no more, once the pump has ended."""
+        self._let_go()
+        self._publisher.unregister()
+        for reader in self._readers.values():
+            reader.close()
+
+    def _meet(self) -> list[Reader]:
+        """Bring the readers up to date with rospy's connections; those that are new."""
+        connections = self._publisher.impl.connections  # rospy replaces the list at each change
+        if connections is self._connections:
+            return []
+        self._connections = connections
+        for gone in [known for known in self._readers if known not in connections]:
+            reader = self._readers.pop(gone)
+            reader.close()
+            self._dropped += reader.dropped
+        newcomers = []
+        for connection in connections:
+            if connection not in self._readers:
+                try:
+                    reader = self._pump.reader(connection)
+                except (OSError, TypeError):  # it has closed already
+                    continue
+                self._readers[connection] = reader
+                newcomers.append(reader)
+        return newcomers
+
+    def _kept(self) -> list[Published]:
+        """What latched publishers of the graph have sent last."""
+        glance = self._session.subscribe(self.topic, self.msgtype, depth=_DEPTH, wake=_nothing)
+        self._session.unsubscribe(glance)
+        return glance.take()
+
+    def _send(self, published: Published, readers: Iterable[Reader]) -> None:
+        try:
+            data = self._encode(published.message, self.msgtype, self._sequence)
+        except GraphError as error:
+            if not self._complained:
+                self._complained = True
+                _log.warning("ROS 1 topic %s: %s", self.topic, error)
+            return
+        self._sequence += 1
+        for reader in tuple(readers):
+            reader.send(data)
+
+    def _let_go(self) -> None:
+        if self._mailbox is not None:
+            self._session.unsubscribe(self._mailbox)
+            self._mailbox = None
+            self._own.clear()
+
+
+def _nothing() -> None:
+    """Nobody needs to be woken."""

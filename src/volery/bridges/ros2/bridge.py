@@ -1,0 +1,202 @@
+"""The door to native ROS 2: the simulation and its nodes are ordinary nodes of a ROS 2 graph.
+
+    with Doors(simulation.gateway) as doors:
+        doors.open(Ros2Door())
+        simulation.run(speed=1.0)
+
+Topics that the graph publishes appear in ROS 2 under the same names; those that it listens to are
+taken from ROS 2; its services, actions and parameters can be used from there, and ROS 2 services
+named to the door from the graph. No ROS 2 needs to be installed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from volery.bridges.ros2.actions import ActionServers
+from volery.bridges.ros2.environment import Ros2Terms, domain_of, join_ros2
+from volery.bridges.ros2.middleware import Participant
+from volery.bridges.ros2.names import NodeName, check_name
+from volery.bridges.ros2.parameters import ParameterServices
+from volery.bridges.ros2.services import Services
+from volery.bridges.ros2.topics import Topics
+from volery.bridges.ros2.writer_thread import Worker
+from volery.bridges.shared_names import COMMANDS, Sharing
+from volery.core.errors import BridgeError, GraphError
+from volery.graph.messages import message_type
+from volery.graph.service_reply import ServiceReply
+from volery.graph.session import Gateway, Session
+
+_SURVEY_S = 0.25
+_BREATH_S = 0.02
+"""Between two surveys, however many others come and go."""
+NODE = "/volery"
+_SET = "rosapi_msgs/srv/SetParam"
+
+_taken: set[tuple[str, int, str]] = set()
+"""Middlewares, domains and node names of the open doors of this process: two of one would take
+every command twice."""
+_places = threading.Lock()
+
+_log = logging.getLogger(__name__)
+
+
+class Ros2Door:
+    """The whole simulation in a ROS 2 graph; a `graph.bridge_kind.Bridge`.
+
+    Parameters
+    ----------
+    terms
+        Middleware, domain and interfaces.
+    node_name
+        Full name of the node that stands for the simulation.
+    topics
+        Patterns of the names of topics and services that are shared, as `fnmatch` has them.
+    commands
+        Patterns of topics that ROS 2 may publish beside publishers of the graph.
+    reliable
+        Patterns of topics that are published reliably though they carry what sensors stream.
+    remote_services
+        ROS 2 services that the graph can call, and their types (`std_srvs/srv/Trigger`).
+
+    """
+
+    def __init__(
+        self,
+        terms: Ros2Terms | None = None,
+        node_name: str = NODE,
+        *,
+        topics: Sequence[str] = ("*",),
+        commands: Sequence[str] = COMMANDS,
+        reliable: Sequence[str] = (),
+        remote_services: Mapping[str, str] | None = None,
+    ) -> None:
+        self.name = f"ROS 2 node {node_name}"
+        self._node_name = node_name
+        self._terms = terms or Ros2Terms()
+        self._sharing = Sharing(tuple(topics), tuple(commands))
+        self._reliable = tuple(reliable)
+        self._remote = dict(remote_services or {})
+        self._shared: _Shared | None = None
+        self._steward: threading.Thread | None = None
+        self._place: tuple[str, int, str] | None = None
+        self._stopping = False
+        self._news = threading.Event()
+
+    @property
+    def dropped(self) -> dict[str, int]:
+        """Messages that came too fast to be sent, by topic, where there are any."""
+        return {} if self._shared is None else self._shared.topics.dropped
+
+    async def start(self, gateway: Gateway) -> None:
+        """Join the ROS 2 graph. `BridgeError` where that is not possible."""
+        await asyncio.get_running_loop().run_in_executor(None, self._begin, gateway)
+
+    async def stop(self) -> None:
+        """Leave it with everything."""
+        await asyncio.get_running_loop().run_in_executor(None, self._end)
+
+    def _begin(self, gateway: Gateway) -> None:
+        try:
+            check_name(self._node_name)
+        except GraphError as error:
+            raise BridgeError(str(error)) from None
+        place = (self._terms.middleware, domain_of(self._terms.domain_id), self._node_name)
+        with _places:
+            if place in _taken:
+                raise BridgeError(
+                    f"ROS 2 domain {place[1]} is joined already over {place[0]}, as {place[2]}"
+                )
+            participant = join_ros2(self._terms)
+            _taken.add(place)
+        self._place = place
+        self.name = f"ROS 2 node {self._node_name}, {participant.where}"
+        node = NodeName.of(self._node_name)
+        session = gateway.open(self.name)
+        shared = _Shared(participant, session, self._sharing, self._reliable, node)
+        self._shared = shared
+        shared.services.take_remote(self._remote)
+        participant.when_changed(self._news.set)
+        shared.survey()
+        self._steward = threading.Thread(target=self._watch, name="volery-ros2-steward")
+        self._steward.daemon = True
+        self._steward.start()
+
+    def _end(self) -> None:
+        self._stopping = True
+        self._news.set()
+        if self._steward is not None:
+            self._steward.join()
+        if self._shared is not None:
+            self._shared.close()
+            self._shared = None
+        if self._place is not None:
+            _taken.discard(self._place)
+            self._place = None
+
+    def _watch(self) -> None:
+        """Share what appears, take back what goes, here and there."""
+        shared, breath = self._shared, threading.Event()
+        while shared is not None and not self._stopping:
+            try:
+                shared.survey()
+            except Exception as error:  # a topic that breaks must not end the door
+                _log.warning("%s: %s: %s", self.name, type(error).__name__, error)
+            breath.wait(_BREATH_S)
+            self._news.wait(_SURVEY_S)
+            self._news.clear()
+
+
+class _Shared:
+    """All that the door shares."""
+
+    def __init__(
+        self,
+        participant: Participant,
+        session: Session,
+        sharing: Sharing,
+        reliable: tuple[str, ...],
+        node: NodeName,
+    ) -> None:
+        self._participant = participant
+        self._session = session
+        self._worker = Worker()
+        self._clerk = Worker("volery-ros2-services")  # answers may wait for who asked to be found
+        participant.add_node(node)
+        self.topics = Topics(participant, session, sharing, reliable, node, self._worker)
+        self.services = Services(participant, session, sharing, node, self._clerk)
+        self._actions = ActionServers(participant, session, node, self._clerk)
+        graph = session.graph
+        self._parameters = ParameterServices(
+            participant, graph.parameters, self._set, node, self._clerk, graph.now_ns
+        )
+
+    def survey(self) -> None:
+        """Bring everything up to date."""
+        self.topics.survey()
+        self.services.survey()
+        self._actions.survey()
+        self._parameters.survey()
+        self._participant.announce()
+
+    def _set(self, node: str, name: str, value: Any, done: Callable[[str], None]) -> None:
+        """Set a parameter as clients of all doors do, so that recorded flights repeat it."""
+        request = message_type(f"{_SET}_Request")(f"{node}:{name}", json.dumps(value))
+        reply = ServiceReply(lambda response: done(response.reason), lambda error: done(str(error)))
+        self._session.call("/rosapi/set_param", request, reply)
+
+    def close(self) -> None:
+        """Take everything back."""
+        self._worker.close()
+        self._clerk.close()
+        self.topics.close()
+        self.services.close()
+        self._actions.close()
+        self._parameters.close()
+        self._session.close()
+        self._participant.close()

@@ -1,0 +1,66 @@
+"""Which endpoints of others speak of services as rmw_cyclonedds does, and why the rest does not.
+
+Both that and rmw_fastrtps call a service's topics the same, but rmw_cyclonedds begins each request
+and response with who asked and a number. rmw_fastrtps tells both in the parameters of RTPS samples
+(PID_RELATED_SAMPLE_IDENTITY), which Cyclone DDS neither hands over nor lets set, so that a
+stranger's bytes would be misread. Endpoints of rmw_cyclonedds have `clientid=` or `serviceid=` in
+their user data. The first two bytes of a GUID name the vendor of the DDS (RTPS 2.5, 9.3.1.5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from volery.bridges.ros2.dds.endpoint_info import Announced
+
+CLIENT, SERVER = "clientid", "serviceid"
+_FAST_DDS = b"\x01\x0f"
+_VENDORS = {b"\x01\x10": "Cyclone DDS", b"\x01\x01": "RTI Connext DDS", b"\x01\x03": "OpenDDS"}
+
+
+def why_foreign(word: str, key: bytes) -> str:
+    """Returns why an endpoint without `word` in its user data is not understood.
+
+    key: its GUID.
+    """
+    if key.startswith(_FAST_DDS):
+        return (
+            "speaks as rmw_fastrtps does, not as rmw_cyclonedds; start it with "
+            "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp"
+        )
+    vendor = _VENDORS.get(key[:2], f"a DDS of vendor {key[:2].hex('.')}")
+    return (
+        f"is of {vendor} and lacks '{word}=...;' in its user data, by which endpoints of "
+        "rmw_cyclonedds are known: add it to a plain DDS program whose requests and responses "
+        "begin as those of rmw_cyclonedds do"
+    )
+
+
+_MOST_KNOWN = 10_000
+
+
+class Counterparts:
+    """The matched endpoints of one side, by their instance handles.
+
+    look_up: what an endpoint tells of itself; None once it has left.
+    """
+
+    def __init__(self, word: str, look_up: Callable[[int], Announced | None]) -> None:
+        self._word = word
+        self._mark = f"{word}=".encode()
+        self._look_up = look_up
+        self._known: dict[int, str] = {}
+
+    def trouble(self, handle: int) -> str:
+        """Why an endpoint is not understood; empty if it is, and for one that has left already."""
+        known = self._known.get(handle)
+        if known is None:
+            found = self._look_up(handle)
+            if found is None or found.terms is None:
+                return ""
+            if len(self._known) >= _MOST_KNOWN:
+                self._known.clear()
+            is_marked = self._mark in found.terms.user_data
+            known = "" if is_marked else why_foreign(self._word, found.key)
+            self._known[handle] = known
+        return known

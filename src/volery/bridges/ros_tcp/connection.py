@@ -1,0 +1,252 @@
+"""A connected socket between a frame parser and an outbox, in one event loop.
+
+Bytes are received where they stay and sent from where they are: asyncio's own transports would copy
+each message twice.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+from volery.bridges.ros_tcp.wire import Bytes, Frame, FrameParser
+from volery.core.errors import BridgeError
+from volery.core.network_access import tend
+from volery.core.preamble import Preamble
+
+_BATCHES_A_TURN = 16
+"""After so many others have their turn."""
+_FRAMES_A_TURN = 32
+"""Who sends more at once is read from in small bites, so that a flood delays nobody else."""
+_BITE_BYTES = 2048
+_LARGEST_BITE_BYTES = 256 << 10
+"""One read copies as long as the peer refills the socket: of 16 MB it took a tenth of a second."""
+_PREAMBLE_BYTES = 16
+_FAREWELL_S = 1.0
+
+
+class Outgoing(Protocol):
+    """Frames that wait to be sent."""
+
+    @property
+    def crowded(self) -> bool:
+        """Whether so much waits that nothing should be done to cause more."""
+
+    def gather(self) -> list[Bytes]:
+        """Parts of whole frames to send next, a bounded number; none if nothing waits."""
+
+
+class ServerEnd(NamedTuple):
+    """What a server wants to know of the first bytes of a client."""
+
+    preamble: Preamble
+    prove: Callable[[], None]
+    """Called when a valid frame has come."""
+    note_stranger: Callable[[str], None]
+    """Called with the protocol of a client that speaks another one."""
+
+
+class Throttle(Protocol):
+    """Tells when to read on from a peer that costs too much; `graph.read_budget.Reading`."""
+
+    def begin(self) -> None:
+        """Decoding begins."""
+
+    def end(self, frames: int, size: int) -> float:
+        """Decoding is over. Returns what it has cost, in s."""
+
+    def pause_s(self) -> float:
+        """Returns for how long not to read; 0: read on."""
+
+
+class Pipe:
+    """Reads frames, hands them to `take`, and sends what the outbox gathers.
+
+    broken: told why nothing that follows can be read; what it puts into the outbox is still sent.
+    closed: told once why the connection has ended.
+    server_end: what a server checks of a new client; None: we are the client.
+    throttle: None where the peer may send as much as it likes.
+    """
+
+    def __init__(
+        self,
+        sock: socket.socket,
+        parser: FrameParser,
+        outbox: Outgoing,
+        take: Callable[[Frame], None],
+        broken: Callable[[str], None],
+        closed: Callable[[str], None],
+        server_end: ServerEnd | None = None,
+        throttle: Throttle | None = None,
+    ) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._sock = sock
+        self.parser = parser
+        self._outbox = outbox
+        self._take = take
+        self._broken = broken
+        self._closed = closed
+        self._unproven = server_end
+        self._throttle = throttle
+        self._paused: asyncio.TimerHandle | None = None
+        self._unsent: list[Bytes] = []
+        self._blocked = False
+        self._bite = _BITE_BYTES
+        self._reading = True
+        self._ending = False
+        self._open = True
+        self.last_received_s = self.last_sent_s = self._loop.time()
+        """Instants of the loop's clock."""
+        sock.setblocking(False)
+        tend(sock)
+        self._loop.add_reader(sock, self._readable)
+
+    def flush(self) -> None:
+        """Send what waits as far as the peer takes it."""
+        if self._open and not self._blocked:
+            self._write()
+
+    def finish(self) -> None:
+        """Hear no more, send what waits, then close."""
+        if self._open and not self._ending:
+            self._ending = True
+            self._loop.call_later(_FAREWELL_S, self.close, "it broke the protocol")
+            self.flush()
+
+    def close(self, reason: str) -> None:
+        """End the connection now; a second time nothing happens."""
+        if not self._open:
+            return
+        self._open = False
+        if self._paused is not None:
+            self._paused.cancel()
+        self._loop.remove_reader(self._sock)
+        self._loop.remove_writer(self._sock)
+        self._sock.close()
+        self._unsent.clear()
+        self.parser.end()
+        self._closed(reason)
+
+    def _readable(self) -> None:
+        space = self.parser.space()
+        try:
+            count = self._sock.recv_into(space[: self._bite])
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError as error:
+            self.close(str(error.strerror))
+            return
+        if not count:
+            self.close("it has left")
+            return
+        self.last_received_s = self._loop.time()
+        if self._ending:  # what is not read would make the system withdraw our last words
+            return
+        if self._is_stranger(space[:count]):
+            return
+        try:
+            frames = self.parser.written(count)
+            self._prove(bool(frames))
+            flood = len(frames) > _FRAMES_A_TURN
+            self._bite = _BITE_BYTES if flood else min(2 * self._bite, _LARGEST_BITE_BYTES)
+            self._take_all(frames, count)
+        except BridgeError as error:
+            self._broken(str(error))
+            self.finish()
+        if self._open and not self._ending and self._must_pause():
+            self._reading = False
+            self._loop.remove_reader(self._sock)
+
+    def _is_stranger(self, data: memoryview) -> bool:
+        """Ends a connection that speaks another protocol; whether it did.
+
+        Nothing need be held back: no frame is whole before its first bytes tell.
+        """
+        if self._unproven is None:
+            return False
+        preamble = self._unproven.preamble
+        preamble.feed(bytes(data[:_PREAMBLE_BYTES]))
+        if preamble.refused is None:
+            return False
+        self._unproven.note_stranger(preamble.refused)
+        self.close(f"it speaks {preamble.refused}")
+        return True
+
+    def _prove(self, has_frames: bool) -> None:
+        if self._unproven is not None and (has_frames or self.parser.keepalives):
+            self._unproven.prove()
+            self._unproven = None
+
+    def _take_all(self, frames: list[Frame], size: int) -> None:
+        if self._throttle is None:
+            for frame in frames:
+                self._take(frame)
+            return
+        self._throttle.begin()
+        try:
+            for frame in frames:
+                self._take(frame)
+        finally:
+            self._throttle.end(len(frames), size)
+
+    def _must_pause(self) -> bool:
+        """Whether not to read on: the peer does not read our answers, or costs too much."""
+        pause_s = 0.0 if self._throttle is None else self._throttle.pause_s()
+        if pause_s and self._paused is None:
+            self._paused = self._loop.call_later(pause_s, self._pause_over)
+        return self._outbox.crowded or bool(pause_s)
+
+    def _pause_over(self) -> None:
+        self._paused = None
+        self._read_again()
+
+    def _write(self) -> None:
+        try:
+            for _ in range(_BATCHES_A_TURN):
+                if not self._unsent:
+                    self._unsent = self._outbox.gather()
+                    if not self._unsent:
+                        self._idle()
+                        return
+                self._forget(self._sock.sendmsg(self._unsent))
+                self.last_sent_s = self._loop.time()
+                self._read_again()
+        except (BlockingIOError, InterruptedError):
+            pass
+        except OSError as error:
+            self.close(str(error.strerror))
+            return
+        self._block(True)
+
+    def _read_again(self) -> None:
+        if self._open and not self._reading and not self._must_pause():
+            self._reading = True
+            self._loop.add_reader(self._sock, self._readable)
+
+    def _idle(self) -> None:
+        """All is sent."""
+        self._block(False)
+        if self._ending:
+            with contextlib.suppress(OSError):
+                self._sock.shutdown(socket.SHUT_WR)
+
+    def _block(self, blocked: bool) -> None:
+        if blocked and not self._blocked:
+            self._loop.add_writer(self._sock, self._write)
+        elif self._blocked and not blocked:
+            self._loop.remove_writer(self._sock)
+        self._blocked = blocked
+
+    def _forget(self, sent: int) -> None:
+        """Drop what was sent from the front."""
+        parts = self._unsent
+        gone = 0
+        while gone < len(parts) and sent >= len(parts[gone]):
+            sent -= len(parts[gone])
+            gone += 1
+        del parts[:gone]
+        if sent:
+            parts[0] = memoryview(parts[0])[sent:]

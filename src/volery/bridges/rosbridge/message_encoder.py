@@ -1,0 +1,115 @@
+"""Published messages in the forms that rosbridge's clients ask for, each made once for all."""
+
+from __future__ import annotations
+
+import base64
+import secrets
+from collections import OrderedDict
+from collections.abc import Callable
+from itertools import chain, zip_longest
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.bridges.rosbridge.cbor_codec import encode_cbor
+from volery.bridges.rosbridge.wire import Frame, encode_json, encode_png
+from volery.graph.codecs.json_codec import JsonCodec
+from volery.graph.codecs.ros1 import ros1_codec
+from volery.graph.messages import Published
+
+Generation = Literal["ros1", "ros2"]
+"""Whose field names (`secs` or `sec`), type names and serialization clients are given."""
+COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
+
+MOST_KEPT = 64
+"""Messages kept for a second client; they are taken within the same turn of the loop as a rule."""
+MOST_KEPT_BYTES = 32 * 1024 * 1024
+
+_BYTES = {"uint8", "char", "byte"}
+
+
+class Forms:
+    """Encodes messages for all clients of a server. For one thread."""
+
+    def __init__(self, generation: Generation = "ros2") -> None:
+        self.generation = generation
+        self._json = JsonCodec(ros1_names=generation == "ros1")
+        self._splicing = JsonCodec(ros1_names=generation == "ros1", arrays=self._json_array)
+        self._mark = f"<{secrets.token_hex(16)}>"
+        """Stands where base64 text goes; no message can hold it by chance."""
+        self._base64: list[str] = []
+        self._cbor = JsonCodec(
+            ros1_names=generation == "ros1",
+            non_finite_as_null=False,
+            arrays=lambda values, _type: values,
+        )
+        self._kept: OrderedDict[tuple[int, str, str], tuple[Published, Frame]] = OrderedDict()
+        self._kept_bytes = 0
+        self._makers: dict[str, Callable[[Published, str], Frame]] = {
+            "none": self._json_frame,
+            "png": lambda published, topic: encode_png(str(self.frame(published, "none", topic))),
+            "cbor": self._cbor_frame,
+            "cbor-raw": self._raw_frame,
+        }
+
+    def plain(self, message: Any, msgtype: str) -> dict[str, Any]:
+        """A message as JSON values. `GraphError` if it does not fit its type."""
+        return self._json.encode(message, msgtype)
+
+    def frame(self, published: Published, compression: str, topic: str) -> Frame:
+        """The `publish` operation of a message under the name that the client has for the topic.
+
+        Raises
+        ------
+        GraphError
+            The message does not fit its type.
+        BridgeError
+            There is no such form of it.
+
+        """
+        key = (id(published), compression, topic)
+        kept = self._kept.get(key)
+        if kept is not None:
+            return kept[1]
+        frame = self._makers[compression](published, topic)
+        # the message is kept beside its form, so that no other one can get its id meanwhile
+        self._kept[key] = (published, frame)
+        self._kept_bytes += len(frame)
+        while len(self._kept) > MOST_KEPT or self._kept_bytes > MOST_KEPT_BYTES:
+            _, (_, old) = self._kept.popitem(last=False)
+            self._kept_bytes -= len(old)
+        return frame
+
+    def _json_frame(self, published: Published, topic: str) -> Frame:
+        self._base64.clear()
+        plain = self._splicing.encode(published.message, published.msgtype)
+        text = encode_json({"op": "publish", "topic": topic, "msg": plain})
+        if not self._base64:
+            return text
+        parts = text.split(self._mark)
+        return "".join(chain.from_iterable(zip_longest(parts, self._base64, fillvalue="")))
+
+    def _json_array(self, values: NDArray[Any], base: str) -> Any:
+        """Array as JSON; base64 waits apart, for the writer would look at its every letter."""
+        if base in _BYTES:
+            self._base64.append(base64.b64encode(values.data).decode("ascii"))
+            return self._mark
+        plain: list[Any] = values.tolist()
+        if values.dtype.kind == "f":
+            for k in np.flatnonzero(~np.isfinite(values)).tolist():
+                plain[k] = None
+        return plain
+
+    def _cbor_frame(self, published: Published, topic: str) -> Frame:
+        plain = self._cbor.encode(published.message, published.msgtype)
+        return encode_cbor({"op": "publish", "topic": topic, "msg": plain})
+
+    def _raw_frame(self, published: Published, topic: str) -> Frame:
+        if self.generation == "ros1":
+            data = ros1_codec().encode(published.message, published.msgtype)
+        else:
+            data = published.cdr
+        secs, nsecs = divmod(published.time_ns, 1_000_000_000)
+        raw = {"secs": secs, "nsecs": nsecs, "bytes": data}
+        return encode_cbor({"op": "publish", "topic": topic, "msg": raw})

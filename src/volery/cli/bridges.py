@@ -1,0 +1,115 @@
+"""Opens the doors that `volery run` was asked for."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from volery.cli.bridge_checks import BUILT_IN, check_autopilots
+from volery.cli.flight import RunOptions
+from volery.core.errors import BridgeError
+
+if TYPE_CHECKING:
+    from volery.bridges.bridge_factory import Bridge, BridgeOptions
+    from volery.mavlink.hil.px4_bridge import Px4Door
+    from volery.mavlink.hil.px4_processes import Px4Instances
+    from volery.scenario.schema import Scenario
+
+_LONGEST_START_S = 60.0
+"""Wall time in which PX4s must have connected."""
+_LOOK_S = 0.05
+
+
+def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
+    """The scenario with what the doors of `options` need: autopilots, or sensors for real ones."""
+    if options.px4_dir is not None:
+        from volery.mavlink.hil.px4_processes import find_px4
+
+        find_px4(options.px4_dir)  # a wrong folder is told before anything is built
+    check_autopilots(scenario, options)
+    names = {text.partition("=")[0] for text in options.doors}
+    if names & set(BUILT_IN):
+        from volery.mavlink.scenario_setup import with_autopilots
+
+        scenario = with_autopilots(scenario)
+    if names & {"px4", "px4-serial"}:
+        from volery.mavlink.scenario_setup import with_px4
+
+        scenario = with_px4(scenario)
+    if "ardupilot" in names:
+        from volery.mavlink.scenario_setup import with_ardupilot
+
+        scenario = with_ardupilot(scenario)
+    return scenario
+
+
+@contextmanager
+def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
+    """Hold the doors of `options` open, and say where they are; none where none was asked for."""
+    if not options.doors:
+        yield
+        return
+    from volery.bridges.bridge_factory import make_bridge
+    from volery.bridges.bridge_host import Doors
+
+    bridge_options = _bridge_options(options)
+    wanted = [make_bridge(text, bridge_options) for text in options.doors]
+    with Doors(simulation.gateway) as doors:
+        for door in wanted:
+            doors.open(door)
+            typer.echo(f"open    {door.name}", err=True)
+        simulation.be_prompt()
+        with _px4_instances(simulation, wanted, options):
+            yield
+
+
+def _bridge_options(options: RunOptions) -> BridgeOptions:
+    from volery.bridges.bridge_factory import BridgeOptions
+
+    return BridgeOptions(
+        allow_remote=options.allow_remote,
+        token=options.token,
+        report=lambda text: typer.echo(text, err=True),
+        domain_id=options.domain_id,
+        interfaces=options.interfaces,
+        mavlink_key=options.mavlink_key,
+        autopilot_timeout_s=options.autopilot_timeout_s,
+        drop_on_timeout=options.drop_silent,
+        reports_missing_autopilots=options.px4_dir is None,  # else `_px4_instances` does
+    )
+
+
+@contextmanager
+def _px4_instances(simulation: Any, bridges: list[Bridge], options: RunOptions) -> Iterator[None]:
+    """Run a PX4 for each UAV where that was asked for, and wait until all are connected."""
+    if options.px4_dir is None:
+        yield
+        return
+    from volery.cli.px4 import parameters_for
+    from volery.mavlink.hil.px4_bridge import Px4Door
+    from volery.mavlink.hil.px4_processes import Px4Instances, find_px4
+
+    build, count = find_px4(options.px4_dir), len(simulation.uav_names)
+    parameters = [parameters_for(uav.airframe) for uav in simulation.uavs.values()]
+    door = next(bridge for bridge in bridges if isinstance(bridge, Px4Door))
+    with Px4Instances(build, count, speed=options.speed, parameters=parameters) as instances:
+        typer.echo(f"started {build.binary}, instances 0 to {count - 1}", err=True)
+        end_s = time.monotonic() + _LONGEST_START_S
+        while len(door.connected) < count:
+            if instances.wait(_LOOK_S) or time.monotonic() > end_s:
+                raise BridgeError(instances.failure or _missing(simulation, door, instances))
+        yield
+
+
+def _missing(simulation: Any, door: Px4Door, instances: Px4Instances) -> str:
+    """Which PX4s have not connected, where to, and what they said last."""
+    return "\n".join(
+        f"{uav}: PX4 {number} has not connected to {door.address(number)} within "
+        f"{_LONGEST_START_S:g} s; it said last:{instances.words_of(number) or ' nothing'}"
+        for number, uav in enumerate(simulation.uav_names)
+        if uav not in door.connected
+    )

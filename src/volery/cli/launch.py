@@ -1,0 +1,89 @@
+"""`volery launch`: the nodes of a profile together in a process of their own."""
+
+from __future__ import annotations
+
+import os
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from volery.cli.connections import DEFAULT_VIA, LinkTold, await_link, join_late
+from volery.cli.trust import may_run_local_nodes
+from volery.core.errors import BridgeError
+from volery.scenario.access import ScenarioAccess
+
+if TYPE_CHECKING:
+    from volery.bridges.nodes.host import NodeHost
+    from volery.bridges.nodes.profile import Profile
+    from volery.graph.nodes.node import Node
+
+
+def launch_profile(
+    path: Path,
+    *,
+    via: str | None,
+    namespace: str | None,
+    lock_step_s: float | None,
+    trust: bool = False,
+) -> None:
+    """Run the nodes of a profile until Ctrl-C, or until one fails; None leaves it to the profile.
+
+    trust: whether modules beside it may run without a question. `BridgeError` where it names no
+    nodes, `ScenarioError` for nodes that may not run.
+    """
+    from volery.bridges.nodes.deferred_connection import LateLink
+    from volery.bridges.nodes.host import NodeHost
+    from volery.bridges.nodes.profile import load_profile
+
+    profile = load_profile(path)
+    if not profile.launch:
+        raise BridgeError(f"{path}: there is no [[launch]] in it; `volery node` starts one node")
+    nodes = [entry.node for entry in profile.launch]
+    access = ScenarioAccess(path.parent, is_trusted=trust)
+    if not trust:
+        access = replace(access, is_trusted=may_run_local_nodes(path, nodes, access))
+    if namespace is not None:
+        profile = profile.model_copy(update={"namespace": namespace})
+    way = via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
+    with closing(LateLink(profile.name, lambda: await_link(way, profile.name))) as late:
+        host = NodeHost(late, clock=profile.clock)
+        started = start_profile(profile, host, access)
+        try:
+            link = join_late(late, host)
+            if lock_step_s is not None:
+                host.join_lock_step(profile.name, lock_step_s)
+            for node in started:
+                host.announce(node.full_name)
+            names = ", ".join(node.get_name() for node in started)
+            typer.echo(f"{names} run on {way}; Ctrl-C ends them", err=True)
+            host.spin(LinkTold(link, way))
+        finally:
+            for node in started:
+                node.destroy_node()
+
+
+def start_profile(
+    profile: Profile, host: NodeHost, access: ScenarioAccess | None = None
+) -> list[Node]:
+    """Start the nodes of a profile on a host, in its order.
+
+    access: which modules they may be; None: as of a scenario that a program makes.
+    """
+    from volery.bridges.nodes.profile import absolute_names
+    from volery.runtime.build.node_loading import start_node
+    from volery.scenario.schema import NodeEntry
+
+    names = absolute_names(profile.remap, profile.namespace)
+    return [
+        start_node(
+            NodeEntry(node=entry.node, parameters=entry.parameters),
+            host.context(names),
+            profile.namespace,
+            f"{profile.name}: launch[{k}]",
+            access or ScenarioAccess(),
+        )
+        for k, entry in enumerate(profile.launch)
+    ]

@@ -1,0 +1,76 @@
+"""What controllers take for the motion of their UAV: the truth, or an estimate that errs.
+
+An estimator speaks some 200 times a second, control runs at every step. What an estimate is off by
+changes slowly, so the error of the last estimate is held and added to the true motion: the estimate
+moves on between two readings as the integrated IMU of a real autopilot does.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.vehicle.compiled import inner_kernel
+from volery.vehicle.rotation_math import four, product, three
+
+Array = NDArray[np.float64]
+
+BELIEF = np.dtype(
+    [
+        ("rate_error", "f8", 3),  # rad/s
+        ("attitude", "f8", 4),  # map from body
+        ("position_map", "f8", 3),  # m
+        ("velocity_map", "f8", 3),  # m/s
+        ("position_error", "f8", 3),  # m, map
+        ("velocity_error", "f8", 3),  # m/s, map
+        ("rotation_error", "f8", 4),  # estimated attitude = this * true attitude
+    ],
+    align=True,
+)
+"""The motion believed, and how far it is from the truth; `PILOT.errs` tells whether it is."""
+
+
+class Motion(NamedTuple):
+    """Position (3,) m, velocity (3,) m/s, attitude (4,) of one UAV, map."""
+
+    position: Array
+    velocity: Array
+    attitude: Array
+
+
+def new_beliefs(count: int) -> NDArray[np.void]:
+    """Beliefs (N,) of UAVs that know the truth."""
+    rows = np.zeros(count, BELIEF)
+    rows["rotation_error"][:, 3] = 1.0
+    return rows
+
+
+@inner_kernel
+def believed_rates(belief: Any, body: Any, errs: bool) -> tuple[float, float, float]:
+    """Body rates believed, rad/s; `errs` spares a look at `belief` where it is the truth."""
+    x, y, z = three(body.omega_body)
+    if errs:
+        ex, ey, ez = three(belief.rate_error)
+        x, y, z = x + ex, y + ey, z + ez
+    return x, y, z
+
+
+@inner_kernel
+def believe_attitude(belief: Any, body: Any, errs: bool) -> None:
+    """Bring the believed attitude up to date."""
+    x, y, z, w = four(body.attitude)
+    if errs:
+        ex, ey, ez, ew = four(belief.rotation_error)
+        x, y, z, w = product(ex, ey, ez, ew, x, y, z, w)
+    attitude = belief.attitude
+    attitude[0], attitude[1], attitude[2], attitude[3] = x, y, z, w
+
+
+@inner_kernel
+def believe_place(belief: Any, body: Any) -> None:
+    """Bring the believed position and velocity up to date."""
+    for k in range(3):
+        belief.position_map[k] = body.position_map[k] + belief.position_error[k]
+        belief.velocity_map[k] = body.velocity_map[k] + belief.velocity_error[k]

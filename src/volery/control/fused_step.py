@@ -1,0 +1,265 @@
+"""The fused step: control and plant of all UAVs, for many steps in one call."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.air import feel_rain, refresh_air
+from volery.control.estimated_state import BELIEF, believe_attitude, believe_place, believed_rates
+from volery.control.flight_modes import CRASHED, guide, stop
+from volery.control.gains import GAINS
+from volery.control.plant_dispatch import fly_otherwise
+from volery.control.rates_attitude import hold_attitude, hold_rates
+from volery.control.setpoints import PILOT
+from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
+from volery.vehicle.battery import drain
+from volery.vehicle.compiled import fused_kernel, inner_kernel
+from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
+from volery.vehicle.downwash import find_downwash
+from volery.vehicle.fleet import BODY
+from volery.vehicle.ground_effect import feel_ground, feels_ground
+from volery.vehicle.identified import IDENTIFIED
+from volery.vehicle.kinematic import KINEMATIC
+from volery.vehicle.plant import PLANT
+from volery.vehicle.plant_types import KINEMATIC_MOTION, RIGID_BODY
+from volery.vehicle.rigid_body_kernels import (
+    accelerate,
+    carry,
+    meet_ground,
+    near_ground,
+    turn_rotors,
+)
+from volery.vehicle.rotation_math import three
+from volery.world.terrain import TerrainGrid
+from volery.world.weather.dryden import TURBULENCE
+
+Array = NDArray[np.float64]
+
+UAV = np.dtype(
+    [
+        ("body", BODY),
+        ("model", "i8"),
+        ("copy", "i8"),
+        ("pilot", PILOT),
+        ("belief", BELIEF),
+        ("turbulence", TURBULENCE),
+    ],
+    align=True,
+)
+"""One UAV: its plant, the row of its model, the copy of the scenario that it flies in (UAVs of
+different copies never meet), its control, what that knows of its motion, the turbulence around it.
+What every step touches lies together in the middle: the order matters to the cache."""
+MODEL = np.dtype(
+    [
+        ("plant", PLANT),
+        ("gains", GAINS),
+        ("identified", IDENTIFIED),
+        ("kinematic", KINEMATIC),
+        ("kind", "i8"),  # vehicle.plants: RIGID_BODY, IDENTIFIED_LOOPS, KINEMATIC_MOTION
+    ],
+    align=True,
+)
+"""One airframe with one plant."""
+
+EVENT = np.dtype(
+    [
+        ("step", "i8"),
+        ("uav", "i8"),
+        ("kind", "i8"),
+        ("mode", "i8"),
+        ("level", "i8"),
+        ("speed", "f8"),
+        ("position", "f8", 3),
+    ],
+    align=True,
+)
+"""One happening; `kind` is `TOUCH_DOWN`, `IMPACT`, `MODE_CHANGE` or `BATTERY_FELL`."""
+MODE_CHANGE = 3
+BATTERY_FELL = 4
+EVENTS_A_STEP = 4
+"""At most, of one UAV."""
+_REACH_M = 0.1
+
+
+@fused_kernel
+def advance_fleet(  # noqa: PLR0912, PLR0915
+    uavs: NDArray[np.void],
+    models: NDArray[np.void],
+    jets: NDArray[np.void],
+    heights: Array,
+    origin_x: float,
+    origin_y: float,
+    spacing: float,
+    steepest: float,
+    history_position: Array,
+    history_attitude: Array,
+    paths: Array,
+    references: Array | None,
+    air: NDArray[np.void],
+    air_nodes: Array,
+    events: NDArray[np.void],
+    step: int,
+    steps: int,
+    guidance_steps: int,
+    attitude_steps: int,
+    air_steps: int,
+    dt: float,
+    bounce: bool,
+    event_ends: bool,
+) -> tuple[int, int, bool]:
+    """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
+
+    paths: segments of trajectories, see `control.trajectory_kernels`. references: None where all
+    plants are rigid bodies: the other plants are then not compiled at all. Else (N, L, 6), commands
+    of the last L steps where identified plants have dead times, or of any size. jets: room for the
+    search of neighbours (`new_jets`).
+
+    A UAV that was told to stop is guided out of turn, with the first of the steps.
+
+    Ends early after a step in which a budget ran out, the events' buffer grew full or, with
+    `event_ends`, anything was noted. The air around the UAVs is looked up each `air_steps`, a
+    multiple of `guidance_steps`. Returns the steps done, the events written, and whether a
+    budget ran out.
+    """
+    grid = TerrainGrid(heights, origin_x, origin_y, spacing)
+    scratch = np.empty(SCRATCH_SHAPE)
+    count = uavs.shape[0]
+    rows = history_position.shape[0]
+    written = 0
+    spent = False
+    calm = False  # whether nothing can happen before the next guidance tick
+    look = True  # whether someone may meet the jet of another since the last look
+    done = 0
+    room = events.shape[0] - EVENTS_A_STEP * count
+    while done < steps and not spent and written <= (0 if event_ends else room):
+        guiding = step % guidance_steps == 0
+        draining = step % (guidance_steps * BATTERY_TICKS) == 0
+        to_tick = guidance_steps - step % guidance_steps
+        # One step for all, or, where nobody needs the others, all steps to the tick for each in
+        # turn, while his data are in the nearest cache.
+        together = min(to_tick, steps - done) if calm and not guiding else 1
+        airing = step % air_steps == 0
+        if airing and look:
+            find_downwash(uavs, models, jets)
+            look = False
+        first_row, first_phase = (step + 1) % rows, step % attitude_steps
+        calm = True
+        for i in range(count):
+            row, phase = (
+                first_row,
+                first_phase,
+            )  # counted on: divisions would cost as much as a rotor
+            body = uavs[i].body
+            pilot = uavs[i].pilot
+            belief = uavs[i].belief
+            model = models[uavs[i].model]
+            plant = model.plant
+            if draining and plant.battery.capacity > 0.0 and drain(body, plant, pilot):
+                _note(events[written], step + 1, i, BATTERY_FELL, pilot.mode, 0.0, body)
+                written += 1
+            if guiding:
+                turn_rotors(body, plant, guidance_steps * dt)
+            if airing and not body.asleep:
+                tick, period = step // air_steps, air_steps * dt
+                refresh_air(uavs[i], jets[i].downwash, air[0], air_nodes, grid, tick, period)
+                if air[0].rain_water > 0.0 and model.kind != KINEMATIC_MOTION:
+                    feel_rain(body, plant, air[0], period)
+            for now in range(step, step + together):
+                guided = guiding or pilot.hurried
+                pilot.hurried = False
+                if body.asleep:
+                    for k in range(3):
+                        body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
+                else:
+                    mode = pilot.mode
+                    if references is None or model.kind == RIGID_BODY:
+                        turning = phase == 0 or guided
+                        if guided:
+                            believe_place(belief, body)
+                        if turning:
+                            believe_attitude(belief, body, pilot.errs)
+                        if guided:
+                            guide(pilot, belief, model.gains, paths, now, dt)
+                        if turning:
+                            hold_attitude(pilot, belief, model.gains)
+                        ox, oy, oz = believed_rates(belief, body, pilot.errs)
+                        hold_rates(pilot, ox, oy, oz, model.gains, dt)
+                        if feels_ground(body, plant):
+                            feel_ground(body, plant, grid, steepest, dt)
+                        accelerate(body, plant, pilot, dt)
+                        touch = NO_TOUCH
+                        if near_ground(body, dt):
+                            touch = meet_ground(
+                                body, plant, pilot, grid, steepest, bounce, scratch, now + 1, dt
+                            )
+                        carry(body, dt)
+                    else:
+                        touch = fly_otherwise(
+                            body,
+                            pilot,
+                            belief,
+                            model,
+                            references,
+                            i,
+                            now % references.shape[1],
+                            paths,
+                            grid,
+                            steepest,
+                            bounce,
+                            scratch,
+                            now,
+                            guided,
+                            dt,
+                        )
+                    if touch != NO_TOUCH:
+                        _note(events[written], now + 1, i, touch, mode, body.touch_speed, body)
+                        written += 1
+                        if touch == IMPACT and not bounce and model.kind != KINEMATIC_MOTION:
+                            body.crashed = True
+                            pilot.mode = CRASHED
+                            stop(pilot)
+                    if pilot.mode != mode:
+                        _note(events[written], now + 1, i, MODE_CHANGE, pilot.mode, 0.0, body)
+                        written += 1
+                for k in range(3):
+                    history_position[row, i, k] = body.position_map[k]
+                for k in range(4):
+                    history_attitude[row, i, k] = body.attitude[k]
+                row = row + 1 if row + 1 < rows else 0
+                phase = phase + 1 if phase + 1 < attitude_steps else 0
+            spent = spent or body.contact_budget <= 0.0 or body.separation_budget <= 0.0
+            look = look or body.in_jet or body.downwash_budget <= 0.0
+            calm = calm and (
+                body.asleep or (model.kind == RIGID_BODY and _is_far(body, guidance_steps * dt))
+            )
+        step += together
+        done += together
+    return done, written, spent
+
+
+@inner_kernel
+def _is_far(body: Any, seconds: float) -> bool:
+    """Whether a UAV can reach nothing, neither ground nor solid nor other UAV, within `seconds`.
+
+    Twice its way at the present speed and `_REACH_M` are surely more than it flies: in the 8 ms of
+    a guidance tick it would need 3,000 m/s^2 to go farther.
+    """
+    vx, vy, vz = three(body.velocity_map)
+    way = 2.0 * (abs(vx) + abs(vy) + abs(vz)) * seconds + _REACH_M
+    nearest = min(body.ground_budget, body.contact_budget, body.separation_budget)
+    return bool(nearest > way)
+
+
+@inner_kernel
+def _note(event: Any, step: int, uav: int, kind: int, mode: int, speed: float, body: Any) -> None:
+    event.step = step
+    event.uav = uav
+    event.kind = kind
+    event.mode = mode
+    event.level = body.battery_level
+    event.speed = speed
+    for k in range(3):
+        event.position[k] = body.position_map[k]

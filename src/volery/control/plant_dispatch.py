@@ -1,0 +1,58 @@
+"""One step of a UAV whose plant is not the rigid body."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from volery.control.estimated_state import believe_attitude, believe_place
+from volery.control.flight_modes import guide
+from volery.control.kinematic_flight import fly_kinematic
+from volery.control.setpoints import ControlLevel
+from volery.vehicle.compiled import apart_kernel
+from volery.vehicle.contact import NO_TOUCH
+from volery.vehicle.identified import accelerate_identified
+from volery.vehicle.plant_types import KINEMATIC_MOTION
+from volery.vehicle.rigid_body_kernels import carry, meet_ground, near_ground
+
+_STOPPED = int(ControlLevel.STOPPED)
+
+
+@apart_kernel
+def fly_otherwise(
+    body: Any,
+    pilot: Any,
+    belief: Any,
+    model: Any,
+    references: Any,
+    i: int,
+    now: int,
+    paths: Any,
+    grid: Any,
+    steepest: float,
+    bounce: bool,
+    scratch: Any,
+    step: int,
+    guiding: bool,
+    dt: float,
+) -> int:
+    """Control and motion of an identified or kinematic plant; how it touched the ground.
+
+    model: a `step.MODEL` row. references, i, now: see `vehicle.identified`.
+    """
+    plant, gains = model.plant, model.gains
+    if model.kind == KINEMATIC_MOTION:
+        kinematic = model.kinematic
+        return fly_kinematic(
+            body, pilot, belief, plant, kinematic, gains, paths, grid, steepest, step, guiding, dt
+        )
+    if guiding:
+        believe_place(belief, body)
+        believe_attitude(belief, body, pilot.errs)
+        guide(pilot, belief, gains, paths, step, dt)
+    live = pilot.level != _STOPPED
+    accelerate_identified(body, plant, model.identified, pilot, live, references, i, now, dt)
+    touch = NO_TOUCH
+    if near_ground(body, dt):
+        touch = meet_ground(body, plant, pilot, grid, steepest, bounce, scratch, step + 1, dt)
+    carry(body, dt)
+    return touch

@@ -1,0 +1,154 @@
+"""Touches between UAVs and the things that move through the world by themselves.
+
+As in `collisions`, the gap is shared: a UAV may use up half of it, by its budget, before it asks
+again, and a thing the other half, for which its highest speed gives a time. Where a UAV is within
+the sphere around a thing, which may turn on the spot, the next look is at most 10 ms away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.control.fleet import Fleet
+from volery.core import rotations
+from volery.core.clock import NS_PER_S
+from volery.world.actors import MovingThings
+from volery.world.scene import Scene, Solid
+from volery.world.scene_content import BodyShape
+
+Array = NDArray[np.float64]
+
+_LEAST_GAP_M = 1e-3
+"""While touching, look again after each millimetre."""
+_RELEASE_M = 0.02
+"""Gap at which a touch is over and another one is a new event."""
+_NEAR_LOOK_NS = 10_000_000
+_LONGEST_WAIT_S = 1000.0
+_FARTHEST_LOOK_M = 10.0
+"""Larger than any UAV."""
+
+Touch = Callable[[int, int, Array, bool, int], None]
+"""Tells of UAV, thing, (3,) m from its nearest point to the UAV, whether it is new, time in ns."""
+
+
+class ThingLooks:
+    """The things of a world, and looks at their shapes from near by, in their own frames."""
+
+    def __init__(self, things: MovingThings) -> None:
+        self.things = things
+        self._reach = [2.0 * shape.radius + _FARTHEST_LOOK_M for shape in things.shapes]
+        by_shape: dict[int, Scene] = {}
+        for shape in things.shapes:
+            if id(shape) not in by_shape:
+                by_shape[id(shape)] = _alone(shape)
+        self._scenes = [by_shape[id(shape)] for shape in things.shapes]
+
+    def from_place(self, k: int, pose: Array, place: Array) -> tuple[Array, float]:
+        """(3,) m, map, from thing `k` at `pose` (7,) out to a place (3,) m, and the distance.
+
+        Inside, the distance is below zero, and the vector points to the nearest way out.
+        """
+        point = rotations.rotate(rotations.conjugate(pose[3:]), place - pose[:3])
+        found = self._scenes[k].clearance(point[None], self._reach[k], include_terrain=False)
+        distance = float(found.distance[0])
+        away = (point - found.nearest[0]) * (-1.0 if distance < 0.0 else 1.0)
+        return rotations.rotate(pose[3:], away), distance
+
+
+def _alone(shape: BodyShape) -> Scene:
+    solids = [Solid(mesh, material, "") for mesh, material in shape.parts]
+    return Scene(None, None, solids=solids)
+
+
+class ThingContacts:
+    """Looks from UAVs at things in time, and tells `touch` of those that meet."""
+
+    def __init__(self, fleet: Fleet, looks: ThingLooks, touch: Touch) -> None:
+        things = looks.things
+        self._fleet = fleet
+        self._things = things
+        self._looks = looks
+        self._touch = touch
+        self._radius = np.array([a.body.collision_radius_m for a in fleet.airframes])
+        self._reach = np.array([shape.radius for shape in things.shapes])
+        self._touching = np.zeros((len(self._radius), len(things)), dtype=bool)
+        self._next_ns = np.zeros(len(self._radius), dtype=np.int64)
+        """When each UAV has to look again at the latest."""
+
+    @property
+    def next_look_ns(self) -> int:
+        """Time of the next look that does not follow from how UAVs move."""
+        return int(self._next_ns.min())
+
+    def resolve(self, refilled: NDArray[np.int64], time_ns: int) -> None:
+        """Look from UAVs whose budget was filled anew, and from those whose time has come.
+
+        Their budgets are lowered to what the things leave them.
+        """
+        rows = np.union1d(refilled, np.flatnonzero(self._next_ns <= time_ns))
+        if not len(rows):
+            return
+        poses, speeds = self._things.poses_at(time_ns), self._things.speeds_m_s
+        state = self._fleet.state
+        for i in rows.tolist():
+            gaps, is_near = self._look_around(i, poses, time_ns)
+            half = np.maximum(0.5 * gaps, 0.5 * _LEAST_GAP_M)
+            state.separation_budget[i] = min(state.separation_budget[i], float(half.min()))
+            self._next_ns[i] = time_ns + self._wait_ns(half, speeds, is_near)
+
+    def look_again(self) -> None:
+        """Look from every UAV at once: a thing was put somewhere."""
+        self._next_ns[:] = 0
+
+    def forget(self, rows: NDArray[np.int64]) -> None:
+        """Take UAVs as new: they touch nothing, and look around at once."""
+        self._touching[rows] = False
+        self._next_ns[rows] = 0
+
+    def continue_from(
+        self, other: ThingContacts, own: NDArray[np.int64], theirs: NDArray[np.int64]
+    ) -> None:
+        """Know what UAVs of another fleet touch: own rows and the other's."""
+        self._touching[own] = other._touching[theirs]
+
+    def get_state(self) -> dict[str, Any]:
+        """What a snapshot keeps."""
+        return {"touching": self._touching.copy(), "next_ns": self._next_ns.copy()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to a kept state."""
+        self._touching[...] = state["touching"]
+        self._next_ns[...] = state["next_ns"]
+
+    def _look_around(self, i: int, poses: Array, time_ns: int) -> tuple[Array, bool]:
+        """Gaps (T,) m between UAV `i` and each thing, or less than they are; touches are told.
+
+        The second says whether it is within the sphere around one of them.
+        """
+        place, radius = self._fleet.state.position_map[i], float(self._radius[i])
+        apart = np.linalg.norm(place - poses[:, :3], axis=1)
+        gaps = apart - self._reach - radius
+        near = np.flatnonzero(gaps <= 0.0).tolist()
+        for k in near:
+            away, distance = self._looks.from_place(k, poses[k], place)
+            gaps[k] = distance - radius
+            if gaps[k] <= 0.0:
+                is_new = not self._touching[i, k]
+                self._touching[i, k] = True
+                self._touch(i, k, away, is_new, time_ns)
+        self._touching[i, gaps > _RELEASE_M] = False
+        return gaps, bool(near)
+
+    def _wait_ns(self, half: Array, speeds: Array, is_near: bool) -> int:
+        """Until the first thing may have used up its half, a whole number of steps."""
+        moves = speeds > 0.0
+        wait_s = float((half[moves] / speeds[moves]).min(initial=np.inf))
+        wait_ns = int(min(wait_s, _LONGEST_WAIT_S) * NS_PER_S)
+        if is_near:
+            wait_ns = min(wait_ns, _NEAR_LOOK_NS)
+        dt_ns = self._fleet.dt_ns
+        return max(wait_ns // dt_ns, 1) * dt_ns

@@ -1,0 +1,288 @@
+"""Real ArduCopters fly the UAVs: ArduPilot's JSON interface over UDP, in lock step.
+
+    with Simulation(with_ardupilot(scenario)) as simulation, Doors(simulation.gateway) as doors:
+        doors.open(ArdupilotDoor())     # 9002 + 10 i; `arducopter --model JSON -I i` speaks
+        simulation.run(speed=1.0)
+
+Every 1.25 ms of simulated time each ArduPilot is told the state of its UAV, and the simulation
+waits for the outputs that it answers with. Who is silent ends the run or is given up, see
+`Patience`. One that was restarted counts its frames from 0 again: it is met anew, with a clock that
+begins anew.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import time
+from typing import Any, cast
+
+from volery.core.clock import NS_PER_S
+from volery.core.errors import BridgeError
+from volery.core.network_access import check_address
+from volery.graph.session import Gateway
+from volery.mavlink.autopilot.vehicle import Vector
+from volery.mavlink.hil.ardupilot_json import (
+    STATE_HZ,
+    Servos,
+    State,
+    motors_of,
+    parse_servos,
+    shares,
+    state_line,
+)
+from volery.mavlink.hil.connection_notice import NOTICE_S, Absence
+from volery.mavlink.hil.lock_step import PATIENCE, Meetings, News, Patience, uavs_with
+from volery.mavlink.hil.sensor_readings import inertial_of, parts
+from volery.mavlink.links.connection import why_not
+
+PORT = 9002
+PORT_STEP = 10
+"""ArduPilot's instances shift all their ports by this."""
+PERIOD_NS = NS_PER_S // STATE_HZ
+_TRUTH = "ground_truth/odom"
+_TOPICS = {
+    "imu": "sensor_msgs/msg/Imu",
+    _TRUTH: "nav_msgs/msg/Odometry",
+    "range": "sensor_msgs/msg/Range",
+    "battery": "sensor_msgs/msg/BatteryState",
+}
+_SLOW = ("range", "battery")
+_GONE_S = 1.5
+"""Of wall time: one that waits for a state asks again every second."""
+_LATE_FRAMES = 16
+"""A frame this far back was held up on its way; farther back, ArduPilot has restarted."""
+_log = logging.getLogger(__name__)
+
+Address = tuple[Any, ...]
+
+
+class ArdupilotDoor:
+    """Listens for instance i, the autopilot of the i-th UAV, at `port` + 10 i.
+
+    The gateway knows the rotors of each UAV. notice_s: wall time after which the bridge logs that
+    ArduPilots are missing; None: the caller reports them.
+    """
+
+    def __init__(
+        self,
+        host: str = "127.0.0.1",
+        port: int = PORT,
+        *,
+        patience: Patience = PATIENCE,
+        anywhere: bool = False,
+        notice_s: float | None = NOTICE_S,
+    ) -> None:
+        self._notice_s = notice_s
+        self._absence: Absence | None = None
+        self._host, self._port = host, port
+        self._patience = patience
+        self._anywhere = anywhere
+        self._seats: list[_Seat] = []
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        return f"ArduPilot UDP {self._host}:{self._port}, +{PORT_STEP} for each further UAV"
+
+    @property
+    def connected(self) -> tuple[str, ...]:
+        """UAVs whose ArduPilot has spoken."""
+        return tuple(seat.uav for seat in self._seats if seat.peer is not None)
+
+    async def start(self, gateway: Gateway) -> None:
+        """Begin to listen. `BridgeError` where a port is taken, or a UAV cannot be flown so."""
+        check_address(self._host, anywhere=self._anywhere, flag="--allow-remote")
+        rotors = gateway.rotor_layouts()
+        uavs = [uav for uav in uavs_with(gateway, _TRUTH) if uav in rotors]
+        if not uavs:
+            raise BridgeError("no UAV tells the true state that an ArduPilot needs")
+        for k, uav in enumerate(uavs):
+            try:
+                motors = motors_of(rotors[uav])
+            except BridgeError as error:
+                raise BridgeError(f"{uav}: {error}") from None
+            seat = _Seat(gateway, uav, motors, self._patience)
+            self._seats.append(seat)
+            await self._listen(seat, self._port + PORT_STEP * k)
+        self._absence = Absence("ArduPilot", self._missing, self._how_to_start, self._notice_s)
+
+    async def stop(self) -> None:
+        """Let all ArduPilots go."""
+        if self._absence is not None:
+            self._absence.cancel()
+        for seat in self._seats:
+            seat.close()
+        self._seats.clear()
+        await asyncio.sleep(0)
+
+    def _missing(self) -> dict[str, str]:
+        """Where the ArduPilots that are not there are to speak, by UAV."""
+        return {
+            seat.uav: f"UDP {self._host}:{self._port + PORT_STEP * number}"
+            for number, seat in enumerate(self._seats)
+            if seat.peer is None
+        }
+
+    def _how_to_start(self) -> str:
+        absent = next((k for k, seat in enumerate(self._seats) if seat.peer is None), 0)
+        instance, odd = divmod(self._port + PORT_STEP * absent - PORT, PORT_STEP)
+        chosen = f" -I {instance}" if instance >= 0 and not odd else ""
+        return f"start with: arducopter --model JSON{chosen} ... (docs/mavlink.md)"
+
+    async def _listen(self, seat: _Seat, port: int) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            await loop.create_datagram_endpoint(lambda: seat, local_addr=(self._host, port))
+        except (OSError, OverflowError) as error:
+            raise BridgeError(
+                f"{seat.uav}: cannot listen on UDP {self._host}:{port}: {why_not(error)}"
+            ) from None
+
+
+class _Seat(asyncio.DatagramProtocol):
+    """Where the ArduPilot of one UAV sits."""
+
+    def __init__(
+        self, gateway: Gateway, uav: str, motors: tuple[int, ...], patience: Patience
+    ) -> None:
+        self.uav = uav
+        self.peer: Address | None = None
+        self._motors = motors
+        self._transport: asyncio.DatagramTransport | None = None
+        self._number = -1
+        self._heard_s = 0.0
+        """Wall time of its last frame."""
+        self._told: set[str] = set()
+        """Warnings that were given."""
+        self._line = b""
+        self._slow: dict[str, Any] = {}
+        """Newest messages of topics that do not come each time."""
+        self._begin_ns: int | None = None
+        self._meetings = Meetings(
+            gateway, uav, "ardupilot", self, period_ns=PERIOD_NS, topics=_TOPICS, patience=patience
+        )
+
+    def close(self) -> None:
+        """Give everything back; a second time nothing happens."""
+        if self.peer is not None:
+            self._meetings.turn_rotors([0.0] * len(self._motors))
+        self._meetings.close()
+        if self._transport is not None:
+            self._transport.close()
+
+    # --------------------------------------------------------------------------------- of meetings
+
+    is_in_step = False
+    """As of `Pilot`: asyncio's transport is the loop's."""
+    may_sleep = False
+    """As of `Pilot`: it answers each state, and repeats its question where it heard none."""
+
+    def tell(self, time_ns: int, news: News) -> bool:
+        """As of `Pilot`."""
+        self._slow.update({name: news[name] for name in _SLOW if name in news})
+        state = _state_of({**self._slow, **news})
+        if self.peer is None or self._transport is None or state is None:
+            return False
+        if self._begin_ns is None:
+            self._begin_ns = time_ns - PERIOD_NS
+        self._line = state_line((time_ns - self._begin_ns) / NS_PER_S, state)
+        self._transport.sendto(self._line, self.peer)
+        return True
+
+    def begin_anew(self) -> None:
+        """As of `Pilot`: an ArduPilot whose simulator's clock goes back flies on where it is."""
+        self._begin_ns = None
+
+    def drop(self) -> None:
+        """As of `Pilot`: forget it; it speaks again every second if it lives."""
+        self.peer, self._begin_ns = None, None
+        self._meetings.turn_rotors([0.0] * len(self._motors))
+
+    # ---------------------------------------------------------------------------------- of asyncio
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """As of asyncio."""
+        self._transport = cast(asyncio.DatagramTransport, transport)  # no such class in 3.11
+
+    def datagram_received(self, data: bytes, addr: Address) -> None:
+        """As of asyncio."""
+        servos = parse_servos(data)
+        if servos is None:
+            self._warn("what speaks to its port is no ArduPilot")
+            return
+        now_s = time.monotonic()
+        if self.peer is None or self._is_new(servos, addr, now_s):
+            self._welcome(addr)
+        if addr != self.peer:
+            self._warn("its ArduPilot is there already; another one is not heard")
+            return
+        self._heard_s = now_s
+        if servos.number == self._number:
+            self._repeat()
+        elif servos.number > self._number:
+            self._obey(servos)
+
+    def _is_new(self, servos: Servos, addr: Address, now_s: float) -> bool:
+        """Whether an ArduPilot begins: where the present one is gone, or itself restarted."""
+        if addr != self.peer:
+            return now_s - self._heard_s > _GONE_S
+        back = self._number - servos.number
+        return back > _LATE_FRAMES or (back > 0 and servos.number == 0)
+
+    def _warn(self, text: str) -> None:
+        """Once, as datagrams come by the hundred."""
+        if text not in self._told:
+            self._told.add(text)
+            _log.warning("%s: %s", self.uav, text)
+
+    def error_received(self, exc: Exception) -> None:
+        """As of asyncio: nobody listens at its address just now; its silence will tell."""
+        _log.debug("%s: %s", self.uav, exc)
+
+    def _welcome(self, peer: Address) -> None:
+        self.peer, self._begin_ns, self._number = peer, None, -1
+        _log.info("%s: an ArduPilot flies it", self.uav)
+
+    def _repeat(self) -> None:
+        """Say again what it has not heard."""
+        if self._meetings.waits and self._transport is not None:
+            self._transport.sendto(self._line, self.peer)
+
+    def _obey(self, servos: Servos) -> None:
+        self._number = servos.number
+        self._meetings.go_on(shares(servos.pwm, self._motors))
+
+
+def _state_of(news: News) -> State | None:
+    """What is new of a UAV; None without a reading of its IMU and its true place."""
+    if "imu" not in news or _TRUTH not in news:
+        return None
+    inertial, truth = inertial_of(news["imu"]), news[_TRUTH]
+    q = truth.pose.pose.orientation
+    attitude = (float(q.x), float(q.y), float(q.z), float(q.w))
+    sonar, battery = news.get("range"), news.get("battery")
+    distance = math.inf if sonar is None else float(sonar.range)
+    return State(
+        inertial.force,
+        inertial.rates,
+        parts(truth.pose.pose.position),
+        attitude,
+        _turned(attitude, parts(truth.twist.twist.linear)),
+        distance if math.isfinite(distance) else None,
+        None if battery is None else (float(battery.voltage), -float(battery.current)),
+    )
+
+
+def _turned(q: tuple[float, float, float, float], v: Vector) -> Vector:
+    """`v` in the body, in the map: v + 2 w (u x v) + 2 u x (u x v)."""
+    x, y, z, w = q
+    a = 2.0 * (y * v[2] - z * v[1])
+    b = 2.0 * (z * v[0] - x * v[2])
+    c = 2.0 * (x * v[1] - y * v[0])
+    return (
+        v[0] + w * a + y * c - z * b,
+        v[1] + w * b + z * a - x * c,
+        v[2] + w * c + x * b - y * a,
+    )

@@ -1,0 +1,212 @@
+"""Real PX4s fly the UAVs: a TCP server for each vehicle, in lock step with the simulation.
+
+    with Simulation(with_px4(scenario)) as simulation, Doors(simulation.gateway) as doors:
+        doors.open(Px4Door())                        # 4560 + i; PX4 instances connect
+        simulation.run(speed=1.0)
+
+Every 4 ms of simulated time all vehicles are told what their sensors measured, and the simulation
+waits for those PX4s that have begun to answer. One that is silent for too long ends the run with an
+error or is given up, see `Patience`. A PX4 that leaves may connect anew, as a restarted one; at a
+reset of the simulation all are sent away, because none can go back in time.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import socket
+from collections.abc import Callable
+
+from volery.core.errors import BridgeError
+from volery.core.listener import Listener, open_listener
+from volery.core.network_access import check_address, tend
+from volery.core.preamble import Preamble
+from volery.graph.session import Gateway
+from volery.mavlink.codec import dialect
+from volery.mavlink.hil.connection_notice import NOTICE_S, Absence
+from volery.mavlink.hil.lock_step import PATIENCE, Patience, uavs_with
+from volery.mavlink.hil.px4_processes import MOST_INSTANCES
+from volery.mavlink.hil.session import HilSeat
+from volery.mavlink.links.connection import why_not
+
+PORT = 4560
+_MOST_UNSENT_BYTES = 1 << 16
+"""What may wait for a PX4 that does not read, beside what the kernel holds."""
+_MOST_CONNECTIONS = 4
+"""To one UAV's port; all but one end as soon as the server sees them."""
+_log = logging.getLogger(__name__)
+
+
+class Px4Door:
+    """Serves PX4 instance i, the autopilot of the i-th UAV, at `port` + i.
+
+    notice_s: wall time after which it is said that PX4s are missing; None: somebody else says so.
+    """
+
+    def __init__(
+        self,
+        host: str = "127.0.0.1",
+        port: int = PORT,
+        *,
+        patience: Patience = PATIENCE,
+        anywhere: bool = False,
+        notice_s: float | None = NOTICE_S,
+    ) -> None:
+        self._host, self._port = host, port
+        self._notice_s = notice_s
+        self._absence: Absence | None = None
+        self._patience = patience
+        self._anywhere = anywhere
+        self._servers: list[asyncio.Server] = []
+        self._seats: list[HilSeat] = []
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        return f"PX4 {self._host}:{self._port} and following"
+
+    @property
+    def connected(self) -> tuple[str, ...]:
+        """UAVs whose PX4 is there."""
+        return tuple(seat.uav for seat in self._seats if seat.taken)
+
+    def address(self, number: int) -> str:
+        """Where instance `number` is to connect."""
+        return f"{self._host}:{self._port + number}"
+
+    async def start(self, gateway: Gateway) -> None:
+        """Begin to listen. `BridgeError` where a port is taken, or a UAV lacks an IMU."""
+        dialect()
+        check_address(self._host, anywhere=self._anywhere, flag="--allow-remote")
+        uavs = uavs_with(gateway, "imu")
+        if not uavs:
+            raise BridgeError("no UAV has the IMU that a PX4 needs")
+        for k, uav in enumerate(uavs):
+            seat = HilSeat(gateway, uav, k + 1, self._patience)
+            self._seats.append(seat)
+            await self._listen(seat, self._port + k)
+        if self._notice_s is not None:
+            self._absence = Absence(
+                "PX4", self._missing, lambda: how_to_start(len(uavs), self._port), self._notice_s
+            )
+
+    async def stop(self) -> None:
+        """Let all PX4s go."""
+        if self._absence is not None:
+            self._absence.cancel()
+        for server in self._servers:
+            server.close()
+        for seat in self._seats:
+            seat.close()
+        self._servers.clear()
+        self._seats.clear()
+        for _ in range(2):  # for connections to be aborted, and to be told so
+            await asyncio.sleep(0)
+
+    def _missing(self) -> dict[str, str]:
+        """Where the PX4s that are not there are to connect, by UAV."""
+        return {
+            seat.uav: self.address(number)
+            for number, seat in enumerate(self._seats)
+            if not seat.taken
+        }
+
+    async def _listen(self, seat: HilSeat, port: int) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            listener = open_listener(
+                self._host, port, f"{seat.uav}: PX4", max_connections=_MOST_CONNECTIONS
+            )
+            server = await loop.create_server(lambda: _Connection(seat, listener), sock=listener)
+        except (OSError, OverflowError) as error:
+            raise BridgeError(
+                f"{seat.uav}: cannot listen on {self._host}:{port}: {why_not(error)}"
+            ) from None
+        self._servers.append(server)
+
+
+class _Connection(asyncio.Protocol):
+    """One PX4's connection; a second one at the same port ends, or the first without a frame.
+
+    The loop reads. The simulation's thread writes, by a socket of its own on the same connection:
+    it would only wait for the loop to wake up.
+    """
+
+    is_for_any_thread = True
+    _transport: asyncio.Transport
+    _out: socket.socket | None = None
+
+    def __init__(self, seat: HilSeat, listener: Listener) -> None:
+        self._seat = seat
+        self._listener = listener
+        self._preamble = Preamble()
+        self._loop = asyncio.get_running_loop()
+        self._unsent = bytearray()
+        self._hear: Callable[[bytes], None] = _ignore
+
+    def send(self, data: bytes) -> bool:
+        """As of `Way`; frames are lost, whole, for a PX4 that does not read."""
+        self._flush()
+        if len(self._unsent) + len(data) > _MOST_UNSENT_BYTES:
+            return False
+        self._unsent += data
+        self._flush()
+        return not self._unsent
+
+    def _flush(self) -> None:
+        with contextlib.suppress(OSError):  # no room now; or it has left, which the loop will tell
+            if self._unsent and self._out is not None:
+                del self._unsent[: self._out.send(self._unsent)]
+
+    def end(self) -> None:
+        """As of `Way`."""
+        self._hear = _ignore
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self._transport.abort)
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """As of asyncio."""
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+        if self._seat.taken and not self._seat.has_heard:
+            self._seat.give_way()
+        if self._seat.taken:
+            uav = self._seat.uav
+            _log.warning("%s: its PX4 is connected already; another connection is ended", uav)
+            transport.abort()
+            return
+        tend(transport.get_extra_info("socket"))
+        self._out = transport.get_extra_info("socket").dup()
+        self._hear = self._seat.take(self)
+
+    def data_received(self, data: bytes) -> None:
+        """As of asyncio."""
+        data = self._preamble.feed(data)
+        if self._preamble.refused is not None:
+            self._listener.note_stranger(self._preamble.refused)
+            self._transport.abort()
+            return
+        self._hear(data)
+        if self._seat.has_heard:
+            self._listener.prove(self._transport)
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
+        """As of asyncio."""
+        if self._hear is not _ignore:
+            self._seat.leave("its PX4 has left")
+        if self._out is not None:
+            self._out.close()
+
+
+def how_to_start(count: int, port: int) -> str:
+    """The command that has PX4s connect to `port` and following."""
+    first = port - PORT
+    if first < 0 or first + count > MOST_INSTANCES:
+        return f"PX4's instances connect to ports {PORT} and following"
+    shift = f" --first {first}" if first else ""
+    return f"start with: volery px4 --px4-dir PX4-Autopilot --count {count}{shift}"
+
+
+def _ignore(_data: bytes) -> None:
+    """Pass over what comes from nobody who sits here."""

@@ -1,0 +1,200 @@
+"""A TCP server for MAVLink: every connection carries all vehicles, as of a MAVLink router."""
+
+from __future__ import annotations
+
+import asyncio
+
+from volery.core.errors import BridgeError
+from volery.core.listener import Listener, open_listener
+from volery.core.network_access import check_address, tend, write_while_open
+from volery.core.preamble import Preamble
+from volery.graph.session import Gateway
+from volery.mavlink.autopilot.streams import GROUND
+from volery.mavlink.codec import dialect
+from volery.mavlink.links import ports
+from volery.mavlink.links.connection import Party, why_not
+from volery.mavlink.links.rate_limits import IntakeLimits
+from volery.mavlink.links.vehicle_registry import Fleet, Sink
+
+_UNSENT_BYTES = 1 << 18
+"""What may wait for a TCP client who does not read; what comes then is lost for him."""
+_MOST_CLIENTS = 32
+"""Of the TCP server (modelling choice). Above, the oldest that has sent no valid frame ends."""
+_BITE_BYTES = 2048
+"""Read at once, so that no client delays others or the simulation for long."""
+
+
+class MavlinkTcp:
+    """Serves all vehicles to each client, as a MAVLink router does.
+
+    host, port: where it listens; port 0 takes a free one, and the attribute tells which.
+    """
+
+    def __init__(
+        self,
+        host: str = "127.0.0.1",
+        port: int = ports.TCP,
+        *,
+        anywhere: bool = False,
+        key: bytes | None = None,
+    ) -> None:
+        self._key = key
+        self.host = host
+        self.port = port
+        self._anywhere = anywhere
+        self._server: asyncio.Server | None = None
+        self._listener: Listener | None = None
+        self._intake = IntakeLimits()
+        self._fleet: Fleet | None = None
+        self._looks: asyncio.Task[None] | None = None
+        self._clients: dict[int, _TcpClient] = {}
+        self._numbers = 0
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        return f"MAVLink TCP {self.host}:{self.port}"
+
+    async def start(self, gateway: Gateway) -> None:
+        """Begin to listen. `BridgeError` where that is not possible."""
+        dialect()
+        check_address(self.host, anywhere=self._anywhere, flag="--allow-remote")
+        loop = asyncio.get_running_loop()
+        try:
+            self._listener = open_listener(
+                self.host,
+                self.port,
+                "MAVLink TCP",
+                max_connections=_MOST_CLIENTS,
+                max_unproven=None,  # a program may listen in silence
+            )
+            self._server = await loop.create_server(lambda: _TcpClient(self), sock=self._listener)
+        except (OSError, OverflowError) as error:
+            raise BridgeError(
+                f"cannot listen on {self.host}:{self.port}: {why_not(error)}"
+            ) from None
+        self.port = self._server.sockets[0].getsockname()[1]
+        self._fleet = Fleet(gateway, self.name, self._join, lambda _system: None)
+        self._fleet.look()
+        self._looks = asyncio.create_task(self._fleet.keep_looking())
+
+    async def stop(self) -> None:
+        """Let everybody go."""
+        if self._looks is not None:
+            self._looks.cancel()
+            await asyncio.gather(self._looks, return_exceptions=True)
+        if self._server is not None:
+            self._server.close()
+        for client in tuple(self._clients.values()):
+            client.transport.abort()
+        await asyncio.sleep(0)  # their callbacks
+        if self._fleet is not None:
+            self._fleet.close()
+
+    def _join(self, _name: str, system: int) -> Sink:
+        if self._fleet is not None:
+            self._intake.fit(len(self._fleet.systems))
+        for client in self._clients.values():
+            client.party.greet(system)
+        return self._send
+
+    def _send(self, number: int, data: bytes) -> None:
+        for client in self._clients.values():
+            if number in (-1, client.party.number):
+                client.send(data)
+
+    def _opened(self, client: _TcpClient) -> None:
+        if self._fleet is None:
+            client.transport.abort()
+            return
+        self._numbers += 1
+        number = (self.port + self._numbers) % 65535
+        client.party = Party(self._fleet, number, GROUND, self._key, self._intake.account())
+        self._clients[number] = client
+        for system in self._fleet.systems:
+            client.party.greet(system)
+
+    def _prove(self, client: _TcpClient) -> None:
+        if self._listener is not None:
+            self._listener.prove(client.transport)
+
+    def _end_stranger(self, client: _TcpClient) -> None:
+        if self._listener is not None:
+            self._listener.note_stranger(client.preamble.refused or "")
+        client.transport.abort()
+
+    def _closed(self, client: _TcpClient) -> None:
+        for number, one in tuple(self._clients.items()):
+            if one is client:
+                del self._clients[number]
+                client.party.leave()
+
+
+class _TcpClient(asyncio.BufferedProtocol):
+    """One connection."""
+
+    transport: asyncio.Transport
+    party: Party
+
+    def __init__(self, door: MavlinkTcp) -> None:
+        self._door = door
+        self._full = False
+        self._bite = bytearray(_BITE_BYTES)
+        self.preamble = Preamble()
+        self._proven = False
+        self._pause: asyncio.TimerHandle | None = None
+
+    def send(self, data: bytes) -> None:
+        """Send frames, whole or not at all."""
+        if not self._full:
+            write_while_open(self.transport, self.party.sign(data))
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """As of asyncio."""
+        assert isinstance(transport, asyncio.Transport)
+        self.transport = transport
+        transport.set_write_buffer_limits(_UNSENT_BYTES)
+        tend(transport.get_extra_info("socket"))
+        self._door._opened(self)
+
+    def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002
+        """As of asyncio."""
+        return self._bite
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """As of asyncio."""
+        data = self.preamble.feed(bytes(self._bite[:nbytes]))
+        if self.preamble.refused is not None:
+            self._door._end_stranger(self)
+            return
+        pause_s = self.party.take(data)
+        if not self._proven and self.party.has_spoken:
+            self._proven = True
+            self._door._prove(self)
+        if pause_s > 0.0 and not self.transport.is_closing():
+            self.transport.pause_reading()
+            self._read_after(pause_s)
+
+    def _read_after(self, pause_s: float) -> None:
+        self._pause = asyncio.get_running_loop().call_later(pause_s, self._read_again)
+
+    def _read_again(self) -> None:
+        pause_s = self.party.may_read()
+        if pause_s > 0.0:
+            self._read_after(pause_s)
+        elif not self.transport.is_closing():
+            self.transport.resume_reading()
+
+    def pause_writing(self) -> None:
+        """As of asyncio."""
+        self._full = True
+
+    def resume_writing(self) -> None:
+        """As of asyncio."""
+        self._full = False
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
+        """As of asyncio."""
+        if self._pause is not None:
+            self._pause.cancel()
+        self._door._closed(self)

@@ -1,0 +1,208 @@
+"""MAVLink over UDP, as PX4's simulations have it: `doors.open(MavlinkUdp())`.
+
+UAVs without an autopilot are not there for it; see `volery.mavlink.scenario_setup`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+
+from volery.core.errors import BridgeError
+from volery.core.network_access import LOOPBACK, check_address
+from volery.graph.session import Gateway
+from volery.mavlink.autopilot.streams import GROUND, ONBOARD
+from volery.mavlink.codec import dialect
+from volery.mavlink.framing import Framer, lengths_of
+from volery.mavlink.links import ports
+from volery.mavlink.links.connection import why_not
+from volery.mavlink.links.rate_limits import IntakeAccount, IntakeLimits
+from volery.mavlink.links.signing import Signing
+from volery.mavlink.links.udp_reader import UdpInlet, connected_beside
+from volery.mavlink.links.vehicle_registry import Fleet, Sink
+
+_MOST_WITH_PEERS = 64
+"""Vehicles whose agreed peers have sockets of their own; those of further vehicles share one."""
+_MOST_DATAGRAM = 1400
+"""Bytes: below the MTU of Ethernet."""
+
+
+class MavlinkUdp:
+    """Two links for each vehicle: to a companion computer and to a ground station.
+
+    host: where those are. port: of the first companion computer, 14540; the others follow, and the
+    vehicles' own ports keep their distance to it, so that several runs can stand side by side.
+    Vehicles send from the beginning, to the stated ports and to whoever has spoken to them last.
+    key: of 32 bytes, by which both sides sign; see `signing`.
+    """
+
+    def __init__(
+        self,
+        host: str = "127.0.0.1",
+        port: int = ports.ONBOARD_TO,
+        *,
+        ground_port: int | None = None,
+        anywhere: bool = False,
+        key: bytes | None = None,
+    ) -> None:
+        self._key = key
+        self._host = host
+        self._shift = port - ports.ONBOARD_TO
+        self._ground = ports.GROUND_TO + self._shift if ground_port is None else ground_port
+        self._anywhere = anywhere
+        self._intake = IntakeLimits()
+        self._links: dict[int, list[_UdpLink]] = {}
+        self._fleet: Fleet | None = None
+        self._looks: asyncio.Task[None] | None = None
+
+    @property
+    def name(self) -> str:
+        """What it is and where."""
+        onboard = ports.ONBOARD_TO + self._shift
+        return f"MAVLink UDP {self._host}:{onboard} and following, {self._ground}"
+
+    async def start(self, gateway: Gateway) -> None:
+        """Begin to send. `BridgeError` where a port is taken."""
+        dialect()
+        check_address(self._host, anywhere=self._anywhere, flag="--allow-remote")
+        self._fleet = Fleet(gateway, self.name, self._join, self._leave)
+        self._fleet.look()
+        self._looks = asyncio.create_task(self._fleet.keep_looking())
+
+    async def stop(self) -> None:
+        """Give all ports back."""
+        if self._looks is not None:
+            self._looks.cancel()
+            await asyncio.gather(self._looks, return_exceptions=True)
+        for system in tuple(self._links):
+            self._leave(system)
+        if self._fleet is not None:
+            self._fleet.close()
+
+    def _join(self, name: str, system: int) -> Sink:
+        assert self._fleet is not None
+        self._intake.fit(len(self._fleet.systems))
+        k = ports.number_of(system) + self._shift
+        links = [
+            (ports.ONBOARD_FROM + k, ports.ONBOARD_TO + k, ONBOARD),
+            (ports.GROUND_FROM + k, self._ground, GROUND),
+        ]
+        opened: list[_UdpLink] = []
+        try:
+            for own, to, profile in links:
+                opened.append(
+                    _UdpLink(
+                        self._fleet,
+                        system,
+                        profile,
+                        own,
+                        (self._host, to),
+                        self._key,
+                        self._intake,
+                        for_peer=len(self._links) < _MOST_WITH_PEERS,
+                    )
+                )
+        except BridgeError as error:
+            for link in opened:
+                link.close()
+            raise BridgeError(f"{name}: {error}") from None
+        self._links[system] = opened
+
+        def sink(number: int, data: bytes) -> None:
+            for link in opened:
+                if number in (-1, link.number):
+                    link.send(data)
+
+        return sink
+
+    def _leave(self, system: int) -> None:
+        for link in self._links.pop(system, ()):
+            link.close()
+
+
+class _UdpLink:
+    """One port of one vehicle, which is the link's number.
+
+    for_peer: whether the peer at `to` has a socket of its own there.
+    """
+
+    def __init__(
+        self,
+        fleet: Fleet,
+        system: int,
+        profile: int,
+        own: int,
+        to: tuple[str, int],
+        key: bytes | None,
+        intake: IntakeLimits,
+        *,
+        for_peer: bool,
+    ) -> None:
+        self.number = own
+        self._intake = intake
+        self._fleet, self._system, self._profile = fleet, system, profile
+        self._peers = [to]
+        self._framer = Framer()
+        self._signing = Signing(key, profile)
+        family = socket.AF_INET6 if ":" in to[0] else socket.AF_INET
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        try:
+            self._socket.bind((to[0] if to[0] in LOOPBACK else "", own))
+        except (OSError, OverflowError) as error:
+            self._socket.close()
+            raise BridgeError(f"cannot listen on UDP port {own}: {why_not(error)}") from None
+        beside = connected_beside(self._socket, to) if for_peer else None
+        self._inlets = [self._read_from(sock) for sock in (self._socket, beside) if sock]
+        fleet.send(system, own, profile, b"")
+
+    def send(self, data: bytes) -> None:
+        """Send frames; where nobody listens they are lost, as by radio."""
+        data = self._signing.sign(data)
+        for peer in self._peers:
+            for part in _pieces(data):
+                with contextlib.suppress(OSError):
+                    self._socket.sendto(part, peer)
+
+    def close(self) -> None:
+        """Give the port back."""
+        for inlet in self._inlets:
+            inlet.close()
+        self._fleet.close_link(self._system, self.number)
+
+    def _read_from(self, sock: socket.socket) -> UdpInlet:
+        def deliver(frames: bytes) -> None:
+            self._fleet.send(self._system, self.number, self._profile, frames)
+
+        account = self._intake.account()
+        return UdpInlet(sock, account, self._take, deliver, lambda: self._fleet.pause_s)
+
+    def _take(
+        self, data: bytes, peer: tuple[str, int], account: IntakeAccount
+    ) -> tuple[bytes, float]:
+        """Returns the frames of a datagram, and for how many seconds none must be read after it."""
+        heard = self._framer.datagram(data)
+        frames = b"".join(frame.data for frame in heard if self._signing.accepts(frame))
+        noise_bytes = len(data) - sum(len(frame.data) for frame in heard)
+        cost_s = account.charge(max(1, len(heard)), noise_bytes)
+        pause_s = max(cost_s, self._fleet.pause_s)
+        if self._signing.has_key and not frames:  # a stranger
+            return b"", pause_s
+        if peer not in self._peers:  # the place agreed upon, and who spoke last
+            self._peers = [self._peers[0], peer[:2]]
+        return frames, pause_s
+
+
+def _pieces(data: bytes) -> list[bytes]:
+    """Frames in datagrams, none of them cut."""
+    if len(data) <= _MOST_DATAGRAM:
+        return [data]
+    pieces, start, at = [], 0, 0
+    for length in lengths_of(data):
+        if at + length - start > _MOST_DATAGRAM and at > start:
+            pieces.append(data[start:at])
+            start = at
+        at += length
+    pieces.append(data[start:])
+    return pieces

@@ -1,0 +1,296 @@
+"""The report of a log: where each UAV was, where it thought it was, and a real flight beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from volery.core.errors import VoleryError
+from volery.core.plurals import counted
+from volery.report.alignment import (
+    TimeShift,
+    at_times,
+    ate_rmse_m,
+    common_times,
+    time_shift,
+    umeyama,
+)
+from volery.report.logged_flights import LoggedFlight, LoggedUav, read_flight, read_way
+from volery.report.page import STYLE, ReportError
+from volery.report.trajectories import Way
+from volery.report.trajectory_charts import Line, date_text, is_date, over_time, ways_from_above
+from volery.report.true_trunks import TrueTrunks, true_trunks
+
+Array = NDArray[np.float64]
+
+_LEAST = 10
+"""Poses in common that an error can be told from."""
+_APART = ".chart + .pair { margin-top: 1.2rem; }\n"
+"""Between the way from above and the charts below it, as between these."""
+_ALIKE, _LEFT_SHARE = 0.95, 0.1
+"""Speeds less alike, or ways farther apart by the spread of one, may be of two flights. Between two
+UAVs of one forest search, whose missions begin alike, 0.85 to 0.91 and 0.12 to 0.15 were measured;
+between truth and estimate of one flight 1.00 and less than 0.01."""
+_TRUE_M = 0.5
+"""So near to a tree a mapped trunk is that tree's."""
+_LONG_SHIFT_S = 86_400.0
+_LEAST_S, _MOST_S = 3.0, 86_400.0
+"""Seconds that a common time can be found from, and is looked for in."""
+
+
+class LogReport(NamedTuple):
+    """What was written."""
+
+    path: Path
+    warnings: list[str]
+    """What whoever reads it should know."""
+    fit: str = ""
+    """How well a real flight fits the simulated one, where it is compared."""
+
+
+def write_log_report(
+    log: Path,
+    folder: Path,
+    *,
+    compare: Path | None = None,
+    compare_topic: str | None = None,
+    uav: str | None = None,
+    overwrite: bool = False,
+) -> LogReport:
+    """Write `index.html` into `folder`; one that is there already only with `overwrite`.
+
+    compare: log of a real flight, laid over that of `uav` (None: the first) in `log`, aligned in
+    time by their speeds and in space by rotation and translation. compare_topic: its poses; None:
+    the only ones there. Without it `uav` alone is drawn, None: all. `VoleryError` for logs that do
+    not hold what is asked for.
+    """
+    path, warnings, fit = folder / "index.html", list[str](), ""
+    if compare is None and compare_topic is not None:
+        raise ReportError(f"--compare-topic {compare_topic}: of which log? --compare names it")
+    if path.exists() and not overwrite:
+        raise ReportError(f"{path} exists; --overwrite replaces it")
+    flight = read_flight(log)
+    chosen = _chosen(flight.uavs, uav, log)
+    drawn = flight.uavs if uav is None or compare is not None else [chosen]
+    trunks = true_trunks(flight.origin, log.parent)
+    parts = _trouble_notes(log, flight.trouble, warnings)
+    parts += [section for each in drawn for section in _estimate_section(each, trunks)]
+    if compare is not None:
+        real = read_way(compare, compare_topic)
+        parts += _trouble_notes(compare, real.trouble, warnings)
+        laid = _laid_over(chosen, real.way, compare)
+        parts += _comparison_section(chosen, laid, compare, trunks)
+        warnings += laid.doubts(compare)
+        fit = laid.fit
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path.write_text(_page(log.name, _lead(flight), parts), encoding="utf-8")
+    except OSError as error:
+        raise ReportError(f"{path}: cannot write the report: {error.strerror}") from None
+    return LogReport(path, warnings, fit)
+
+
+def _trouble_notes(log: Path, trouble: str, warnings: list[str]) -> list[str]:
+    """A note for the page where something is wrong with a log's file; a warning, too."""
+    if not trouble:
+        return []
+    warnings.append(f"{log}: {trouble}; the report shows what can be read")
+    return [f'<p class="note">{escape(log.name)}: {escape(trouble)}.</p>']
+
+
+def _chosen(uavs: Sequence[LoggedUav], name: str | None, log: Path) -> LoggedUav:
+    for each in uavs:
+        if name in (None, each.name):
+            return each
+    known = ", ".join(each.name for each in uavs)
+    raise VoleryError(f"{log}: there is no {name} in it; known: {known}")
+
+
+def _estimate_section(uav: LoggedUav, trunks: TrueTrunks) -> list[str]:
+    """Simulated against estimated: from above with the trunks, x and y over time."""
+    lines = []
+    if uav.truth is not None:
+        lines.append(Line("simulated", uav.truth.time_s, uav.truth.position))
+    if uav.estimate is not None:
+        lines.append(Line("estimated", uav.estimate.time_s, uav.estimate.position))
+    told = "Trajectory and trunk map."
+    if len(uav.trunks):
+        told = (
+            f"Trajectory, and {counted(len(uav.trunks), 'trunk')} that the level LIDAR saw three "
+            "times or more, where the estimate puts them."
+        )
+        if not uav.is_founded:
+            told += (
+                " No nodding LIDAR tells what stands on the ground: crowns and rises of the "
+                "ground may be among them."
+            )
+    near = trunks.near(np.concatenate([line.position for line in lines]))
+    told += _trunks_text(uav.trunks, near)
+    if uav.truth is not None and uav.estimate is not None:
+        told += _error_text(uav.estimate, uav.truth)
+    return [f"<h2>{escape(uav.name)}</h2>", *_figures(lines, uav.trunks, near, told)]
+
+
+def _trunks_text(found: Array, near: TrueTrunks) -> str:
+    """What the rings are, and how well mapped trunks fit them."""
+    if near.why_none:
+        return f" {escape(near.why_none)}"
+    if not len(near.places):
+        return " No tree of the scenario stands within 15 m of the way."
+    told = (
+        f" Rings: {counted(len(near.places), 'tree')} of the scenario within 15 m of the way, by "
+        "the width of trunks (thin ones wider, so that they can be seen)."
+    )
+    away = near.distances_m(found)
+    if len(away):
+        told += (
+            f" {(away <= _TRUE_M).mean():.0%} of the mapped trunks stand within {_TRUE_M} m of "
+            "one, as the estimate puts them."
+        )
+    return told
+
+
+def _error_text(estimate: Way, truth: Way) -> str:
+    known = common_times(estimate.time_s, truth.time_s)
+    if known.sum() < _LEAST:
+        return ""
+    own = estimate.position[known]
+    true = at_times(truth.time_s, truth.position, estimate.time_s[known])
+    raw = _rms(own - true)
+    return (
+        f" Root mean square error {raw:.2f} m as it stands, {ate_rmse_m(own, true):.2f} m after "
+        "rigid alignment (Umeyama), over "
+        f"{float(np.linalg.norm(np.diff(true, axis=0), axis=1).sum()):.0f} m."
+    )
+
+
+class _Laid(NamedTuple):
+    """A real way laid over a simulated one."""
+
+    lines: list[Line]
+    shift: TimeShift
+    left_m: float
+    """Root mean square distance."""
+    size_m: float
+    """That of the simulated way from its middle."""
+    share: float
+    """Of the real way's poses that have a time in common."""
+
+    @property
+    def fit(self) -> str:
+        """How well they fit, in figures."""
+        return (
+            f"correlation of speeds {self.shift.alike:.2f}, {self.left_m:.2f} m apart (root mean "
+            f"square) over {self.share:.0%} of it"
+        )
+
+    def doubts(self, log: Path) -> list[str]:
+        """Why the two may not be of one flight; empty where they fit."""
+        found = []
+        if self.shift.alike < _ALIKE:
+            found.append(
+                f"the speeds differ (correlation {self.shift.alike:.2f}: 1 is the same flight, and "
+                "two UAVs on missions that begin alike come to 0.9), so the shift in time may be "
+                "wrong"
+            )
+        if self.left_m > _LEFT_SHARE * self.size_m:
+            found.append(
+                f"the ways are {self.left_m:.2f} m apart (root mean square) where the simulated "
+                f"one spreads by {self.size_m:.1f} m"
+            )
+        return [f"{log}: it may be another flight: {doubt}" for doubt in found]
+
+
+def _laid_over(uav: LoggedUav, real: Way, log: Path) -> _Laid:
+    simulated = uav.truth or uav.estimate
+    if simulated is None or min(real.lasts_s, simulated.lasts_s) < _LEAST_S:
+        raise VoleryError(f"{log}: too few poses to lay it over {uav.name}")
+    if real.lasts_s > _MOST_S:
+        raise VoleryError(
+            f"{log}: its poses span {real.lasts_s / 3600.0:.0f} hours; was its clock set meanwhile?"
+        )
+    shift = time_shift(simulated.time_s, simulated.position, real.time_s, real.position)
+    times = real.time_s + shift.seconds
+    known = common_times(times, simulated.time_s)
+    if known.sum() < _LEAST:
+        raise VoleryError(f"{log}: it has no time in common with {uav.name}")
+    there = at_times(simulated.time_s, simulated.position, times[known])
+    aligned = umeyama(real.position[known], there).apply(real.position)
+    lines = [
+        Line(f"simulated {uav.name}", simulated.time_s, simulated.position),
+        Line("real", times, aligned),
+    ]
+    left, size = (_rms(way) for way in (aligned[known] - there, there - there.mean(axis=0)))
+    return _Laid(lines, shift, left, size, float(known.mean()))
+
+
+def _rms(offsets: Array) -> float:
+    return float(np.sqrt((offsets**2).sum(axis=1).mean()))
+
+
+def _shift_text(laid: _Laid) -> str:
+    """By how much the real flight's clock was moved; far away ones by what they show."""
+    shift_s, begins_s = laid.shift.seconds, float(laid.lines[1].time_s[0])
+    real_s = begins_s - shift_s
+    if abs(shift_s) > _LONG_SHIFT_S and is_date(real_s):
+        at = date_text(begins_s) if is_date(begins_s) else f"{begins_s:.2f} s"
+        return f"its clock moved so that {date_text(real_s)}, its beginning, is {at}"
+    moved = round(shift_s, 2) + 0.0  # which is no -0.0
+    return f"its clock moved by {moved:,.2f} s"
+
+
+def _comparison_section(uav: LoggedUav, laid: _Laid, log: Path, trunks: TrueTrunks) -> list[str]:
+    """A real flight over the simulated one."""
+    told = (
+        f"The flight of {escape(log.name)} over that of {escape(uav.name)}: {_shift_text(laid)} "
+        f"(where their speeds are most alike, with a correlation of "
+        f"{laid.shift.alike:.2f}), turned and moved onto it. Root mean square distance "
+        f"{laid.left_m:.2f} m over {laid.share:.0%} of it."
+    )
+    notes = [f'<p class="note">{escape(doubt)}.</p>' for doubt in laid.doubts(Path(log.name))]
+    near = trunks.near(laid.lines[0].position)
+    figures = _figures(laid.lines, uav.trunks, near, told)
+    return ["<h2>Real against simulated</h2>", *notes, *figures]
+
+
+def _lead(flight: LoggedFlight) -> list[str]:
+    """What the log tells of the whole flight."""
+    count = len(flight.uavs)
+    fleet = counted(count, "UAV")
+    scenario = f"Scenario {flight.scenario}, " if flight.scenario else ""
+    texts = [flight.description, f"{scenario}{flight.lasts_s:.1f} s with {fleet}."]
+    return [f'<p class="lead">{escape(text)}</p>' for text in texts if text]
+
+
+def _figures(lines: Sequence[Line], trunks: Array, true: TrueTrunks, told: str) -> list[str]:
+    def figure(svg: str, text: str) -> str:
+        return f'<figure class="chart">{svg}<figcaption>{text}</figcaption></figure>'
+
+    return [
+        figure(ways_from_above(lines, trunks, true), told),
+        '<div class="pair">',
+        figure(over_time(lines, 0), "x over time."),
+        figure(over_time(lines, 1), "y over time."),
+        "</div>",
+    ]
+
+
+def _page(title: str, lead: Sequence[str], parts: Sequence[str]) -> str:
+    name = escape(title)
+    head = [
+        "<!doctype html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        '<meta name="color-scheme" content="light dark">',
+        f"<title>{name} · flight report</title>",
+        f"<style>{STYLE}{_APART}</style></head><body><main>",
+        f'<header><p class="kicker">Volery flight report</p><h1>{name}</h1>',
+        *lead,
+        "</header>",
+    ]
+    return "\n".join([*head, *parts, "</main></body></html>"]) + "\n"

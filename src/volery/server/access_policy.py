@@ -1,0 +1,126 @@
+"""What a client of the page's rosbridge may do."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from volery.bridges.rosbridge.fields import absolute
+from volery.bridges.rosbridge.wire import Operation
+from volery.core.errors import BridgeError, CommandError
+from volery.runtime.services.control_authority import HAND_OVER, RELEASE, TAKE
+from volery.runtime.vehicles.control_authority import (
+    MOST_CHARACTERS,
+    Pilots,
+    operator_name,
+    same_operator,
+)
+from volery.runtime.vehicles.control_targets import names_in, parts_of
+from volery.server.operator_names import CrewList
+from volery.server.read_only import READ_ONLY_SERVICES
+
+_LOOKING = {"subscribe", "unsubscribe", "set_level", "status", "auth"}
+"""Operations that change nothing for others."""
+_TOLD_AGAIN_S = 1.0
+"""How often the sender of a stream of commands learns that it is refused."""
+_MOST_TOLD = 1000
+
+
+class ViewerGate:
+    """Lets a client look on."""
+
+    def check(self, operation: Operation) -> bool:
+        """`BridgeError` for whatever changes something."""
+        op = operation["op"]
+        if op in _LOOKING or (op == "call_service" and service_of(operation) in READ_ONLY_SERVICES):
+            return True
+        what = operation.get("service", operation.get("topic", operation.get("action", "")))
+        doing = f"{op.replace('_', ' ')} {what}".strip()
+        raise BridgeError(f"a viewer may not {doing[:120]}; show the pilots' token")
+
+
+class PilotGate:
+    """Lets a client command the UAVs that nobody else holds.
+
+    `name` is what the pilot is called; `crew` are all who are connected to this server. What it
+    asks of the services of control it asks in its own name.
+    """
+
+    def __init__(
+        self, name: str, crew: CrewList, pilots: Pilots, now_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.name = name
+        self._crew = crew
+        self._pilots = pilots
+        self._now_s = now_s
+        self._told_s: dict[str, float] = {}
+
+    def check(self, operation: Operation) -> bool:
+        """`BridgeError` for a command to a UAV that another pilot holds."""
+        op = operation["op"]
+        if op == "call_service":
+            service = service_of(operation)
+            if service in (TAKE, RELEASE, HAND_OVER):
+                self._sign(service, operation)
+            elif service not in READ_ONLY_SERVICES:
+                self._check_free(service, operation)
+        elif op == "send_action_goal":
+            self._check_free(_absolute(operation.get("action")), operation)
+        elif op in ("publish", "advertise", "advertise_service", "advertise_action"):
+            return self._may_publish(operation)
+        return True
+
+    def _may_publish(self, operation: Operation) -> bool:
+        """Whether a publication passes; one of a stream that does not is told of now and then."""
+        topic = _absolute(operation.get("topic", operation.get("service", operation.get("action"))))
+        try:
+            self._check_free(topic, {})
+        except BridgeError:
+            now_s = self._now_s()
+            if now_s - self._told_s.get(topic, -_TOLD_AGAIN_S) < _TOLD_AGAIN_S:
+                return False
+            if len(self._told_s) >= _MOST_TOLD:
+                self._told_s.clear()
+            self._told_s[topic] = now_s
+            raise
+        return True
+
+    def _check_free(self, name: str, operation: Operation) -> None:
+        """Refuse what is below, or about, a UAV that another pilot holds."""
+        try:
+            about = {*parts_of(name), *names_in(operation.get("args"))}
+        except CommandError as error:
+            raise BridgeError(str(error)) from None
+        for uav in sorted(about):
+            holder = self._pilots.holder_of(uav)
+            if holder and not same_operator(holder, self.name):
+                raise BridgeError(f"{uav} is held by {holder}, who can hand it over")
+
+    def _sign(self, service: str, operation: Operation) -> None:
+        """See to it that the pilot speaks for nobody else."""
+        args = operation.get("args")
+        if not isinstance(args, dict):
+            raise BridgeError(f"{service}: args must be an object with uav")
+        called = args.get("pilot")
+        if isinstance(called, str) and called.strip() and not same_operator(called, self.name):
+            called = operator_name(called)
+            if not 0 < len(called) <= MOST_CHARACTERS:
+                raise BridgeError(f"a pilot's name has 1 to {MOST_CHARACTERS} characters")
+            if service != TAKE or self._pilots.held_by(self.name):
+                raise BridgeError(f"you are {self.name}, not {called[:MOST_CHARACTERS]}")
+            self._crew.rename(self.name, called)
+            self.name = called
+        to = args.get("to")
+        if service == HAND_OVER and to not in self._crew:
+            raise BridgeError(f"no pilot is called {str(to)[:MOST_CHARACTERS]!r} here")
+        operation["args"] = {**args, "pilot": self.name}
+
+
+def service_of(operation: Operation) -> str:
+    """Name in the graph of what a client calls `/add` or, long ago, `/add#3`."""
+    return _absolute(str(operation.get("service", "")).partition("#")[0])
+
+
+def _absolute(name: Any) -> str:
+    return absolute(str(name or ""))

@@ -1,0 +1,144 @@
+"""What the server knows of the run: its state, its world, and who is connected.
+
+Its owner, who builds and flies, tells through `PageServer`; the server's own thread reads.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Protocol
+
+from volery.bridges.rosbridge.bulk_turns import BulkTurns
+from volery.bridges.rosbridge.message_encoder import Forms
+from volery.bridges.rosbridge.protocol import Shared
+from volery.bridges.rosbridge.rosapi import RosApi
+from volery.bridges.rosbridge.tf_republisher import TfRepublisher
+from volery.bridges.rosbridge.websocket_session import SERVICE_RESTART, Channel
+from volery.graph.graph import Graph
+from volery.graph.session import Gateway
+from volery.runtime.build.geometry import Geometry
+from volery.runtime.end_of_run import EndOfRun
+from volery.runtime.vehicles.control_authority import Pilots
+from volery.scenario.catalog import Shelf
+from volery.scenario.schema import Scenario
+from volery.server.operator_names import CrewList
+
+_FAREWELL_S = 1.0
+"""Time for a client to take the news that its world is gone."""
+
+
+class State(StrEnum):
+    """What goes on."""
+
+    BUILDING = "building"
+    FLYING = "flying"
+    ENDED = "ended"
+    """A simulation waits at the end of its scenario."""
+    LOBBY = "lobby"
+    FAILED = "failed"
+    """As in the lobby, because the scenario could not be built."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The present state, in words."""
+
+    state: State = State.BUILDING
+    scenario: str | None = None
+    description: str = ""
+    message: str = ""
+    """What went wrong, if something did."""
+
+
+class World(Protocol):
+    """What clients can join: a simulation, a lobby, a recording.
+
+    Where it has a `scenario`, `geometry` and `pilots`, as a `Simulation` has, they are served too.
+    Where it has no scenario but a `name`, as a log of unknown origin has, that is told.
+    """
+
+    graph: Graph
+    gateway: Gateway
+
+    def be_prompt(self) -> None:
+        """Answer clients soon."""
+
+
+class JoinedWorld:
+    """A world that clients have joined: what their conversations have in common."""
+
+    def __init__(self, world: World) -> None:
+        graph = world.graph
+        self.gateway = world.gateway
+        self.scenario: Scenario | None = getattr(world, "scenario", None)
+        self.pilots: Pilots | None = getattr(world, "pilots", None)
+        self.shared = Shared(Forms("ros2"), graph.now_ns)
+        self.bulk = BulkTurns()
+        self._world = world
+        self._rosapi = RosApi(world.gateway, "ros2", graph.now_ns)
+        self._rosapi.start()
+        self._transforms = TfRepublisher(world.gateway)
+        self._transforms.start()
+
+    @property
+    def geometry(self) -> Geometry | None:
+        """What stands there at present; None: nothing that could be shown."""
+        geometry: Geometry | None = getattr(self._world, "geometry", None)
+        return geometry
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether a simulation waits at the end of its scenario."""
+        end: EndOfRun | None = getattr(self._world, "end", None)
+        return end is not None and end.waits
+
+    def leave(self) -> None:
+        """Take back what is offered to clients."""
+        self._rosapi.stop()
+        self._transforms.stop()
+
+
+@dataclass(eq=False)
+class Client:
+    """One rosbridge client."""
+
+    channel: Channel
+    conversation: asyncio.Task[Exception | None]
+
+    async def dismiss(self, reason: str) -> None:
+        """Have it connect again, to another world; who does not listen is left alone."""
+        with suppress(Exception):
+            async with asyncio.timeout(_FAREWELL_S):
+                await self.channel.close(SERVICE_RESTART, reason)
+        self.conversation.cancel()
+        await asyncio.gather(self.conversation, return_exceptions=True)
+
+
+@dataclass(eq=False)
+class Site:
+    """What all requests share. Written to in the server's thread only."""
+
+    recordings: Path | None = None
+    """Folder of logs; None: there is none."""
+    shelf: Shelf = field(default_factory=Shelf)
+    """Scenarios that can be loaded; its folder is that of uploads."""
+    situation: Situation = field(default_factory=Situation)
+    world: JoinedWorld | None = None
+    clients: set[Client] = field(default_factory=set)
+    crew: CrewList = field(default_factory=CrewList)
+
+    async def join(self, world: World, situation: Situation) -> None:
+        """Let clients into a world."""
+        self.world, self.situation = JoinedWorld(world), situation
+
+    async def leave(self, situation: Situation) -> None:
+        """Send everybody out of the present world."""
+        world, self.world, self.situation = self.world, None, situation
+        farewell = situation.message or "the world changes"
+        await asyncio.gather(*(client.dismiss(farewell) for client in tuple(self.clients)))
+        if world is not None:
+            world.leave()

@@ -1,0 +1,187 @@
+"""A scenario around a file: ground large enough for it, and two F450s that wait beside it.
+
+text = toml_of("grid_map", Path("map.png"), "yard", "yard.png")
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from volery.core.errors import DataFileError
+from volery.core.geodesy import LocalFrame
+from volery.core.plurals import counted
+from volery.server.uploads.kinds import FARTHEST_M, MOST_CELLS, MOST_TREES, MOST_TRIANGLES
+from volery.world.city.geojson import read_features
+from volery.world.grid_maps.reading import read_cells
+from volery.world.inventory import read_inventory
+from volery.world.mesh_files import read_mesh
+
+_CELL_M, _BLOCK_M = 2.0, 5.0
+"""Room for an F450 (0.5 m wide) between blocks, above its usual flight."""
+_MARGIN_M = 30.0
+"""Ground beyond what stands there."""
+_BESIDE_M = 5.0
+_LEAST_EXTENT_M = 150.0
+_CITY_REACH_M = 2_000.0
+"""Of the part of a city that is kept, from its middle to each side."""
+
+
+class _Part(NamedTuple):
+    """What a file adds to a scenario."""
+
+    world: str
+    """TOML."""
+    extent_m: float
+    """How far from the origin something stands."""
+    first_m: tuple[float, float]
+    last_m: tuple[float, float]
+    """Where the UAVs wait."""
+
+
+def toml_of(kind: str, path: Path, name: str, called: str) -> str:
+    """TOML of a scenario `name` around the file `path`, which lies beside it.
+
+    called: the file's name at home, for people. Raises `DataFileError` for a file that cannot be
+    read, or is too large for a picture in a browser.
+    """
+    part = _MAKERS[kind](path)
+    if not part.extent_m <= FARTHEST_M:
+        raise DataFileError(
+            f"{path} reaches {part.extent_m:.0f} m from the origin; at most {FARTHEST_M:.0f} m are "
+            "allowed: are its coordinates metres from an origin near by?"
+        )
+    extent = max(_LEAST_EXTENT_M, math.ceil(part.extent_m + _MARGIN_M))
+    shown = "".join(c if c.isascii() and c.isprintable() else "?" for c in called)[:80]
+    return _SCENARIO.format(
+        name=name,
+        description=json.dumps(f"Two F450s and what is in {shown}."),
+        extent=float(extent),
+        world=part.world,
+        first=_numbers(part.first_m),
+        last=_numbers(part.last_m),
+    )
+
+
+def _grid_map(path: Path) -> _Part:
+    rows, columns = read_cells(path).shape
+    if rows * columns > MOST_CELLS:
+        raise DataFileError(f"{path}: {columns} x {rows} cells; at most {MOST_CELLS} are allowed")
+    width, height = columns * _CELL_M, rows * _CELL_M
+    corner = (-width / 2.0, -height / 2.0)
+    world = (
+        "[world.grid_map]\n"
+        f'maps = [{{ file = {json.dumps(path.name)}, name = "uploaded" }}]\n'
+        f"cell_size_m = {_CELL_M}\nblock_height_m = {_BLOCK_M}\n"
+        f"origin_m = {_numbers(corner)}\n"
+    )
+    return _Part(world, max(width, height) / 2.0, *_beside(corner[0]))
+
+
+def _city(path: Path) -> _Part:
+    features = read_features(path)
+    rings = [ring for feature in features for polygon in feature.polygons for ring in polygon]
+    if not rings:
+        raise DataFileError(f"{path}: there is no polygon in it")
+    corners = np.concatenate(rings)
+    longitude, latitude = ((corners.min(axis=0) + corners.max(axis=0)) / 2.0).tolist()
+    frame = LocalFrame.from_degrees(latitude, longitude, 0.0)
+    radians = np.radians(corners[:, ::-1])
+    places = frame.enu_from_geodetic(np.pad(radians, ((0, 0), (0, 1))))
+    reach = min(float(np.abs(places[:, :2]).max()) + 1.0, _CITY_REACH_M)
+    world = (
+        f"[world.origin]\nlatitude_deg = {latitude!r}\nlongitude_deg = {longitude!r}\n"
+        f"altitude_m = 0.0\n[world.city]\nfile = {json.dumps(path.name)}\n"
+        f"region_m = {_numbers((-reach, -reach, reach, reach))}\n"
+    )
+    return _Part(world, reach + _MARGIN_M, (0.0, 0.0), (5.0, 0.0))
+
+
+def _mesh(path: Path) -> _Part:
+    mesh = read_mesh(path).mesh
+    if len(mesh) > MOST_TRIANGLES:
+        raise DataFileError(f"{path}: {len(mesh)} triangles; at most {MOST_TRIANGLES} are allowed")
+    low, high = mesh.bounds
+    middle = (low + high) / 2.0
+    place = (-float(middle[0]), -float(middle[1]), -float(low[2]))
+    half = float((high - low)[:2].max()) / 2.0
+    world = (
+        f'[[world.meshes]]\nfile = {json.dumps(path.name)}\nname = "uploaded"\n'
+        f"position_m = {_numbers(place)}\n"
+    )
+    return _Part(world, half, *_beside(-half))
+
+
+def _forest(path: Path) -> _Part:
+    inventory = read_inventory(path)
+    if not 0 < len(inventory) <= MOST_TREES:
+        raise DataFileError(
+            f"{path}: {counted(len(inventory), 'tree')}; allowed are 1 to {MOST_TREES}"
+        )
+    low, high = inventory.position.min(axis=0), inventory.position.max(axis=0)
+    world = (
+        f'[world.forest]\nkind = "inventory"\nfile = {json.dumps(path.name)}\n'
+        'species = "broadleaf"\n'
+    )
+    y = float(low[1] + high[1]) / 2.0
+    extent = float(np.abs([low, high]).max()) + _BESIDE_M
+    return _Part(world, extent, *_beside(float(low[0]), y))
+
+
+def _beside(x: float, y: float = 0.0) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Two places west of what begins at x, around y."""
+    return (x - _BESIDE_M, y - _BESIDE_M), (x - _BESIDE_M, y + _BESIDE_M)
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return f"[{', '.join(repr(round(float(value), 6)) for value in values)}]"
+
+
+_MAKERS: dict[str, Callable[[Path], _Part]] = {
+    "grid_map": _grid_map,
+    "city": _city,
+    "mesh": _mesh,
+    "forest": _forest,
+}
+
+_SCENARIO = """\
+name = "{name}"
+description = {description}
+duration_s = 3600.0
+
+[world.terrain]
+kind = "flat"
+extent_m = {extent}
+{world}
+[types.visitor]
+airframe = "f450"
+
+[[types.visitor.sensors]]
+kind = "lidar"
+name = "horizontal"
+position_m = [0.0, 0.0, 0.18]
+[[types.visitor.sensors]]
+kind = "imu"
+[[types.visitor.sensors]]
+kind = "sonar"
+position_m = [0.0, 0.0, -0.05]
+rpy_deg = [0.0, 90.0, 0.0]
+[[types.visitor.sensors]]
+kind = "odometry"
+[[types.visitor.sensors]]
+kind = "ground_truth"
+[[types.visitor.sensors]]
+kind = "battery"
+
+[[uavs]]
+type = "visitor"
+count = 2
+position_m = {first}
+last_position_m = {last}
+placement = "nearest_free"
+"""

@@ -1,0 +1,64 @@
+"""Makes a scenario of an uploaded file and builds its world, in a process of its own.
+
+    python -m volery.server.uploads.validation grid_map FOLDER/map.png yard yard.png
+
+Files of strangers are read here, with bounds on memory and time, and without a simulation beside it
+that could suffer. Prints one JSON object: `{}` or `{"error": "one clear message"}`.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from volery.core.errors import VoleryError
+from volery.scenario.catalog import Shelf
+from volery.server.bounded_process import bound_this_process
+from volery.server.uploads.kinds import BOUNDS, SCENARIO
+from volery.server.uploads.scenario_builder import toml_of
+
+
+def check(kind: str, path: Path, name: str, called: str) -> None:
+    """Write `scenario.toml` beside `path`, and build all that stands in it.
+
+    Raises `VoleryError` where the file is no such thing, or no UAV finds a place.
+    """
+    from volery.runtime.build.fleet import check_types, place
+    from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
+    from volery.scenario.load import load_scenario
+    from volery.server.uploads.scenario_file import check_contents, text_of
+
+    target = path.parent / Shelf.FILE
+    own = kind == SCENARIO
+    text = text_of(path, name) if own else toml_of(kind, path, name, called)
+    target.write_text(text, encoding="utf-8")
+    scenario = load_scenario(target, confined=True)
+    if own:
+        check_contents(scenario)
+        check_types(scenario)
+    terrain = build_terrain(scenario)
+    city = build_city(scenario, terrain)
+    forest = build_forest(scenario, terrain, city)
+    scene = build_scene(scenario, terrain, forest, city)
+    try:
+        place(scenario, scene, terrain)
+    finally:
+        scene.close()
+
+
+def main(kind: str, file: str, name: str, called: str) -> None:
+    """Check, and print what came of it."""
+    bound_this_process(BOUNDS)
+    told: dict[str, str] = {}
+    try:
+        check(kind, Path(file), name, called)
+    except VoleryError as error:
+        told["error"] = str(error)
+    except MemoryError:
+        told["error"] = f"{file} needs more than {BOUNDS.memory_bytes >> 30} GB of memory"
+    sys.stdout.write(json.dumps(told))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
