@@ -52,7 +52,13 @@ def test_what_happens_rarely_in_flight_is_compiled_too(tmp_path: Path) -> None:
     """Motion and places lost and found, many divisions of maps: what unit tests have nodes do."""
     _run(tmp_path, "-m", "volery.runtime.warmup")
     folder = _TESTS / "unit" / "autonomy"
-    names = ("slam_node", "slam_way", "planar_slam", "coverage_plans", "local_planning")
+    names = (
+        "slam_node",
+        "slam_keyframe_graph",
+        "planar_slam",
+        "coverage_plans",
+        "receding_horizon",
+    )
     files = [str(folder / f"test_{name}.py") for name in names]
     _run(tmp_path, "-m", "pytest", "-q", "-p", "compile_watch", "-m", "not slow", *files)
     assert json.loads((tmp_path / "compiled.json").read_text()) == [], _REASON

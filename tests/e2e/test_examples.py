@@ -12,7 +12,7 @@ NEEDS_A_RUN = {
     "09_bring_your_own_planner_ros_tcp",
     "13_mavros_offboard",
 }
-"""They join a simulation that runs already: test_run_with_doors.py flies them."""
+"""They join a simulation that runs already: test_run_with_bridges.py flies them."""
 EXAMPLES = sorted(
     path
     for path in (Path(__file__).parents[2] / "examples").glob("*.py")

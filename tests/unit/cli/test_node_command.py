@@ -3,7 +3,7 @@
 import pytest
 from typer.testing import CliRunner
 
-from volery.cli import node
+from volery.cli import launch, node
 from volery.cli.app import app
 
 GAPS = "gap_following"

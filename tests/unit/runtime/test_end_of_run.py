@@ -3,7 +3,7 @@
 from contextlib import suppress
 
 import pytest
-from asking import ask, code_of, request_of
+from service_calls import ask, code_of, request_of
 
 from volery.core.errors import GraphError
 from volery.graph.service_reply import ServiceReply

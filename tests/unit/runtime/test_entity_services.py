@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from asking import ask, code_of
+from service_calls import ask, code_of
 
 OK, UNSUPPORTED, NOT_FOUND, FAILED, INVALID_POSE = 1, 0, 2, 4, 101
 NAME_NOT_UNIQUE, NAME_INVALID, UNSUPPORTED_FORMAT, NO_RESOURCE = 101, 102, 103, 104

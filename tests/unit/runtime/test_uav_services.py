@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from asking import ask
+from service_calls import ask
 
 from volery.core.errors import CommandError
 from volery.graph.messages import (

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from asking import ask
+from service_calls import ask
 
 from volery.bridges.logs.reader import summarize
 from volery.core.errors import RecordingError

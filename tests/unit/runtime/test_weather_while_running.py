@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from asking import ask
+from service_calls import ask
 
 from volery.bridges.logs.replay import Replay
 from volery.core.errors import ScenarioError

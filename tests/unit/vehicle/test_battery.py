@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from plants import F450, LEVEL, body, plant
+from flown_plants import F450, LEVEL, body, plant
 from scipy.integrate import solve_ivp
 
 from volery.control.fleet import Fleet

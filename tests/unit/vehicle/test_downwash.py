@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from plants import F450, LEVEL
+from flown_plants import F450, LEVEL
 from scipy.integrate import quad
 
 from volery.control.fleet import Fleet

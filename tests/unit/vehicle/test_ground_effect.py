@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from plants import F450, LEVEL, plant, ring
+from flown_plants import F450, LEVEL, plant, ring
 
 from volery.control.fleet import Fleet
 from volery.vehicle.compiled import fused_kernel

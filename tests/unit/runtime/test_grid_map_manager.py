@@ -6,7 +6,7 @@ import copy
 
 import numpy as np
 import pytest
-from asking import ask, request_of
+from service_calls import ask, request_of
 
 from volery.core.errors import CommandError, DataFileError, PlacementError, ScenarioError
 from volery.engine.events import EventKind

@@ -8,8 +8,8 @@ import struct
 from collections import Counter
 from types import MappingProxyType
 
-from door_bench import IMAGE, STRING, TRIGGER, Bench, Client, Refused
-from door_ros_tcp import Form
+from bridge_bench import IMAGE, STRING, TRIGGER, Bench, Client, Refused
+from bridge_ros_tcp import Form
 from plain_peers import take_peer
 from ros2_bench import DOMAIN
 from ros_tcp_client import until

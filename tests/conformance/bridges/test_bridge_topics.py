@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from door_bench import IMAGE, STRING
+from bridge_bench import IMAGE, STRING
 from ros_tcp_client import until
 
 from volery.graph import messages as m

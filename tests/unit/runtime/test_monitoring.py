@@ -4,9 +4,9 @@ import math
 import time
 
 import pytest
-from asking import ask
+from recorded_messages import Watcher
+from service_calls import ask
 from test_pause import InThread, wait_for
-from watching import Watcher
 
 from volery.graph.messages import Twist, Vector3
 from volery.runtime.monitoring.status import Speedometer

@@ -12,7 +12,7 @@ import threading
 from types import MappingProxyType
 
 import cbor2
-from door_bench import (
+from bridge_bench import (
     IMAGE,
     LIMIT_BYTES,
     PATIENCE_S,

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from asking import ask
+from service_calls import ask
 
 from volery.core.errors import CommandError
 from volery.runtime import Simulation

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from door_bench import Refused
+from bridge_bench import Refused
 
 from volery.core.errors import GraphError
 

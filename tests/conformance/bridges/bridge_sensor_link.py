@@ -9,7 +9,7 @@ import struct
 import threading
 from types import MappingProxyType
 
-from door_bench import IMAGE, PATIENCE_S, Bench, Client, reset
+from bridge_bench import IMAGE, PATIENCE_S, Bench, Client, reset
 from ros_tcp_client import until
 
 from volery.bridges.sensor_link.server import SensorLink

@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from asking import ask, ask_later, code_of
+from service_calls import ask, ask_later, code_of
 from test_pause import InThread, wait_for
 
 from volery.core.errors import CommandError, GraphError

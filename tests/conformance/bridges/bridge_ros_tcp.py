@@ -10,7 +10,7 @@ import struct
 import threading
 from types import MappingProxyType
 
-from door_bench import (
+from bridge_bench import (
     IMAGE,
     LIMIT_BYTES,
     PATIENCE_S,

@@ -9,8 +9,8 @@ from types import MappingProxyType
 from xmlrpc.client import ServerProxy
 
 import pytest
-from door_bench import IMAGE, TRIGGER, Bench, Client, Refused
-from door_ros_tcp import Form
+from bridge_bench import IMAGE, TRIGGER, Bench, Client, Refused
+from bridge_ros_tcp import Form
 from plain_tcpros import WRONG_SUM, PlainNode
 from ros1_bench import shared_master
 from ros_tcp_client import until

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from door_bench import IMAGE, PATIENCE_S, STRING, Refused, taken_port, vanish
+from bridge_bench import IMAGE, PATIENCE_S, STRING, Refused, taken_port, vanish
 from ros_tcp_client import until
 
 from volery.core.errors import VoleryError

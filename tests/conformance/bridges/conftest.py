@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from door_ros1 import Ros1Bench
-from door_ros2 import Ros2Bench
-from door_ros_tcp import ConnectorBench, EndpointBench
-from door_rosbridge import ClientBench, ServerBench
-from door_sensor_link import SensorLinkBench
+from bridge_ros1 import Ros1Bench
+from bridge_ros2 import Ros2Bench
+from bridge_ros_tcp import ConnectorBench, EndpointBench
+from bridge_rosbridge import ClientBench, ServerBench
+from bridge_sensor_link import SensorLinkBench
 from plain_peers import end_idle_peers
 
 BENCHES = {
